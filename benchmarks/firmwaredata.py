@@ -14,8 +14,8 @@ from sklearn.model_selection import LeaveOneGroupOut, StratifiedKFold
 
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.samples import Samples
-from thenar.simulator.running.simulation import simulate
-from thenar.simulator.scenes.decode import load_scene
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import simulate
 
 SWITCHES, JOINTS, FOLDS, SEED = 33, 16, 4, 1
 PORTS = -(-SWITCHES // 8)

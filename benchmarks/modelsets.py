@@ -13,8 +13,8 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.samples import Samples
 from thenar.runtime.manifest import Of
-from thenar.simulator.running.simulation import simulate
-from thenar.simulator.scenes.decode import load_scene
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import simulate
 
 COLUMNS = Path(__file__).parents[1] / "examples" / "columns"
 # Real recordings: their table, and a columns.toml.

@@ -24,8 +24,8 @@ from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.workers import in_workers
-from thenar.simulator.running.simulation import simulate
-from thenar.simulator.scenes.decode import load_scene
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import simulate
 
 SEED = 1
 

@@ -22,10 +22,10 @@ import numpy as np
 from thenar.simulator.contact.model import Contact
 from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
 from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import sessions, simulate
+from thenar.simulator.pipeline.steps import Ledger, Pipeline, compile_pipeline
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.pipeline import Ledger, Pipeline, compile_pipeline
-from thenar.simulator.running.simulation import sessions, simulate
-from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Scene
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -38,7 +38,7 @@ MEMORY_REPETITIONS = (25, 100, 400)
 def poses(scene: Scene, repetitions: int) -> Iterator[Batch]:
     """Yield every condition's first repetitions, in the form that the contact model takes."""
     pipeline = compile_pipeline(scene)
-    before = tuple(stop for stop in pipeline.stops if stop.effect.order < CONTACT)
+    before = tuple(stop for stop in pipeline.steps if stop.effect.order < CONTACT)
     for session in sessions(scene, Postures.shipped(scene.taxonomy)):
         for place, trials in enumerate(session.trials):
             batch = session.batch(place, np.arange(min(repetitions, len(trials))))

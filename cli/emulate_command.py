@@ -189,8 +189,8 @@ def _performance(
         return performance.of_set(
             played_set, given_us or _FRAME_US, rest_us=rest_us, cyberglove=cyberglove
         ), lambda _line: None
+    from thenar.simulator.pipeline.scene_file import load_scene
     from thenar.simulator.playing.bench import cable_of
-    from thenar.simulator.scenes.decode import load_scene
 
     scene = load_scene(source)
     with progress("simulating") as report:

@@ -26,7 +26,7 @@ from .lines import echo
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from thenar.compiler.segmenting.timeline import FoundSegment, Timeline
+    from thenar.compiler.movements.timeline import FoundSegment, Timeline
 
 _ENDINGS = (".csv", ".eaf", ".mcap")
 _SHOWN = 20
@@ -80,9 +80,9 @@ def command(
         thenar segment movements.grasps -b build/ --picture timeline.svg --transitions graph.json
     """
     from thenar.compiler.artifact.segments import segment
-    from thenar.compiler.segmenting.files import write
-    from thenar.compiler.segmenting.picture import draw
-    from thenar.compiler.segmenting.transitions import Transitions
+    from thenar.compiler.movements.files import write
+    from thenar.compiler.movements.picture import draw
+    from thenar.compiler.movements.transitions import Transitions
     from thenar.runtime.files import write_atomically
 
     keep_apart(recordings, output, picture, transitions)
@@ -98,7 +98,7 @@ def command(
 
 
 def _summary(timelines: "Sequence[Timeline]") -> Segmented:
-    from thenar.compiler.segmenting.scores import OVERLAPS, score_streams
+    from thenar.compiler.movements.scores import OVERLAPS, score_streams
 
     known = [(each.continued, each.truth, each.states, None) for each in timelines if each.truth is not None]
     none, f1 = len(timelines[0].types), None

@@ -30,9 +30,9 @@ from .options import scene_name
 
 if TYPE_CHECKING:
     from thenar.compiler.evaluation.ablation import Ablation, Change, Variant
-    from thenar.simulator.running.explain import Explanation
-    from thenar.simulator.running.report import Report, StepReport
-    from thenar.simulator.scenes.decode import Shipped
+    from thenar.simulator.pipeline.explain import Explanation
+    from thenar.simulator.pipeline.report import SimulationReport, StepReport
+    from thenar.simulator.pipeline.scene_file import Shipped
     from thenar.simulator.scenes.scene import Rest, Scene
 
 _MODES = ("--output", "--explain", "--ablate", "--list")
@@ -99,7 +99,7 @@ def command(
         thenar simulate crowd --subjects 20 --repetitions 6 -o hands.grasps
         thenar simulate continuous --rest flat -o flat.grasps
     """
-    from thenar.simulator.scenes.decode import load_scene, own_file, shipped_scenes
+    from thenar.simulator.pipeline.scene_file import load_scene, own_file, shipped_scenes
 
     _check_modes(scene, (output, explain, ablate, listing), keep_unsettled=keep_unsettled)
     if scene is None:
@@ -111,11 +111,11 @@ def command(
             keep_apart(own_file(scene), output)
             _simulate(loaded, output, jobs, keep_unsettled=keep_unsettled)
         elif explain:
-            from thenar.simulator.running.explain import explain as explained
+            from thenar.simulator.pipeline.explain import explain as explained
 
             show(explained(loaded, jobs), _print_explanation)
         else:
-            from thenar.simulator.running.ablation import ablate as ablated
+            from thenar.simulator.pipeline.ablation import ablate as ablated
 
             with progress(f"removing the effects of {loaded.name}") as report:
                 ablation = ablated(loaded, jobs, report)
@@ -141,7 +141,7 @@ def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled
 def _located(name: str) -> Iterator[None]:
     """Add file and line to errors of a scene."""
     from thenar.simulator.errors import SceneError
-    from thenar.simulator.scenes.decode import located
+    from thenar.simulator.pipeline.scene_file import located
 
     try:
         yield
@@ -150,7 +150,7 @@ def _located(name: str) -> Iterator[None]:
 
 
 def _simulate(scene: "Scene", output: Path, jobs: int, *, keep_unsettled: bool) -> None:
-    from thenar.simulator.running.simulation import simulate
+    from thenar.simulator.pipeline.simulation import simulate
 
     with progress(f"simulating {scene.name}") as report:
         simulated = simulate(scene, jobs, report, keep_unsettled=keep_unsettled)
@@ -163,7 +163,7 @@ def _print_scenes(scenes: "list[Shipped]") -> None:
         echo(f"{scene.name:<16}{scene.what}")
 
 
-def _print_report(report: "Report", path: Path, size: str) -> None:
+def _print_report(report: "SimulationReport", path: Path, size: str) -> None:
     """Print the grasps by type and the cost of each step, and warn of grasps that did not settle."""
     console = out()
     fresh = f"after repetition {report.done}, " if report.done else ""
@@ -188,7 +188,7 @@ def _table(title: str, *columns: str) -> Table:
     return made
 
 
-def _grasps(report: "Report") -> Table:
+def _grasps(report: "SimulationReport") -> Table:
     grasps = _table(
         "Grasps, simulated",
         *("grasp type", "grasps", "frames", "switches ON", "from - to", "distinct patterns", "no contact", "unsettled"),
@@ -232,7 +232,7 @@ def _steps(steps: "tuple[StepReport, ...]") -> Table:
     return costs
 
 
-def _warn_of_unsettled(report: "Report") -> None:
+def _warn_of_unsettled(report: "SimulationReport") -> None:
     if not report.unsettled:
         return
     what = "kept as requested" if report.kept_unsettled else "left out of the set (--keep-unsettled keeps them)"

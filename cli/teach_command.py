@@ -57,8 +57,8 @@ def command(
         thenar run build/ --glove glove.toml --task task.json
     """
     from thenar.compiler.artifact.demonstrations import demonstrations as shown_in
-    from thenar.compiler.segmenting.teaching import Demonstration, behaviour_tree, task_json, taught
-    from thenar.compiler.segmenting.transitions import Transitions
+    from thenar.compiler.movements.teaching import Demonstration, behaviour_tree, task_json, taught
+    from thenar.compiler.movements.transitions import Transitions
     from thenar.runtime import Build
     from thenar.runtime.files import write_atomically
     from thenar.runtime.preshape import load_preshapes

@@ -9,12 +9,16 @@ from typing import TYPE_CHECKING, Any
 from thenar.drivers.extras import optional
 
 if TYPE_CHECKING:
-    from .running.simulation import Simulated, simulate
-    from .scenes.decode import load_scene
+    from .pipeline.scene_file import load_scene
+    from .pipeline.simulation import Simulation, simulate
 
-__all__ = ["Simulated", "load_scene", "simulate"]
+__all__ = ["Simulation", "load_scene", "simulate"]
 
-_HOMES = {"Simulated": ".running.simulation", "load_scene": ".scenes.decode", "simulate": ".running.simulation"}
+_HOMES = {
+    "Simulation": ".pipeline.simulation",
+    "load_scene": ".pipeline.scene_file",
+    "simulate": ".pipeline.simulation",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -22,7 +22,7 @@ Words = NDArray[np.uint64]
 
 
 @dataclass(frozen=True, slots=True)
-class Numbers:
+class RandomWords:
     """Raw 64-bit words of any shape, and their conversions."""
 
     words: Words
@@ -127,7 +127,7 @@ class Site:
 
 
 @dataclass(slots=True)
-class Draws:
+class DrawCounts:
     """The number of random numbers that each effect has drawn."""
 
     counts: Counter[str] = field(default_factory=Counter)
@@ -145,32 +145,32 @@ class Draw:
     seed: int
     effect: str
     site: Site
-    draws: Draws
+    draws: DrawCounts
 
     def at_rest(self, numbers: NDArray[np.int64]) -> "Draw":
         """Return the draws for the same subject's rests (n,): the rest before trial t has the number t."""
         return replace(self, site=Site(self.site.subject, NONE, "", numbers))
 
-    def per_repetition(self, *shape: int) -> Numbers:
+    def per_repetition(self, *shape: int) -> RandomWords:
         """Return numbers of shape (n, *shape)."""
         site, size = self.site, int(np.prod(shape))
         rows = self._words(site.repetitions.tolist(), _hash(site.grasp, site.object), _hash(site.subject), size)
-        return Numbers(rows.reshape(len(rows), *shape))
+        return RandomWords(rows.reshape(len(rows), *shape))
 
-    def per_subject(self, *shape: int) -> Numbers:
+    def per_subject(self, *shape: int) -> RandomWords:
         """Return numbers of `shape`, specific to the subject."""
         return self._common(_hash(self.site.subject), shape)
 
-    def per_type(self, *shape: int) -> Numbers:
+    def per_type(self, *shape: int) -> RandomWords:
         """Return numbers of `shape`, specific to the subject and this grasp type."""
         return self._common(_hash(self.site.subject, self.site.grasp), shape)
 
-    def per_glove(self, *shape: int) -> Numbers:
+    def per_glove(self, *shape: int) -> RandomWords:
         """Return numbers of `shape`, the same for every subject and repetition of the scene."""
         return self._common(_ALL, shape)
 
-    def _common(self, subject: int, shape: tuple[int, ...]) -> Numbers:
-        return Numbers(self._words([_ALL], _ALL, subject, int(np.prod(shape))).reshape(shape))
+    def _common(self, subject: int, shape: tuple[int, ...]) -> RandomWords:
+        return RandomWords(self._words([_ALL], _ALL, subject, int(np.prod(shape))).reshape(shape))
 
     def count(self, what: str, number: int) -> None:
         """Count something of this effect, such as solver steps, for its entry in the ledger."""

@@ -139,7 +139,7 @@ LONGEST = (
     "cli/test_narrow.py",
     "compiler/firmware/test_cppcheck.py",
     "cli/test_compile_documents.py",
-    "simulator/running/test_simulation.py",
+    "simulator/pipeline/test_simulation.py",
 )
 
 

@@ -11,9 +11,9 @@ import pytest
 
 from thenar.simulator.body.shapes import Box, Cylinder, Sphere
 from thenar.simulator.pipeline.effect import EFFECTS
+from thenar.simulator.pipeline.scene_file import _SceneFile, load_scene
 from thenar.simulator.scenes import shipped
-from thenar.simulator.scenes.decode import _SceneFile, load_scene
-from thenar.simulator.scenes.scene import SURVEYS, Glove, Population, Recording, SceneObject, Subject
+from thenar.simulator.scenes.scene import SURVEYS, Recording, SceneGlove, SceneObject, Subject, SurveyPopulation
 
 NAMES = tuple(EFFECTS)
 
@@ -102,8 +102,8 @@ def test_an_effect_has_the_parameters_defaults_and_limits_of_the_page(name: str)
 
 TABLES: dict[str, type[msgspec.Struct]] = {
     "key of `[recording]`": Recording,
-    "key of `[glove]`": Glove,
-    "key of `[population]`": Population,
+    "key of `[glove]`": SceneGlove,
+    "key of `[population]`": SurveyPopulation,
     "key of `[[subjects]]`": Subject,
 }
 

@@ -138,7 +138,7 @@ ALLOWED = {
         "compiler.workers",
         "simulator",
     ),
-    "simulator.running.ablation": ("compiler.evaluation.ablation", "simulator"),
+    "simulator.pipeline.ablation": ("compiler.evaluation.ablation", "simulator"),
     "stability": ("compiler", "drivers", "runtime", "simulator", "stability"),
     "stability.reference": ("stability.reference",),
     "cli": PACKAGES,

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.simulator.running.simulation import simulate
-from thenar.simulator.scenes.decode import load_scene
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import simulate
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 

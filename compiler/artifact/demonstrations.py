@@ -10,11 +10,11 @@ from thenar.runtime.build import Build
 from thenar.runtime.live.replay import recognised
 from thenar.runtime.policy import Policy
 
+from ..movements.scores import segments_of
+from ..movements.streams import MovementError, streams_of
+from ..movements.teaching import DemonstratedGrasp, Demonstration
+from ..movements.timeline import Timeline
 from ..recordings.graspset import GraspSet
-from ..segmenting.scores import segments_of
-from ..segmenting.streams import SegmentingError, streams_of
-from ..segmenting.teaching import Demonstration, Shown
-from ..segmenting.timeline import Timeline
 from .segments import MCAP, segment
 from .verify_firmware import select_inputs
 
@@ -24,7 +24,7 @@ Codes = tuple[NDArray[np.int64], NDArray[np.uint16]]
 def demonstrations(folder: Path, recordings: Sequence[Path]) -> Iterator[Demonstration]:
     """Yield a demonstration for each recording (.mcap) of the build's inputs and for each stream of whole movements.
 
-    Whole movements come from sets (.grasps). Raises SegmentingError where a demonstration shows no grasp, and whatever
+    Whole movements come from sets (.grasps). Raises MovementError where a demonstration shows no grasp, and whatever
     `segment` raises.
     """
     build = Build.load(folder)
@@ -56,9 +56,9 @@ def _shown(build: Build, name: str, timelines: Sequence[Timeline], read: Sequenc
         for one in segments_of(timeline.states, len(timeline.types)):
             start, end = (timeline.start_us + tick * timeline.tick_us for tick in (one.start, one.end))
             own = codes[(times >= start) & (times < end)]
-            grasps.append(Shown(timeline.types[one.state], (end - start) / 1e6, _values(build, own)))
+            grasps.append(DemonstratedGrasp(timeline.types[one.state], (end - start) / 1e6, _values(build, own)))
     if not grasps:
-        raise SegmentingError(f"{name} shows no grasp: look at it with thenar segment, or leave it out")
+        raise MovementError(f"{name} shows no grasp: look at it with thenar segment, or leave it out")
     return Demonstration(name, tuple(grasps))
 
 

@@ -26,7 +26,7 @@ from .training import USUAL_ROUNDS
 if TYPE_CHECKING:
     from ..evaluation.study import Study
     from ..frontier.points import Frontier
-    from ..segmenting.transitions import Transitions
+    from ..movements.transitions import Transitions
 
 REPORT_NAME, TRY_NAME, SPEC_FOLDER = "report.html", "try.html", "spec"
 _TRAININGS = 40  # roughly, for the paper's tables
@@ -153,12 +153,12 @@ class Documents:
 
 def _transitions(grasp_set: GraspSet) -> "Transitions | None":
     """Return which type follows which, where the rows are whole movements, else None."""
-    from ..segmenting.streams import SegmentingError
-    from ..segmenting.transitions import Transitions
+    from ..movements.streams import MovementError
+    from ..movements.transitions import Transitions
 
     try:
         return Transitions.of_set(grasp_set) if grasp_set.is_none.any() else None
-    except SegmentingError:
+    except MovementError:
         return None
 
 

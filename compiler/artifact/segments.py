@@ -12,10 +12,10 @@ from thenar.runtime.live.replay import recognised
 from thenar.runtime.rejection import refused
 from thenar.runtime.segmenting.decoder import decode, emissions
 
+from ..movements.learning import live_states
+from ..movements.streams import MovementError, newest, streams_of
+from ..movements.timeline import Timeline, probabilities
 from ..recordings.graspset import GraspSet
-from ..segmenting.learning import live_states
-from ..segmenting.streams import SegmentingError, newest, streams_of
-from ..segmenting.timeline import Timeline, probabilities
 from ..tables.quantise import integer_scores
 from .documents import Progress
 from .verify_firmware import select_inputs
@@ -54,7 +54,7 @@ def segment(
 
     Raises
     ------
-    SegmentingError
+    MovementError
         If the recordings are not whole movements, or are empty.
     SettingError
         If the lag is out of range, or a recording lacks an input of the build.
@@ -81,7 +81,7 @@ def _of_movements(
 ) -> tuple[Timeline, ...]:
     """Return the timelines of whole movements, with their recorded types as the truth."""
     if not len(grasp_set):
-        raise SegmentingError("the set has no rows to find segments in")
+        raise MovementError("the set has no rows to find segments in")
     bits, codes = select_inputs(grasp_set, build.manifest)
     streams = streams_of(grasp_set, build.manifest.segmenting.tick_us)
     types = build.grasps[: build.manifest.segmenting.n_types]
@@ -133,7 +133,7 @@ def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], 
         if moment.scores is not None:
             read.append((moment.grasp.unix_us, moment.scores, moment.refused))
     if not read:
-        raise SegmentingError(f"{path.name} holds no moment with enough readings for the build")
+        raise MovementError(f"{path.name} holds no moment with enough readings for the build")
     times_us, lanes, no = (np.array(each) for each in zip(*read, strict=True))
     found = []
     for number, (start_us, rows) in enumerate(newest(times_us, tick_us), 1):

@@ -27,12 +27,12 @@ from thenar.runtime.segmenting.model import SegmentModel
 from ..evaluation.folds import Fold, leave_groups_out, trial_folds
 from ..evaluation.rates import RecipeWords, student
 from ..evaluation.study import recipe_words
+from ..movements.learning import LAG_TICKS, Counts, announced_live, live_states
+from ..movements.scores import OVERLAPS, SegmentScore, score_streams, segments_of
+from ..movements.streams import TICK_US, MovementError, movements_of, streams_of
 from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
 from ..samples import FRAMES, Samples
-from ..segmenting.learning import LAG_TICKS, Counts, announced_live, live_states
-from ..segmenting.scores import OVERLAPS, Score, score_streams, segments_of
-from ..segmenting.streams import TICK_US, SegmentingError, moving, streams_of
 from ..tables.quantise import integer_scores
 from ..trainers.base import SHARED
 from ..workers import in_workers
@@ -57,7 +57,7 @@ TIMES = ("onset ms", "onset 90 % ms", "end ms", "end 90 % ms", "latency ms")
 FALSE = "false per 100"
 
 
-class Measured(msgspec.Struct, frozen=True):
+class SubjectMean(msgspec.Struct, frozen=True):
     """A mean over subjects and its 95 % interval (Student's t; None with one subject); None: nothing was measured."""
 
     mean: float | None
@@ -75,7 +75,7 @@ class MethodRow(msgspec.Struct, frozen=True):
     inputs: Inputs
     method: str
     what: str
-    values: dict[str, Measured]
+    values: dict[str, SubjectMean]
 
 
 class StreamStudy(msgspec.Struct, frozen=True):
@@ -112,39 +112,41 @@ def study_streams(
 
     Raises
     ------
-    SegmentingError
+    MovementError
         If the set holds no whole movements, no rows in which nothing is held, or only one subject.
     """
     streams = streams_of(grasp_set)
     if not grasp_set.is_none.any():
-        raise SegmentingError(
+        raise MovementError(
             "the set has no rows in which nothing is held: record them (thenar record), or simulate a scene that keeps "
             'every frame (rows = "all")'
         )
     subjects = tuple(sorted({stream.subject for stream in streams}))
     if len(subjects) < 2:
-        raise SegmentingError(f"the set holds streams of {subjects[0]} only: leaving a subject out takes two")
-    there: dict[Inputs, bool] = {"switches": bool(grasp_set.element_names), "joints": bool(grasp_set.joints)}
-    kinds = [kind for kind, some in {"both": all(there.values()), **there}.items() if some]
+        raise MovementError(f"the set holds streams of {subjects[0]} only: leaving a subject out takes two")
+    given: dict[Inputs, bool] = {"switches": bool(grasp_set.element_names), "joints": bool(grasp_set.joints)}
+    kinds = [kind for kind, some in {"both": all(given.values()), **given}.items() if some]
     report, total = progress or (lambda _done, _total: None), len(subjects) * (1 + len(kinds))
     report(0, total)
     chosen: dict[str, Recipe] = {}
-    for subject, own in in_workers(partial(_chosen, grasp_set, kinds[0], options), subjects, jobs):
-        chosen[subject] = own
+    for subject, best in in_workers(partial(_chosen, grasp_set, kinds[0], options), subjects, jobs):
+        chosen[subject] = best
         report(len(chosen), total)
     tasks = [(kind, subject, chosen[subject]) for kind in kinds for subject in subjects]
-    found: dict[tuple[Inputs, str], dict[str, Score]] = {}
+    results: dict[tuple[Inputs, str], dict[str, SegmentScore]] = {}
     for kind, subject, scores in in_workers(partial(_of_subject, grasp_set), tasks, jobs):
-        found[kind, subject] = scores
-        report(len(chosen) + len(found), total)
+        results[kind, subject] = scores
+        report(len(chosen) + len(results), total)
     return StreamStudy(
         fingerprint=grasp_set.fingerprint(),
         recipe=recipe_words(options),
         subjects=subjects,
-        movements=sum(len(segments_of(grasp_set.labels[each.rows], len(grasp_set.taxonomy.types))) for each in streams),
+        movements=sum(
+            len(segments_of(grasp_set.labels[stream.rows], len(grasp_set.taxonomy.types))) for stream in streams
+        ),
         seconds=sum(len(stream.rows) for stream in streams) * TICK_US / 1e6,
         rows=tuple(
-            MethodRow(kind, name, what, _row([found[kind, subject][name] for subject in subjects]))
+            MethodRow(kind, name, what, _row([results[kind, subject][name] for subject in subjects]))
             for kind in kinds
             for name, what in METHODS.items()
         ),
@@ -159,71 +161,71 @@ def _learning(
     These are all rows, unless the usual frames of each movement are more than _LEARNT: then equally many of each
     movement, or rows drawn from two of each.
     """
-    own = grasp_set.rows(grasp_set.subjects != subject)
+    others = grasp_set.rows(grasp_set.subjects != subject)
     samples = Samples.of(grasp_set, kind).rows(grasp_set.subjects != subject)
     movements = len(np.unique(samples.movements))
     if movements * FRAMES <= _LEARNT:
-        return own, samples, np.arange(len(own))
+        return others, samples, np.arange(len(others))
     some = samples.balanced(max(2, _LEARNT // movements))
     if len(some) > _LEARNT:
         some = np.sort(np.random.default_rng(options.seed).choice(some, _LEARNT, replace=False))
-    return own, samples, some
+    return others, samples, some
 
 
-def _groups(own: GraspSet) -> NDArray[np.str_] | None:
-    return own.subjects if len(np.unique(own.subjects)) > 1 else None
+def _groups(others: GraspSet) -> NDArray[np.str_] | None:
+    return others.subjects if len(np.unique(others.subjects)) > 1 else None
 
 
 def _chosen(grasp_set: GraspSet, kind: Inputs, options: Recipe, subject: str) -> tuple[str, Recipe]:
     """Return the options with the trainer and settings that suit all other subjects best."""
-    own, learning, some = _learning(grasp_set, kind, options, subject)
-    training = Recogniser.fit(learning, options, some, groups=_groups(own)).training
+    others, learning, some = _learning(grasp_set, kind, options, subject)
+    training = Recogniser.fit(learning.rows(some), options, groups=_groups(others.rows(some))).training
     assert training is not None
     settings: dict[str, Any] = dict(training.settings)
     return subject, replace(options, trainer=training.trainer, settings=settings, **dict.fromkeys(SHARED))
 
 
-def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Recipe]) -> tuple[Inputs, str, dict[str, Score]]:
+def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Recipe]) -> tuple[Inputs, str, dict[str, SegmentScore]]:
     kind, subject, options = task
-    own, learning, some = _learning(grasp_set, kind, options, subject)
+    others, learning, some = _learning(grasp_set, kind, options, subject)
     samples, few = Samples.of(grasp_set, kind), learning.rows(some)
     recogniser = Recogniser.fit(few, options)
     tables = recogniser.integers
-    scores = np.zeros((len(own), samples.n_classes))
-    for fold in _inner_folds(learning, own, options):
+    scores = np.zeros((len(others), samples.n_classes))
+    for fold in _inner_folds(learning, others, options):
         thinned = Fold(np.intersect1d(fold.train, some), fold.test, fold.name)
-        scores[fold.test] = scores_of(learning, options, None, _groups(own), None, thinned)
-    model = segments_for(own, learning, scores, tables.scale)
+        scores[fold.test] = scores_of(learning, options, None, _groups(others), None, thinned)
+    model = segments_for(others, learning, scores, tables.scale)
     assert model is not None
     read = recogniser.read(samples)
-    counts = Counts.of((learning.labels[stream.rows] for stream in streams_of(own)), samples.n_types)
+    counts = Counts.of((learning.labels[stream.rows] for stream in streams_of(others)), samples.n_types)
     parts: dict[str, list[tuple[bool, Labels, Labels, Labels | None]]] = {name: [] for name in METHODS}
     for stream in streams_of(grasp_set):
         if stream.subject == subject:
             part = read.rows(stream.rows)
             lanes = integer_scores(tables, part.switches, part.codes)
-            found = _Decoded(lanes, model, counts, tables.scale)
-            for name, (states, announced) in found.every().items():
+            decoders = _StreamScores(lanes, model, counts, tables.scale)
+            for name, (states, announced) in decoders.every().items():
                 parts[name].append((stream.continued, part.labels, states, announced))
     return kind, subject, {name: score_streams(every, model.n_types) for name, every in parts.items()}
 
 
-def _inner_folds(learning: Samples, own: GraspSet, options: Recipe) -> list[Fold]:
+def _inner_folds(learning: Samples, others: GraspSet, options: Recipe) -> list[Fold]:
     """Return folds that together test all rows of streams: each leaves out some subjects, or half of the movements of
     the only one.
     """
-    rows = np.flatnonzero(moving(own))
-    several = len(np.unique(own.subjects[rows]))
+    rows = np.flatnonzero(movements_of(others).inside)
+    several = len(np.unique(others.subjects[rows]))
     if several > 1:
-        folds = leave_groups_out(own.subjects[rows], "subject", min(several, _INNER))
+        folds = leave_groups_out(others.subjects[rows], "subject", min(several, _INNER))
     else:
         folds = trial_folds(learning.labels[rows], learning.movements[rows], 2, options.seed)
-    every = np.arange(len(own))
+    every = np.arange(len(others))
     return [Fold(np.setdiff1d(every, rows[fold.test]), rows[fold.test], fold.name) for fold in folds]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Decoded:
+class _StreamScores:
     """Scores (T, K + 1) of a stream, and each method's result: states, and announcements in time."""
 
     lanes: NDArray[np.int32]
@@ -253,12 +255,12 @@ class _Decoded:
         for tick, row in enumerate((self.lanes + LANE_OFFSET).tolist()):
             standing = Standing(tuple(row))
             decided = [rule.update(tick * TICK_US, standing) for rule in rules]
-            states.append([none if each is None else each for each in decided])
+            states.append([none if state is None else state for state in decided])
         return np.array(states, np.intp).T
 
     def _hidden_markov(self) -> Labels:
         """Return the most probable states of a chain with the counted changes per tick and softmax scores."""
-        ticks = np.array([sum(own) for own in self.counts.durations]) + 1.0
+        ticks = np.array([sum(durations) for durations in self.counts.durations]) + 1.0
         changes = self.counts.changes + 0.5 * (1 - np.eye(len(ticks)))
         changes = changes * (1 - np.eye(len(ticks)))
         chain = changes / (ticks + changes.sum(axis=1))[:, np.newaxis]
@@ -275,7 +277,7 @@ class _Decoded:
         return np.array(states[::-1], np.intp)
 
 
-def _row(scores: list[Score]) -> dict[str, Measured]:
+def _row(scores: list[SegmentScore]) -> dict[str, SubjectMean]:
     def ticks(values: tuple[int, ...], percent: float, *, signed: bool = False) -> float | None:
         size = values if signed else tuple(map(abs, values))
         return float(np.percentile(size, percent)) * TICK_US / 1000 if values else None
@@ -291,16 +293,16 @@ def _row(scores: list[Score]) -> dict[str, Measured]:
     columns["end 90 % ms"] = [ticks(one.ends, 90) for one in scores]
     columns["latency ms"] = [ticks(one.latencies, 50, signed=True) for one in scores]
     columns[FALSE] = [100 * one.false / max(one.true, 1) for one in scores]
-    return {name: _measured(values, most=1.0 if name in SHARES else None) for name, values in columns.items()}
+    return {name: _mean(values, most=1.0 if name in SHARES else None) for name, values in columns.items()}
 
 
-def _measured(values: list[float | None], most: float | None) -> Measured:
-    there = [value for value in values if value is not None]
-    if not there:
-        return Measured(None, None, None, tuple(values))
+def _mean(values: list[float | None], most: float | None) -> SubjectMean:
+    known = [value for value in values if value is not None]
+    if not known:
+        return SubjectMean(None, None, None, tuple(values))
     rounded: list[Any] = [None if value is None else round(value, 6) for value in values]
-    if len(there) < 2:
-        return Measured(round(there[0], 6), None, None, tuple(rounded))
-    low, high = student(there)
-    low, high = max(low, 0.0) if min(there) >= 0 else low, high if most is None else min(high, most)
-    return Measured(round(fmean(there), 6), round(low, 6), round(high, 6), tuple(rounded))
+    if len(known) < 2:
+        return SubjectMean(round(known[0], 6), None, None, tuple(rounded))
+    low, high = student(known)
+    low, high = max(low, 0.0) if min(known) >= 0 else low, high if most is None else min(high, most)
+    return SubjectMean(round(fmean(known), 6), round(low, 6), round(high, 6), tuple(rounded))

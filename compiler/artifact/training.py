@@ -15,14 +15,14 @@ from ..evaluation.folds import Fold, leave_groups_out, leave_one_out, trial_fold
 from ..evaluation.populations import OF, groups_of
 from ..evaluation.rates import UNITS, rated
 from ..limits import check_inputs, check_memory, check_types
+from ..movements.learning import learnt
+from ..movements.streams import TICK_US, MovementError, streams_of
 from ..placement.constraints import Limits
 from ..placement.ports import PortCosts
 from ..recogniser import Classes, Groups, Recogniser, Scores
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
-from ..segmenting.learning import learnt
-from ..segmenting.streams import TICK_US, SegmentingError, streams_of
 from ..trainers.base import Report, Training
 from ..workers import in_workers, little
 from . import CompileError
@@ -206,7 +206,7 @@ def segments_for(grasp_set: GraspSet, samples: Samples, scores: Scores | None, s
         return None
     try:
         streams = streams_of(grasp_set)
-    except SegmentingError:
+    except MovementError:
         return None
     return learnt(streams, samples.labels, scores, samples.n_types, scale, TICK_US)
 

@@ -33,12 +33,12 @@ from .finalists import Close, finalists, look_closely
 from .latency import POLICIES, Pace, latencies
 from .marks import choices_to_mark, marks_of, own_build
 from .measure import measured
-from .moving import Moving
 from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, frontier_to_bytes
+from .replay import Replay, replay_of
 from .screen import Screened, screen, screen_fewer, screen_others
 from .search import TAXEL_LEVELS, Candidate, Search
-from .stream import Stream, stream_of
+from .segments import MovementSamples
 from .survey import Cuts, Survey
 from .timing.scan_times import Records, records_of
 from .timing.wirings import Wiring, is_avr, wirings
@@ -173,7 +173,7 @@ def find_frontier(
             records = _records(grasp_set, harness, target, joint_us, record_time, filtered)
             equipment = equipment_for(target, _wirings(grasp_set, harness, target), cache, records)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
-            played = _stream(survey, stream)
+            played = _replay(survey, stream)
             own = () if build is None else (own_build(build, grasp_set, equipment),)
         untimed = (_UNTIMED.format(list_names(grasp_set.joint_names)),) if records.how == "unknown" else ()
         found = _found(survey, played, wanted or Wanted(), own, (*untimed, *lacking))
@@ -272,15 +272,15 @@ def _documents(found: Frontier) -> dict[str, bytes]:
     return {FRONTIER_NAME: frontier_to_bytes(found), TABLE_NAME: csv_bytes(found), **drawn}
 
 
-def _stream(survey: Survey, given: GraspSet | None) -> Stream:
-    """Return the test rows of the first fold as a stream, or the recordings given for it."""
+def _replay(survey: Survey, given: GraspSet | None) -> Replay:
+    """Return the test rows of the first fold as a replay, or the recordings given for it."""
     grasp_set, seed = survey.grasp_set, survey.search.seed
     number = {grasp: label for label, grasp in enumerate(survey.samples.grasps)} | {NONE: -1}
     if given is None:
         labels = np.array([number[grasp] for grasp in grasp_set.grasps.tolist()], np.intp)
         # The test rows, and the rows of their movements in which nothing is held.
         movements, test = grasp_set.movement_ids, np.flatnonzero(~grasp_set.is_none)[survey.cuts.screening[0].test]
-        return stream_of(grasp_set, labels, np.flatnonzero(np.isin(movements, movements[test])), seed=seed)
+        return replay_of(grasp_set, labels, np.flatnonzero(np.isin(movements, movements[test])), seed=seed)
     if given.fingerprint() == grasp_set.fingerprint():
         raise FrontierError(
             f"the stream equals the training set, {survey.source}: name other recordings with ``stream``, or leave it "
@@ -292,10 +292,10 @@ def _stream(survey: Survey, given: GraspSet | None) -> Stream:
     if strange:
         raise FrontierError(f"the stream holds {strange[0]!r}, which {survey.source} does not")
     labels = np.array([number[str(grasp)] for grasp in given.grasps], dtype=np.intp)
-    return stream_of(given, labels, seed=seed)
+    return replay_of(given, labels, seed=seed)
 
 
-def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...], lacking: tuple[str, ...]) -> Frontier:
+def _found(survey: Survey, replay: Replay, wanted: Wanted, own: tuple[Mark, ...], lacking: tuple[str, ...]) -> Frontier:
     search, n_switches, most = survey.search, survey.samples.n_switches, survey.levels[-1]
     n_elements = len(survey.elements(most))
     screened, curves = screen(survey)
@@ -313,7 +313,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     by_time, by_switches = best_designs(every)
     kept, skipped = measured(list(dict.fromkeys([*by_time, *by_switches])), survey.equipment, survey.cache)
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
-    points = points_of(kept, _latencies(survey, stream, kept), luck, survey.names, survey.training, survey.some_joints)
+    points = points_of(kept, _latencies(survey, replay, kept), luck, survey.names, survey.training, survey.some_joints)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
     claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
     return Frontier(
@@ -339,18 +339,18 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
         tried=tried,
         curves=curves,
         marks=(*marks_of(named, closes, survey), *own),
-        skipped=(*lacking, *claimed, *skipped, stream.what),
+        skipped=(*lacking, *claimed, *skipped, replay.what),
         picked=None if picked is None else picked.number,
         wanted=wanted.words,
     )
 
 
-def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latencies:
+def _latencies(survey: Survey, replay: Replay, kept: Sequence[Design]) -> Latencies:
     """Return the latency of every design with every decision, by tables trained on rows outside the
-    stream of held-out rows.
+    replay of held-out rows.
     """
     fold, grouped = survey.cuts.screening[0], dict[Candidate, list[Design]]()
-    moving = Moving.of(survey.grasp_set, fold.train, survey.search.seed)
+    movements = MovementSamples.of(survey.grasp_set, fold.train, survey.search.seed)
     for design in kept:
         grouped.setdefault(design.close.screened.choice, []).append(design)
     calls = [
@@ -358,10 +358,10 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
             survey.read(choice, fold),
             fold.train,
             survey.columns(choice, fold),
-            stream.with_elements(survey.elements(choice.levels, fold)).with_joints(survey.joints(choice, fold)),
+            replay.reading(survey.elements(choice.levels, fold), survey.joints(choice, fold)),
             tuple(Pace(design.tables.tabled, design.frame.us) for design in mine),
             survey.training(choice, fold),
-            moving and moving.reading(survey.elements(choice.levels, fold), survey.joints(choice, fold)),
+            movements and movements.reading(survey.elements(choice.levels, fold), survey.joints(choice, fold)),
         )
         for choice, mine in grouped.items()
     ]

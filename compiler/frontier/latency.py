@@ -25,10 +25,10 @@ from ..samples import Columns, Samples
 from ..tables.quantise import integer_scores
 from ..trainers.base import Training
 from .cache import stored
-from .moving import Moving
 from .points import DecisionKind, FrontierError, Latency
 from .price import Tabled, tables_of
-from .stream import Stream
+from .replay import Replay
+from .segments import MovementSamples
 
 NOTHING = -1
 # The shortest time between two frames that are played.
@@ -70,7 +70,9 @@ class Decisions:
 
 
 def stretches(scores: NDArray[np.int32], at_us: NDArray[np.int64], step_us: int) -> Stretches:
-    """Return the frames, one every step_us from at_us[0] on, of states (T,) with scores (T, K); the last is the end."""
+    """Return the frames, one every step_us from at_us[0] on, of states with scores (T, K)
+    that begin at at_us[:-1]; at_us[-1] is the end.
+    """
     due = -((at_us[0] - at_us) // step_us)
     seen = np.flatnonzero(due[1:] > due[:-1])
     alike = np.zeros(len(seen), np.bool_)
@@ -90,13 +92,13 @@ def decisions(tables: IntegerTables, frames: Stretches, policy: Deciding) -> Dec
     for stretch, row in zip(frames.times, lanes, strict=True):
         standing = Standing(row)
         for time_us in stretch:
-            held = decide(time_us, standing)
-            if not types or held != types[-1]:
+            decided = decide(time_us, standing)
+            if not types or decided != types[-1]:
                 changes.append(time_us)
-                types.append(held)
+                types.append(decided)
     return Decisions(
         np.array(changes, np.int64) // frames.step_us,
-        np.array([NOTHING if held is None else held for held in types], np.intp),
+        np.array([NOTHING if one is None else one for one in types], np.intp),
     )
 
 
@@ -116,8 +118,8 @@ def _by_segments(tables: IntegerTables, model: SegmentModel | None) -> Decide:
     live = LiveSegments(model, [str(number) for number in range(tables.n_classes)], Policy().lag_us or 0)
 
     def decide(time_us: int, standing: Standing) -> int | None:
-        found = live.update(time_us, standing.lanes)
-        return None if found.state == "forming" else found.label
+        segment = live.update(time_us, standing.lanes)
+        return None if segment.state == "forming" else segment.label
 
     return decide
 
@@ -142,36 +144,36 @@ class Pace(Struct, frozen=True):
     frame_us: float
 
 
-@stored(6)
+@stored(7)
 def latencies(
     samples: Samples,
     rows: Rows,
     columns: Columns,
-    stream: Stream,
+    replay: Replay,
     paces: tuple[Pace, ...],
     training: Training,
-    moving: Moving | None = None,
+    movements: MovementSamples | None = None,
 ) -> tuple[tuple[Latency, ...], ...]:
-    """Train on some rows, on the switches `columns` and the joints; return the latencies on a stream for every pace
-    and each of POLICIES. The stream holds none of the rows.
+    """Train on some rows, on the switches `columns` and the joints; return the latencies on a replay for every pace
+    and each of POLICIES. The replay holds none of the rows.
 
-    moving  the same rows with those in which nothing is held: segments use tables trained with these rows, and costs
-            learnt from them. None: segments have the default costs
+    movements  the same rows with those in which nothing is held: segments use tables trained with these rows, and costs
+               learnt from them. None: segments have the default costs
     """
-    wanted = tuple(dict.fromkeys(pace.tabled for pace in paces))
-    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, training)}
-    learnt = moving.segmenting(columns, wanted, training) if moving else {}
+    shapes = tuple(dict.fromkeys(pace.tabled for pace in paces))
+    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, shapes, training)}
+    learnt = movements.segment_tables(columns, shapes, training) if movements else {}
 
     def of(pace: Pace, kind: DecisionKind) -> Latency:
         if kind == "segments" and pace.tabled in learnt:
-            return latency(learnt[pace.tabled][0], columns, stream, pace.frame_us, learnt[pace.tabled][1])
-        return latency(tables[pace.tabled], columns, stream, pace.frame_us, POLICIES[kind])
+            return latency(learnt[pace.tabled][0], columns, replay, pace.frame_us, learnt[pace.tabled][1])
+        return latency(tables[pace.tabled], columns, replay, pace.frame_us, POLICIES[kind])
 
     return tuple(tuple(of(pace, kind) for kind in POLICIES) for pace in paces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Held:
+class _Grasps:
     """Grasps (g,): when each was complete, and when it ended, in microseconds of the stream; and its class."""
 
     arrived_us: Times
@@ -180,12 +182,14 @@ class _Held:
 
 
 def latency(
-    tables: IntegerTables, columns: Sequence[int], stream: Stream, frame_us: float, policy: Deciding
+    tables: IntegerTables, columns: Sequence[int], replay: Replay, frame_us: float, policy: Deciding
 ) -> Latency:
-    """Return the latency of tables on a stream with one frame every frame_us, in integer microseconds; one every
+    """Return the latency of tables on a replay with one frame every frame_us, in integer microseconds; one every
     LEAST_STEP_US if frames are shorter.
 
-    columns  the tables' switches as columns of the stream, in the tables' order; of its joints they take all, or none
+    columns  the tables' switches as columns of the replay, in the tables' order; of its joints they take all, or none
+
+    Only grasps whose type differs from the one before count: the same type may still be decided on from before.
 
     A frame shows the glove as it was when the frame began; its prediction is available at its end, frame_us later. A
     grasp's latency is the time from its arrival until the first prediction of its type, and at least a frame, which is
@@ -193,71 +197,79 @@ def latency(
     end are missed, and in neither number; if all are, both numbers are the duration of the longest. The 99th percentile
     is one of the latencies (nearest rank).
 
-    Raises FrontierError if the tables are not for these inputs, the stream has no grasps, or a frame takes no time.
+    Raises FrontierError if the tables are not for these inputs, the replay has no grasps, or a frame takes no time.
     """
-    _check(tables, columns, stream, frame_us)
+    _check(tables, columns, replay, frame_us)
     takes_us = max(round(frame_us), 1)
     step_us = max(takes_us, LEAST_STEP_US)
-    decided = decided_on(tables, columns, stream, step_us, policy)
-    begun_us = stream.at_us - stream.at_us[0]
-    held = _Held(begun_us[stream.arrivals], begun_us[stream.ends], stream.types[stream.arrivals])
+    decided = decided_on(tables, columns, replay, step_us, policy)
+    arrivals, ends, types = np.array(replay.grasps, np.intp).T
+    another = np.concatenate([[True], types[1:] != types[:-1]])
+    begun_us = _bounds_us(replay) - replay.stream.start_us
+    grasps = _Grasps(begun_us[arrivals[another]], begun_us[ends[another]], types[another])
     predicted_us = decided.frames * step_us + takes_us
-    return _measured(held, *_waits_and_errors(predicted_us, decided.types, held), takes_us)
+    return _measured(grasps, *_waits_and_errors(predicted_us, decided.types, grasps), takes_us)
+
+
+def _bounds_us(replay: Replay) -> Times:
+    """Return when each state begins, and the last ends (T + 1,)."""
+    return np.append(replay.stream.at_us, np.int64(replay.stream.end_us))
 
 
 def decided_on(
-    tables: IntegerTables, columns: Sequence[int], stream: Stream, step_us: int, policy: Deciding
+    tables: IntegerTables, columns: Sequence[int], replay: Replay, step_us: int, policy: Deciding
 ) -> Decisions:
-    """Return the decisions under `policy` on a stream with a frame every step_us, the first at the stream's start."""
-    codes = stream.codes[:, : None if tables.n_joints else 0]
-    scores = integer_scores(tables, stream.bits[:, list(columns)], codes)
-    return decisions(tables, stretches(scores, stream.at_us, step_us), policy)
+    """Return the decisions under `policy` on a replay with a frame every step_us, the first at its start."""
+    rows, codes = replay.stream.rows, replay.codes[:, : None if tables.n_joints else 0]
+    scores = integer_scores(tables, replay.bits[rows][:, list(columns)], codes[rows])
+    return decisions(tables, stretches(scores, _bounds_us(replay), step_us), policy)
 
 
-def _waits_and_errors(predicted_us: Times, types: NDArray[np.intp], held: _Held) -> tuple[Times, Times]:
+def _waits_and_errors(predicted_us: Times, types: NDArray[np.intp], grasps: _Grasps) -> tuple[Times, Times]:
     """Return how long (g,) after arrival each grasp was first predicted rightly, -1 if not before its end; and for how
     much of its remaining time (g,) another type was predicted. From predicted_us[i] on types[i] is predicted.
     """
-    standing = np.maximum(np.searchsorted(predicted_us, held.arrived_us, side="right") - 1, 0).tolist()
-    beyond = np.searchsorted(predicted_us, held.ended_us, side="right").tolist()
-    waits_us, wrong_us = np.full(len(held.types), -1, np.int64), np.zeros(len(held.types), np.int64)
-    for grasp, (first, last, right) in enumerate(zip(standing, beyond, held.types.tolist(), strict=True)):
+    standing = np.maximum(np.searchsorted(predicted_us, grasps.arrived_us, side="right") - 1, 0).tolist()
+    beyond = np.searchsorted(predicted_us, grasps.ended_us, side="right").tolist()
+    waits_us, wrong_us = np.full(len(grasps.types), -1, np.int64), np.zeros(len(grasps.types), np.int64)
+    for grasp, (first, last, right) in enumerate(zip(standing, beyond, grasps.types.tolist(), strict=True)):
         predictions = types[first:last]
-        found = np.flatnonzero(predictions == right)
-        if len(found):
-            since_us = np.maximum(predicted_us[first + found[0] : last], held.arrived_us[grasp])
-            waits_us[grasp] = since_us[0] - held.arrived_us[grasp]
-            lasted_us = np.diff(since_us, append=held.ended_us[grasp])
-            wrong_us[grasp] = lasted_us[~np.isin(predictions[found[0] :], (right, NOTHING))].sum()
+        hits = np.flatnonzero(predictions == right)
+        if len(hits):
+            since_us = np.maximum(predicted_us[first + hits[0] : last], grasps.arrived_us[grasp])
+            waits_us[grasp] = since_us[0] - grasps.arrived_us[grasp]
+            lasted_us = np.diff(since_us, append=grasps.ended_us[grasp])
+            wrong_us[grasp] = lasted_us[~np.isin(predictions[hits[0] :], (right, NOTHING))].sum()
     return waits_us, wrong_us
 
 
-def _measured(held: _Held, waits_us: Times, wrong_us: Times, step_us: int) -> Latency:
-    lasted_us, predicted = held.ended_us - held.arrived_us, waits_us >= 0
-    found = np.sort(np.maximum(waits_us[predicted], step_us))
-    if not len(found):
+def _measured(grasps: _Grasps, waits_us: Times, wrong_us: Times, step_us: int) -> Latency:
+    lasted_us, predicted = grasps.ended_us - grasps.arrived_us, waits_us >= 0
+    waits = np.sort(np.maximum(waits_us[predicted], step_us))
+    if not len(waits):
         return Latency(float(lasted_us.max()), float(lasted_us.max()), 1.0)
     left_us = int((lasted_us - waits_us)[predicted].sum())
     return Latency(
-        mean_us=int(found.sum()) / len(found),
-        p99_us=float(found[math.ceil(0.99 * len(found)) - 1]),
-        missed=(len(waits_us) - len(found)) / len(waits_us),
+        mean_us=int(waits.sum()) / len(waits),
+        p99_us=float(waits[math.ceil(0.99 * len(waits)) - 1]),
+        missed=(len(waits_us) - len(waits)) / len(waits_us),
         wrong=int(wrong_us.sum()) / left_us if left_us else 0.0,
     )
 
 
-def _check(tables: IntegerTables, columns: Sequence[int], stream: Stream, frame_us: float) -> None:
-    switches, joints = stream.bits.shape[1], stream.codes.shape[1]
+def _check(tables: IntegerTables, columns: Sequence[int], replay: Replay, frame_us: float) -> None:
+    switches, joints = replay.bits.shape[1], replay.codes.shape[1]
     if tables.n_switches != len(columns) or tables.n_joints not in (0, joints):
         raise FrontierError(
             f"tables of {tables.n_switches} switches and {tables.n_joints} joints, for {len(columns)} and {joints}"
         )
-    if any(not 0 <= column < switches for column in columns) or stream.types.max(initial=-1) >= tables.n_classes:
+    most = max((grasp.state for grasp in replay.grasps), default=NOTHING)
+    if any(not 0 <= column < switches for column in columns) or most >= tables.n_classes:
         raise FrontierError(
-            f"a stream of {switches} switches and types up to {stream.types.max(initial=-1)} does not fit these "
-            f"switches and {tables.n_classes} types"
+            f"a stream of {switches} switches and types up to {most} does not fit these switches and "
+            f"{tables.n_classes} types"
         )
     if not (math.isfinite(frame_us) and frame_us > 0):
         raise FrontierError(f"a frame of {frame_us} us: it must take some time")
-    if not len(stream.arrivals):
+    if not replay.grasps:
         raise FrontierError("the stream has no grasp that follows one of another type: there is no latency to measure")

@@ -14,8 +14,8 @@ from thenar.runtime.tables import IntegerTables
 from ..evaluation.study import Study
 from ..frontier.points import Frontier
 from ..hand import HandShape
+from ..movements.transitions import Transitions
 from ..placement.tree import Tree
-from ..segmenting.transitions import Transitions
 from ..tables.compare import Comparison, WorstCase
 from ..tables.faults import FaultCounts
 

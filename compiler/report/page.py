@@ -5,9 +5,9 @@ from functools import lru_cache
 
 from thenar.drivers.extras import optional
 
+from ..movements.transitions import graph_of
 from ..pages import embedded, policy_hash, templates
 from ..pictures import colour_variables
-from ..segmenting.transitions import graph_of
 from ..sensors import SensorCount
 from ..text import sentence
 from . import results, sections

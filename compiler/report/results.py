@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..evaluation.populations import PROTOCOLS
 from ..evaluation.study import Study
 from ..evaluation.tables import RateTable, both
-from ..segmenting.transitions import Transitions
+from ..movements.transitions import Transitions
 from ..text import NBSP, counted, percent, sentence
 from .content import PlainTable, ReportContent
 from .sections import recipe

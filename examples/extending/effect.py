@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from thenar.simulator.body.cyberglove import SENSORS
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Effect, EffectParameters, Setting, Step
+from thenar.simulator.pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from thenar.simulator.streams import Draw
 
 
@@ -20,7 +20,7 @@ class Parameters(EffectParameters, frozen=True):
     sd_deg: Annotated[float, Meta(ge=0.0, le=45.0)] = 4.0
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that shifts every sensor, by a different number of degrees for each subject."""
 
     def step(batch: Batch, draw: Draw) -> None:

@@ -30,7 +30,7 @@ class Pad:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Held:
+class PlannedGrasp:
     """The undisturbed grasp of an object by a hand of some size.
 
     posture_deg  (20,) joint angles, order of DOF
@@ -54,7 +54,7 @@ class Condition:
     hand: Hand
     grasp: str
     thing: Thing
-    held: Held
+    held: PlannedGrasp
 
     def site(self, repetitions: NDArray[np.int64]) -> Site:
         """Return the draw site of some repetitions (n,)."""

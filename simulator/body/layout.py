@@ -102,3 +102,22 @@ class Switches:
         frames, place = skeleton.frames[self.capsules], self.places[:, :, None, None]
         turned = frames[:, :, 0] * place[:, 0] + frames[:, :, 1] * place[:, 1] + frames[:, :, 2] * place[:, 2]
         return skeleton.origins[self.capsules] + turned
+
+
+def taxel_places(listed: tuple[str, ...] | str) -> tuple[int, ...]:
+    """Return the numbers of the places with taxels: "all", or names of places or of segments, as "index_distal".
+
+    Raises ValueError for the first that the layout does not have.
+    """
+    names = [patch.name for patch in murakami160()]
+    if listed == "all":
+        return tuple(range(len(names)))
+    found = set[int]()
+    for given in listed:
+        own = {place for place, name in enumerate(names) if given in (name, name.rpartition("_")[0])}
+        if not own:
+            raise ValueError(
+                f"the glove has no place {given!r}: `thenar draw --numbers` shows all, thumb_distal_1 is one"
+            )
+        found |= own
+    return tuple(sorted(found))

@@ -122,7 +122,7 @@ def surfaces(shapes: Sequence[Shape], counts: Sequence[int]) -> Surfaces:
 
 
 @dataclass(frozen=True, slots=True)
-class Pace:
+class SolverSettings:
     """Numerical parameters on which results should hardly depend; halving them measures how much they do.
 
     rest_n, rest_nmm  residual force and moment allowed at rest, on the object and on each joint
@@ -134,7 +134,7 @@ class Pace:
     parts: int = 1
 
 
-USUAL = Pace()
+USUAL = SolverSettings()
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +162,7 @@ class Skin:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Case:
+class SolverCase:
     """Repetitions of one condition: joint angles (20, n) in radians, object poses (6, n), grip forces (n,)."""
 
     condition: Condition
@@ -203,7 +203,7 @@ class Command:
         )
 
 
-def command(cases: Sequence[Case]) -> Command:
+def command(cases: Sequence[SolverCase]) -> Command:
     """Return the commands of all `cases`, of one hand, one after the other."""
     hand = cases[0].condition.hand
     counts = [len(case.grip_n) for case in cases]
@@ -325,7 +325,7 @@ class Balance:
         force, moment, joints = self._left
         return np.maximum(np.maximum(force, moment / _LEVER_MM), joints / _LEVER_MM)
 
-    def at_rest(self, pace: Pace) -> Bits:
+    def at_rest(self, pace: SolverSettings) -> Bits:
         """Return the mask (n,) of repetitions at rest, without any that hold a NaN."""
         force, moment, joints = self._left
         return (force < pace.rest_n) & (moment < pace.rest_nmm) & (joints < pace.rest_nmm)

@@ -16,10 +16,10 @@ from .balance import (
     LIMIT_NMM_PER_RAD,
     USUAL,
     Balance,
-    Case,
     Command,
-    Pace,
     Skin,
+    SolverCase,
+    SolverSettings,
     command,
     contract,
     cross,
@@ -228,7 +228,7 @@ class Rest:
         return Rest(pose=self.pose.rows(slice(first, last)), **arrays)
 
 
-def close(cases: Sequence[Case], skin: Skin, most_steps: int, pace: Pace = USUAL) -> list[Rest]:
+def close(cases: Sequence[SolverCase], skin: Skin, most_steps: int, pace: SolverSettings = USUAL) -> list[Rest]:
     """Return the rest of the hands of `cases`, all of one size, one Rest per case."""
     target = command(cases)
     rest, walk = Rest.of(target), _Walk.start(target)

@@ -10,7 +10,7 @@ from thenar.compiler.elementary import log
 from ..body.layout import murakami160
 from ..errors import SceneError
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step, drawn_rows
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, drawn_rows
 from ..pipeline.parts import port_count, port_of
 from ..streams import Draw
 
@@ -25,7 +25,7 @@ class Parameters(EffectParameters, frozen=True):
     jitter_us: Annotated[float, Meta(ge=0.0, le=1e6)] = 0.0
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that sets the delay of each switch from the frame's start: the end of its port's reading.
 
     Raises SceneError if all ports together take longer than the period of frames.

@@ -11,10 +11,10 @@ import numpy as np
 from ..body.hand import CAPSULES, Hand
 from ..body.layout import Switches, murakami160
 from ..body.shapes import rotation_vector
-from ..contact.balance import USUAL, Case, Pace, Skin
+from ..contact.balance import USUAL, Skin, SolverCase, SolverSettings
 from ..contact.model import Contact, ContactModel, Load, split
 from ..contact.settle import Rest, close
-from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, EffectParameters, Setting
+from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, EffectParameters, SceneSetting
 
 _Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)]
 # Repetitions solved at a time: enough to amortise numpy's calls, few enough for the processor's cache.
@@ -41,7 +41,7 @@ class Parameters(EffectParameters, frozen=True):
 class Quasistatic:
     """The contact model of hands and objects at rest."""
 
-    def __init__(self, parameters: Parameters, pace: Pace = USUAL) -> None:
+    def __init__(self, parameters: Parameters, pace: SolverSettings = USUAL) -> None:
         self.pace = pace
         self.skin = Skin(parameters.press_n_per_mm, parameters.soft_mm, parameters.drag_n_per_mm, parameters.friction)
         self.reach_mm, self.most_steps = parameters.reach_mm, parameters.most_steps
@@ -52,7 +52,7 @@ class Quasistatic:
         for _, same_hand in groupby(loads, key=lambda load: load.condition.hand.size):
             for together in _bundles(list(same_hand)):
                 cases = [
-                    Case(load.condition, load.posture_deg.T * (np.pi / 180.0), load.pose.T, load.grip_n)
+                    SolverCase(load.condition, load.posture_deg.T * (np.pi / 180.0), load.pose.T, load.grip_n)
                     for load in together
                 ]
                 rests = close(cases, self.skin, self.most_steps, self.pace)
@@ -95,7 +95,7 @@ def _bundles(loads: list[Load]) -> list[list[Load]]:
     return bundles
 
 
-def model(parameters: Parameters, setting: Setting) -> ContactModel:
+def model(parameters: Parameters, setting: SceneSetting) -> ContactModel:
     """Return the contact model."""
     return Quasistatic(parameters)
 

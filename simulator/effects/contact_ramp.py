@@ -15,7 +15,7 @@ from msgspec import Meta
 from ..contact.model import Contact, ContactModel, Load
 from ..errors import SceneError
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Together
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Together
 from ..pipeline.ramp import NEVER, Ramp, crossings
 from ..streams import Draw
 
@@ -30,7 +30,7 @@ class Parameters(EffectParameters, frozen=True):
     levels: Annotated[int, Meta(ge=1, le=100)] = 10
 
 
-def prepare(parameters: Parameters, setting: Setting, contact: ContactModel) -> Together:
+def prepare(parameters: Parameters, setting: SceneSetting, contact: ContactModel) -> Together:
     """Return the step that times every switch. Raises SceneError if the grip is not full when the row is read."""
     rise_us = 1e3 * parameters.rise_ms
     if rise_us > setting.hold_us:

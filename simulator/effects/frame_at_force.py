@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from ..errors import SceneError
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step, frame_times
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, frame_times
 from ..streams import Draw
 
 
@@ -21,7 +21,7 @@ class Parameters(EffectParameters, frozen=True):
     to_n: Annotated[float, Meta(gt=0.0, le=100.0)] = 1.0
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that moves the frames. Raises SceneError if there are too few."""
     times = frame_times(setting)
     held = np.flatnonzero((times >= 0) & (times <= setting.hold_us))

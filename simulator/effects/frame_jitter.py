@@ -6,7 +6,7 @@ import numpy as np
 from msgspec import Meta
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step, drawn_rows
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, drawn_rows
 from ..streams import Draw
 
 
@@ -16,7 +16,7 @@ class Parameters(EffectParameters, frozen=True):
     sd_us: Annotated[float, Meta(gt=0.0, le=1e6)] = 300.0
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that moves every frame by an independent normal deviate, and keeps them in order."""
     rows = drawn_rows(setting)
 

@@ -7,7 +7,7 @@ from msgspec import Meta
 from thenar.compiler.elementary import exp
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..streams import Draw
 
 
@@ -17,7 +17,7 @@ class Parameters(EffectParameters, frozen=True):
     log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.25
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that multiplies the grip by a lognormal factor of median 1."""
 
     def step(batch: Batch, draw: Draw) -> None:

@@ -8,7 +8,7 @@ from msgspec import Meta
 from thenar.compiler.elementary import Floats, add_up, sincos
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..streams import Draw
 
 
@@ -19,7 +19,7 @@ class Parameters(EffectParameters, frozen=True):
     sd_deg: Annotated[float, Meta(ge=0.0, le=45.0)] = 2.5
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that shifts and rotates the object by normal deviates."""
 
     def step(batch: Batch, draw: Draw) -> None:

@@ -7,7 +7,7 @@ from msgspec import Meta
 
 from ..body.hand import DOF, LIMITS_DEG
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..streams import Draw
 
 
@@ -17,7 +17,7 @@ class Parameters(EffectParameters, frozen=True):
     sd_deg: Annotated[float, Meta(ge=0.0, le=45.0)] = 1.5
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that shifts every joint by an independent normal deviate, within its range."""
 
     def step(batch: Batch, draw: Draw) -> None:

@@ -9,7 +9,7 @@ from thenar.compiler.elementary import exp
 
 from ..body.hand import DOF, LIMITS_DEG
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..streams import Draw
 
 _Degrees = Annotated[float, Meta(ge=0.0, le=45.0)]
@@ -28,7 +28,7 @@ class Parameters(EffectParameters, frozen=True):
     log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.15
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that applies the subject's style to the posture and the grip of a batch."""
 
     def step(batch: Batch, draw: Draw) -> None:

@@ -18,7 +18,7 @@ from ..body.cyberglove import sensors_deg
 from ..body.hand import DOF, LIMITS_DEG
 from ..errors import SceneError
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step, frame_times
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, frame_times
 from ..streams import Draw
 
 _FLEXES = np.array([not name.endswith("abduction") for name in DOF])
@@ -31,7 +31,7 @@ class Parameters(EffectParameters, frozen=True):
     opening_deg: Annotated[float, Meta(ge=0.0, le=90.0)] = 20.0
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that moves the angles of the frames before contact, and after the release where the hand rests.
 
     Raises SceneError if there are none before contact.

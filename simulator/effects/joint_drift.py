@@ -6,7 +6,7 @@ from msgspec import Meta
 
 from ..body.cyberglove import SENSORS
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..streams import Draw
 
 
@@ -16,7 +16,7 @@ class Parameters(EffectParameters, frozen=True):
     deg_per_session: Annotated[float, Meta(ge=0.0, le=90.0)] = 5.0
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that shifts every sensor in proportion to the number of previous trials."""
 
     def step(batch: Batch, draw: Draw) -> None:

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from ..body.cyberglove import SENSORS
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step, drawn_rows
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, drawn_rows
 from ..streams import Draw
 
 _Degrees = Annotated[float, Meta(ge=0.0, le=45.0)]
@@ -23,7 +23,7 @@ class Parameters(EffectParameters, frozen=True):
     trial_sd_deg: _Degrees = 0.0
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that adds normal noise to every sensor."""
     rows = drawn_rows(setting)
 

@@ -9,7 +9,7 @@ from msgspec import Meta
 
 from ..body.layout import murakami160
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..pipeline.parts import chooser, port_count, port_of
 from ..streams import Draw
 
@@ -26,7 +26,7 @@ class Parameters(EffectParameters, frozen=True):
             raise ValueError("say which `ports` are dead or their `count`, not both")
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that opens every switch of the dead ports. Raises SceneError if there are no such ports."""
     switches = len(murakami160())
     dead = chooser("port.dead", "port", "dead", port_count(switches), parameters.ports or (), parameters.count)

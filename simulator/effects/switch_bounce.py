@@ -8,17 +8,13 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
 
-from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.batch import Batch, Bits, Integers
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..pipeline.ramp import NEVER
 from ..streams import Draw
-
-Bits = NDArray[np.bool_]
-Integers = NDArray[np.int64]
 
 _MOST_PAIRS = 5
 
@@ -30,7 +26,7 @@ class Parameters(EffectParameters, frozen=True):
     off_ms: Annotated[float, Meta(ge=0.0, le=1000.0)] = 8.0
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that flips the bits read while their contact bounces."""
 
     def step(batch: Batch, draw: Draw) -> None:

@@ -8,19 +8,17 @@ the reading of its row: changes from one row to the next (bus.latency) are ignor
 import numpy as np
 from numpy.typing import NDArray
 
-from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.batch import Batch, Bits
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..pipeline.parts import PORT, port_count, port_of
 from ..streams import Draw
-
-Bits = NDArray[np.bool_]
 
 
 class Parameters(EffectParameters, frozen=True):
     """No parameters: a row of the matrix is a port, a column one of its sixteen places."""
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that closes every switch with a current path."""
 
     def step(batch: Batch, draw: Draw) -> None:

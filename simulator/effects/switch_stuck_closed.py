@@ -1,7 +1,7 @@
 """Switches that are always closed: a short circuit, a jammed dome."""
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, Setting, Step
+from ..pipeline.effect import Effect, SceneSetting, Step
 from ..pipeline.parts import StuckParameters, stuck
 from ..streams import Draw
 
@@ -10,7 +10,7 @@ class Parameters(StuckParameters, frozen=True):
     """Which switches. One that is also stuck open (switch.stuck_open) reads closed."""
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that closes them. Raises SceneError if the glove has no such switch."""
     chosen = stuck(MEMBER.name, parameters)
 

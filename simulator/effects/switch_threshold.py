@@ -6,7 +6,7 @@ import numpy as np
 from msgspec import Meta
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..streams import Draw
 
 # No tact switch closes by itself. Ours.
@@ -19,7 +19,7 @@ class Parameters(EffectParameters, frozen=True):
     sd_n: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.15
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that shifts every threshold by a normal deviate, drawn per glove."""
 
     def step(batch: Batch, draw: Draw) -> None:

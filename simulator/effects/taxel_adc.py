@@ -10,8 +10,8 @@ from typing import Annotated
 from msgspec import Meta
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, Setting, Step
-from ..pipeline.taxels import Converter
+from ..pipeline.effect import Effect, SceneSetting, Step
+from ..pipeline.glove import Converter
 from ..streams import Draw
 
 
@@ -22,7 +22,7 @@ class Parameters(Converter, frozen=True):
     full_n: Annotated[float, Meta(gt=0.0, le=1000.0)] = 10.0
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that converts every reading."""
 
     def step(batch: Batch, draw: Draw) -> None:

@@ -13,7 +13,7 @@ from msgspec import Meta
 from thenar.compiler.elementary import Floats, exp
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..streams import Draw
 
 _TIMES_US = np.array([0.1e6, 1e6, 10e6])
@@ -25,7 +25,7 @@ class Parameters(EffectParameters, frozen=True):
     per_decade: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that adds the creep since contact to each reading."""
 
     def step(batch: Batch, draw: Draw) -> None:

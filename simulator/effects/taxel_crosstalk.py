@@ -16,7 +16,7 @@ from msgspec import Meta
 from thenar.compiler.elementary import add_up
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..pipeline.parts import PORT
 from ..streams import Draw
 
@@ -28,7 +28,7 @@ class Parameters(EffectParameters, frozen=True):
     pad_ohm: Annotated[float, Meta(gt=0.0, le=1e9)] = 10_000.0
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that lowers every reading by its row's conductance; a row has the places of a port."""
     rows = np.array(setting.taxels, dtype=np.intp) // PORT
     per_n = parameters.row_ohm / parameters.pad_ohm

@@ -13,7 +13,7 @@ from msgspec import Meta
 from thenar.compiler.elementary import exp
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..streams import Draw
 
 
@@ -26,7 +26,7 @@ class Parameters(EffectParameters, frozen=True):
     actuates_n: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.1
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that scales every pad's force, once it actuates."""
 
     def step(batch: Batch, draw: Draw) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Meta
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..streams import Draw
 
 
@@ -22,7 +22,7 @@ class Parameters(EffectParameters, frozen=True):
     share: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.1
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that lets readings follow the force with play, frame by frame."""
     most = 1.0 + parameters.share
 

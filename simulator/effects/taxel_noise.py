@@ -11,7 +11,7 @@ from msgspec import Meta
 from thenar.compiler.elementary import exp
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step, drawn_rows
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, drawn_rows
 from ..streams import Draw
 
 
@@ -22,7 +22,7 @@ class Parameters(EffectParameters, frozen=True):
     sd_n: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.005
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that adds normal noise to every reading."""
     rows = drawn_rows(setting)
 

@@ -8,7 +8,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step, drawn_rows
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, drawn_rows
 from ..streams import Draw
 
 Bytes = NDArray[np.uint8]
@@ -26,7 +26,7 @@ def damaged(data: Bytes, chances: NDArray[np.float64], rate: float) -> Bytes:
     return np.where(chances < rate, data ^ (np.uint8(1) << bit), data)
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that damages bytes."""
     rows = drawn_rows(setting)
 

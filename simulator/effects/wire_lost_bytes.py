@@ -8,7 +8,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step, drawn_rows
+from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, drawn_rows
 from ..streams import Draw
 
 
@@ -23,7 +23,7 @@ def arrives(chances: NDArray[np.float64], rate: float) -> NDArray[np.bool_]:
     return chances >= rate
 
 
-def prepare(parameters: Parameters, setting: Setting) -> Step:
+def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     """Return the step that loses bytes."""
     rows = drawn_rows(setting)
 

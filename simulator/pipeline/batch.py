@@ -14,7 +14,7 @@ from .ramp import NEVER, Ramp
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Traffic:
+class SerialTraffic:
     """The bytes of n repetitions, F frames each; of a frame's B bytes the first `board` are on the board's line, the
     others on the CyberGlove's.
 
@@ -93,7 +93,7 @@ class Batch:
     bits: Bits = field(init=False)
     sensors_deg: Floats = field(init=False)
     raw: NDArray[np.uint8] = field(init=False)
-    traffic: Traffic = field(init=False)
+    traffic: SerialTraffic = field(init=False)
     lost: Bits | None = None
     ramp: Ramp | None = None
     taxels_n: Floats = field(init=False)

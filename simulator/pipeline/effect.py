@@ -21,7 +21,7 @@ Steps act in the order of their numbers, effects and the glove's own alike:
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
@@ -30,9 +30,11 @@ from numpy.typing import NDArray
 
 from thenar.drivers.members import MembersByName
 
+from ..body.layout import taxel_places
 from ..contact.model import ContactModel
+from ..scenes.scene import Scene
 from ..streams import Draw
-from .batch import Batch
+from .batch import Batch, Integers
 
 # The fields of a batch that a contact model reads and writes (`Batch.load`, `Batch.take`).
 CONTACT_READS = ("posture_deg", "pose", "grip_n")
@@ -70,13 +72,13 @@ class Effect:
     timed: bool = False
     on_wire: bool = False
     parameters: type[EffectParameters] = EffectParameters
-    prepare: Callable[[Any, "Setting"], Step] | None = None
-    model: Callable[[Any, "Setting"], ContactModel] | None = None
-    together: Callable[[Any, "Setting", ContactModel], Together] | None = None
+    prepare: Callable[[Any, "SceneSetting"], Step] | None = None
+    model: Callable[[Any, "SceneSetting"], ContactModel] | None = None
+    together: Callable[[Any, "SceneSetting", ContactModel], Together] | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class SceneSetting:
     """The properties of a scene that effects and the glove's own steps need.
 
     seed, session_trials  trials of one subject's session
@@ -103,6 +105,27 @@ class Setting:
     rest: str | None = None
     rest_us: int = 0
 
+    @classmethod
+    def of(cls, scene: Scene, effects: Iterable[Effect]) -> "SceneSetting":
+        """Return the properties of a scene that its `effects` need."""
+        effects, recording = tuple(effects), scene.recording
+        return cls(
+            seed=scene.seed,
+            session_trials=(scene.done or scene.repetitions) * scene.types,
+            threshold_n=scene.glove.threshold_n,
+            period_us=round(1e6 / recording.rate_hz),
+            first_us=-round(recording.lead_ms * 1000),
+            hold_us=round(recording.hold_ms * 1000),
+            release_us=round(recording.release_ms * 1000),
+            # Every frame as a row requires frames, even if no effect depends on time.
+            timed=recording.rows == "all" or any(effect.timed for effect in effects),
+            on_wire=any(effect.on_wire for effect in effects),
+            taxels=taxel_places(scene.glove.taxels),
+            every_frame=recording.rows == "all",
+            rest=("relaxed" if recording.rest is True else recording.rest) or None,
+            rest_us=round(recording.rest_ms * 1000),
+        )
+
     @property
     def released_us(self) -> int:
         """The end of the release, when the hand goes to its rest."""
@@ -120,13 +143,11 @@ class Setting:
 EFFECTS = MembersByName("effect", Effect, "thenar.simulator.effects", "thenar.effects")
 
 
-Integers = NDArray[np.int64]
-
 # The most frames simulated at a time: with all derived data, each takes two to five kilobytes.
 _MOST = 50_000
 
 
-def frame_times(setting: Setting) -> Integers:
+def frame_times(setting: SceneSetting) -> Integers:
     """Return the start times of the frames (F,) of a repetition, in microseconds from first contact.
 
     They are aligned with the one at hold_us, whose row is read out, so it is always among them. If nothing depends on
@@ -140,12 +161,12 @@ def frame_times(setting: Setting) -> Integers:
     return setting.hold_us + setting.period_us * np.arange(-hold_frame(setting), after + 1, dtype=np.int64)
 
 
-def hold_frame(setting: Setting) -> int:
+def hold_frame(setting: SceneSetting) -> int:
     """Return the number of the frame at hold_us."""
     return (setting.hold_us - setting.first_us) // setting.period_us if setting.timed else 0
 
 
-def at_a_time(setting: Setting, repetitions: int) -> int:
+def at_a_time(setting: SceneSetting, repetitions: int) -> int:
     """Return the number of repetitions simulated at a time, `repetitions` if they have one frame each.
 
     With many frames each it is fewer, to limit the memory, but at least one.
@@ -153,26 +174,12 @@ def at_a_time(setting: Setting, repetitions: int) -> int:
     return max(min(repetitions, _MOST // len(frame_times(setting))), 1)
 
 
-def drawn_rows(setting: Setting) -> NDArray[np.intp]:
+def drawn_rows(setting: SceneSetting) -> NDArray[np.intp]:
     """Return the row of a repetition's random numbers for each frame (F,).
 
     The frame at hold_us takes the first, so that its numbers do not depend on other frames; frames after the release
     take the last, so that a rest does not change the numbers of the others.
     """
-    times, held = frame_times(setting), hold_frame(setting)
+    times, read_out = frame_times(setting), hold_frame(setting)
     frames, moving = np.arange(len(times), dtype=np.intp), int((times <= setting.released_us).sum())
-    return np.where(frames < moving, (frames - held) % moving, frames)
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """A step of a scene: `own` if every scene has it; `parameters` come from the scene."""
-
-    effect: Effect
-    own: bool
-    parameters: EffectParameters = field(default_factory=EffectParameters)
-
-
-def in_order(places: Iterable[Place]) -> list[Place]:
-    """Return the steps in the order in which they act."""
-    return sorted(places, key=lambda place: (place.effect.order, place.effect.name))
+    return np.where(frames < moving, (frames - read_out) % moving, frames)

@@ -1,19 +1,29 @@
-"""The steps of every scene: the hand recalls a posture, switches close, frames are scanned and read.
+"""The glove's own steps: the hand recalls a posture, switches close, frames are scanned and read.
 
-Effects act before and after them, by their order numbers.
+Every scene has `STEPS`, one with taxels `TAXEL_STEPS`, one with rests between grasps `rest_step`. Effects act before
+and after them, by their order numbers.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Annotated, NamedTuple
 
+import msgspec
 import numpy as np
+from numpy.typing import NDArray
+
+from thenar.compiler.elementary import Floats
+from thenar.compiler.recordings.graspset import Joint
 
 from ..body.cyberglove import Calibration, sensors_deg
-from ..streams import Draw
+from ..body.hand import DOF, LIMITS_DEG, RESTS_DEG
+from ..errors import SceneError
+from ..streams import Draw, DrawCounts
 from .batch import Batch
-from .effect import Effect, EffectParameters, Setting, Step, frame_times
+from .effect import Effect, EffectParameters, SceneSetting, Step, frame_times
 from .ramp import NEVER
 
-Act = Callable[[Batch, Setting], None]
+Act = Callable[[Batch, SceneSetting], None]
 STEPS: tuple[Effect, ...] = ()
 
 
@@ -21,7 +31,7 @@ def _own(order: int, summary: str, reads: tuple[str, ...], writes: tuple[str, ..
     """Add the decorated function to `STEPS`; _recall is "glove.recall". It draws no random numbers."""
 
     def add(act: Act) -> Act:
-        def prepare(_parameters: EffectParameters, setting: Setting) -> Step:
+        def prepare(_parameters: EffectParameters, setting: SceneSetting) -> Step:
             def step(batch: Batch, _draw: Draw) -> None:
                 act(batch, setting)
 
@@ -36,20 +46,20 @@ def _own(order: int, summary: str, reads: tuple[str, ...], writes: tuple[str, ..
 
 
 @_own(100, "takes the planned posture, the object's pose and the grip", (), ("posture_deg", "pose", "grip_n"))
-def _recall(batch: Batch, setting: Setting) -> None:
-    held = batch.condition.held
-    batch.posture_deg = np.tile(held.posture_deg, (len(batch), 1))
-    batch.pose = np.tile(held.pose, (len(batch), 1))
-    batch.grip_n = np.full(len(batch), held.grip_n)
+def _recall(batch: Batch, setting: SceneSetting) -> None:
+    grasp = batch.condition.held
+    batch.posture_deg = np.tile(grasp.posture_deg, (len(batch), 1))
+    batch.pose = np.tile(grasp.pose, (len(batch), 1))
+    batch.grip_n = np.full(len(batch), grasp.grip_n)
 
 
 @_own(300, "sets the closing force of every switch", ("forces_n",), ("thresholds_n",))
-def _threshold(batch: Batch, setting: Setting) -> None:
+def _threshold(batch: Batch, setting: SceneSetting) -> None:
     batch.thresholds_n = np.full(batch.forces_n.shape[1], setting.threshold_n)
 
 
 @_own(320, "closes the switches that are pressed hard enough", ("forces_n", "thresholds_n"), ("on_us", "off_us"))
-def _close(batch: Batch, setting: Setting) -> None:
+def _close(batch: Batch, setting: SceneSetting) -> None:
     let_go_us = NEVER if setting.let_go_us is None else setting.let_go_us
     closed = batch.forces_n > batch.thresholds_n
     batch.on_us = np.where(closed, 0, NEVER)
@@ -57,22 +67,147 @@ def _close(batch: Batch, setting: Setting) -> None:
 
 
 @_own(400, "sets the times of frames", (), ("frame_us",))
-def _frames(batch: Batch, setting: Setting) -> None:
+def _frames(batch: Batch, setting: SceneSetting) -> None:
     batch.frame_us = np.tile(frame_times(setting), (len(batch), 1))
 
 
 @_own(500, "bends the CyberGlove's sensors with the hand", ("posture_deg", "frame_us"), ("sensors_deg",))
-def _sense(batch: Batch, setting: Setting) -> None:
+def _sense(batch: Batch, setting: SceneSetting) -> None:
     felt = sensors_deg(batch.posture_deg)
     batch.sensors_deg = np.repeat(felt[:, None], batch.frame_us.shape[1], axis=1)
 
 
 @_own(540, "converts the sensors to bytes by the subject's calibration", ("sensors_deg",), ("raw",))
-def _encode(batch: Batch, setting: Setting) -> None:
+def _encode(batch: Batch, setting: SceneSetting) -> None:
     batch.raw = Calibration.of_subject(setting.seed, batch.condition.subject).bytes(batch.sensors_deg)
 
 
 @_own(700, "reads every switch in every frame", ("on_us", "off_us", "frame_us", "delay_us"), ("bits",))
-def _sample(batch: Batch, setting: Setting) -> None:
+def _sample(batch: Batch, setting: SceneSetting) -> None:
     at = batch.frame_us[:, :, None] if batch.delay_us is None else batch.frame_us[:, :, None] + batch.delay_us
     batch.bits = (batch.on_us[:, None] <= at) & (at < batch.off_us[:, None])
+
+
+class Converter(EffectParameters, frozen=True):
+    """Counts of `bits` bits in even steps up to the full scale of `full_n` newtons; by default a thousandth of a newton
+    per count.
+    """
+
+    bits: Annotated[int, msgspec.Meta(ge=1, le=15)] = 15
+    full_n: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 32.768
+
+    def codes(self, newtons: Floats) -> NDArray[np.uint16]:
+        """Return the counts of forces of any shape, clipped to the first and the last."""
+        steps = 1 << self.bits
+        return np.clip(np.rint(newtons * (steps / self.full_n)), 0.0, steps - 1.0).astype(np.uint16)
+
+    def column(self, name: str) -> Joint:
+        """Return the joint that describes the counts of a taxel of this name."""
+        return Joint(name, "N", 0, 0.0, 1 << (self.bits - 1), self.full_n / 2.0)
+
+
+IDEAL = Converter()
+
+
+def _feel(parameters: EffectParameters, setting: SceneSetting) -> Step:
+    places = list(setting.taxels)
+
+    def step(batch: Batch, draw: Draw) -> None:
+        at = batch.frame_us[:, :, None]
+        if batch.delay_us is not None:
+            at = at + np.broadcast_to(batch.delay_us, (*batch.frame_us.shape, batch.forces_n.shape[1]))[:, :, places]
+        forces = batch.forces_n[:, places]
+        if batch.ramp is None:
+            pressed = (at >= 0) if setting.let_go_us is None else (at >= 0) & (at < setting.let_go_us)
+            batch.taxels_n = np.where(pressed, forces[:, None], 0.0)
+        else:
+            batch.taxels_n = batch.ramp.forces_at(at, places, setting.let_go_us)
+
+    return step
+
+
+def _count(parameters: EffectParameters, setting: SceneSetting) -> Step:
+    def step(batch: Batch, draw: Draw) -> None:
+        batch.taxels = IDEAL.codes(batch.taxels_n)
+
+    return step
+
+
+# Additional steps for a glove with taxels, with any effects.
+TAXEL_STEPS = (
+    Effect(
+        name="glove.feel",
+        summary="presses every taxel with the force on its place, frame by frame",
+        order=550,
+        reads=("forces_n", "frame_us", "delay_us", "ramp"),
+        writes=("taxels_n",),
+        prepare=_feel,
+    ),
+    Effect(
+        name="glove.count",
+        summary="converts the taxels' newtons to counts",
+        order=710,
+        reads=("taxels_n",),
+        writes=("taxels",),
+        prepare=_count,
+    ),
+)
+
+
+_STYLE, _POSTURE, _TRANSITION = "hand.style", "hand.posture", "hand.transition"
+
+
+class RestSpreads(NamedTuple):
+    """Standard deviations of rests in degrees: between subjects, in addition to that of all postures; between rests."""
+
+    sd_deg: float = 0.0
+    habit_sd_deg: float = 0.0
+    each_sd_deg: float = 0.0
+
+
+def _prepare_rest(parameters: RestSpreads, setting: SceneSetting) -> Step:
+    assert setting.rest is not None
+    usual = RESTS_DEG[setting.rest]
+
+    def step(batch: Batch, draw: Draw) -> None:
+        style = replace(draw, effect=_STYLE, draws=DrawCounts()).per_subject(len(DOF) + 1).normal()[:-1]
+        resting = draw.at_rest(batch.trials)
+        mean = usual + parameters.sd_deg * style + parameters.habit_sd_deg * resting.per_type(len(DOF)).normal()
+
+        def rest(before: Draw) -> Floats:
+            varied = mean + parameters.each_sd_deg * before.per_repetition(len(DOF)).normal()
+            return np.clip(varied, LIMITS_DEG[:, 0], LIMITS_DEG[:, 1])
+
+        # The rest after a trial is the one before the next.
+        batch.previous_deg, batch.rest_deg = rest(resting), rest(draw.at_rest(batch.trials + 1))
+
+    return step
+
+
+def rest_step(listed: Mapping[str, msgspec.Struct], setting: SceneSetting) -> Effect:
+    """Return the step that sets the rests of the hand, varied by the `listed` effects like other postures.
+
+    Raises SceneError if nothing would move the hand, or no row would show it.
+    """
+    needs = {
+        'rows = "all"': setting.every_frame,
+        "a lead_ms": setting.first_us < 0,
+        "a release_ms": setting.release_us > 0,
+        "the effect [effects.hand.transition]": _TRANSITION in listed,
+    }
+    if lacking := [what for what, given in needs.items() if not given]:
+        raise SceneError(f"recording.rest: for the hand to return to an open rest the scene needs {', '.join(lacking)}")
+    style, posture = listed.get(_STYLE), listed.get(_POSTURE)
+    spreads = RestSpreads(
+        sd_deg=getattr(style, "sd_deg", 0.0),
+        habit_sd_deg=getattr(style, "habit_sd_deg", 0.0),
+        each_sd_deg=getattr(posture, "sd_deg", 0.0),
+    )
+    return Effect(
+        name="glove.rest",
+        summary="opens the hand before and after each grasp",
+        order=105,
+        reads=("trials",),
+        writes=("previous_deg", "rest_deg"),
+        prepare=lambda _parameters, setting: _prepare_rest(spreads, setting),
+    )

@@ -57,20 +57,20 @@ def stuck(effect: str, parameters: StuckParameters) -> Callable[[Draw], Bits]:
 
 
 def chooser(
-    effect: str, part: str, fault: str, there: int, numbers: Sequence[int], count: int | None
+    effect: str, part: str, fault: str, total: int, numbers: Sequence[int], count: int | None
 ) -> Callable[[Draw], Bits]:
-    """Return a function for the mask (there,) of faulty parts: those of these numbers, or `count` of them (None: one),
+    """Return a function for the mask (total,) of faulty parts: those of these numbers, or `count` of them (None: one),
     those with the smallest uniform numbers. Raises SceneError if there are no such parts.
     """
     parts = _MANY[part]
     for number in numbers:
-        if not 0 <= number < there:
-            said = f"the glove has no {part} {number}: they go from 0 to {there - 1}"
+        if not 0 <= number < total:
+            said = f"the glove has no {part} {number}: they go from 0 to {total - 1}"
             raise SceneError(f"effects.{effect}.{parts}: {said}")
     if numbers:
-        named = np.isin(np.arange(there), numbers)
+        named = np.isin(np.arange(total), numbers)
         return lambda draw: named
-    if (count or 1) > there:
-        raise SceneError(f"effects.{effect}.count: {count} {parts} cannot be {fault}: the glove has {there}")
+    if (count or 1) > total:
+        raise SceneError(f"effects.{effect}.count: {count} {parts} cannot be {fault}: the glove has {total}")
     drawn = count or 1
-    return lambda draw: np.isin(np.arange(there), np.argsort(draw.per_glove(there).uniform(), kind="stable")[:drawn])
+    return lambda draw: np.isin(np.arange(total), np.argsort(draw.per_glove(total).uniform(), kind="stable")[:drawn])

@@ -41,8 +41,8 @@ class Ramp:
     def reached_us(self, newtons: float) -> Integers:
         """Return the first time (n,) at which any place bears more than this, or NEVER."""
         thresholds = np.full(self.forces_n.shape[2], newtons)
-        found: Integers = crossings(self.forces_n, thresholds, self.rise_us / (len(self.forces_n) - 1))[0].min(axis=1)
-        return found
+        first: Integers = crossings(self.forces_n, thresholds, self.rise_us / (len(self.forces_n) - 1))[0].min(axis=1)
+        return first
 
 
 def crossings(forces_n: Floats, thresholds_n: Floats, level_us: float) -> tuple[Integers, Integers]:
@@ -72,5 +72,5 @@ def _between(forces_n: Floats, thresholds_n: Floats, level: NDArray[np.intp]) ->
     return levels
 
 
-def _times(time_us: Floats, there: Bits) -> Integers:
-    return np.where(there, np.ceil(np.where(there, time_us, 0.0)).astype(np.int64), NEVER)
+def _times(time_us: Floats, known: Bits) -> Integers:
+    return np.where(known, np.ceil(np.where(known, time_us, 0.0)).astype(np.int64), NEVER)

@@ -19,13 +19,11 @@ from thenar.drivers.lines import CLOCK_US, SEQUENCES, LineParser, checked, switc
 from ..body.layout import murakami160
 from ..errors import SceneError
 from ..streams import Draw
-from .batch import Batch, Traffic
-from .effect import Effect, EffectParameters, Setting, Step
+from .batch import Batch, Bits, Integers, SerialTraffic
+from .effect import Effect, EffectParameters, SceneSetting, Step
 
-Bits = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
 Codes = NDArray[np.uint16]
-Integers = NDArray[np.int64]
 # From chunks of bytes to the payloads of completed frames.
 Feed = Callable[[bytes], list[bytes]]
 
@@ -39,7 +37,7 @@ _CODE = "<u2"
 _MOST_COUNTS = np.iinfo(np.uint16).max
 
 
-def _send(parameters: EffectParameters, setting: Setting) -> Step:
+def _send(parameters: EffectParameters, setting: SceneSetting) -> Step:
     _check_rate(setting)
 
     def send(batch: Batch, draw: Draw) -> None:
@@ -49,13 +47,13 @@ def _send(parameters: EffectParameters, setting: Setting) -> Step:
         data = np.concatenate([rows, records], axis=2)
         at_us = [_arrivals(scanned, rows.shape[2], BOARD_BAUD)]
         at_us.append(_arrivals(batch.frame_us + _DIGITISED_US, records.shape[2], GLOVE_BAUD))
-        batch.traffic = Traffic(data, np.concatenate(at_us, axis=2), np.ones(data.shape, np.bool_), rows.shape[2])
+        batch.traffic = SerialTraffic(data, np.concatenate(at_us, axis=2), np.ones(data.shape, np.bool_), rows.shape[2])
         draw.count("bytes sent", data.size)
 
     return send
 
 
-def _check_rate(setting: Setting) -> None:
+def _check_rate(setting: SceneSetting) -> None:
     row = _row(0, 0, np.zeros(len(murakami160()), np.bool_), np.zeros(len(setting.taxels), np.uint16))
     record_us = _sent_us(glove.SENSORS + glove.OVERHEAD, GLOVE_BAUD)
     longest = max(_sent_us(len(row), BOARD_BAUD), _DIGITISED_US + record_us)
@@ -126,7 +124,7 @@ def _sent_us(size: int, baud: int) -> int:
 
 
 def _received(
-    traffic: Traffic, line: slice, width: int, ends: bytes, decoder: Callable[[], Feed]
+    traffic: SerialTraffic, line: slice, width: int, ends: bytes, decoder: Callable[[], Feed]
 ) -> tuple[Bytes, Bits]:
     """Return the data received in time for each frame (n, F, width), and whether there was any (n, F)."""
     at_us, arrives = traffic.at_us[:, :, line], traffic.arrives[:, :, line]

@@ -20,7 +20,7 @@ import numpy as np
 from thenar.compiler.elementary import Floats
 from thenar.compiler.workers import in_workers
 
-from ..body.condition import Held, Thing
+from ..body.condition import PlannedGrasp, Thing
 from ..body.hand import Hand, Size
 from ..errors import PlanError, SceneError
 from ..scenes.scene import Scene, SceneObject
@@ -128,7 +128,7 @@ def entry_of(work: Work, plans: dict[float, Plan]) -> Entry:
     )
 
 
-def _held_at(length: float, held: Held, pose: Floats) -> HeldAt:
+def _held_at(length: float, held: PlannedGrasp, pose: Floats) -> HeldAt:
     return HeldAt(
         length,
         tuple(round(float(angle), 2) for angle in held.posture_deg),

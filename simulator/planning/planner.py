@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
 
-from ..body.condition import Held, Pad, Thing
+from ..body.condition import Pad, PlannedGrasp, Thing
 from ..body.hand import LIMITS_DEG, Hand, Skeleton
 from ..body.shapes import Cylinder, Pose, Shape, Sphere, rotation_vector
 from ..errors import PlanError
@@ -170,7 +170,7 @@ class Plan:
     imbalance  residual of the pads' pushes, over the grip force (borne by friction)
     """
 
-    held: Held
+    held: PlannedGrasp
     cost: float
     gap_mm: float
     sunk_mm: float
@@ -185,7 +185,7 @@ class Plan:
         return max(self.gap_mm / TOLERANCE_MM, self.sunk_mm / TOLERANCE_MM, self.imbalance / BORNE)
 
 
-def plan(hand: Hand, grasp: str, prehension: Prehension, thing: Thing, near: Held | None = None) -> Plan:
+def plan(hand: Hand, grasp: str, prehension: Prehension, thing: Thing, near: PlannedGrasp | None = None) -> Plan:
     """Return a posture of `hand` that holds `thing`; `near` is a starting posture of a hand of similar size.
 
     Raises PlanError if the best one leaves a pad too far off or skin too deep, or pushes the object away.
@@ -205,7 +205,7 @@ def plan(hand: Hand, grasp: str, prehension: Prehension, thing: Thing, near: Hel
     return best
 
 
-def measure(hand: Hand, held: Held, shape: Shape) -> tuple[float, float]:
+def measure(hand: Hand, held: PlannedGrasp, shape: Shape) -> tuple[float, float]:
     """Return the widest gap under a pad, and the greatest depth of any skin, in mm."""
     centres = hand.spheres(hand.skeleton(np.radians(held.posture_deg)[:, None]))
     gap = Pose.of(held.pose[:, None]).distance(shape, centres)[0][:, 0] - hand.sphere_radii
@@ -225,7 +225,7 @@ def _refusal(hand: Hand, grasp: str, thing: Thing, best: Plan) -> str:
     )
 
 
-def _start_near(misfit: Misfit, near: Held) -> Floats:
+def _start_near(misfit: Misfit, near: PlannedGrasp) -> Floats:
     """Return the candidate (26,) with a known posture's joint angles and object's pose."""
     known, start = Pose.of(near.pose[:, None]), Pose.of(misfit.start[:, None])
     turn = rotation_vector(np.einsum("ijn,kjn->ikn", known.rotation, start.rotation))
@@ -283,5 +283,5 @@ def _finished(misfit: Misfit, x: Floats, cost: float) -> Plan:
     pads = tuple(Pad(int(sphere), float(part)) for sphere, part in zip(misfit.pads, share, strict=True))
     numbers = np.concatenate([pose.position[:, 0], rotation_vector(pose.rotation)[:, 0]])
     down = np.array(prehension.down)
-    held = Held(np.degrees(x[:20]), numbers, pads, prehension.grip_n, down / np.linalg.norm(down))
+    held = PlannedGrasp(np.degrees(x[:20]), numbers, pads, prehension.grip_n, down / np.linalg.norm(down))
     return Plan(held, cost, *measure(hand, held, misfit.shape), float(np.linalg.norm(left)))

@@ -19,7 +19,7 @@ import numpy as np
 from thenar.runtime.files import read_file, write_atomically
 from thenar.runtime.nesting import check_json
 
-from ..body.condition import Held, Pad, Thing
+from ..body.condition import Pad, PlannedGrasp, Thing
 from ..body.hand import Hand, Size
 from ..body.shapes import Shape
 from ..contact.model import GRAVITY
@@ -108,7 +108,7 @@ class Postures:
         """Return the planned entry of this grasp type and object shape, if any."""
         return self._found.get((grasp, thing.shape))
 
-    def held(self, hand: Hand, grasp: str, thing: Thing) -> Held:
+    def held(self, hand: Hand, grasp: str, thing: Thing) -> PlannedGrasp:
         """Return the grasp of `thing` by `hand`, interpolated between the two planned lengths next to its own.
 
         Raises SceneError naming grasp and object if nothing was planned, or not for this size of hand.
@@ -124,7 +124,7 @@ class Postures:
         return _between(entry, low, high, length, entry.grip_n + thing.mass_kg * GRAVITY / FRICTION)
 
 
-def _between(entry: Entry, low: HeldAt, high: HeldAt, length: float, grip_n: float) -> Held:
+def _between(entry: Entry, low: HeldAt, high: HeldAt, length: float, grip_n: float) -> PlannedGrasp:
     span = high.length_mm - low.length_mm
     part = (length - low.length_mm) / span if span else 0.0
     posture, pose, shares = (
@@ -132,7 +132,7 @@ def _between(entry: Entry, low: HeldAt, high: HeldAt, length: float, grip_n: flo
         for a, b in ((low.posture_deg, high.posture_deg), (low.pose, _near(low, high)), (low.shares, high.shares))
     )
     pads = tuple(Pad(sphere, float(share)) for sphere, share in zip(entry.spheres, shares, strict=True))
-    return Held(posture, pose, pads, grip_n, np.array(entry.down))
+    return PlannedGrasp(posture, pose, pads, grip_n, np.array(entry.down))
 
 
 def _near(low: HeldAt, high: HeldAt) -> tuple[float, ...]:

@@ -21,7 +21,8 @@ from thenar.runtime.taxels import TaxelCalibration, TaxelLine
 
 from ..body.cyberglove import SENSORS, USED, Calibration
 from ..errors import SceneError
-from ..running.simulation import Progress, simulate
+from ..pipeline.simulation import simulate
+from ..planning.plan import Progress
 from ..scenes.scene import Scene
 
 Bits = NDArray[np.bool_]

@@ -1,11 +1,12 @@
 """Scenes: subjects, objects and repetitions, the glove, and the effects.
 
-A scene comes from a TOML file (decode.py) or is built here; lengths are in millimetres, times in milliseconds.
+A scene comes from a TOML file (pipeline/scene_file.py) or is built here. Lengths are in millimetres, times in
+milliseconds.
 
 Every subject has separate draws, so that a larger count leaves the first subjects unchanged.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import floor, sqrt
 from typing import Annotated, Literal, NamedTuple
@@ -17,11 +18,10 @@ from thenar.runtime.names import nearest
 
 from ..body.condition import Thing
 from ..body.hand import Hand, Size
+from ..body.layout import taxel_places
 from ..body.shapes import Shape
 from ..errors import SceneError
-from ..pipeline.effect import Effect, EffectParameters, Setting
-from ..pipeline.taxels import taxel_places
-from ..streams import Draw, Draws, Site
+from ..streams import Draw, DrawCounts, Site
 
 # No hand is smaller or larger.
 HAND_LENGTHS_MM = (130.0, 240.0)
@@ -78,7 +78,7 @@ class Recording(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     rest_ms: _Milliseconds = 500.0
 
 
-class Glove(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SceneGlove(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The glove: the layout and threshold of its switches, and whether joint codes are the sensors' bytes ("raw") or
     mapped by every subject's calibration to one scale ("common"). The places `taxels`, by their names or those of their
     segments, have taxels instead of switches.
@@ -93,11 +93,11 @@ class Glove(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         taxel_places(self.taxels)
 
 
-class Listed(NamedTuple):
+class ListedEffect(NamedTuple):
     """An effect that the scene lists."""
 
     name: str
-    parameters: EffectParameters
+    parameters: msgspec.Struct
 
 
 class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -107,7 +107,7 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     objects      at least one for every grasp type of the taxonomy
     repetitions  of every grasp type by every subject, shared evenly by the type's objects
     done         earlier repetitions: the numbers and trials of these follow
-    effects      by their rank, at most one contact model among them
+    effects      by their order, at most one contact model among them
     """
 
     name: str
@@ -117,8 +117,8 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     subjects: tuple[Subject, ...]
     repetitions: int
     recording: Recording = Recording()
-    glove: Glove = Glove()
-    effects: tuple[Listed, ...]
+    glove: SceneGlove = SceneGlove()
+    effects: tuple[ListedEffect, ...]
     done: int = 0
 
     def varied(
@@ -142,34 +142,14 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         for subject in subjects:
             if subject not in known:
                 raise SceneError(f"scene {self.name} has no subject {subject!r}{nearest(subject, list(known))}")
-        own = self.repetitions if repetitions is None else repetitions
+        listed = self.repetitions if repetitions is None else repetitions
         return msgspec.structs.replace(
             self,
-            repetitions=own if more is None else more,
-            done=self.done if more is None else self.done + own,
+            repetitions=listed if more is None else more,
+            done=self.done if more is None else self.done + listed,
             seed=self.seed if seed is None else seed,
             subjects=tuple(known[name] for name in known if not subjects or name in subjects)[:first],
             recording=msgspec.structs.replace(self.recording, rest=rest or self.recording.rest),
-        )
-
-    def setting(self, effects: Iterable[Effect]) -> Setting:
-        """Return the properties of this scene that its `effects` need."""
-        effects, recording = tuple(effects), self.recording
-        return Setting(
-            seed=self.seed,
-            session_trials=(self.done or self.repetitions) * self.types,
-            threshold_n=self.glove.threshold_n,
-            period_us=round(1e6 / recording.rate_hz),
-            first_us=-round(recording.lead_ms * 1000),
-            hold_us=round(recording.hold_ms * 1000),
-            release_us=round(recording.release_ms * 1000),
-            # Every frame as a row requires frames, even if no effect depends on time.
-            timed=recording.rows == "all" or any(effect.timed for effect in effects),
-            on_wire=any(effect.on_wire for effect in effects),
-            taxels=taxel_places(self.glove.taxels),
-            every_frame=recording.rows == "all",
-            rest=("relaxed" if recording.rest is True else recording.rest) or None,
-            rest_us=round(recording.rest_ms * 1000),
         )
 
     @property
@@ -198,7 +178,7 @@ CORRELATION = 0.79
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class SizeSpread:
     """A measure of many hands in mm: its mean and standard deviation."""
 
     mean: float
@@ -213,8 +193,8 @@ class Spread:
 class Hands:
     """The hands of one sex in a survey."""
 
-    length: Spread
-    breadth: Spread
+    length: SizeSpread
+    breadth: SizeSpread
 
 
 # Men, then women. Published: lengths of the US Army (ANSUR II, NATICK/TR-15/007), lengths from the radial styloid (some
@@ -223,17 +203,17 @@ class Hands:
 _BREADTH_SD = 4.0
 SURVEYS = {
     "ansur2": (
-        Hands(Spread(193.3, 9.9), Spread(0.455 * 193.3, _BREADTH_SD)),
-        Hands(Spread(181.1, 10.1), Spread(0.455 * 181.1, _BREADTH_SD)),
+        Hands(SizeSpread(193.3, 9.9), SizeSpread(0.455 * 193.3, _BREADTH_SD)),
+        Hands(SizeSpread(181.1, 10.1), SizeSpread(0.455 * 181.1, _BREADTH_SD)),
     ),
     "aist2012": (
-        Hands(Spread(189.6, 8.1), Spread(83.3, _BREADTH_SD)),
-        Hands(Spread(175.4, 7.3), Spread(74.4, _BREADTH_SD)),
+        Hands(SizeSpread(189.6, 8.1), SizeSpread(83.3, _BREADTH_SD)),
+        Hands(SizeSpread(175.4, 7.3), SizeSpread(74.4, _BREADTH_SD)),
     ),
 }
 
 
-class Population(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SurveyPopulation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Subjects of a survey, men and women mixed evenly to the share of women."""
 
     survey: Literal["ansur2", "aist2012"]
@@ -241,15 +221,15 @@ class Population(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     women: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.5
 
 
-def draw_subjects(population: Population, seed: int) -> tuple[Subject, ...]:
+def draw_subjects(population: SurveyPopulation, seed: int) -> tuple[Subject, ...]:
     """Return the subjects P001, P002, ... of a population."""
     return tuple(_subject(population, seed, number) for number in range(population.count))
 
 
-def _subject(population: Population, seed: int, number: int) -> Subject:
+def _subject(population: SurveyPopulation, seed: int, number: int) -> Subject:
     name = f"P{number + 1:03d}"
     site = Site(name, "", "", np.zeros(1, dtype=np.int64))
-    first, second = Draw(seed, SITE, site, Draws()).per_subject(2).normal().tolist()
+    first, second = Draw(seed, SITE, site, DrawCounts()).per_subject(2).normal().tolist()
     woman = floor((number + 1) * population.women) > floor(number * population.women)
     hands = SURVEYS[population.survey][woman]
     across = CORRELATION * first + sqrt(1.0 - CORRELATION * CORRELATION) * second

@@ -17,8 +17,8 @@ import numpy as np
 from thenar.compiler.artifact.compile import compile_build
 from thenar.drivers.extras import optional
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
-from thenar.simulator.running.simulation import simulate
-from thenar.simulator.scenes.decode import load_scene
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import simulate
 
 with optional():
     from threadpoolctl import threadpool_info

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from thenar.compiler.elementary import Floats
-from thenar.simulator.body.condition import Condition, Held, Pad, Thing
+from thenar.simulator.body.condition import Condition, Pad, PlannedGrasp, Thing
 from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.contact.balance import Case
+from thenar.simulator.contact.balance import SolverCase
 from thenar.simulator.contact.model import Load
+from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import SURVEYS
 
 HAND = Hand(Size(185.0, 83.0))
@@ -42,7 +42,7 @@ class Grasp(NamedTuple):
 def held(shape: Shape = BAR, mass_kg: float = 0.1, grip_n: float = 15.0, hand: Hand = HAND, **changes: object) -> Grasp:
     """Return a hand that holds `shape`; `changes` of posture_deg, pose, pads or down."""
     usual = {"posture_deg": _ROUND_IT_DEG, "pose": _BESIDE_THE_PALM, "pads": _TIPS}
-    holds = Held(grip_n=grip_n, **(usual | changes))  # type: ignore[arg-type]
+    holds = PlannedGrasp(grip_n=grip_n, **(usual | changes))  # type: ignore[arg-type]
     condition = Condition("A", hand, "PoS", Thing("thing", shape, mass_kg), holds)
     return Grasp("", Load(condition, holds.posture_deg[None], holds.pose[None], np.array([grip_n])))
 
@@ -115,14 +115,14 @@ def planned(every: int) -> Iterator[Grasp]:
 
 
 def otherwise(load: Load, **changes: object) -> Load:
-    """Return a load with changes in its condition's `Held`."""
+    """Return a load with changes in its condition's `PlannedGrasp`."""
     changed = replace(load.condition.held, **changes)  # type: ignore[arg-type]
     return replace(load, condition=replace(load.condition, held=changed))
 
 
-def case_of(load: Load) -> Case:
+def case_of(load: Load) -> SolverCase:
     """Return a load in the form of the quasistatic model."""
-    return Case(load.condition, load.posture_deg.T * (np.pi / 180.0), load.pose.T, load.grip_n)
+    return SolverCase(load.condition, load.posture_deg.T * (np.pi / 180.0), load.pose.T, load.grip_n)
 
 
 def _at(position: Floats | list[float]) -> Floats:

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
 from thenar.simulator.body.layout import murakami160
-from thenar.simulator.contact.balance import USUAL, Pace
+from thenar.simulator.contact.balance import USUAL, SolverSettings
 from thenar.simulator.contact.model import Contact, Load
 from thenar.simulator.effects import switch_threshold
 from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
 from thenar.simulator.pipeline.batch import SLID_OUT_MM
 from thenar.simulator.pipeline.ramp import crossings
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import conditions_of
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.simulation import conditions_of
-from thenar.simulator.scenes.decode import load_scene
 
 from ..finding import Finding, Worst
 
@@ -38,12 +38,12 @@ def findings(full: bool) -> Iterator[Finding]:
     """Yield the changes of forces and of switches by halved steps."""
     loads = list(shipped(4 if full else 1))
     rest = Quasistatic(Parameters()).solve(loads)
-    nearer = Quasistatic(Parameters(), Pace(USUAL.rest_n / 2, USUAL.rest_nmm / 2)).solve(loads)
+    nearer = Quasistatic(Parameters(), SolverSettings(USUAL.rest_n / 2, USUAL.rest_nmm / 2)).solve(loads)
     yield _nearer(loads, rest, nearer)
-    halved = Quasistatic(Parameters(), Pace(parts=2)).solve(loads)
+    halved = Quasistatic(Parameters(), SolverSettings(parts=2)).solve(loads)
     yield _turned("quasistatic: Newton steps halved", loads, rest, halved)
     if full:
-        again = Quasistatic(Parameters(), Pace(parts=4)).solve(loads)
+        again = Quasistatic(Parameters(), SolverSettings(parts=4)).solve(loads)
         yield _turned("quasistatic: Newton steps halved again", loads, halved, again)
     yield _finer_grip(loads[:: 1 if full else 14])
 

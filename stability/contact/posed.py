@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thenar.simulator.body.hand import ABDUCTORS, BETWEEN, LIMITS_DEG, REST, Hand
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere, rotation
-from thenar.simulator.contact.balance import HOLD_N_PER_MM, HOLD_NMM_PER_RAD, LIMIT_NMM_PER_RAD, Case, Skin
+from thenar.simulator.contact.balance import HOLD_N_PER_MM, HOLD_NMM_PER_RAD, LIMIT_NMM_PER_RAD, Skin, SolverCase
 from thenar.simulator.contact.model import GRAVITY, STIFFNESS
 from thenar.simulator.contact.settle import Rest
 
@@ -125,7 +125,7 @@ class Touch(NamedTuple):
     normal: Vector
 
 
-def touches_of(case: Case, found: list[Vector], frame: Matrix, position: Vector) -> list[Touch]:
+def touches_of(case: SolverCase, found: list[Vector], frame: Matrix, position: Vector) -> list[Touch]:
     """Return all spheres of skin (50,), from their centres, for an object at `frame` and `position`."""
     touches = []
     for sphere, (centre, radius) in enumerate(zip(found, case.condition.hand.sphere_radii.tolist(), strict=True)):
@@ -148,7 +148,7 @@ def press(skin: Skin, sunk: mpf) -> mpf:
 
 
 @precisely()
-def place_error_mm(case: Case) -> mpf:
+def place_error_mm(case: SolverCase) -> mpf:
     """Bound the error of a sphere's distance from the object.
 
     Each of a finger's four turns takes sine and cosine of 2 roundings, and rounds two products and their sum: 7.4
@@ -163,7 +163,7 @@ def place_error_mm(case: Case) -> mpf:
 
 
 @precisely()
-def press_error_n(case: Case, skin: Skin, press: float) -> float:
+def press_error_n(case: SolverCase, skin: Skin, press: float) -> float:
     """Bound the error of a pressing force of at most `press` newtons: that of its depth, and 6 roundings."""
     return float(mpf(skin.press_n_per_mm) * place_error_mm(case) + 6 * ROUNDING * mpf(press))
 
@@ -190,7 +190,7 @@ class Left(NamedTuple):
 
 
 @precisely()
-def left_of(case: Case, rest: Rest, skin: Skin, k: int) -> Left:
+def left_of(case: SolverCase, rest: Rest, skin: Skin, k: int) -> Left:
     """Return the residuals of repetition k, with friction as returned, and all else from angles and pose."""
     hand, thing = case.condition.hand, case.condition.thing
     posed = digits(hand, rest.angles[:, k].tolist())
@@ -213,17 +213,17 @@ def left_of(case: Case, rest: Rest, skin: Skin, k: int) -> Left:
     )
 
 
-def _told_frame(case: Case, k: int) -> Matrix:
+def _told_frame(case: SolverCase, k: int) -> Matrix:
     return exactly(rotation(case.numbers[3:, [k]])[..., 0])
 
 
-def _turned(case: Case, k: int, frame: Matrix) -> Vector:
+def _turned(case: SolverCase, k: int, frame: Matrix) -> Vector:
     """Return sin(rotation) times its axis, from the object's initial pose: half the sum of its axes' cross products."""
     half: Vector = np.cross(_told_frame(case, k).T, frame.T).sum(axis=0) / 2
     return half
 
 
-def _is_outside(case: Case, skin: Skin, touch: Touch, pressed: mpf, drag: Vector) -> bool:
+def _is_outside(case: SolverCase, skin: Skin, touch: Touch, pressed: mpf, drag: Vector) -> bool:
     """Return whether friction is outside its limits by more than rounding.
 
     Limit, length, root, quotient and products round 8 times in all; a normal rotates by its position's error over its
@@ -235,7 +235,7 @@ def _is_outside(case: Case, skin: Skin, touch: Touch, pressed: mpf, drag: Vector
     return bool(slips or (off > 1 and abs(drag @ touch.normal) > size * (place_error_mm(case) / off + 8 * ROUNDING)))
 
 
-def _joints(case: Case, rest: Rest, k: int, posed: list[Digit], points: Matrix, forces: Matrix) -> Vector:
+def _joints(case: SolverCase, rest: Rest, k: int, posed: list[Digit], points: Matrix, forces: Matrix) -> Vector:
     """Return the residual torque on each joint: its pads', its spring's, its end stop's, and that of skin."""
     initial, now = exactly(case.angles[:, k]), exactly(rest.angles[:, k])
     low, high = map(exactly, LIMITS_DEG.T * (np.pi / 180.0))
@@ -246,7 +246,7 @@ def _joints(case: Case, rest: Rest, k: int, posed: list[Digit], points: Matrix, 
     return found
 
 
-def _grip(case: Case, k: int) -> Vector:
+def _grip(case: SolverCase, k: int) -> Vector:
     """Return the torques of the grip: every pad pushes its share into the surface at the target posture."""
     hand, grip = case.condition.hand, mpf(float(case.grip_n[k]))
     posed = digits(hand, case.angles[:, k].tolist())

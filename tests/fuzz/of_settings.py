@@ -25,11 +25,11 @@ from thenar.runtime.recording.session import Collection
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import scan_us
+from thenar.simulator.pipeline.scene_file import load_catalogue, load_scene
+from thenar.simulator.pipeline.simulation import conditions_of
+from thenar.simulator.pipeline.steps import compile_pipeline
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.pipeline import compile_pipeline
-from thenar.simulator.running.simulation import conditions_of
 from thenar.simulator.scenes import shipped
-from thenar.simulator.scenes.decode import load_catalogue, load_scene
 
 
 @cache

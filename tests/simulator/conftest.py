@@ -5,13 +5,13 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 import pytest
 
-from thenar.simulator.body.condition import Condition, Held, Pad, Thing
+from thenar.simulator.body.condition import Condition, Pad, PlannedGrasp, Thing
 from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Cylinder
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import EFFECTS, EffectParameters, Setting
-from thenar.simulator.scenes.scene import Glove, Listed, Recording, Scene, SceneObject, Subject
-from thenar.simulator.streams import Draw, Draws, Site
+from thenar.simulator.pipeline.effect import EFFECTS, EffectParameters, SceneSetting
+from thenar.simulator.scenes.scene import ListedEffect, Recording, Scene, SceneGlove, SceneObject, Subject
+from thenar.simulator.streams import Draw, DrawCounts, Site
 
 BAR = Cylinder(diameter_mm=40.0, length_mm=120.0)
 # Fingers bent round it, the thumb in opposition, order of DOF.
@@ -25,7 +25,7 @@ TIPS = tuple(Pad(7 * digit + 6, 0.2) for digit in range(5))
 
 
 def _condition(subject: str = "A", grasp: str = "PoS", thing: str = "bar", grip_n: float = 15.0) -> Condition:
-    held = Held(ROUND_IT_DEG, BESIDE_THE_PALM, TIPS, grip_n)
+    held = PlannedGrasp(ROUND_IT_DEG, BESIDE_THE_PALM, TIPS, grip_n)
     return Condition(subject, Hand(Size(185.0, 83.0)), grasp, Thing(thing, BAR, 0.1), held)
 
 
@@ -35,7 +35,7 @@ def _batch(repetitions: Iterable[int] = range(4), condition: Condition | None = 
     return Batch(condition or _condition(), numbers, 3 * numbers, np.tile(np.zeros(20), (len(numbers), 1)))
 
 
-def _setting(**changes: object) -> Setting:
+def _setting(**changes: object) -> SceneSetting:
     usual = {
         "seed": 7,
         "session_trials": 100,
@@ -47,18 +47,18 @@ def _setting(**changes: object) -> Setting:
         "timed": False,
         "on_wire": False,
     }
-    return Setting(**(usual | changes))  # type: ignore[arg-type]
+    return SceneSetting(**(usual | changes))  # type: ignore[arg-type]
 
 
 def _draw(effect: str, batch: Batch, seed: int = 7) -> Draw:
     condition = batch.condition
     site = Site(condition.subject, condition.grasp, condition.thing.name, batch.repetitions)
-    return Draw(seed, effect, site, Draws())
+    return Draw(seed, effect, site, DrawCounts())
 
 
 def _scene(effects: Sequence[str | tuple[str, EffectParameters]] = (), **changes: object) -> Scene:
     pairs = [(given, EFFECTS[given].parameters()) if isinstance(given, str) else given for given in effects]
-    listed = tuple(Listed(*pair) for pair in sorted(pairs, key=lambda pair: EFFECTS[pair[0]].order))
+    listed = tuple(ListedEffect(*pair) for pair in sorted(pairs, key=lambda pair: EFFECTS[pair[0]].order))
     usual = {
         "name": "small",
         "seed": 7,
@@ -67,7 +67,7 @@ def _scene(effects: Sequence[str | tuple[str, EffectParameters]] = (), **changes
         "subjects": (Subject(name="A", hand_length_mm=185.0, hand_breadth_mm=83.0),),
         "repetitions": 8,
         "recording": Recording(lead_ms=30.0, hold_ms=250.0, release_ms=40.0),
-        "glove": Glove(taxels=PADS if any(name.startswith("taxel.") for name, _ in pairs) else ()),
+        "glove": SceneGlove(taxels=PADS if any(name.startswith("taxel.") for name, _ in pairs) else ()),
     }
     return Scene(effects=listed, **(usual | changes))  # type: ignore[arg-type]
 
@@ -85,8 +85,8 @@ def make_batch() -> Callable[..., Batch]:
 
 
 @pytest.fixture(scope="session")
-def make_setting() -> Callable[..., Setting]:
-    """Return a function of whatever field of `Setting` is to differ."""
+def make_setting() -> Callable[..., SceneSetting]:
+    """Return a function of whatever field of `SceneSetting` is to differ."""
     return _setting
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS
-from thenar.simulator.running.pipeline import Ledger, Pipeline, compile_pipeline
+from thenar.simulator.pipeline.steps import Ledger, Pipeline, compile_pipeline
 from thenar.simulator.scenes.scene import Scene
 from thenar.simulator.streams import Draw
 

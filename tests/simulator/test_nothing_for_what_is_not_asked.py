@@ -16,7 +16,7 @@ import pytest
 
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS
-from thenar.simulator.running.pipeline import Ledger, compile_pipeline
+from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import Scene
 
 # Every scene has a contact model.
@@ -72,7 +72,7 @@ spec.loader.exec_module(small)
 
 import thenar.simulator.effects
 from thenar.simulator.pipeline.effect import EFFECTS
-from thenar.simulator.running.pipeline import Ledger, compile_pipeline
+from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
 
 batch, ledger = small._batch(range(2)), Ledger()
 tracemalloc.start()

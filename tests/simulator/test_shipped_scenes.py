@@ -1,13 +1,13 @@
 """What each shipped scene promises."""
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
-from thenar.simulator.pipeline.effect import EffectParameters
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.steps import compile_pipeline
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.scenes import shipped
-from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Scene, Subject
 
 MEN = {"A": (188, 84), "B": (196, 89), "C": (181, 81), "D": (185, 83), "E": (192, 86), "F": (199, 91)}
@@ -30,7 +30,7 @@ ADDED["initial-contact"] = ONSET
 ADDED |= {"continuous-def": IN_TIME, "continuous-rest": IN_TIME}
 
 
-def effects(scene: Scene) -> dict[str, EffectParameters]:
+def effects(scene: Scene) -> dict[str, msgspec.Struct]:
     return dict(scene.effects)
 
 
@@ -60,7 +60,7 @@ def test_a_shipped_scene_says_that_it_is_simulated_and_can_be_compiled(name: str
     assert shipped()[name].read_text().startswith("# Simulated. ")
     scene = load_scene(name)
     assert scene.name == name
-    assert compile_pipeline(scene).stops
+    assert compile_pipeline(scene).steps
 
 
 @pytest.mark.parametrize("name", shipped())

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.streams import Draw, Draws, Numbers, Site
+from thenar.simulator.streams import Draw, DrawCounts, RandomWords, Site
 from thenar.stability.reference.intervals import normal_quantile
 from thenar.stability.reference.numbers import distance
 
@@ -22,7 +22,7 @@ def draw_for(
     repetitions: list[int] | None = None,
 ) -> Draw:
     numbers = np.array([0, 1, 2] if repetitions is None else repetitions, dtype=np.int64)
-    return Draw(seed, effect, Site(subject, grasp, thing, numbers), Draws())
+    return Draw(seed, effect, Site(subject, grasp, thing, numbers), DrawCounts())
 
 
 def every_draw(draw: Draw) -> tuple[bytes, bytes, bytes]:
@@ -97,14 +97,14 @@ WORDS = st.integers(0, 2**64 - 1)
 
 @given(WORDS)
 def test_a_uniform_number_lies_strictly_between_nought_and_one_where_its_word_says(word: int) -> None:
-    (number,) = Numbers(np.array([word], dtype=np.uint64)).uniform()
+    (number,) = RandomWords(np.array([word], dtype=np.uint64)).uniform()
     assert 0.0 < number < 1.0
     assert abs(Fraction(float(number)) - Fraction(word, 2**64)) <= Fraction(1, 2**52)
 
 
 @given(WORDS)
 def test_a_normal_number_is_the_quantile_of_the_uniform_one(word: int) -> None:
-    numbers = Numbers(np.array([word], dtype=np.uint64))
+    numbers = RandomWords(np.array([word], dtype=np.uint64))
     truth = normal_quantile(float(numbers.uniform()[0]))
     # AS 241 is good to about 1e-16 of the number; a dozen roundings come on top.
     assert distance(float(numbers.normal()[0]), truth) <= 1e-15 * max(abs(float(truth)), 1e-3)
@@ -112,7 +112,7 @@ def test_a_normal_number_is_the_quantile_of_the_uniform_one(word: int) -> None:
 
 def test_normal_numbers_are_symmetric() -> None:
     words = draw_for().per_glove(1000).words
-    np.testing.assert_array_equal(Numbers(~words).normal(), -Numbers(words).normal())
+    np.testing.assert_array_equal(RandomWords(~words).normal(), -RandomWords(words).normal())
 
 
 def test_a_hundred_thousand_normal_numbers_have_the_moments_of_a_normal_law() -> None:

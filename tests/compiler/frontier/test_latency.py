@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 
 from thenar.compiler.frontier.latency import POLICIES, decided_on, latency
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.frontier.stream import Stream, stream_from
+from thenar.compiler.frontier.replay import Replay
+from thenar.compiler.movements.scores import Span
+from thenar.compiler.movements.streams import Stream
 from thenar.runtime.build import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.recogniser import LiveRecognizer
@@ -46,7 +48,15 @@ def make_tables(seed: int, joints: int = JOINTS) -> IntegerTables:
     )
 
 
-def make_stream(seed: int, grasps: int = 12) -> Stream:
+def make_replay(
+    bits: np.ndarray, codes: np.ndarray, at_us: np.ndarray, end_us: int, grasps: Iterable[tuple[int, int, int]]
+) -> Replay:
+    stream = Stream(np.arange(len(at_us)), at_us, end_us)
+    spans = tuple(Span(*grasp) for grasp in grasps)
+    return Replay(bits, codes, np.zeros((len(at_us), 0), np.uint16), stream, spans, "made up")
+
+
+def make_random_replay(seed: int, grasps: int = 12) -> Replay:
     """Grasps of random states: eight on the way to each, five while it is held, of 1 to 40 ms."""
     random = np.random.default_rng(seed)
     states = 13 * grasps
@@ -54,16 +64,11 @@ def make_stream(seed: int, grasps: int = 12) -> Stream:
     arrivals = np.arange(grasps) * 13 + 8
     held = np.repeat(random.random((grasps, SWITCHES)) < 0.5, 13, axis=0)
     codes = np.repeat(random.integers(1, 256, (grasps, JOINTS)), 13, axis=0)
-    return stream_from(
-        bits=held ^ (random.random((states, SWITCHES)) < 0.2),
-        codes=np.clip(codes + random.integers(-20, 21, codes.shape), 1, 255).astype(np.uint16),
-        at_us=at_us.astype(np.int64),
-        end_us=int(at_us[-1]) + 30_000,
-        arrivals=arrivals,
-        ends=arrivals + 5,
-        grasps=random.integers(0, CLASSES, grasps),
-        what="made up",
-    )
+    bits = held ^ (random.random((states, SWITCHES)) < 0.2)
+    codes = np.clip(codes + random.integers(-20, 21, codes.shape), 1, 255).astype(np.uint16)
+    types = random.integers(0, CLASSES, grasps)
+    spans = zip(arrivals.tolist(), (arrivals + 5).tolist(), types.tolist(), strict=True)
+    return make_replay(bits, codes, at_us.astype(np.int64), int(at_us[-1]) + 30_000, spans)
 
 
 def make_build(tables: IntegerTables) -> Build:
@@ -96,7 +101,7 @@ def policy_of(
     return None if usual is None else replace(usual, **changes[kind])
 
 
-def played_live(tables: IntegerTables, stream: Stream, step_us: int, policy: Policy | None) -> list[str]:
+def played_live(tables: IntegerTables, replay: Replay, step_us: int, policy: Policy | None) -> list[str]:
     """The grasp that the live recogniser publishes for every frame, given bytes and masks as devices deliver them, or
     that of the segment that it says is held.
     """
@@ -108,10 +113,10 @@ def played_live(tables: IntegerTables, stream: Stream, step_us: int, policy: Pol
         policy=policy or Policy(),
     )
     found = []
-    for time_us in range(int(stream.at_us[0]), int(stream.at_us[-1]), step_us):
-        state = int(np.searchsorted(stream.at_us, time_us, side="right")) - 1
-        closed = sum(1 << place for place, column in enumerate(KEPT) if stream.bits[state, column])
-        glove = GloveFrame(time_us, stream.codes[state].astype(np.uint8).tobytes()) if tables.n_joints else None
+    for time_us in range(replay.stream.start_us, replay.stream.end_us, step_us):
+        state = int(np.searchsorted(replay.stream.at_us, time_us, side="right")) - 1
+        closed = sum(1 << place for place, column in enumerate(KEPT) if replay.bits[state, column])
+        glove = GloveFrame(time_us, replay.codes[state].astype(np.uint8).tobytes()) if tables.n_joints else None
         said = live.step(time_us, 0, SwitchFrame(time_us, closed), glove).grasp
         held = said.segment_type if said.state in ("held", "releasing") else UNKNOWN
         found.append(held if policy is None else said.grasp)
@@ -131,28 +136,33 @@ def played_live(tables: IntegerTables, stream: Stream, step_us: int, policy: Pol
 def test_what_is_decided_is_what_the_live_recogniser_publishes(
     kind: Any, joints: int, seed: int, step_us: int, dwell_us: int, spacing_us: int
 ) -> None:
-    tables, stream = make_tables(seed, joints), make_stream(seed, grasps=2)
+    tables, replay = make_tables(seed, joints), make_random_replay(seed, grasps=2)
     policy = policy_of(kind, dwell_us, 0.05, spacing_us, 70_000)
-    live = played_live(tables, stream, step_us, policy)
-    found = decided_on(tables, KEPT, stream, step_us, policy)
+    live = played_live(tables, replay, step_us, policy)
+    found = decided_on(tables, KEPT, replay, step_us, policy)
     names = [UNKNOWN if number < 0 else f"grasp {number}" for number in found.at(np.arange(len(live))).tolist()]
     assert names == live
 
 
-def by_definition(tables: IntegerTables, stream: Stream, step_us: int, policy: Policy | None) -> list[float]:
+def by_definition(tables: IntegerTables, replay: Replay, step_us: int, policy: Policy | None) -> list[float]:
     """mean, p99, missed and wrong, from every frame's answer and when it is there."""
-    decided = decided_on(tables, KEPT, stream, step_us, policy)
-    count = -(-int(stream.at_us[-1] - stream.at_us[0]) // step_us)
+    decided = decided_on(tables, KEPT, replay, step_us, policy)
+    count = -(-(replay.stream.end_us - replay.stream.start_us) // step_us)
     answers = decided.at(np.arange(count)).tolist()
-    answered_us = [int(stream.at_us[0]) + (frame + 1) * step_us for frame in range(count)]
+    answered_us = [replay.stream.start_us + (frame + 1) * step_us for frame in range(count)]
 
     def answer(time_us: int) -> int:
         there = [given for given, at_us in zip(answers, answered_us, strict=True) if at_us <= time_us]
         return there[-1] if there else -1
 
     waits, wrong, left = [], 0, 0
-    for arrival, end in zip(stream.arrivals.tolist(), stream.ends.tolist(), strict=True):
-        begins_us, ends_us, right = int(stream.at_us[arrival]), int(stream.at_us[end]), int(stream.types[arrival])
+    at_us, before = [*replay.stream.at_us.tolist(), replay.stream.end_us], -1
+    counted = []
+    for arrival, end, right in replay.grasps:
+        if right != before:
+            counted.append((at_us[arrival], at_us[end], right))
+        before = right
+    for begins_us, ends_us, right in counted:
         moments = [begins_us, *(us for us in answered_us if begins_us < us < ends_us), ends_us]
         at_once = [us for us in moments if answer(us) == right]
         if at_once:
@@ -160,37 +170,29 @@ def by_definition(tables: IntegerTables, stream: Stream, step_us: int, policy: P
             spans = [(us, nxt) for us, nxt in pairwise(moments) if us >= at_once[0]]
             wrong += sum(nxt - us for us, nxt in spans if answer(us) not in (right, -1))
             left += ends_us - at_once[0]
-    missed = 1 - len(waits) / len(stream.arrivals)
+    missed = 1 - len(waits) / len(counted)
     return [sum(waits) / len(waits), sorted(waits)[math.ceil(0.99 * len(waits)) - 1], missed, wrong / left]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(5))
 def test_latency_follows_its_definition_frame_by_frame(kind: Any, seed: int) -> None:
-    tables, stream, policy = make_tables(seed), make_stream(seed), policy_of(kind, 15_000, 0.2)
-    found = latency(tables, KEPT, stream, 2_500.2, policy)
+    tables, replay, policy = make_tables(seed), make_random_replay(seed), policy_of(kind, 15_000, 0.2)
+    found = latency(tables, KEPT, replay, 2_500.2, policy)
     assert [found.mean_us, found.p99_us, found.missed, found.wrong] == pytest.approx(
-        by_definition(tables, stream, 2_500, policy)
+        by_definition(tables, replay, 2_500, policy)
     )
 
 
-def two_grasps(flicker: bool = False) -> tuple[IntegerTables, Stream]:
+def two_grasps(flicker: bool = False) -> tuple[IntegerTables, Replay]:
     """Class 0 for a second, its switch open; class 1 for a second, its switch closed from the arrival on."""
     rows = np.array([[-400, 400]], np.int16)
     none = np.zeros((0, 2), np.int16)
     tables = IntegerTables(np.array([200, -200], np.int16), rows, (), (), rows // 2, none, 100.0)
     closed = [False, True, not flicker, True]
-    stream = stream_from(
-        bits=np.array([closed]).T,
-        codes=np.zeros((4, 0), np.uint16),
-        at_us=np.array([0, 1_000_300, 1_500_300, 1_600_300]),
-        end_us=2_000_300,
-        arrivals=np.array([0, 1]),
-        ends=np.array([1, 4]),
-        grasps=np.array([0, 1]),
-        what="",
-    )
-    return tables, stream
+    at_us = np.array([0, 1_000_300, 1_500_300, 1_600_300])
+    codes = np.zeros((4, 0), np.uint16)
+    return tables, make_replay(np.array([closed]).T, codes, at_us, 2_000_300, [(0, 1, 0), (1, 4, 1)])
 
 
 @pytest.mark.parametrize(
@@ -207,36 +209,36 @@ def two_grasps(flicker: bool = False) -> tuple[IntegerTables, Stream]:
     ],
 )
 def test_latencies_that_can_be_said_ahead(policy: Policy | None, first: int, second: int) -> None:
-    tables, stream = two_grasps()
-    found = latency(tables, (0,), stream, 1_000, policy)
+    tables, replay = two_grasps()
+    found = latency(tables, (0,), replay, 1_000, policy)
     assert found.p99_us == second
     assert found.mean_us == (first + second) / 2
     assert (found.missed, found.wrong) == (0, 0)
 
 
 def test_shorter_frames_are_played_once_a_millisecond_and_take_their_own_time() -> None:
-    tables, stream = two_grasps()
-    found = latency(tables, (0,), stream, 200, POLICIES["single"])
+    tables, replay = two_grasps()
+    found = latency(tables, (0,), replay, 200, POLICIES["single"])
     # The frame at 1001 ms is the first that sees the second grasp.
     assert (found.mean_us, found.p99_us) == ((200 + 900) / 2, 900)
 
 
 def test_where_all_grasps_are_missed_latency_is_how_long_the_longest_lasted() -> None:
-    tables, stream = two_grasps()
-    found = latency(tables, (0,), stream, 3_000_000, POLICIES["single"])
+    tables, replay = two_grasps()
+    found = latency(tables, (0,), replay, 3_000_000, POLICIES["single"])
     assert (found.mean_us, found.p99_us, found.missed) == (1_000_300, 1_000_300, 1)
 
 
-def wrong_class(stream: Stream) -> Stream:
-    return Stream(stream.bits, stream.codes, stream.at_us, stream.types + 9, stream.arrivals, stream.ends)
+def wrong_class(replay: Replay) -> Replay:
+    return replace(replay, grasps=tuple(grasp._replace(state=grasp.state + 9) for grasp in replay.grasps))
 
 
-def without_grasps(stream: Stream) -> Stream:
-    return Stream(stream.bits, stream.codes, stream.at_us, stream.types, stream.arrivals[:0], stream.ends[:0])
+def without_grasps(replay: Replay) -> Replay:
+    return replace(replay, grasps=())
 
 
-def without_a_joint(stream: Stream) -> Stream:
-    return Stream(stream.bits, stream.codes[:, 1:], stream.at_us, stream.types, stream.arrivals, stream.ends)
+def without_a_joint(replay: Replay) -> Replay:
+    return replace(replay, codes=replay.codes[:, 1:])
 
 
 @pytest.mark.parametrize(
@@ -253,8 +255,8 @@ def without_a_joint(stream: Stream) -> Stream:
     ],
 )
 def test_what_does_not_fit_is_refused(
-    columns: tuple[int, ...], change: Callable[[Stream], Stream] | None, frame_us: float, says: str
+    columns: tuple[int, ...], change: Callable[[Replay], Replay] | None, frame_us: float, says: str
 ) -> None:
-    stream = make_stream(0)
+    replay = make_random_replay(0)
     with pytest.raises(FrontierError, match=says):
-        latency(make_tables(0), columns, change(stream) if change else stream, frame_us, POLICIES["single"])
+        latency(make_tables(0), columns, change(replay) if change else replay, frame_us, POLICIES["single"])

@@ -13,8 +13,8 @@ from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.find import FRONTIER_NAME, find_frontier
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.points import Frontier, PlacementChoice, Point
+from thenar.compiler.frontier.replay import replay_of
 from thenar.compiler.frontier.search import TAXEL_LEVELS, Candidate, Search
-from thenar.compiler.frontier.stream import Stream, stream_of
 from thenar.compiler.frontier.survey import Cuts, Survey
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY
@@ -118,13 +118,13 @@ def test_levels_of_a_fold_come_from_its_training_rows_alone(pressed: GraspSet, t
 
 
 def test_a_composed_stream_presses_taxels_as_trials_do(pressed: GraspSet) -> None:
-    stream = stream_of(pressed, pressed.labels, seed=1, grasps=9)
-    held = stream.taxels[stream.arrivals]
+    replay = replay_of(pressed, pressed.labels, seed=1, grasps=9)
+    held = replay.taxels[[grasp.start for grasp in replay.grasps]]
     assert all(any((row == trial).all() for trial in pressed.taxels) for row in held)
     rest = np.sort(pressed.taxels, axis=0)[int(0.05 * (len(pressed) - 1))]
-    assert (stream.taxels.min(axis=0) <= rest).all()
-    bits = stream.with_elements(elements_of(Samples.of(pressed), 3))
-    assert isinstance(bits, Stream)
-    assert bits.bits.shape == (len(stream), len(elements_of(Samples.of(pressed), 3)))
+    assert (replay.taxels.min(axis=0) <= rest).all()
+    elements = elements_of(Samples.of(pressed), 3)
+    bits = replay.reading(elements, ()).bits
+    assert bits.shape == (len(replay.stream), len(elements))
     # Levels of one taxel are nested: above a higher threshold is above a lower one.
-    assert not (bits.bits[:, 3] & ~bits.bits[:, 2]).any()
+    assert not (bits[:, 3] & ~bits[:, 2]).any()

@@ -14,9 +14,9 @@ from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.preshape import Preshape, PreshapeSelector, PreshapeTable
 from thenar.runtime.published import NONE, LiveGrasp
 from thenar.simulator.body.cyberglove import SENSORS
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import simulate
 from thenar.simulator.playing.performance import of_set
-from thenar.simulator.running.simulation import simulate
-from thenar.simulator.scenes.decode import load_scene
 
 PERIOD_US = 10_000
 

@@ -11,7 +11,7 @@ import pytest
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.hand import CAPSULES, LIMITS_DEG, Hand, Size
-from thenar.simulator.contact.balance import Case
+from thenar.simulator.contact.balance import SolverCase
 from thenar.simulator.contact.model import Load
 from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
 
@@ -51,7 +51,7 @@ def jaccard(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def test_two_programs_agree_on_one_grasp_better_than_one_program_on_two(
-    oracle: ModuleType, planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., Case]
+    oracle: ModuleType, planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., SolverCase]
 ) -> None:
     loads = []
     for condition in planned["kamakura"]:

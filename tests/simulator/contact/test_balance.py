@@ -14,8 +14,8 @@ from thenar.simulator.contact.balance import (
     HOLD_NMM_PER_RAD,
     LIMIT_NMM_PER_RAD,
     Balance,
-    Case,
     Skin,
+    SolverCase,
     command,
 )
 from thenar.simulator.contact.model import STIFFNESS
@@ -27,7 +27,7 @@ GRASPS = ("PoS", "PoH", "CMF", "PMF", "PE")
 def balance(
     request: pytest.FixtureRequest,
     by_grasp: dict[str, Condition],
-    make_case: Callable[..., Case],
+    make_case: Callable[..., SolverCase],
     skin: Skin,
 ) -> Balance:
     """Hands a little off where they were told to be, so that skin is both pressed and dragged."""

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.simulator.body.condition import Condition, Held, Pad, Thing
+from thenar.simulator.body.condition import Condition, Pad, PlannedGrasp, Thing
 from thenar.simulator.body.hand import LIMITS_DEG, Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Pose, Shape, Sphere
 from thenar.simulator.contact.model import torques
@@ -24,7 +24,7 @@ STEP = 1e-5
 
 
 def condition(shape: Shape, pads: tuple[Pad, ...]) -> Condition:
-    held = Held(np.zeros(20), POSE, pads, 10.0)
+    held = PlannedGrasp(np.zeros(20), POSE, pads, 10.0)
     return Condition("A", HAND, "PoS", Thing("thing", shape, 0.1), held)
 
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from thenar.simulator.body.condition import Condition, Held, Pad, Thing
+from thenar.simulator.body.condition import Condition, Pad, PlannedGrasp, Thing
 from thenar.simulator.body.hand import LIMITS_DEG, Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.contact.balance import Balance, Case, Skin, command
+from thenar.simulator.contact.balance import Balance, Skin, SolverCase, command
 from thenar.simulator.contact.settle import newton_step, stiffness
 
 HAND = Hand(Size(185.0, 83.0))
@@ -67,9 +67,9 @@ def touched(sphere: int, shape: Shape, angles: np.ndarray, way: np.ndarray, sunk
     axes = np.stack([side, np.cross(-way, side), -way], axis=1)
     depth = shape.extent_mm()[2] / 2 + HAND.sphere_radii[sphere] - sunk
     pose = np.concatenate([centre + depth * way, Rotation.from_matrix(axes).as_rotvec()])
-    held = Held(np.degrees(angles), pose, (Pad(sphere, 1.0),), 0.0)
+    held = PlannedGrasp(np.degrees(angles), pose, (Pad(sphere, 1.0),), 0.0)
     condition = Condition("A", HAND, "touch", Thing("thing", shape, 0.0), held)
-    told = command([Case(condition, angles[:, None], pose[:, None], np.zeros(1))])
+    told = command([SolverCase(condition, angles[:, None], pose[:, None], np.zeros(1))])
     return Balance(told, skin, told.angles, told.pose, 2.0)
 
 
@@ -106,7 +106,7 @@ def test_shifting_an_object_is_resisted_exactly_even_where_its_surface_bends(sha
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["kamakura", "cutkosky"])
 def test_on_planned_grasps_the_matrix_is_near_the_differences(
-    scene: str, planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., Case], skin: Skin
+    scene: str, planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., SolverCase], skin: Skin
 ) -> None:
     off = []
     for condition in planned[scene]:
@@ -123,7 +123,7 @@ def test_on_planned_grasps_the_matrix_is_near_the_differences(
 
 
 def test_the_matrix_is_positive_definite_on_planned_grasps(
-    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., Case], skin: Skin
+    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., SolverCase], skin: Skin
 ) -> None:
     for condition in (*planned["kamakura"], *planned["cutkosky"]):
         told = command([make_case(condition, 1)])
@@ -131,7 +131,7 @@ def test_the_matrix_is_positive_definite_on_planned_grasps(
 
 
 def test_a_step_solves_the_matrix_or_a_part_of_it(
-    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., Case], skin: Skin
+    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., SolverCase], skin: Skin
 ) -> None:
     for condition in planned["kamakura"]:
         told = command([make_case(condition, 1)])
@@ -144,7 +144,7 @@ def test_a_step_solves_the_matrix_or_a_part_of_it(
 
 
 def test_no_step_is_longer_than_joints_and_objects_may_move_at_once(
-    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., Case], skin: Skin
+    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., SolverCase], skin: Skin
 ) -> None:
     for condition in planned["cutkosky"]:
         told = command([make_case(condition, 8, share=3.0)])

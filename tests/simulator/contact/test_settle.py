@@ -8,12 +8,12 @@ import pytest
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.shapes import Sphere
-from thenar.simulator.contact.balance import HOLD_N_PER_MM, USUAL, Case, Pace, Skin
+from thenar.simulator.contact.balance import HOLD_N_PER_MM, USUAL, Skin, SolverCase, SolverSettings
 from thenar.simulator.contact.model import GRAVITY
 from thenar.simulator.contact.settle import Rest, close
 
 MOST_STEPS = 40
-Cases = Callable[..., Case]
+Cases = Callable[..., SolverCase]
 Planned = dict[str, tuple[Condition, ...]]
 
 
@@ -38,18 +38,18 @@ def assert_same(one: Rest, other: Rest, place: int, first: int = 0) -> None:
 
 
 @pytest.fixture(scope="module")
-def every(planned: Planned, make_case: Cases, skin: Skin) -> list[tuple[Case, Rest]]:
+def every(planned: Planned, make_case: Cases, skin: Skin) -> list[tuple[SolverCase, Rest]]:
     """Every grasp type and object of both taxonomies, four repetitions each."""
     cases = [make_case(condition, 4, seed) for scene in planned.values() for seed, condition in enumerate(scene)]
     return list(zip(cases, close(cases, skin, MOST_STEPS), strict=True))
 
 
-def test_nearly_every_hand_comes_to_rest(every: list[tuple[Case, Rest]]) -> None:
+def test_nearly_every_hand_comes_to_rest(every: list[tuple[SolverCase, Rest]]) -> None:
     settled = np.concatenate([rest.settled for _, rest in every])
     assert settled.mean() > 0.97
 
 
-def test_skin_and_weight_balance_but_for_a_small_share_of_the_load(every: list[tuple[Case, Rest]]) -> None:
+def test_skin_and_weight_balance_but_for_a_small_share_of_the_load(every: list[tuple[SolverCase, Rest]]) -> None:
     shares = []
     for case, rest in every:
         load = case.grip_n + case.condition.thing.mass_kg * GRAVITY
@@ -97,7 +97,7 @@ def test_a_hand_that_meets_nothing_and_presses_nothing_stays_as_told(
     assert not rest.residual_n.any()
 
 
-def test_a_hand_that_is_not_given_the_steps_is_marked(every: list[tuple[Case, Rest]], skin: Skin) -> None:
+def test_a_hand_that_is_not_given_the_steps_is_marked(every: list[tuple[SolverCase, Rest]], skin: Skin) -> None:
     cases = [case for case, _ in every][:8]
     for most_steps in (1, 2):
         for rest in close(cases, skin, most_steps):
@@ -106,20 +106,21 @@ def test_a_hand_that_is_not_given_the_steps_is_marked(every: list[tuple[Case, Re
 
 
 def test_steps_in_parts_are_counted_by_the_part_and_given_as_many_more(
-    every: list[tuple[Case, Rest]], skin: Skin
+    every: list[tuple[SolverCase, Rest]], skin: Skin
 ) -> None:
     cases = [case for case, _ in every][:8]
-    for rest in close(cases, skin, 2, Pace(parts=3)):
+    for rest in close(cases, skin, 2, SolverSettings(parts=3)):
         assert (rest.steps[~rest.settled] == 6).all()
         assert not rest.settled.any()
     whole, parts = (
-        np.concatenate([rest.steps for rest in close(cases, skin, MOST_STEPS, pace)]) for pace in (USUAL, Pace(parts=2))
+        np.concatenate([rest.steps for rest in close(cases, skin, MOST_STEPS, pace)])
+        for pace in (USUAL, SolverSettings(parts=2))
     )
     assert np.median(parts) > np.median(whole)
 
 
-def test_a_stricter_rest_is_reached_and_leaves_less(every: list[tuple[Case, Rest]], skin: Skin) -> None:
-    cases, strict = [case for case, _ in every], Pace(USUAL.rest_n / 100, USUAL.rest_nmm / 100)
+def test_a_stricter_rest_is_reached_and_leaves_less(every: list[tuple[SolverCase, Rest]], skin: Skin) -> None:
+    cases, strict = [case for case, _ in every], SolverSettings(USUAL.rest_n / 100, USUAL.rest_nmm / 100)
     for case, rest in zip(cases, close(cases, skin, MOST_STEPS, strict), strict=True):
         shift = rest.pose.position - case.numbers[:3]
         held = HOLD_N_PER_MM * np.sqrt((shift * shift).sum(axis=0))
@@ -146,11 +147,11 @@ def test_a_repetition_comes_out_the_same_in_any_number(
         (together,) = close([case], skin, MOST_STEPS)
         for one in range(min(n, 4)):
             own = slice(one, one + 1)
-            alone = Case(case.condition, case.angles[:, own], case.numbers[:, own], case.grip_n[own])
+            alone = SolverCase(case.condition, case.angles[:, own], case.numbers[:, own], case.grip_n[own])
             assert_same(close([alone], skin, MOST_STEPS)[0], together, one)
 
 
-def test_a_case_comes_out_the_same_in_any_company_and_order(every: list[tuple[Case, Rest]], skin: Skin) -> None:
+def test_a_case_comes_out_the_same_in_any_company_and_order(every: list[tuple[SolverCase, Rest]], skin: Skin) -> None:
     some = [every[number] for number in (0, 11, 23, 30, 45, 59)]
     for order in ((5, 3, 1), (0, 2), (4, 5, 0, 1, 2, 3)):
         for number, rest in zip(order, close([some[k][0] for k in order], skin, MOST_STEPS), strict=True):

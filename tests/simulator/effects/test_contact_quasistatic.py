@@ -10,10 +10,10 @@ from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.shapes import Pose
 from thenar.simulator.contact.model import Contact, ContactModel, Load
 from thenar.simulator.effects.contact_quasistatic import Parameters, model
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.effect import SceneSetting
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import sessions
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.simulation import sessions
-from thenar.simulator.scenes.decode import load_scene
 
 FIELDS = ("posture_deg", "pose", "forces_n", "capsules_n", "between_n", "settled", "residual_n", "residual_nmm")
 
@@ -31,7 +31,7 @@ def conditions() -> list[Condition]:
 
 
 @pytest.fixture(scope="module")
-def default(make_setting: Callable[..., Setting]) -> ContactModel:
+def default(make_setting: Callable[..., SceneSetting]) -> ContactModel:
     return model(Parameters(), make_setting())
 
 
@@ -100,7 +100,7 @@ def test_a_pose_at_rest_is_where_the_object_is_felt(conditions: list[Condition],
 
 
 def test_a_switch_that_reaches_further_feels_more(
-    conditions: list[Condition], make_setting: Callable[..., Setting]
+    conditions: list[Condition], make_setting: Callable[..., SceneSetting]
 ) -> None:
     told = [load(condition) for condition in conditions]
     lost = [
@@ -111,7 +111,7 @@ def test_a_switch_that_reaches_further_feels_more(
 
 
 def test_what_does_not_come_to_rest_is_marked(
-    conditions: list[Condition], make_setting: Callable[..., Setting]
+    conditions: list[Condition], make_setting: Callable[..., SceneSetting]
 ) -> None:
     (contact,) = model(Parameters(most_steps=1), make_setting()).solve([load(conditions[0])])
     assert not contact.settled.any()
@@ -123,7 +123,7 @@ def test_what_does_not_come_to_rest_is_marked(
 @pytest.mark.parametrize("drag_n_per_mm", [5e-324, 1000.0])
 def test_skins_at_the_ends_of_what_may_be_asked_for_come_to_numbers(
     conditions: list[Condition],
-    make_setting: Callable[..., Setting],
+    make_setting: Callable[..., SceneSetting],
     press_n_per_mm: float,
     soft_mm: float,
     drag_n_per_mm: float,

@@ -7,15 +7,15 @@ import pytest
 
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.running.pipeline import Ledger, compile_pipeline
-from thenar.simulator.scenes.scene import Glove, Recording, Scene
+from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
+from thenar.simulator.scenes.scene import Recording, Scene, SceneGlove
 
 PRESSED = Recording(rows="all", rate_hz=20.0, hold_ms=300.0)  # seven frames
 
 
 def simulated(make_scene: Callable[..., Scene], make_batch: Callable[..., Batch], *effects: str) -> Batch:
     batch = make_batch(range(4))
-    scene = make_scene(list(effects), recording=PRESSED, glove=Glove(taxels="all"))
+    scene = make_scene(list(effects), recording=PRESSED, glove=SceneGlove(taxels="all"))
     compile_pipeline(scene).run([batch], Ledger())
     return batch
 

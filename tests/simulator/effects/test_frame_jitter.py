@@ -6,12 +6,14 @@ import pytest
 
 from thenar.simulator.effects.frame_jitter import Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting, frame_times
+from thenar.simulator.pipeline.effect import SceneSetting, frame_times
 
 MakeBatch = Callable[..., Batch]
 
 
-def jittered(make_batch: MakeBatch, make_draw: Callable, setting: Setting, sd_us: float, rows: range) -> np.ndarray:
+def jittered(
+    make_batch: MakeBatch, make_draw: Callable, setting: SceneSetting, sd_us: float, rows: range
+) -> np.ndarray:
     batch = make_batch(rows)
     batch.frame_us = np.tile(frame_times(setting), (len(batch), 1))
     prepare(Parameters(sd_us=sd_us), setting)(batch, make_draw("frame.jitter", batch))

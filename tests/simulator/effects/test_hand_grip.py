@@ -6,12 +6,12 @@ import numpy as np
 
 from thenar.simulator.effects.hand_grip import MEMBER, Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
 
 
 def test_grip_is_lognormal_about_what_was_planned(
-    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., Setting]
+    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., SceneSetting]
 ) -> None:
     batch = make_batch(range(4000))
     batch.grip_n = np.full(4000, 12.0)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from thenar.simulator.effects.hand_object_pose import MEMBER, Parameters, prepare, turned
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
 
 VECTORS = arrays(np.float64, (3, 3), elements=st.floats(-1.8, 1.8))  # up to half a turn
@@ -40,7 +40,7 @@ def test_it_holds_next_to_no_rotation_and_about_half_a_turn(length: float) -> No
 
 
 def test_places_and_turns_vary_as_much_as_is_asked(
-    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., Setting]
+    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., SceneSetting]
 ) -> None:
     batch = make_batch(range(2000))
     held = batch.condition.held.pose
@@ -56,7 +56,7 @@ def test_places_and_turns_vary_as_much_as_is_asked(
 
 
 def test_either_can_be_left_out(
-    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., Setting]
+    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., SceneSetting]
 ) -> None:
     for parameters, still in ((Parameters(sd_mm=0.0), slice(0, 3)), (Parameters(sd_deg=0.0), slice(3, 6))):
         batch = make_batch()

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from thenar.simulator.body.hand import LIMITS_DEG
 from thenar.simulator.effects.hand_posture import MEMBER, Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
 
 
 def shifted(
-    make_batch: Callable[..., Batch], draw: Callable[..., Draw], setting: Setting, sd_deg: float, n: int
+    make_batch: Callable[..., Batch], draw: Callable[..., Draw], setting: SceneSetting, sd_deg: float, n: int
 ) -> Batch:
     batch = make_batch(range(n))
     batch.posture_deg = np.tile(batch.condition.held.posture_deg, (n, 1))
@@ -23,7 +23,7 @@ def shifted(
 
 
 def test_each_angle_varies_as_much_as_is_asked_and_by_itself(
-    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., Setting]
+    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., SceneSetting]
 ) -> None:
     batch = shifted(make_batch, make_draw, make_setting(), 1.5, 2000)
     off = batch.posture_deg - batch.condition.held.posture_deg
@@ -38,7 +38,7 @@ def test_each_angle_varies_as_much_as_is_asked_and_by_itself(
 def test_no_joint_leaves_its_range(
     make_batch: Callable[..., Batch],
     make_draw: Callable[..., Draw],
-    make_setting: Callable[..., Setting],
+    make_setting: Callable[..., SceneSetting],
     sd_deg: float,
 ) -> None:
     posture = shifted(make_batch, make_draw, make_setting(), sd_deg, 5).posture_deg

@@ -9,7 +9,7 @@ from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.hand import LIMITS_DEG
 from thenar.simulator.effects.hand_style import MEMBER, Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
 
 # Far from all limits, so that nothing is clipped unless a test wants it.
@@ -22,7 +22,7 @@ def style(
     make_batch: Callable[..., Batch],
     make_condition: Callable[..., Condition],
     make_draw: Callable[..., Draw],
-    make_setting: Callable[..., Setting],
+    make_setting: Callable[..., SceneSetting],
 ) -> Styler:
     """Return a function of subject, grasp, thing that returns how far posture is off (n, 20) and grip's factor (n,)."""
 

@@ -10,7 +10,7 @@ from thenar.simulator.body.hand import DOF, LIMITS_DEG
 from thenar.simulator.effects.hand_transition import Parameters, path, prepare
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.effect import SceneSetting
 
 MakeBatch = Callable[..., Batch]
 
@@ -71,7 +71,9 @@ def test_without_opening_it_is_the_minimum_jerk_path() -> None:
     assert angles[7] == pytest.approx(15.0)
 
 
-def moved(make_batch: MakeBatch, make_draw: Callable, setting: Setting, frame_us: np.ndarray, rows: range) -> tuple:
+def moved(
+    make_batch: MakeBatch, make_draw: Callable, setting: SceneSetting, frame_us: np.ndarray, rows: range
+) -> tuple:
     batch, random = make_batch(rows), np.random.default_rng(1)
     every = random.uniform(0.0, 60.0, (100, 2, 20))
     batch.previous_deg, batch.posture_deg = every[batch.repetitions, 0], every[batch.repetitions, 1]

@@ -8,7 +8,7 @@ import pytest
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.effects.joint_drift import MEMBER, Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
 
 Drift = Callable[..., np.ndarray]
@@ -19,7 +19,7 @@ def drift(
     make_batch: Callable[..., Batch],
     make_condition: Callable[..., Condition],
     make_draw: Callable[..., Draw],
-    make_setting: Callable[..., Setting],
+    make_setting: Callable[..., SceneSetting],
 ) -> Drift:
     """Return a function of subject and trials of 100 that returns what is added (n, 2 frames, 18)."""
 

@@ -7,7 +7,7 @@ import pytest
 
 from thenar.simulator.effects.joint_noise import MEMBER, Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting, frame_times
+from thenar.simulator.pipeline.effect import SceneSetting, frame_times
 from thenar.simulator.streams import Draw
 
 Noise = Callable[..., np.ndarray]
@@ -15,7 +15,7 @@ Noise = Callable[..., np.ndarray]
 
 @pytest.fixture(scope="session")
 def noise(
-    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., Setting]
+    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., SceneSetting]
 ) -> Noise:
     """Return a function of n, timed and parameters that returns what is added (n, F, 18)."""
 

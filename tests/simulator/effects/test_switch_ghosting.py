@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from thenar.simulator.effects import port_dead, switch_stuck_closed, switch_stuck_open
 from thenar.simulator.effects.switch_ghosting import Parameters, joined, prepare
-from thenar.simulator.running.pipeline import Ledger, compile_pipeline
-from thenar.simulator.scenes.scene import Glove
+from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
+from thenar.simulator.scenes.scene import SceneGlove
 
 
 def searched(bits: np.ndarray) -> np.ndarray:
@@ -70,6 +70,6 @@ def test_current_flows_through_stuck_switches_and_dead_ports(
 ) -> None:
     """Row 1, columns 2 and 7, and row 5, column 2; the threshold is so high that the hand closes nothing."""
     batch, effects = make_batch(range(1)), ["switch.ghosting", *others]
-    glove = Glove(threshold_n=20.0)
+    glove = SceneGlove(threshold_n=20.0)
     compile_pipeline(make_scene(effects, glove=glove)).run([batch], Ledger())
     assert np.flatnonzero(batch.bits[0, 0]).tolist() == reads

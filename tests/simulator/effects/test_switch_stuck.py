@@ -13,7 +13,7 @@ from thenar.simulator.body.layout import murakami160
 from thenar.simulator.effects import switch_stuck_closed, switch_stuck_open
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
 
 BOTH = [(switch_stuck_open, False), (switch_stuck_closed, True)]
@@ -26,7 +26,7 @@ def read(
     make_batch: Callable[..., Batch],
     make_condition: Callable[..., Condition],
     make_draw: Callable[..., Draw],
-    make_setting: Callable[..., Setting],
+    make_setting: Callable[..., SceneSetting],
 ) -> Read:
     """Return a function of modules with parameters, and of a subject: what is read of random bits (3, 2, 160)."""
 
@@ -97,7 +97,7 @@ def test_open_and_closed_ones_are_drawn_apart_and_closed_wins(read: Read) -> Non
     ],
 )
 def test_switches_that_are_not_there_are_refused_with_the_place(
-    module: object, value: bool, parameters: dict, words: tuple[str, ...], make_setting: Callable[..., Setting]
+    module: object, value: bool, parameters: dict, words: tuple[str, ...], make_setting: Callable[..., SceneSetting]
 ) -> None:
     given = module.Parameters(**parameters)  # type: ignore[attr-defined]
     with pytest.raises(SceneError) as caught:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.effects.switch_threshold import LEAST_N, MEMBER, Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
 
 Thresholds = Callable[..., np.ndarray]
@@ -21,7 +21,7 @@ def thresholds(
     make_batch: Callable[..., Batch],
     make_condition: Callable[..., Condition],
     make_draw: Callable[..., Draw],
-    make_setting: Callable[..., Setting],
+    make_setting: Callable[..., SceneSetting],
 ) -> Thresholds:
     """Return a function of a subject and sd_n that returns the thresholds (160,) about 1 N."""
 

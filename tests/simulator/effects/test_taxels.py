@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import EFFECTS, Setting
+from thenar.simulator.pipeline.effect import EFFECTS, SceneSetting
 from thenar.simulator.streams import Draw
 
 FRAMES, PADS = 5, 40
@@ -25,7 +25,7 @@ def acted(
     make_batch: Callable[..., Batch],
     make_condition: Callable[..., Condition],
     make_draw: Callable[..., Draw],
-    make_setting: Callable[..., Setting],
+    make_setting: Callable[..., SceneSetting],
 ) -> Acted:
     """Return a function of an effect's name, forces (n, F, t) and parameters that returns what it makes of them.
 

@@ -5,18 +5,23 @@ import numpy as np
 import pytest
 
 from thenar.simulator.effects.wire_lost_bytes import Parameters, arrives, prepare
-from thenar.simulator.pipeline.batch import Batch, Traffic
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.batch import Batch, SerialTraffic
+from thenar.simulator.pipeline.effect import SceneSetting
 
 MakeBatch = Callable[..., Batch]
 
 
 def through(
-    make_batch: MakeBatch, make_draw: Callable, setting: Setting, shape: tuple[int, int], rows: range, rate: float = 0.2
+    make_batch: MakeBatch,
+    make_draw: Callable,
+    setting: SceneSetting,
+    shape: tuple[int, int],
+    rows: range,
+    rate: float = 0.2,
 ) -> np.ndarray:
     batch = make_batch(rows)
     zeros = np.zeros((len(batch), *shape), dtype=np.uint8)
-    batch.traffic = Traffic(zeros, zeros.astype(np.int64), np.ones(zeros.shape, dtype=np.bool_), 26)
+    batch.traffic = SerialTraffic(zeros, zeros.astype(np.int64), np.ones(zeros.shape, dtype=np.bool_), 26)
     before = batch.traffic
     prepare(Parameters(rate=rate), setting)(batch, make_draw("wire.lost_bytes", batch))
     assert batch.traffic.data is before.data
@@ -38,7 +43,7 @@ def test_the_share_that_is_lost_is_the_rate(make_batch: MakeBatch, make_draw: Ca
 def test_what_was_lost_before_stays_lost(make_batch: MakeBatch, make_draw: Callable, make_setting: Callable) -> None:
     batch = make_batch(range(2))
     data = np.zeros((2, 1, 46), dtype=np.uint8)
-    batch.traffic = Traffic(data, data.astype(np.int64), np.zeros(data.shape, dtype=np.bool_), 26)
+    batch.traffic = SerialTraffic(data, data.astype(np.int64), np.zeros(data.shape, dtype=np.bool_), 26)
     prepare(Parameters(), make_setting())(batch, make_draw("wire.lost_bytes", batch))
     assert not batch.traffic.arrives.any()
 

@@ -6,13 +6,15 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.pipeline.effect import Setting, at_a_time, drawn_rows, frame_times, hold_frame
+from thenar.simulator.pipeline.effect import SceneSetting, at_a_time, drawn_rows, frame_times, hold_frame
 
 PERIODS = st.integers(1_000, 30_000)
 TIMES = st.integers(0, 200_000)
 
 
-def test_without_time_there_is_the_frame_that_is_read_out_and_no_other(make_setting: Callable[..., Setting]) -> None:
+def test_without_time_there_is_the_frame_that_is_read_out_and_no_other(
+    make_setting: Callable[..., SceneSetting],
+) -> None:
     setting = make_setting(timed=False)
     assert frame_times(setting).tolist() == [setting.hold_us]
     assert hold_frame(setting) == 0
@@ -21,7 +23,7 @@ def test_without_time_there_is_the_frame_that_is_read_out_and_no_other(make_sett
 
 @given(period=PERIODS, lead=TIMES, hold=TIMES, release=TIMES)
 def test_frames_are_a_period_apart_between_the_ends_and_one_is_at_the_end_of_holding(
-    make_setting: Callable[..., Setting], period: int, lead: int, hold: int, release: int
+    make_setting: Callable[..., SceneSetting], period: int, lead: int, hold: int, release: int
 ) -> None:
     setting = make_setting(timed=True, period_us=period, first_us=-lead, hold_us=hold, release_us=release)
     times = frame_times(setting)
@@ -33,7 +35,7 @@ def test_frames_are_a_period_apart_between_the_ends_and_one_is_at_the_end_of_hol
 
 @given(period=PERIODS, lead=TIMES, hold=TIMES, release=TIMES)
 def test_every_frame_draws_a_row_of_its_own_and_the_one_read_out_the_first(
-    make_setting: Callable[..., Setting], period: int, lead: int, hold: int, release: int
+    make_setting: Callable[..., SceneSetting], period: int, lead: int, hold: int, release: int
 ) -> None:
     setting = make_setting(timed=True, period_us=period, first_us=-lead, hold_us=hold, release_us=release)
     rows = drawn_rows(setting)
@@ -43,7 +45,7 @@ def test_every_frame_draws_a_row_of_its_own_and_the_one_read_out_the_first(
 
 @given(period=PERIODS, hold=st.integers(1, 60_000_000), few=st.integers(1, 1000), more=st.integers(0, 1000))
 def test_the_more_frames_the_fewer_repetitions_at_a_time_but_never_none(
-    make_setting: Callable[..., Setting], period: int, hold: int, few: int, more: int
+    make_setting: Callable[..., SceneSetting], period: int, hold: int, few: int, more: int
 ) -> None:
     setting = make_setting(timed=True, period_us=period, hold_us=hold)
     frames = len(frame_times(setting))

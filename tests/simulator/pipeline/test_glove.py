@@ -11,12 +11,12 @@ from hypothesis.extra.numpy import arrays
 from thenar.simulator.body.cyberglove import Calibration, sensors_deg
 from thenar.simulator.pipeline import glove
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting, frame_times
+from thenar.simulator.pipeline.effect import SceneSetting, frame_times
 from thenar.simulator.pipeline.ramp import NEVER
 from thenar.simulator.streams import Draw
 
 BatchMaker = Callable[..., Batch]
-SettingMaker = Callable[..., Setting]
+SettingMaker = Callable[..., SceneSetting]
 DrawMaker = Callable[..., Draw]
 FORCES = arrays(np.float64, (2, 5), elements=st.sampled_from([0.0, 0.999, 1.0, 1.001, 4.0]))
 
@@ -26,7 +26,7 @@ def take(make_draw: DrawMaker) -> Callable[..., None]:
     """Return a function that takes a batch through one of the glove's own steps, which draws nothing."""
     steps = {effect.name: effect for effect in glove.STEPS}
 
-    def run(name: str, batch: Batch, setting: Setting) -> None:
+    def run(name: str, batch: Batch, setting: SceneSetting) -> None:
         draw = make_draw(name, batch)
         effect = steps[name]
         assert effect.prepare is not None

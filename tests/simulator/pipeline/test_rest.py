@@ -17,12 +17,12 @@ from thenar.simulator.body.cyberglove import USED, sensors_deg
 from thenar.simulator.body.hand import LIMITS_DEG, RESTS_DEG
 from thenar.simulator.effects import hand_posture, hand_style, joint_noise
 from thenar.simulator.errors import SceneError
+from thenar.simulator.pipeline.ablation import ablate
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.running.ablation import ablate
-from thenar.simulator.running.pipeline import Ledger, compile_pipeline
-from thenar.simulator.running.simulation import simulate
-from thenar.simulator.scenes.decode import load_scene
-from thenar.simulator.scenes.scene import Listed, Recording, Scene
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import simulate
+from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
+from thenar.simulator.scenes.scene import ListedEffect, Recording, Scene
 
 SceneMaker = Callable[..., Scene]
 BatchMaker = Callable[..., Batch]
@@ -96,7 +96,7 @@ def test_a_rest_changes_no_draw_of_any_other_frame(name: str) -> None:
     moving = {"lead_ms": 300.0, "hold_ms": 500.0, "release_ms": 200.0}
     if name == "faulty-glove":
         transition = dict(load_scene("continuous").effects)["hand.transition"]
-        scene = replace(scene, effects=(*scene.effects, Listed("hand.transition", transition)))
+        scene = replace(scene, effects=(*scene.effects, ListedEffect("hand.transition", transition)))
     objects = tuple(item for item in scene.objects if item.grasp in ("PoS", "Tip"))
     scene = replace(scene, objects=objects, repetitions=2, recording=replace(scene.recording, **moving))
     plain = simulate(scene, jobs=1).grasp_set

@@ -8,15 +8,15 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.simulator import simulate
+from thenar.simulator.body.layout import taxel_places
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS
-from thenar.simulator.pipeline.taxels import taxel_places
-from thenar.simulator.running.pipeline import Ledger, compile_pipeline
-from thenar.simulator.scenes.decode import load_scene
-from thenar.simulator.scenes.scene import Glove, Recording, Scene
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
+from thenar.simulator.scenes.scene import Recording, Scene, SceneGlove
 
-ALL = Glove(taxels="all")
+ALL = SceneGlove(taxels="all")
 LOSES: Any = {"rate": 0.02}
 
 
@@ -67,7 +67,7 @@ def test_only_the_places_that_are_named_are_taxels_and_the_others_stay_switches(
 ) -> None:
     scene = load_scene("quick").varied(repetitions=2, subjects=["A"])
     plain = simulate(scene, 1).grasp_set
-    glove = Glove(taxels=("index_distal", "thumb_distal_5"))
+    glove = SceneGlove(taxels=("index_distal", "thumb_distal_5"))
     mixed = simulate(replace(scene, glove=glove), 1).grasp_set
     names = [taxel.name for taxel in mixed.taxel_columns]
     assert names == ["thumb_distal_5", *(f"index_distal_{n}" for n in range(1, 9))]
@@ -109,7 +109,7 @@ def test_a_scene_without_the_converter_counts_thousandths() -> None:
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name.startswith("taxel.")])
 def test_an_effect_on_taxels_needs_some(name: str, make_scene: Callable[..., Scene]) -> None:
     with pytest.raises(SceneError, match=f"^effects.{name}: the glove has no taxels"):
-        compile_pipeline(make_scene([name], glove=Glove()))
+        compile_pipeline(make_scene([name], glove=SceneGlove()))
 
 
 def test_counts_go_over_the_boards_line_and_come_through_where_nothing_happens(

@@ -9,19 +9,19 @@ from hypothesis import strategies as st
 from thenar.drivers.lines import checked
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Effect, Setting, Step
+from thenar.simulator.pipeline.effect import Effect, SceneSetting, Step
 from thenar.simulator.pipeline.wire import RECEIVE, SEND
 from thenar.simulator.streams import Draw
 
 MakeBatch = Callable[..., Batch]
 MakeDraw = Callable[..., Draw]
-MakeSetting = Callable[..., Setting]
+MakeSetting = Callable[..., SceneSetting]
 
 # $row, five digits, ten digits, a digit for every four of 160 switches, a checksum, and CR LF.
 FRAMES, ROW_BYTES, RECORD_BYTES = 5, 5 + 6 + 11 + 40 + 3 + 2, 20
 
 
-def prepared(effect: Effect, setting: Setting) -> Step:
+def prepared(effect: Effect, setting: SceneSetting) -> Step:
     assert effect.prepare is not None
     return effect.prepare(effect.parameters(), setting)
 

@@ -6,15 +6,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from thenar.simulator.body.condition import Held, Thing
+from thenar.simulator.body.condition import PlannedGrasp, Thing
 from thenar.simulator.body.hand import Hand
 from thenar.simulator.body.shapes import Pose, Shape, Sphere
 from thenar.simulator.errors import PlanError
+from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.planning.plan import Work, average_hand, entry_of, plan_object, shipped_prehensions
 from thenar.simulator.planning.planner import Plan
 from thenar.simulator.planning.postures import Entry, Postures
 from thenar.simulator.planning.prehension import pad_sphere
-from thenar.simulator.scenes.decode import load_scene
 
 TYPES = shipped_prehensions("kamakura14")
 SHIPPED = [(name, entry) for name in ("kamakura14", "cutkosky16") for entry in Postures.shipped(name).entries]
@@ -26,7 +26,7 @@ PLANNED_MM = (3.0, 3.0)
 BETWEEN_MM = (4.0, 3.0)
 
 
-def gaps(hand: Hand, held: Held, shape: Shape) -> np.ndarray:
+def gaps(hand: Hand, held: PlannedGrasp, shape: Shape) -> np.ndarray:
     """Return how far each sphere of skin (m,) is from an object, in mm; below 0 it sinks in."""
     centres = hand.spheres(hand.skeleton(np.radians(held.posture_deg)[:, None]))
     return Pose.of(held.pose[:, None]).distance(shape, centres)[0][:, 0] - hand.sphere_radii
@@ -129,7 +129,7 @@ def test_of_two_ways_to_hold_a_thing_all_lengths_take_the_better() -> None:
 
 def test_a_lid_that_lies_near_half_a_turn_turns_little_from_hand_to_hand() -> None:
     # As a rotation vector, a little beyond half a turn is nearly half a turn the other way.
-    held = Held(np.zeros(20), np.zeros(6), (), 10.0)
+    held = PlannedGrasp(np.zeros(20), np.zeros(6), (), 10.0)
     poses = [np.array([0.0, 0.0, 0.0, turn, 0.0, 0.0]) for turn in (3.0, 3.1, 3.2 - 2 * np.pi, 3.3 - 2 * np.pi)]
     plans = {
         150.0 + 15.0 * place: Plan(dataclasses.replace(held, pose=pose), 0.0, 0.0, 0.0, 0.0)

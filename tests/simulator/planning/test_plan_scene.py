@@ -12,6 +12,7 @@ from thenar.simulator.body.condition import Thing
 from thenar.simulator.body.hand import LIMITS_DEG
 from thenar.simulator.body.shapes import Shape, Sphere, rotation
 from thenar.simulator.errors import PlanError, SceneError
+from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.planning.plan import (
     Work,
     average_hand,
@@ -23,7 +24,6 @@ from thenar.simulator.planning.plan import (
 )
 from thenar.simulator.planning.planner import Misfit, _start_near
 from thenar.simulator.planning.postures import Entry, Postures
-from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Scene, SceneObject, Subject
 
 MakeScene = Callable[..., Scene]

@@ -11,7 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from thenar.simulator.body.condition import Held, Thing
+from thenar.simulator.body.condition import PlannedGrasp, Thing
 from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import rotation
 from thenar.simulator.contact.model import GRAVITY
@@ -23,12 +23,12 @@ ENTRIES = [entry for postures in SHIPPED.values() for entry in postures.entries]
 PIN = next(entry for entry in SHIPPED["kamakura14"].entries if entry.object == "pin")
 
 
-def held(entry: Entry, length_mm: float, mass_kg: float = 0.0) -> Held:
+def held(entry: Entry, length_mm: float, mass_kg: float = 0.0) -> PlannedGrasp:
     thing = Thing(entry.object, entry.shape, mass_kg)
     return Postures("", (entry,)).held(Hand(Size(length_mm, 80.0)), entry.grasp, thing)
 
 
-def numbers(one: Held) -> np.ndarray:
+def numbers(one: PlannedGrasp) -> np.ndarray:
     return np.concatenate([one.posture_deg, one.pose, [pad.share for pad in one.pads]])
 
 

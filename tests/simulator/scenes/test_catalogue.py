@@ -5,7 +5,7 @@ import pytest
 from thenar.compiler.recordings.taxonomy import published
 from thenar.simulator.body.shapes import Box, Cylinder, Sphere
 from thenar.simulator.errors import SceneError
-from thenar.simulator.scenes.decode import Catalogue, load_catalogue
+from thenar.simulator.pipeline.scene_file import Catalogue, load_catalogue
 
 
 def table(name: str, grasp: str, shape: str = 'shape = "sphere"\ndiameter_mm = 50') -> str:

@@ -8,8 +8,8 @@ import pytest
 from thenar.simulator.effects import joint_noise
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.effect import EFFECTS
-from thenar.simulator.scenes.decode import load_catalogue, load_scene
-from thenar.simulator.scenes.scene import Glove, Population, Recording, Scene, Subject, draw_subjects
+from thenar.simulator.pipeline.scene_file import load_catalogue, load_scene
+from thenar.simulator.scenes.scene import Recording, Scene, SceneGlove, Subject, SurveyPopulation, draw_subjects
 
 NAMES = tuple(EFFECTS)
 
@@ -61,7 +61,7 @@ def test_the_least_scene_has_defaults_for_everything_else(scene: Load) -> None:
         subjects=(Subject(name="A", hand_length_mm=188.0, hand_breadth_mm=84.0),),
         repetitions=4,
         recording=Recording(rate_hz=100.0, lead_ms=0.0, hold_ms=500.0, release_ms=0.0, rows="last"),
-        glove=Glove(layout="murakami160", threshold_n=1.0, codes="common"),
+        glove=SceneGlove(layout="murakami160", threshold_n=1.0, codes="common"),
         effects=(),
     )
 
@@ -75,7 +75,7 @@ def test_everything_that_is_said_is_kept(scene: Load, tmp_path: Path) -> None:
     )
     assert found.name == "other"
     assert found.recording == Recording(rate_hz=50.0, lead_ms=10.0, hold_ms=20.0, release_ms=30.0, rows="all")
-    assert found.glove == Glove(threshold_n=0.8, codes="raw")
+    assert found.glove == SceneGlove(threshold_n=0.8, codes="raw")
 
 
 def test_effects_come_by_their_rank_with_their_parameters(scene: Load) -> None:
@@ -106,7 +106,7 @@ def test_only_the_effects_that_are_listed_are_imported(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(LEAST + "[effects.joint.noise]\n[effects.switch.bounce]\n")
     program = (
-        "import sys; from thenar.simulator.scenes.decode import load_scene; load_scene(sys.argv[1]);"
+        "import sys; from thenar.simulator.pipeline.scene_file import load_scene; load_scene(sys.argv[1]);"
         "print(*sorted(name for name in sys.modules if name.startswith('thenar.simulator.effects.')))"
     )
     done = subprocess.run([sys.executable, "-c", program, str(path)], check=True, capture_output=True, text=True)
@@ -115,7 +115,7 @@ def test_only_the_effects_that_are_listed_are_imported(tmp_path: Path) -> None:
 
 def test_a_population_is_drawn_with_the_seed_of_the_scene(scene: Load) -> None:
     text = LEAST[: LEAST.index("[[")] + '[population]\nsurvey = "ansur2"\ncount = 6\nwomen = 0.25\n'
-    assert scene(text).subjects == draw_subjects(Population(survey="ansur2", count=6, women=0.25), seed=1)
+    assert scene(text).subjects == draw_subjects(SurveyPopulation(survey="ansur2", count=6, women=0.25), seed=1)
 
 
 def test_objects_of_ones_own_are_read_like_a_catalogue(scene: Load) -> None:

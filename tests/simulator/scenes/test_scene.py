@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.body.shapes import Sphere
-from thenar.simulator.pipeline.effect import EFFECTS
+from thenar.simulator.pipeline.effect import EFFECTS, SceneSetting
 from thenar.simulator.scenes.scene import Recording, Scene, SceneObject, Subject
 
 MakeScene = Callable[..., Scene]
@@ -43,13 +43,13 @@ def test_more_repetitions_go_on_where_those_of_the_scene_end(grasps: list[str], 
     assert fresh == scene.varied(repetitions, more=more)
     for (_, old), (_, new), (_, whole) in zip(scene.shares(), fresh.shares(), both.shares(), strict=True):
         assert [*old, *new] == [*whole]
-    assert fresh.setting([]).session_trials == scene.setting([]).session_trials
+    assert SceneSetting.of(fresh, []).session_trials == SceneSetting.of(scene, []).session_trials
     assert fresh.origin == f"scene x, seed 1, {more} more after {repetitions} repetitions"
 
 
 def test_a_setting_has_times_in_microseconds_from_the_first_contact(make_scene: MakeScene) -> None:
     scene = make_scene(recording=Recording(rate_hz=80.0, lead_ms=30.5, hold_ms=250.0, release_ms=40.0))
-    setting = scene.setting([])
+    setting = SceneSetting.of(scene, [])
     assert (setting.period_us, setting.first_us, setting.hold_us, setting.release_us) == (
         12_500,
         -30_500,
@@ -61,7 +61,7 @@ def test_a_setting_has_times_in_microseconds_from_the_first_contact(make_scene: 
 
 def test_a_session_has_the_trials_of_one_subject(make_scene: MakeScene) -> None:
     scene = make_scene(objects=objects(["PoS", "PoS", "Tip"]), repetitions=10)
-    assert scene.setting([]).session_trials == 20
+    assert SceneSetting.of(scene, []).session_trials == 20
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,8 @@ def test_a_session_has_the_trials_of_one_subject(make_scene: MakeScene) -> None:
 def test_frames_and_bytes_are_there_if_the_rows_or_an_effect_want_them(
     make_scene: MakeScene, rows: str, effects: list[str], timed: bool, on_wire: bool
 ) -> None:
-    setting = make_scene(recording=Recording(rows=rows)).setting(EFFECTS[name] for name in effects)  # type: ignore[arg-type]
+    scene = make_scene(recording=Recording(rows=rows))  # type: ignore[arg-type]
+    setting = SceneSetting.of(scene, [EFFECTS[name] for name in effects])
     assert (setting.timed, setting.on_wire) == (timed, on_wire)
 
 

@@ -1,0 +1,274 @@
+"""Replays: a glove's data while a hand goes from grasp to grasp, recorded or composed of single trials.
+
+Without recordings of transitions, a replay is composed of single trials. The switches and joints of each grasp come
+from the recordings; everything in between is modelled. When the hand lets go, the switches of the grasp open one
+by one, at times spread evenly over RELEASE_US. During the transition the joints follow a minimum-jerk path (Flash and
+Hogan 1985, J. Neurosci. 5: 1688) that opens the hand, most at two thirds of the path (Jeannerod 1984, J. Motor Behav.
+16: 235), in TRAVEL_US, sampled every RECORD_US as by a CyberGlove. When it grips, the switches of the next grasp close
+one by one over GRIP_US; with the last one the grasp is complete. The times are those of the scene `continuous`. In the
+open hand, each joint has the value that only a twentieth of the trials exceeds. A taxel is pressed and released at
+once, like a switch; between grasps it has its value in the twentieth of the trials that press it least.
+
+The model leaves out movement within a hold: a trial is one frame, so an error in that frame lasts for the whole hold,
+and more frames do not correct it. It also leaves out contact bounce, and switches that are touched in passing.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..movements.scores import Span
+from ..movements.streams import (
+    LEAST_FRAMES,
+    Bits,
+    Codes,
+    Rows,
+    Stream,
+    Times,
+    frames_are_dense,
+    holds_of,
+    movements_of,
+)
+from ..placement.elements import Elements, above
+from ..recordings.graspset import GraspSet
+from ..samples import Columns
+from .points import FrontierError
+
+RELEASE_US, TRAVEL_US, GRIP_US = 200_000, 300_000, 200_000
+TRANSITION_US = RELEASE_US + TRAVEL_US + GRIP_US
+HOLD_US = (600_000, 1_000_000)
+RECORD_US = 10_000
+_OPENING = 0.5
+_OPEN = 0.05  # share of the trials in which a joint is opened further than in the open hand
+_BUMP = 3.0**9 / 2.0**6  # scales the maximum of t^6 (1 - t)^3, at t = 2/3, to one
+_NEVER = np.int64(1) << 60
+
+GRASPS = 300
+PERIOD_US = 10_000
+# The golden section: the fractional parts of its multiples are spread evenly, for any number of them.
+_GOLDEN = 0.618034
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replay:
+    """What latencies are measured on: n rows of a glove's readings, the stream that shows them, the grasps in it.
+
+    bits    (n, s) bool     every switch of the set
+    codes   (n, j) uint16   the joints
+    taxels  (n, t) uint16   the taxels
+    grasps  every grasp, from the state at which it is complete to the one at which it ends, and its class
+    what    a sentence: the kind of stream, and the reason for it
+    """
+
+    bits: Bits
+    codes: Codes
+    taxels: Codes
+    stream: Stream
+    grasps: tuple[Span, ...]
+    what: str
+
+    def reading(self, elements: Elements, joints: Columns) -> "Replay":
+        """Return the same replay with these elements as switches, if it has taxels, and with these joints, if any."""
+        bits, codes = self.bits, self.codes
+        if self.taxels.shape[1]:
+            bits = above(bits, self.taxels, elements)
+        if joints:
+            codes = codes[:, list(joints)]
+        return replace(self, bits=bits, codes=codes, taxels=self.taxels[:, :0])
+
+
+def replay_of(
+    grasp_set: GraspSet,
+    labels: Rows,
+    rows: Rows | None = None,
+    *,
+    seed: int,
+    grasps: int = GRASPS,
+    period_us: int = PERIOD_US,
+) -> Replay:
+    """Return a replay of rows of a set: of its movements if its frames are dense, else composed of its trials.
+
+    labels  (n,) the classes of all rows, as the tables number them; -1 for nothing held
+    rows    those that may be used, the tables' test rows; None: all. Of movements, only those with all of their rows
+            among them are used
+
+    Raises FrontierError if no replay can be made of the rows.
+    """
+    if frames_are_dense(grasp_set):
+        return recorded(grasp_set, labels, rows, grasps=grasps, period_us=period_us)
+    chosen = np.arange(len(grasp_set)) if rows is None else rows
+    chosen = chosen[labels[chosen] >= 0]
+    return composed(
+        grasp_set.switches[chosen],
+        grasp_set.codes[chosen],
+        labels[chosen],
+        seed=seed,
+        grasps=grasps,
+        opens_up=np.array([joint.step < 0 for joint in grasp_set.joints], np.bool_),
+        taxels=grasp_set.taxels[chosen],
+        eases_up=np.array([taxel.step < 0 for taxel in grasp_set.taxel_columns], np.bool_),
+    )
+
+
+def recorded(
+    grasp_set: GraspSet,
+    labels: Rows,
+    rows: Rows | None = None,
+    *,
+    grasps: int = GRASPS,
+    period_us: int = PERIOD_US,
+) -> Replay:
+    """Return the movements of a set with a grasp and at least LEAST_FRAMES rows, one after the other.
+
+    Rows of a set without times are taken to be `period_us` apart. Two movements are separated by a period plus a
+    varying fraction, so that no frame time stays in step with the rows. If there are more than `grasps` movements, that
+    many of them are taken, evenly spread.
+
+    Raises FrontierError if no movement lies in `rows` as a whole.
+    """
+    movements = movements_of(grasp_set)
+    movements = movements.pick((movements.sizes >= LEAST_FRAMES) & (movements.counts(~grasp_set.is_none) > 0))
+    if rows is not None:
+        usable = np.isin(np.arange(len(grasp_set)), rows)
+        movements = movements.pick(movements.counts(usable) == movements.sizes)
+    if not len(movements):
+        raise FrontierError("no whole movement is among the held-out rows for latency: cut the folds between movements")
+    spread = np.unique(np.linspace(0, len(movements) - 1, min(grasps, len(movements))).astype(np.intp))
+    movements = movements.pick(spread)
+    begins = np.cumsum(movements.sizes) - movements.sizes
+    complete, released = (begins + frame for frame in holds_of(grasp_set, movements))
+    number = np.repeat(np.arange(len(begins)), movements.sizes)
+    shown = movements.rows[np.arange(len(number)) - begins[number] + movements.first[number]]
+    times_us = grasp_set.times_us[shown] if grasp_set.times_us.size else np.arange(len(shown)) * period_us
+    steps_us = np.maximum(np.diff(times_us, prepend=times_us[:1]), 0)
+    steps_us[begins[1:]] = period_us + round(_GOLDEN * period_us)
+    at_us = np.cumsum(steps_us, dtype=np.int64)
+    apart = "when they were recorded" if grasp_set.times_us.size else f"taken to be {period_us / 1000:g} ms apart"
+    return Replay(
+        grasp_set.switches[shown],
+        grasp_set.codes[shown],
+        grasp_set.taxels[shown],
+        Stream(np.arange(len(shown)), at_us, int(at_us[-1]) + period_us),
+        tuple(map(Span, complete.tolist(), released.tolist(), labels[shown[complete]].tolist())),
+        f"Latencies are over {len(movements)} recorded movements, frames {apart}: "
+        "neighbouring rows of a trial resemble each other, as the frames of a whole movement do.",
+    )
+
+
+def composed(
+    switches: Bits,
+    codes: Codes,
+    labels: Rows,
+    *,
+    seed: int,
+    grasps: int = GRASPS,
+    opens_up: Bits | None = None,
+    taxels: Codes | None = None,
+    eases_up: Bits | None = None,
+) -> Replay:
+    """Return a replay composed of single trials (n, s), (n, j) of classes `labels` (n,): see this module.
+
+    opens_up  (j,) the joints whose codes rise as the hand opens; None: the codes of all fall
+    taxels    (n, t) codes; eases_up (t,): those that rise as the taxel is released; None: all fall
+
+    Raises FrontierError for fewer than two grasp types, which have no transitions.
+    """
+    if len(np.unique(labels)) < 2:
+        raise FrontierError("a latency is measured between grasps of different types, and the rows are of one")
+    pads = np.empty((len(labels), 0), np.uint16) if taxels is None else taxels
+    n_switches, rest = switches.shape[1], _open_hand(pads, eases_up).astype(np.uint16)
+    contacts, rest = np.hstack([switches, pads], dtype=np.uint16), np.append(np.zeros(n_switches, np.uint16), rest)
+    random = np.random.default_rng(seed)
+    order = _order(labels, grasps, random)
+    legs = _legs(contacts, rest, codes, _open_hand(codes, opens_up), order, random)
+    readings, at_us = np.concatenate([leg.contacts for leg in legs]), np.concatenate([leg.at_us for leg in legs])
+    ends = np.cumsum([len(leg.at_us) for leg in legs])
+    # A leg ends with the state in which its grasp is complete.
+    return Replay(
+        readings[:, :n_switches] > 0,
+        np.concatenate([leg.codes for leg in legs]),
+        readings[:, n_switches:],
+        Stream(np.arange(len(at_us)), at_us, int(at_us[-1]) + HOLD_US[0]),
+        tuple(map(Span, (ends - 1).tolist(), ends.tolist(), labels[order].tolist())),
+        f"Latencies are over a stream composed of {grasps} single trials, each held for {HOLD_US[0] / 1e6:g} to "
+        f"{HOLD_US[1] / 1e6:g} s, up to {TRANSITION_US / 1e6:g} s from one to the next: the recordings hold no whole "
+        "movements.",
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Leg:
+    """The transition from one grasp to the next: states (t,), of which the last is its hold."""
+
+    contacts: Codes
+    codes: Codes
+    at_us: Times
+
+
+def _order(labels: Rows, grasps: int, random: np.random.Generator) -> list[int]:
+    """Return the sequence of trials; every trial occurs once before any is repeated."""
+    chosen: list[int] = []
+    waiting: list[int] = []
+    while len(chosen) < grasps:
+        place = next((n for n, row in enumerate(waiting) if not chosen or labels[row] != labels[chosen[-1]]), None)
+        if place is None:
+            waiting += random.permutation(len(labels)).tolist()
+        else:
+            chosen.append(waiting.pop(place))
+    return chosen
+
+
+def _open_hand(codes: Codes, opens_up: Bits | None) -> NDArray[np.float64]:
+    """Return the values of joints or taxels (n, c) while nothing is held; opens_up: see composed_stream."""
+    if not len(codes):
+        return np.zeros(codes.shape[1])
+    rising = np.sort(codes, axis=0)
+    rank = int(_OPEN * (len(codes) - 1))
+    opened: NDArray[np.float64] = np.where(
+        False if opens_up is None else opens_up, rising[len(codes) - 1 - rank], rising[rank]
+    ).astype(np.float64)
+    return opened
+
+
+def _legs(
+    contacts: Codes,
+    rest: Codes,
+    codes: Codes,
+    opened: NDArray[np.float64],
+    order: list[int],
+    random: np.random.Generator,
+) -> list[_Leg]:
+    legs: list[_Leg] = []
+    contact, pose, leaves_us = rest, opened, 0
+    for row in order:
+        lets_go = leaves_us + random.integers(0, RELEASE_US, len(rest))
+        grips = leaves_us + RELEASE_US + TRAVEL_US + random.integers(0, GRIP_US, len(rest))
+        open_us = np.where(contact != rest, lets_go, -_NEVER)
+        close_us = np.where(contacts[row] != rest, grips, _NEVER)
+        at_us, travelled = _changes(leaves_us, open_us, close_us, _path(pose, codes[row].astype(np.float64), opened))
+        now = at_us[:, np.newaxis]
+        seen = np.where(now < open_us, contact, np.where(now >= close_us, contacts[row], rest))
+        leg = _Leg(seen, travelled, at_us)
+        contact, pose = contacts[row], codes[row].astype(np.float64)
+        leaves_us = int(leg.at_us[-1]) + int(random.integers(*HOLD_US))
+        legs.append(leg)
+    return legs
+
+
+def _path(start: NDArray[np.float64], end: NDArray[np.float64], opened: NDArray[np.float64]) -> Codes:
+    """Return the codes (TRAVEL_US / RECORD_US + 1, j) along the path, including both ends."""
+    t = np.arange(TRAVEL_US // RECORD_US + 1)[:, np.newaxis] / (TRAVEL_US // RECORD_US)
+    cubed, left = t * t * t, 1.0 - t
+    straight = start + (end - start) * (cubed * (10.0 - t * (15.0 - 6.0 * t)))
+    bent = straight + (opened - straight) * (_OPENING * _BUMP * cubed * cubed * left * left * left)
+    return np.rint(bent).astype(np.uint16)
+
+
+def _changes(leaves_us: int, open_us: Times, close_us: Times, path: Codes) -> tuple[Times, Codes]:
+    """Return the times of all changes from the beginning of the release to the last, and the joints at these times."""
+    starts_us = leaves_us + RELEASE_US
+    records_us = starts_us + RECORD_US * np.arange(len(path)) if path.shape[1] else np.array([starts_us + TRAVEL_US])
+    changes = np.concatenate([[leaves_us], open_us[open_us > -_NEVER], records_us, close_us[close_us < _NEVER]])
+    at_us = np.unique(changes.astype(np.int64))
+    return at_us, path[np.clip((at_us - starts_us) // RECORD_US, 0, len(path) - 1)]

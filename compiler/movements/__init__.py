@@ -1,0 +1,1 @@
+"""Movements: which rows belong together in time; their segments, learnt, scored, written and drawn."""

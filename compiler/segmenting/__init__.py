@@ -1,1 +1,0 @@
-"""Segments of whole movements: learn them from recordings, find, score, write and draw them."""

@@ -1,0 +1,108 @@
+"""Segments on the latency axis: learnt from the training movements alone, with tables that know nothing held."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thenar.compiler.frontier.latency import Pace, latencies, latency
+from thenar.compiler.frontier.price import Tabled
+from thenar.compiler.frontier.replay import replay_of
+from thenar.compiler.frontier.search import Shape
+from thenar.compiler.frontier.segments import MovementSamples
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.samples import Samples
+from thenar.compiler.trainers.base import Training
+from thenar.runtime.published import NONE
+from thenar.runtime.recipe import Recipe
+from thenar.runtime.segmenting.model import SegmentModel
+
+Make = Callable[..., GraspSet]
+BEFORE, HELD, AFTER = 20, 30, 10
+TABLED = Tabled(5, Shape(16))
+
+
+def movements(make_set: Make, subjects: int = 2) -> GraspSet:
+    """Return twelve movements of three types, in turn by each subject: open, held, open again, 10 ms a frame."""
+    random = np.random.default_rng(7)
+    parts = np.tile(np.repeat([True, False, True], (BEFORE, HELD, AFTER)), 12)
+    frames = make_set(rows=12, types=3, subjects=subjects, frames=BEFORE + HELD + AFTER)
+    switches = (frames.switches & ~parts[:, None]) ^ (random.random(frames.switches.shape) < 0.05)
+    codes = np.where(parts[:, None], 1, frames.codes) + random.integers(0, 9, frames.codes.shape)
+    return replace(
+        frames,
+        switches=switches,
+        codes=codes.astype(np.uint16),
+        grasps=np.where(parts, NONE, frames.grasps),
+        times_us=10_000 * np.arange(len(frames)),
+    )
+
+
+def held_by(grasp_set: GraspSet, *subjects: str) -> np.ndarray:
+    held = grasp_set.without_none()
+    return np.flatnonzero(np.isin(held.subjects, subjects))
+
+
+def test_a_subject_who_is_left_out_has_no_part_in_what_is_learnt(make_set: Make) -> None:
+    grasp_set = movements(make_set)
+    new = grasp_set.subjects == "S1"
+    random = np.random.default_rng(1)
+    changed = replace(
+        grasp_set,
+        switches=np.where(new[:, None], random.random(grasp_set.switches.shape) < 0.5, grasp_set.switches),
+        codes=np.where(new[:, None], 7, grasp_set.codes).astype(np.uint16),
+    )
+    columns, training = tuple(range(14)), Training.of(Recipe(rounds=5))
+    found = []
+    for one in (grasp_set, changed):
+        moving = MovementSamples.of(one, held_by(one, "S0"), seed=1)
+        assert moving is not None
+        assert sum(len(stream.rows) for stream in moving.streams) >= np.count_nonzero(~new)
+        assert {stream.subject for stream in moving.streams} == {"S0"}
+        made, model = moving.segment_tables(columns, [TABLED], training)[TABLED]
+        found.append((made.switch_rows.tobytes(), made.scale, model))
+    assert found[0] == found[1]
+    model = found[0][2]
+    # Half of the shortest that was seen.
+    assert model.least == (HELD // 2,) * 3 + ((BEFORE + AFTER) // 2,)
+    assert model != SegmentModel.usual(3, has_none=True, scale=found[0][1])
+
+
+def test_no_stream_goes_over_a_movement_that_is_left_out(make_set: Make) -> None:
+    grasp_set = movements(make_set, subjects=1)
+    trials = grasp_set.without_none().trials
+    moving = MovementSamples.of(grasp_set, np.flatnonzero((trials != 3) & (trials != 4)), seed=1)
+    assert moving is not None
+    assert [len(stream.rows) // 60 for stream in moving.streams] == [3, 7]
+    assert [stream.start_us for stream in moving.streams] == [0, 5 * 600_000]
+    assert np.concatenate([stream.rows for stream in moving.streams]).tolist() == list(range(600))
+
+
+@pytest.mark.parametrize("change", [{"independent": True}, {"none": False}])
+def test_what_has_no_streams_or_never_says_that_nothing_is_held_teaches_nothing(
+    make_set: Make, change: dict[str, Any]
+) -> None:
+    grasp_set = make_set(rows=12) if "none" in change else replace(movements(make_set), **change)
+    assert MovementSamples.of(grasp_set, np.arange(6), seed=1) is None
+
+
+def test_segments_alone_are_decided_at_learnt_costs_and_with_a_class_of_nothing_held(make_set: Make) -> None:
+    grasp_set = movements(make_set)
+    held, columns, training = Samples.of(grasp_set.without_none()), tuple(range(14)), Training.of(Recipe(rounds=5))
+    train, new = held_by(grasp_set, "S0"), np.flatnonzero(grasp_set.subjects == "S1")
+    labels = np.where(grasp_set.is_none, -1, np.searchsorted(np.unique(grasp_set.labels), grasp_set.labels))
+    replay = replay_of(grasp_set, labels, new, seed=1)
+    paces = (Pace(TABLED, 3000.0),)
+    moving = MovementSamples.of(grasp_set, train, seed=1)
+    assert moving is not None
+    ((*others, segments),) = latencies(held, train, columns, replay, paces, training, moving)
+    ((*before, usual),) = latencies(held, train, columns, replay, paces, training)
+    assert others == before
+    made, model = moving.segment_tables(columns, [TABLED], training)[TABLED]
+    assert made.n_classes == held.n_classes + 1
+    assert segments == latency(made, columns, replay, 3000.0, model)
+    assert segments != usual
+    assert segments.missed == 0
+    assert segments.wrong == 0

@@ -1,0 +1,159 @@
+"""Which rows make a movement, and while which of them its grasp is complete."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.movements.streams import frames_are_dense, hold_of, holds_of, movements_of
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import own
+
+TYPES = ("cup", "pen", "rod")
+SWITCHES, JOINTS = 6, 2
+
+
+def set_of(switches: Any, codes: Any, labels: Any, trials: Any, objects: Any = "thing") -> GraspSet:
+    labels = np.asarray(labels, np.intp)
+    return GraspSet(
+        switches=np.asarray(switches, bool),
+        switch_names=tuple(f"s{number}" for number in range(np.shape(switches)[1])),
+        codes=np.asarray(codes, np.uint16),
+        joints=tuple(Joint(f"j{number}", "deg", 0, 0.0, 255, 127.5) for number in range(np.shape(codes)[1])),
+        grasps=np.array(TYPES)[labels],
+        taxonomy=own(TYPES),
+        subjects=np.full(len(labels), "A"),
+        objects=np.broadcast_to(objects, len(labels)),
+        trials=np.broadcast_to(trials, len(labels)).astype(np.int64),
+    )
+
+
+def movement(
+    random: np.random.Generator, held: int = 40, noise: int = 2, joints: int = JOINTS
+) -> tuple[np.ndarray, np.ndarray, int, int]:
+    """A movement: switches and codes, and between which frames its grasp is complete."""
+    coming, rising = 30, 10
+    frames = coming + rising + held + 20
+    switches = np.zeros((frames, SWITCHES), bool)
+    closing = np.sort(random.integers(coming, coming + rising, SWITCHES - 2))
+    for switch, frame in enumerate(closing.tolist()):
+        switches[frame : coming + rising + held + (0 if frame == closing[-1] else 5), switch] = True
+    pose, start = random.integers(100, 200, joints), random.integers(300, 400, joints)
+    way = np.clip(np.arange(frames) / coming, 0, 1)[:, np.newaxis]
+    codes = np.rint(start + (pose - start) * way) + random.integers(-noise, noise + 1, (frames, joints))
+    return switches, codes.astype(np.uint16), int(closing[-1]), coming + rising + held
+
+
+def recorded(seed: int, count: int = 6) -> GraspSet:
+    random = np.random.default_rng(seed)
+    made = [movement(random) for _ in range(count)]
+    labels = np.repeat(np.arange(count) % len(TYPES), [len(each[0]) for each in made])
+    trials = np.repeat(np.arange(count), [len(each[0]) for each in made])
+    return set_of(np.vstack([each[0] for each in made]), np.vstack([each[1] for each in made]), labels, trials)
+
+
+def trials_of(seed: int, rows: int = 120) -> GraspSet:
+    random = np.random.default_rng(seed)
+    labels = np.arange(rows) % len(TYPES)
+    centres = np.random.default_rng(9).random((len(TYPES), SWITCHES)) < 0.5
+    switches = centres[labels] ^ (random.random((rows, SWITCHES)) < 0.2)
+    codes = 100 + 30 * labels[:, np.newaxis] + random.integers(-9, 10, (rows, JOINTS))
+    return set_of(switches, codes, labels, np.arange(rows))
+
+
+def without_trial_numbers(grasp_set: GraspSet) -> GraspSet:
+    """The same rows by grasp type, all of trial 1, as a table without a column of trials is imported."""
+    order = np.argsort(grasp_set.labels, kind="stable")
+    return set_of(grasp_set.switches[order], grasp_set.codes[order], grasp_set.labels[order], 1)
+
+
+@given(st.integers(0, 10_000))
+def test_a_set_of_whole_movements_is_told(seed: int) -> None:
+    assert frames_are_dense(recorded(seed))
+
+
+@given(st.integers(0, 10_000))
+def test_single_trials_are_no_movements_even_where_nothing_numbers_them(seed: int) -> None:
+    assert not frames_are_dense(trials_of(seed))
+    assert not frames_are_dense(without_trial_numbers(trials_of(seed)))
+
+
+def test_trials_that_are_all_alike_are_no_movements() -> None:
+    assert not frames_are_dense(set_of(np.ones((60, 2)), np.full((60, 1), 7), np.repeat([0, 1, 2], 20), 1))
+
+
+def test_an_empty_set_holds_no_movements() -> None:
+    empty = trials_of(0).rows([])
+    assert not frames_are_dense(empty)
+    assert len(movements_of(empty)) == 0
+
+
+@pytest.mark.parametrize("joints", [0, 2])
+@pytest.mark.parametrize("noise", [0, 1, 4])
+def test_a_grasp_is_complete_from_the_last_switch_that_closes_to_the_first_that_opens(noise: int, joints: int) -> None:
+    # In one of 250 movements, frames at an end of the hold are noisier than twice the median.
+    for seed in range(100):
+        switches, codes, complete, released = movement(np.random.default_rng(seed), noise=noise, joints=joints)
+        assert hold_of(switches, codes) == (complete, released)
+
+
+@given(st.integers(0, 10_000), st.integers(0, 2))
+def test_where_no_switch_closes_the_joints_tell(seed: int, noise: int) -> None:
+    _, codes, *_ = movement(np.random.default_rng(seed), held=60, noise=noise)
+    complete, released = hold_of(np.zeros((len(codes), SWITCHES), bool), codes)
+    assert 27 <= complete <= 30  # the last steps of the way may lie within the noise
+    assert released == len(codes)
+
+
+def test_a_bounce_interrupts_no_hold() -> None:
+    switches = np.repeat([[False], [True], [False]], [10, 30, 10], axis=0)
+    switches[[11, 20, 21]] = False
+    assert hold_of(switches, np.zeros((50, 0), np.uint16)) == (10, 40)
+
+
+def spans(grasp_set: GraspSet) -> list[list[int]]:
+    found = movements_of(grasp_set)
+    return [found.rows[a:b].tolist() for a, b in zip(found.first.tolist(), found.beyond.tolist(), strict=True)]
+
+
+def test_movements_are_the_runs_of_one_trial_in_their_order() -> None:
+    grasp_set = recorded(3)
+    assert spans(grasp_set) == np.arange(600).reshape(6, 100).tolist()
+    random = np.random.default_rng(3)
+    held = [movement(random)[2:] for _ in range(6)]
+    complete, released = holds_of(grasp_set, movements_of(grasp_set))
+    assert list(zip(complete.tolist(), released.tolist(), strict=True)) == held
+
+
+def test_another_object_or_trial_or_session_begins_another_movement() -> None:
+    switches, codes = np.zeros((8, 1)), np.zeros((8, 1))
+    grasp_set = set_of(switches, codes, [0] * 8, [0, 0, 1, 1, 1, 1, 1, 1], ["a", "a", "a", "a", "b", "b", "b", "b"])
+    grasp_set = replace(grasp_set, sessions=np.array(["1"] * 6 + ["2"] * 2))
+    assert spans(grasp_set) == [[0, 1], [2, 3], [4, 5], [6, 7]]
+    assert spans(replace(grasp_set, subjects=np.array(list("ABABABAB")))) == []
+
+
+def test_subjects_recorded_at_once_have_movements_of_their_own() -> None:
+    both = set_of(np.zeros((6, 1)), np.zeros((6, 1)), [0] * 6, 1)
+    assert spans(replace(both, subjects=np.array(list("ABABAB")))) == [[0, 2, 4], [1, 3, 5]]
+
+
+def test_single_rows_and_independent_rows_are_no_movements() -> None:
+    rows = set_of(np.zeros((6, 1)), np.zeros((6, 1)), [0, 1, 0, 1, 0, 0], 1)
+    assert spans(rows) == [[4, 5]]
+    assert spans(replace(rows, independent=True)) == []
+
+
+def test_rows_in_which_nothing_is_held_belong_to_their_movement_and_say_while_when_it_is_complete() -> None:
+    whole = recorded(3)
+    frame = np.arange(len(whole)) % 100
+    grasps = np.where((frame >= 42) & (frame < 77) & (frame != 50), whole.grasps, "none")
+    labelled = replace(whole, grasps=grasps)
+    assert spans(labelled) == spans(whole)
+    complete, released = holds_of(labelled, movements_of(labelled))
+    assert complete.tolist() == [42] * 6
+    assert released.tolist() == [77] * 6
+    assert frames_are_dense(labelled)

@@ -1,0 +1,93 @@
+"""Which type follows which: counted, written, drawn."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.artifact.compile import compile_build
+from thenar.compiler.artifact.documents import Documents
+from thenar.compiler.movements.streams import MovementError
+from thenar.compiler.movements.transitions import FREQUENT, SIZE, Transitions, graph_of
+from thenar.compiler.recordings.graspset import GraspSet
+
+TYPES = tuple(f"type {number}" for number in range(14))
+MANY = tuple(f"type {number}" for number in range(60))
+SEQUENCES = st.lists(st.lists(st.sampled_from(TYPES), max_size=12), max_size=6)
+
+
+@given(SEQUENCES)
+def test_every_change_is_counted_once_and_shares_are_of_a_types_own_changes(sequences: list[list[str]]) -> None:
+    found = Transitions.of(sequences, TYPES)
+    assert found.counts.sum() == sum(max(len(each) - 1, 0) for each in sequences)
+    sums = found.probabilities.sum(axis=1)
+    assert np.allclose(sums[found.counts.sum(axis=1) > 0], 1)
+    assert not sums[found.counts.sum(axis=1) == 0].any()
+    for place, name in enumerate(TYPES):
+        frequent = found.frequent(name)
+        shares = [found.probabilities[place, TYPES.index(each)] for each in frequent]
+        assert shares == sorted(shares, reverse=True)
+        assert all(share >= FREQUENT for share in shares)
+
+
+@given(SEQUENCES, st.sampled_from([TYPES, MANY]))
+def test_each_change_is_an_arrow_within_the_picture_between_types_that_do_not_touch(
+    sequences: list[list[str]], types: tuple[str, ...]
+) -> None:
+    found = Transitions.of(sequences, types)
+    graph = graph_of(found)
+    assert [node.name for node in graph.nodes] == list(types)
+    assert len(graph.edges) == np.count_nonzero(found.counts)
+    for one in graph.nodes:
+        for other in graph.nodes:
+            assert one is other or np.hypot(one.x - other.x, one.y - other.y) > 2 * graph.radius
+    for edge in graph.edges:
+        numbers = [float(number) for number in re.findall(r"-?\d+\.\d", f"{edge.path} {edge.tip}")]
+        assert all(0 <= number <= SIZE for number in numbers)
+        assert re.search(r": \d+ of \d+ \(\d+%\)", edge.words)
+    assert [edge.width for edge in graph.edges] == sorted(edge.width for edge in graph.edges)
+
+
+def test_nothing_held_is_passed_over_and_what_is_written_is_read(
+    make_movements: Callable[..., GraspSet], tmp_path: Path
+) -> None:
+    grasp_set = make_movements("A", 2)
+    found = Transitions.of_set(grasp_set)
+    held = [grasp_set.grasps[rows[0]] for rows in np.split(np.arange(len(grasp_set)), _starts(grasp_set))]
+    held = [name for name in held if name != "none"]
+    assert found.counts.sum() == len(held) - 1 == 5
+    for one, other in pairwise(held):
+        assert found.counts[found.types.index(one), found.types.index(other)]
+    path = tmp_path / "graph.json"
+    path.write_bytes(found.to_json())
+    again = Transitions.load(path)
+    assert (again.types, again.counts.tolist()) == (found.types, found.counts.tolist())
+    for wrong in (b"{}", b'{"types":["a"],"counts":[[1,2]],"probabilities":[[1]]}', b"\xff"):
+        path.write_bytes(wrong)
+        with pytest.raises(MovementError, match=r"graph\.json is not a transitions file"):
+            Transitions.load(path)
+
+
+def _starts(grasp_set: GraspSet) -> np.ndarray:
+    return np.flatnonzero(grasp_set.grasps[1:] != grasp_set.grasps[:-1]) + 1
+
+
+def test_a_report_has_the_graph_where_the_recordings_are_whole_movements(
+    make_movements: Callable[..., GraspSet], tmp_path: Path
+) -> None:
+    grasp_set = make_movements("AB", 2)
+    apart = replace(grasp_set, trials=np.arange(len(grasp_set)))
+    for number, (rows, drawn) in enumerate(((grasp_set.without_none(), False), (apart, False), (grasp_set, True))):
+        folder = compile_build(rows, tmp_path / f"{number}", rounds=3, folds=0, documents=Documents()).folder
+        page = (folder / "report.html").read_text()
+        assert ('<svg class="changes"' in page) == ("Transitions between grasp types" in page) == drawn
+    found = Transitions.of_set(grasp_set)
+    assert page.count("stroke-width") >= np.count_nonzero(found.counts)
+    for name in found.types:
+        assert re.search(rf"<text[^>]*>{name}</text>", page)

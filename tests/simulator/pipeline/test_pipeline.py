@@ -1,0 +1,228 @@
+"""The pipeline: what a scene lists, in order, and what cannot be compiled."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.simulator.body.condition import Condition
+from thenar.simulator.errors import SceneError
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import EFFECTS, hold_frame
+from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
+from thenar.simulator.scenes.scene import Recording, Scene
+
+NAMES = tuple(EFFECTS)
+
+SceneMaker = Callable[..., Scene]
+BatchMaker = Callable[..., Batch]
+
+OWN = {
+    "glove.recall",
+    "glove.threshold",
+    "glove.close",
+    "glove.frames",
+    "glove.sense",
+    "glove.encode",
+    "glove.sample",
+}
+WIRED = {"glove.send", "glove.receive"}
+FELT = {"glove.feel", "glove.count"}
+OTHERS = [name for name in NAMES if name != "contact.quasistatic"]
+EVERYTHING = ["contact.quasistatic", *OTHERS]
+SUBSETS = st.sets(st.sampled_from(OTHERS)).map(lambda others: ["contact.quasistatic", *sorted(others)])
+
+
+def listed_with(name: str, **parameters: Any) -> tuple:
+    return name, EFFECTS[name].parameters(**parameters)
+
+
+def light() -> list[tuple]:
+    """Return all effects but the contact model: the ramp in two levels, the bus as it reads all that it can."""
+    special: dict[str, dict[str, Any]] = {"contact.ramp": {"levels": 2}, "bus.latency": {"jitter_us": 20.0}}
+    return [listed_with(name, **special.get(name, {})) for name in OTHERS]
+
+
+def order(scene: Scene, without: str | None = None) -> list[str]:
+    return [stop.effect.name for stop in compile_pipeline(scene, without).steps]
+
+
+@given(names=SUBSETS)
+def test_a_pipeline_holds_the_scenes_effects_and_the_gloves_own_steps_and_nothing_else(
+    make_scene: SceneMaker, names: list[str]
+) -> None:
+    stops = compile_pipeline(make_scene(names)).steps
+    on_wire = any(name.startswith("wire.") for name in names)
+    assert sorted(stop.effect.name for stop in stops if not stop.own) == sorted(names)
+    felt = any(name.startswith("taxel.") for name in names)
+    own = OWN | (WIRED if on_wire else set()) | (FELT if felt else set())
+    assert {stop.effect.name for stop in stops if stop.own} == own
+
+
+@given(names=SUBSETS, seed=st.integers(0, 100))
+def test_the_order_is_that_of_the_numbers_however_the_scene_lists_them(
+    make_scene: SceneMaker, names: list[str], seed: int
+) -> None:
+    scene = make_scene(names)
+    shuffled = np.random.default_rng(seed).permutation(len(names))
+    other = make_scene(names, name="other")
+    mixed = Scene(**{f: getattr(other, f) for f in other.__struct_fields__} | {"effects": _pick(scene, shuffled)})
+    assert order(mixed) == order(scene)
+    stops = compile_pipeline(scene).steps
+    numbers = [stop.effect.order for stop in stops]
+    assert numbers == sorted(numbers)
+
+
+def _pick(scene: Scene, places: np.ndarray) -> tuple:
+    return tuple(scene.effects[place] for place in places)
+
+
+def test_the_order_of_everything(make_scene: SceneMaker) -> None:
+    assert " ".join(order(make_scene(EVERYTHING))) == (
+        "glove.recall hand.style hand.posture hand.object_pose hand.grip contact.quasistatic "
+        "glove.threshold switch.threshold glove.close contact.ramp "
+        "glove.frames frame.at_force frame.jitter bus.latency "
+        "glove.sense hand.transition joint.noise joint.drift glove.encode glove.feel "
+        "taxel.gain taxel.hysteresis taxel.creep taxel.crosstalk taxel.noise "
+        "glove.sample glove.count "
+        "switch.bounce switch.stuck_open switch.stuck_closed switch.ghosting port.dead taxel.adc "
+        "glove.send wire.lost_bytes wire.damaged_bytes glove.receive"
+    )
+
+
+class Watched(Batch):
+    """A batch that notes which of its fields are read and written."""
+
+    def __getattribute__(self, name: str) -> object:
+        if name in FIELDS:
+            object.__getattribute__(self, "seen").append(("reads", name))
+        return super().__getattribute__(name)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in FIELDS:
+            object.__getattribute__(self, "seen").append(("writes", name))
+        super().__setattr__(name, value)
+
+    def taken(self) -> tuple[set[str], set[str]]:
+        """Return what was read and what was written since the last time."""
+        seen: list[tuple[str, str]] = object.__getattribute__(self, "seen")
+        reads, writes = ({name for kind, name in seen if kind == asked} for asked in ("reads", "writes"))
+        seen.clear()
+        return reads, writes
+
+
+FIELDS = set(Batch.__dataclass_fields__) - {"condition", "repetitions"}
+
+
+def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_batch: BatchMaker) -> None:
+    plain = make_batch(range(2))
+    batch = Watched.__new__(Watched)
+    object.__setattr__(batch, "seen", [])
+    batch.__init__(plain.condition, plain.repetitions, plain.trials, plain.previous_deg)  # type: ignore[misc]
+    batch.taken()
+    for name in OTHERS:
+        assert {*EFFECTS[name].reads, *EFFECTS[name].writes} <= FIELDS
+    pipeline = compile_pipeline(make_scene(["contact.quasistatic", *light()]))
+    written = {"trials", "previous_deg", "rest_deg", "delay_us", "lost", "ramp", "taxels"}
+    for stop in pipeline.steps:
+        single = type(pipeline)(pipeline.setting, (stop,))
+        single.run([batch], Ledger())
+        effect, (reads, writes) = stop.effect, batch.taken()
+        assert writes == set(effect.writes), effect.name
+        # Whether a field is read that the step itself writes is its own affair.
+        assert (reads ^ set(effect.reads)) <= set(effect.writes), effect.name
+        assert set(effect.reads) <= written, effect.name
+        written |= writes
+
+
+def test_a_scene_without_a_contact_model_gets_the_default_as_the_gloves_own(make_scene: SceneMaker) -> None:
+    stops = compile_pipeline(make_scene(["hand.grip"])).steps
+    assert [(s.effect.name, s.own) for s in stops if s.effect.order < 300] == [
+        ("glove.recall", True),
+        ("hand.grip", False),
+        ("contact.quasistatic", True),
+    ]
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_leaving_an_effect_out_is_the_scene_without_it(make_scene: SceneMaker, name: str) -> None:
+    rest = [other for other in EVERYTHING if other != name]
+    left, never = compile_pipeline(make_scene(EVERYTHING), without=name), compile_pipeline(make_scene(rest))
+    assert [(stop.effect, stop.own) for stop in left.steps] == [(stop.effect, stop.own) for stop in never.steps]
+    assert left.setting == never.setting
+
+
+@pytest.mark.parametrize(
+    ("without", "words"),
+    [
+        ("joint.noise", ["'joint.noise'", "does not list it", "joint.drift"]),
+        ("contact.quasistatic", ["'contact.quasistatic'", "nothing closes the hand"]),
+        ("no.such", ["'no.such'", "does not list it"]),
+    ],
+)
+def test_what_cannot_be_left_out_is_refused_with_the_reason(
+    make_scene: SceneMaker, without: str, words: list[str]
+) -> None:
+    with pytest.raises(SceneError) as caught:
+        compile_pipeline(make_scene(["contact.quasistatic", "joint.drift"]), without)
+    assert all(word in str(caught.value) for word in words)
+
+
+def outcome(batch: Batch, row: int) -> dict[str, bytes]:
+    names = ["posture_deg", "pose", "grip_n", "forces_n", "settled", "residual_n", "on_us", "off_us", "frame_us"]
+    found = {
+        name: np.asarray(getattr(batch, name)[row]).tobytes()
+        for name in [*names, "bits", "sensors_deg", "raw", "taxels"]
+    }
+    return found | ({} if batch.lost is None else {"lost": batch.lost[row].tobytes()})
+
+
+@settings(max_examples=4, deadline=None)
+@given(company=st.lists(st.integers(0, 50), min_size=2, max_size=5, unique=True))
+def test_a_repetition_comes_out_the_same_in_any_batch_and_beside_any_other(
+    make_scene: SceneMaker,
+    make_batch: BatchMaker,
+    make_condition: Callable[..., Condition],
+    company: list[int],
+) -> None:
+    pipeline = compile_pipeline(make_scene([listed_with("contact.quasistatic", most_steps=12), *light()]))
+    row = len(company) // 2
+    alone, together = make_batch([company[row]]), make_batch(company)
+    beside = make_batch(company[1:], make_condition(grasp="Tip", grip_n=4.0))
+    pipeline.run([alone], Ledger())
+    pipeline.run([beside, together], Ledger())
+    assert outcome(alone, 0) == outcome(together, row)
+
+
+def test_a_longer_lead_and_no_release_leave_the_frame_that_is_read_as_it_is(
+    make_scene: SceneMaker, make_batch: BatchMaker
+) -> None:
+    """Of every effect: what is drawn for a frame hangs on its time, not on how many come before and after it."""
+    found = []
+    for lead_ms, release_ms in ((30.0, 40.0), (200.0, 0.0)):
+        recording = Recording(lead_ms=lead_ms, hold_ms=250.0, release_ms=release_ms)
+        pipeline = compile_pipeline(make_scene(light(), recording=recording))
+        batch, held = make_batch(range(2)), hold_frame(pipeline.setting)
+        pipeline.run([batch], Ledger())
+        assert batch.lost is not None
+        assert batch.taxels is not None
+        read = (batch.bits, batch.sensors_deg, batch.raw, batch.taxels, batch.lost, batch.frame_us)
+        found.append([each[:, held] for each in read])
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_run_enters_every_step_with_its_batches(make_scene: SceneMaker, make_batch: BatchMaker) -> None:
+    pipeline, ledger = compile_pipeline(make_scene(["hand.grip", "joint.noise"])), Ledger()
+    pipeline.run([make_batch(range(3)), make_batch(range(2))], ledger)
+    pipeline.run([make_batch(range(4))], ledger)
+    assert list(ledger.entries) == [stop.effect.name for stop in pipeline.steps]
+    for entry in ledger.entries.values():
+        assert (entry.calls, entry.grasps) == (3, 9)
+        assert entry.nanoseconds > 0
+    assert ledger.entries["hand.grip"].draws == 9
+    assert ledger.entries["joint.noise"].draws == 9 * 2 * 18
+    assert ledger.entries["contact.quasistatic"].counters["solver steps"] >= 9
