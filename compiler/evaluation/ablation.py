@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.recipe import Recipe
+from thenar.runtime.recipe import PAPERS_TRAINER, Recipe
 
 from ..placement.placement import Placer
 from ..recordings.graspset import GraspSet
@@ -105,7 +105,7 @@ def _further(progress: Progress, before: int, total: int) -> Progress:
 def _predicted(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[str, Labels]:
     """Return, for each kind of inputs, the label (n,) predicted for each row when it was left out of training."""
     parts = populations(grasp_set, "trial", FOLDS, repeats=1, seed=SEED)
-    planner = Planner(parts, Samples.of(grasp_set), Placer(Recipe(seed=SEED)))
+    planner = Planner(parts, Samples.of(grasp_set), Placer(Recipe(trainer=PAPERS_TRAINER, seed=SEED)))
     fits = {
         name: [fit for part in parts for fit in planner.cell(part, kind, lambda *_: ()).fits]
         for name, kind in _KINDS.items()
