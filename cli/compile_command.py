@@ -60,7 +60,7 @@ PRESETS: dict[str, dict[str, str]] = {
 }
 _GROUPS = {
     "Basics": ("output", "preset", "placement", "keep", "levels", "keep_joints", "prune", "inputs"),
-    "Limits": LIMITS[:-1],
+    "Limits": LIMITS,
     "Training": ("trainer", "robust", "refuse"),
     "Integer tables": ("table_bits", "width"),
     "The accuracies in build.json": ("folds", "seed", "by", "jobs"),

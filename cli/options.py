@@ -58,8 +58,9 @@ def _names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str
     return () if text is None else comma_separated(text)
 
 
-LIMITS = ("keep_these", "never", "apart_mm", "at_most_taxels", "budget_us", "robust")
-CHOOSING = ("placement", "keep", "levels", "keep_joints", "prune", *LIMITS)
+# Fields of a recipe: those that limit a placement, and all that it depends on but the inputs.
+LIMITS = ("keep_these", "never", "apart_mm", "at_most_taxels", "budget_us")
+CHOOSING = ("placement", "keep", "levels", "keep_joints", "prune", *LIMITS, "robust")
 
 
 def recipe_options(*names: str, **changes: Any) -> Callable[[Command], Command]:

@@ -21,7 +21,7 @@ from .evaluation.populations import OF
 from .limits import check_inputs
 from .placement.constraints import Limits
 from .placement.elements import Elements
-from .placement.placement import Selection, select
+from .placement.placement import InputSelection, select
 from .placement.ports import PortCosts
 from .samples import Samples
 from .tables.collapse import Model, collapse
@@ -44,7 +44,7 @@ class Recogniser:
         The choices that made it.
     samples : Samples
         The rows that it learnt from, with all inputs.
-    selection : Selection
+    selection : InputSelection
         The elements and joints that it reads.
     model : Model
         The additive model.
@@ -58,7 +58,7 @@ class Recogniser:
 
     recipe: Recipe
     samples: Samples
-    selection: Selection
+    selection: InputSelection
     model: Model
     fitting: Fitting | None = None
     training: Training | None = None

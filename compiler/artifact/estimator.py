@@ -24,7 +24,7 @@ from ..firmware.classifier import LIBRARY_NAME
 from ..firmware.generate import Firmware, write_folder
 from ..placement.elements import elements_of
 from ..placement.methods.base import METHODS, PAPERS
-from ..placement.placement import Chosen, Selection, information_alone
+from ..placement.placement import Chosen, InputSelection, information_alone
 from ..placement.selectors import SwitchSelector
 from ..recogniser import Recogniser, Scores
 from ..recordings.frames import check_trials
@@ -185,7 +185,7 @@ def _classifier(estimator: Any) -> Any:
     return estimator[-1] if hasattr(estimator, "steps") else estimator
 
 
-def _learnt(estimator: Any, samples: Samples) -> tuple[Selection, Model]:
+def _learnt(estimator: Any, samples: Samples) -> tuple[InputSelection, Model]:
     """Return the switches and joints that an estimator uses, and the model that it learned from these samples."""
     columns = _columns(estimator, samples.inputs)
     switches = tuple(column for column in columns if column < samples.n_switches)
@@ -194,7 +194,7 @@ def _learnt(estimator: Any, samples: Samples) -> tuple[Selection, Model]:
     model = _model(classifier, columns, samples.n_switches)
     if fault := model_fault(model, len(switches), len(joints), len(classifier.classes_)):
         raise CompileError(f"the estimator has a model that {fault}: fit it on these recordings")
-    return Selection(elements_of(samples), Chosen(switches, (), None), joints), model
+    return InputSelection(elements_of(samples), Chosen(switches, (), None), joints), model
 
 
 def _columns(estimator: Any, X: NDArray[np.uint16]) -> Columns:

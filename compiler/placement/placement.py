@@ -34,7 +34,7 @@ Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Selection:
+class InputSelection:
     """The elements and joints that a recipe keeps.
 
     elements  those that there were to choose from: switches, and levels of taxels
@@ -56,7 +56,9 @@ class Selection:
         return bits_of(samples.with_joints(self.joints), self.kept)
 
 
-def select(samples: Samples, recipe: Recipe, ports: PortCosts | None = None, limits: Limits | None = None) -> Selection:
+def select(
+    samples: Samples, recipe: Recipe, ports: PortCosts | None = None, limits: Limits | None = None
+) -> InputSelection:
     """Choose elements and joints of `samples`, rows in which something is held, as a recipe says.
 
     Parameters
@@ -85,7 +87,7 @@ def select(samples: Samples, recipe: Recipe, ports: PortCosts | None = None, lim
     costs = None if ports is None else ports_of(ports, elements)
     bound = None if limits is None else limits.on(elements, costs)
     chosen = choose(bits, method.name, parameter, costs, bound, robust=recipe.robust)
-    return Selection(elements, chosen, kept_joints(bits.keeping(chosen.columns), recipe.keep_joints, limits))
+    return InputSelection(elements, chosen, kept_joints(bits.keeping(chosen.columns), recipe.keep_joints, limits))
 
 
 @dataclass(frozen=True, slots=True)
