@@ -129,14 +129,14 @@ def command(
         thenar frontier set.grasps -o frontier/ --budget-us 1500
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
-    from thenar.compiler.frontier.find import Wanted, find_frontier
+    from thenar.compiler.frontier.find import PointGoal, find_frontier
     from thenar.compiler.placement.methods.base import usual
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
 
     if budget_us is not None and rate is not None:
         raise click.UsageError("--budget-us and --rate each pick a point: give one of them.")
-    wanted, harness = Wanted(budget_us, rate), None if glove is None else load_harness(glove)
+    wanted, harness = PointGoal(budget_us, rate), None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
     methods = methods or usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns))
     search = _search(context, methods, usual(ours=False) if baselines is None else baselines, asked)

@@ -61,7 +61,7 @@ _UNTIMED = (
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class PointGoal:
     """Requirement for a point: the best within a time, or the fastest with an accuracy; None: no selection."""
 
     budget_us: float | None = None
@@ -93,7 +93,7 @@ def find_frontier(
     harness: Harness | None = None,
     target: str = "host",
     search: Search | None = None,
-    wanted: Wanted | None = None,
+    wanted: PointGoal | None = None,
     build: Path | None = None,
     joint_us: float | None = None,
     record_time: RecordTime = "formula",
@@ -176,7 +176,7 @@ def find_frontier(
             played = _replay(survey, stream)
             own = () if build is None else (own_build(build, grasp_set, equipment),)
         untimed = (_UNTIMED.format(list_names(grasp_set.joint_names)),) if records.how == "unknown" else ()
-        found = _found(survey, played, wanted or Wanted(), own, (*untimed, *lacking))
+        found = _found(survey, played, wanted or PointGoal(), own, (*untimed, *lacking))
         if output is not None:
             # The store moves into the new folder as the same file, and stays locked meanwhile.
             store.finish()
@@ -295,7 +295,9 @@ def _replay(survey: Survey, given: GraspSet | None) -> Replay:
     return replay_of(given, labels, seed=seed)
 
 
-def _found(survey: Survey, replay: Replay, wanted: Wanted, own: tuple[Mark, ...], lacking: tuple[str, ...]) -> Frontier:
+def _found(
+    survey: Survey, replay: Replay, wanted: PointGoal, own: tuple[Mark, ...], lacking: tuple[str, ...]
+) -> Frontier:
     search, n_switches, most = survey.search, survey.samples.n_switches, survey.levels[-1]
     n_elements = len(survey.elements(most))
     screened, curves = screen(survey)

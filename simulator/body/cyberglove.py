@@ -72,7 +72,7 @@ def sensors_deg(posture_deg: Floats) -> Floats:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Calibration:
+class SubjectCalibration:
     """Two points of each sensor's straight line: degrees (18,) at byte 1 and at byte 255."""
 
     low_deg: Floats
@@ -122,7 +122,7 @@ def common_joints() -> tuple[Joint, ...]:
 
 def raw_joints() -> tuple[Joint, ...]:
     """Return the joints of the raw bytes on the typical subject: 16 joints."""
-    nominal = Calibration.nominal()
+    nominal = SubjectCalibration.nominal()
     ends = zip(SENSORS[:USED], nominal.low_deg.tolist(), nominal.high_deg.tolist(), strict=False)
     return tuple(Joint(sensor, "deg", _LEAST, low, _MOST, high) for sensor, low, high in ends)
 

@@ -75,7 +75,7 @@ def murakami160() -> tuple[Patch, ...]:
 
 
 @dataclass(frozen=True)
-class Switches:
+class SwitchPlaces:
     """The switches of `layout` on a hand: capsules (s,), and positions (s, 3) in each capsule's axes, mm."""
 
     hand: Hand

@@ -172,7 +172,7 @@ class SolverCase:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Command:
+class HandCommand:
     """The commands of n hands of one size.
 
     torque  (20, n)  that presses the pads, N mm
@@ -189,9 +189,9 @@ class Command:
     skin_points: Floats
     object_points: Floats
 
-    def rows(self, index: Indices) -> "Command":
+    def rows(self, index: Indices) -> "HandCommand":
         """Return the command of some repetitions, in order."""
-        return Command(
+        return HandCommand(
             self.hand,
             self.surfaces.rows(index),
             self.angles[:, index],
@@ -203,7 +203,7 @@ class Command:
         )
 
 
-def command(cases: Sequence[SolverCase]) -> Command:
+def command(cases: Sequence[SolverCase]) -> HandCommand:
     """Return the commands of all `cases`, of one hand, one after the other."""
     hand = cases[0].condition.hand
     counts = [len(case.grip_n) for case in cases]
@@ -221,7 +221,7 @@ def command(cases: Sequence[SolverCase]) -> Command:
     ]
     pulling = [case.condition.thing.mass_kg * GRAVITY * case.condition.held.down for case in cases]
     weight = np.stack(pulling, axis=1).repeat(counts, axis=1)
-    return Command(hand, shapes, angles, pose, np.concatenate(turning, axis=1), weight, own, pose.inward(touch))
+    return HandCommand(hand, shapes, angles, pose, np.concatenate(turning, axis=1), weight, own, pose.inward(touch))
 
 
 Bits = NDArray[np.bool_]
@@ -251,7 +251,7 @@ class Balance:
     residual_n, residual_nmm (n,)            unbalanced force and moment of skin and weight on the object
     """
 
-    def __init__(self, command: Command, skin: Skin, angles: Floats, pose: Pose, sticks: float = 1.0) -> None:
+    def __init__(self, command: HandCommand, skin: Skin, angles: Floats, pose: Pose, sticks: float = 1.0) -> None:
         self.command, self.skin, self.angles, self.pose = command, skin, angles, pose
         hand = command.hand
         self.skeleton = hand.skeleton(angles)

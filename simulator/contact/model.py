@@ -16,7 +16,7 @@ from thenar.compiler.elementary import Floats, add_up
 
 from ..body.condition import Condition
 from ..body.hand import CAPSULES, Skeleton
-from ..body.layout import Switches
+from ..body.layout import SwitchPlaces
 from ..body.shapes import Pose
 
 
@@ -95,7 +95,7 @@ def _add_moments(total: Floats, skeleton: Skeleton, capsule: int, centre: Floats
         total[4 * digit + joint] += add_up(skeleton.axes[digit, joint] * moment)
 
 
-def split(switches: Switches, depths: Floats, forces: Floats) -> tuple[Floats, Floats]:
+def split(switches: SwitchPlaces, depths: Floats, forces: Floats) -> tuple[Floats, Floats]:
     """Return the force on every switch (s, n), and the force between them (n,), in newtons.
 
     depths (s, n): depth of each contact's top in the object, mm, negative outside; forces (20, n): net normal force on

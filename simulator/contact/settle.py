@@ -16,7 +16,7 @@ from .balance import (
     LIMIT_NMM_PER_RAD,
     USUAL,
     Balance,
-    Command,
+    HandCommand,
     Skin,
     SolverCase,
     SolverSettings,
@@ -205,7 +205,7 @@ class Rest:
     steps: NDArray[np.int64]
 
     @classmethod
-    def of(cls, target: Command) -> "Rest":
+    def of(cls, target: HandCommand) -> "Rest":
         """Return the state of the hands before any step."""
         n = target.angles.shape[1]
         pose = Pose(target.pose.position.copy(), target.pose.rotation.copy())
@@ -266,7 +266,7 @@ class _Walk:
     pose: Pose
 
     @classmethod
-    def start(cls, target: Command) -> "_Walk":
+    def start(cls, target: HandCommand) -> "_Walk":
         n = target.angles.shape[1]
         far = np.full(n, np.inf)
         return cls(target.angles, target.pose, np.zeros((26, n)), np.ones(n), far, target.angles, target.pose)

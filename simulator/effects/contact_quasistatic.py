@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from ..body.hand import CAPSULES, Hand
-from ..body.layout import Switches, murakami160
+from ..body.layout import SwitchPlaces, murakami160
 from ..body.shapes import rotation_vector
 from ..contact.balance import USUAL, Skin, SolverCase, SolverSettings
 from ..contact.model import Contact, ContactModel, Load, split
@@ -81,8 +81,8 @@ class Quasistatic:
 
 
 @lru_cache(maxsize=8)
-def _switches(hand: Hand) -> Switches:
-    return Switches(hand, murakami160())
+def _switches(hand: Hand) -> SwitchPlaces:
+    return SwitchPlaces(hand, murakami160())
 
 
 def _bundles(loads: list[Load]) -> list[list[Load]]:

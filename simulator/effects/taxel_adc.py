@@ -11,11 +11,11 @@ from msgspec import Meta
 
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, SceneSetting, Step
-from ..pipeline.glove import Converter
+from ..pipeline.glove import TaxelConverter
 from ..streams import Draw
 
 
-class Parameters(Converter, frozen=True):
+class Parameters(TaxelConverter, frozen=True):
     """Number of bits, and full-scale force in newtons."""
 
     bits: Annotated[int, Meta(ge=1, le=15)] = 12

@@ -19,7 +19,7 @@ from thenar.compiler.elementary import sincos
 from thenar.compiler.hand import HandShape
 
 from ..body.hand import DIGITS, Hand, Size
-from ..body.layout import Switches, murakami160
+from ..body.layout import SwitchPlaces, murakami160
 
 Floats = NDArray[np.float64]
 Places = Floats | Sequence[float]
@@ -211,7 +211,7 @@ _PALM_SPREAD = 1.2  # factor on the distance of a palm switch from its capsule's
 @lru_cache(maxsize=1)
 def hand_map() -> HandShape:
     """Return the flat map of the glove `murakami160`."""
-    switches = Switches(HAND, murakami160())
+    switches = SwitchPlaces(HAND, murakami160())
     around = np.array([patch.around_deg for patch in switches.layout])
     sides = np.where(np.abs(around) > _SIDE_DEG, np.sign(around), 0.0).astype(np.intp)
     parts = np.minimum(switches.capsules // 3, 5)
@@ -246,13 +246,13 @@ def hand_map() -> HandShape:
     )
 
 
-def _along(switches: Switches) -> Floats:
+def _along(switches: SwitchPlaces) -> Floats:
     """Return the distance of switches from their digit's base (s,)."""
     begins = np.array([*np.concatenate([ray.joints[:3] for ray in rays()]), *np.zeros(5)])
     return begins[switches.capsules] + switches.places[:, 0]
 
 
-def _flat(switches: Switches, mine: NDArray[np.bool_], sides: NDArray[np.intp]) -> Floats:
+def _flat(switches: SwitchPlaces, mine: NDArray[np.bool_], sides: NDArray[np.intp]) -> Floats:
     """Return the offset to the right of the middle of one segment's switches on flattened skin (m,)."""
     layout = [patch for patch, is_mine in zip(switches.layout, mine, strict=True) if is_mine]
     on_tip = np.array([patch.along < 0.0 for patch in layout])
@@ -270,7 +270,7 @@ def _strip(ray: Ray, along: Floats, side: int) -> Floats:
     return ray.strip(side, float(along.min()) - _STRIP_END_MM, float(along.max()) + _STRIP_END_MM)
 
 
-def _on_palm(switches: Switches) -> Floats:
+def _on_palm(switches: SwitchPlaces) -> Floats:
     """Return positions of switches on the palm's capsules (s, 2), along axes that are spread like the knuckles."""
     skeleton = HAND.skeleton(np.zeros((20, 1)))
     tops = switches.tops(skeleton)[:, :2, 0]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from thenar.compiler.elementary import Floats
 from thenar.compiler.recordings.graspset import Joint
 
-from ..body.cyberglove import Calibration, sensors_deg
+from ..body.cyberglove import SubjectCalibration, sensors_deg
 from ..body.hand import DOF, LIMITS_DEG, RESTS_DEG
 from ..errors import SceneError
 from ..streams import Draw, DrawCounts
@@ -79,7 +79,7 @@ def _sense(batch: Batch, setting: SceneSetting) -> None:
 
 @_own(540, "converts the sensors to bytes by the subject's calibration", ("sensors_deg",), ("raw",))
 def _encode(batch: Batch, setting: SceneSetting) -> None:
-    batch.raw = Calibration.of_subject(setting.seed, batch.condition.subject).bytes(batch.sensors_deg)
+    batch.raw = SubjectCalibration.of_subject(setting.seed, batch.condition.subject).bytes(batch.sensors_deg)
 
 
 @_own(700, "reads every switch in every frame", ("on_us", "off_us", "frame_us", "delay_us"), ("bits",))
@@ -88,7 +88,7 @@ def _sample(batch: Batch, setting: SceneSetting) -> None:
     batch.bits = (batch.on_us[:, None] <= at) & (at < batch.off_us[:, None])
 
 
-class Converter(EffectParameters, frozen=True):
+class TaxelConverter(EffectParameters, frozen=True):
     """Counts of `bits` bits in even steps up to the full scale of `full_n` newtons; by default a thousandth of a newton
     per count.
     """
@@ -106,7 +106,7 @@ class Converter(EffectParameters, frozen=True):
         return Joint(name, "N", 0, 0.0, 1 << (self.bits - 1), self.full_n / 2.0)
 
 
-IDEAL = Converter()
+IDEAL = TaxelConverter()
 
 
 def _feel(parameters: EffectParameters, setting: SceneSetting) -> Step:

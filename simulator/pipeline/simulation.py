@@ -13,7 +13,7 @@ from thenar.compiler.recordings.taxonomy import published
 from thenar.compiler.workers import in_workers
 
 from ..body.condition import Condition
-from ..body.cyberglove import USED, Calibration, common_joints, raw_joints
+from ..body.cyberglove import USED, SubjectCalibration, common_joints, raw_joints
 from ..body.layout import murakami160, taxel_places
 from ..errors import SceneError
 from ..planning.plan import Progress, postures_of
@@ -22,7 +22,7 @@ from ..scenes.scene import Scene, Subject
 from ..streams import Draw, DrawCounts
 from .batch import Batch, Integers
 from .effect import at_a_time
-from .glove import IDEAL, Converter
+from .glove import IDEAL, TaxelConverter
 from .report import (
     Codes,
     Notes,
@@ -189,7 +189,7 @@ def _run(scene: Scene, without: str | None, keep_unsettled: bool, batches: _Batc
 def _codes(scene: Scene, batch: Batch) -> Codes:
     if scene.glove.codes == "raw":
         return batch.raw[..., :USED].astype(np.uint16)
-    return Calibration.of_subject(scene.seed, batch.condition.subject).common_codes(batch.raw)
+    return SubjectCalibration.of_subject(scene.seed, batch.condition.subject).common_codes(batch.raw)
 
 
 def _gathered(results: Iterator[_Done], total: int, progress: Progress | None) -> _Done:
@@ -207,7 +207,7 @@ def _gathered(results: Iterator[_Done], total: int, progress: Progress | None) -
 def _taxels(scene: Scene, without: str | None) -> tuple[Joint, ...]:
     """Return the joints of the scene's taxels: the meaning of counts by the effect that converts them."""
     listed = (effect.parameters for effect in scene.effects if effect.name != without)
-    converter = next((one for one in listed if isinstance(one, Converter)), IDEAL)
+    converter = next((one for one in listed if isinstance(one, TaxelConverter)), IDEAL)
     return tuple(converter.column(murakami160()[place].name) for place in taxel_places(scene.glove.taxels))
 
 

@@ -19,7 +19,7 @@ from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Label
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine
 
-from ..body.cyberglove import SENSORS, USED, Calibration
+from ..body.cyberglove import SENSORS, USED, SubjectCalibration
 from ..errors import SceneError
 from ..pipeline.simulation import simulate
 from ..planning.plan import Progress
@@ -139,7 +139,7 @@ def of_scene(
         effects=tuple(listed for listed in scene.effects if not listed.name.startswith(_WIRE)),
     )
     grasp_set = simulate(played, jobs, progress).grasp_set
-    calibration = Calibration.of_subject(scene.seed, one.name)
+    calibration = SubjectCalibration.of_subject(scene.seed, one.name)
     found = Performance(
         switches=grasp_set.switches,
         switch_names=grasp_set.switch_names,
@@ -254,7 +254,7 @@ def _nearest(rising: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArra
     return np.where(wanted - rising[above - 1] <= rising[above] - wanted, above - 1, above)
 
 
-def _with_wrist(used: Bytes, calibration: Calibration) -> Bytes:
+def _with_wrist(used: Bytes, calibration: SubjectCalibration) -> Bytes:
     """Return all 18 bytes (F, 18): the wrist, which is not simulated, is straight."""
     straight = calibration.bytes(np.zeros(len(SENSORS)))[USED:]
     return np.hstack([used, np.tile(straight, (len(used), 1))])
@@ -272,10 +272,10 @@ def _byte_at_zero(sensor: SensorCalibration) -> int:
 
 def typical() -> GloveCalibration:
     """Return the calibration of a typical hand."""
-    return _in_points(Calibration.nominal(), "")
+    return _in_points(SubjectCalibration.nominal(), "")
 
 
-def _in_points(calibration: Calibration, subject: str) -> GloveCalibration:
+def _in_points(calibration: SubjectCalibration, subject: str) -> GloveCalibration:
     ends = zip(SENSORS, calibration.low_deg.tolist(), calibration.high_deg.tolist(), strict=True)
     return GloveCalibration(
         sensors=tuple(SensorCalibration(name, 1, low, 255, high) for name, low, high in ends),

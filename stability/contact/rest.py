@@ -5,7 +5,7 @@ from math import fsum
 
 import numpy as np
 
-from thenar.simulator.body.layout import Switches, murakami160
+from thenar.simulator.body.layout import SwitchPlaces, murakami160
 from thenar.simulator.body.shapes import Pose
 from thenar.simulator.contact.balance import USUAL, Skin
 from thenar.simulator.contact.model import Contact, Load
@@ -91,7 +91,7 @@ def _on_the_surface(full: bool) -> Finding:
     lost = Worst(check, "exact sums", MOST_SWITCHES + 1.0, "x 2^-53 of the force")
     grasp = held()
     (rest,) = Quasistatic(_USUAL).solve([grasp.load])
-    switches = Switches(HAND, murakami160())
+    switches = SwitchPlaces(HAND, murakami160())
     tops = switches.tops(HAND.skeleton(rest.posture_deg.T * (np.pi / 180.0)))
     gaps = Pose.of(rest.pose.T).distance(BAR, tops)[0][:, 0]
     near = np.flatnonzero((gaps > 0.0) & (gaps < 4.0) & (rest.capsules_n[0, switches.capsules] > 0.0))

@@ -10,7 +10,7 @@ from mpmath import mpf
 
 from thenar.compiler.elementary import Floats
 from thenar.simulator.body.hand import CAPSULES
-from thenar.simulator.body.layout import Switches, murakami160
+from thenar.simulator.body.layout import SwitchPlaces, murakami160
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere, rotation, rotation_vector
 from thenar.simulator.contact.model import split
 
@@ -132,7 +132,7 @@ def _shares(rng: np.random.Generator, n: int) -> Finding:
     With k switches the sum of depths rounds k - 1 times, each quotient and product once: k + 1 roundings of the force,
     plus halves of the smallest double.
     """
-    switches = Switches(HAND, murakami160())
+    switches = SwitchPlaces(HAND, murakami160())
     worst = Worst("forces shared by switches", REFERENCE, MOST_SWITCHES + 1.0, "x 2^-53 of the force")
     depths = rng.choice([-5.0, 0.0, -0.0, *_TINY, 0.3, 2.0], (len(switches.capsules), n))
     forces = rng.choice([0.0, 5e-324, 1e-300, 0.7, 50.0, 1e300], (len(CAPSULES), n))

@@ -71,24 +71,17 @@ def without_trial_numbers(grasp_set: GraspSet) -> GraspSet:
 
 
 @given(st.integers(0, 10_000))
-def test_a_set_of_whole_movements_is_told(seed: int) -> None:
+def test_frames_of_movements_are_dense_and_single_trials_are_not(seed: int) -> None:
     assert frames_are_dense(recorded(seed))
-
-
-@given(st.integers(0, 10_000))
-def test_single_trials_are_no_movements_even_where_nothing_numbers_them(seed: int) -> None:
     assert not frames_are_dense(trials_of(seed))
     assert not frames_are_dense(without_trial_numbers(trials_of(seed)))
 
 
-def test_trials_that_are_all_alike_are_no_movements() -> None:
-    assert not frames_are_dense(set_of(np.ones((60, 2)), np.full((60, 1), 7), np.repeat([0, 1, 2], 20), 1))
-
-
-def test_an_empty_set_holds_no_movements() -> None:
+def test_an_empty_set_and_equal_trials_are_not_dense() -> None:
     empty = trials_of(0).rows([])
     assert not frames_are_dense(empty)
     assert len(movements_of(empty)) == 0
+    assert not frames_are_dense(set_of(np.ones((60, 2)), np.full((60, 1), 7), np.repeat([0, 1, 2], 20), 1))
 
 
 @pytest.mark.parametrize("joints", [0, 2])
@@ -128,23 +121,16 @@ def test_movements_are_the_runs_of_one_trial_in_their_order() -> None:
     assert list(zip(complete.tolist(), released.tolist(), strict=True)) == held
 
 
-def test_another_object_or_trial_or_session_begins_another_movement() -> None:
-    switches, codes = np.zeros((8, 1)), np.zeros((8, 1))
-    grasp_set = set_of(switches, codes, [0] * 8, [0, 0, 1, 1, 1, 1, 1, 1], ["a", "a", "a", "a", "b", "b", "b", "b"])
-    grasp_set = replace(grasp_set, sessions=np.array(["1"] * 6 + ["2"] * 2))
-    assert spans(grasp_set) == [[0, 1], [2, 3], [4, 5], [6, 7]]
-    assert spans(replace(grasp_set, subjects=np.array(list("ABABABAB")))) == []
-
-
-def test_subjects_recorded_at_once_have_movements_of_their_own() -> None:
-    both = set_of(np.zeros((6, 1)), np.zeros((6, 1)), [0] * 6, 1)
-    assert spans(replace(both, subjects=np.array(list("ABABAB")))) == [[0, 2, 4], [1, 3, 5]]
-
-
-def test_single_rows_and_independent_rows_are_no_movements() -> None:
-    rows = set_of(np.zeros((6, 1)), np.zeros((6, 1)), [0, 1, 0, 1, 0, 0], 1)
-    assert spans(rows) == [[4, 5]]
-    assert spans(replace(rows, independent=True)) == []
+def test_another_object_trial_session_or_subject_begins_another_movement() -> None:
+    blank = np.zeros((8, 1))
+    rows = set_of(blank, blank, [0] * 8, [0, 0, 1, 1, 1, 1, 1, 1], list("aaaabbbb"))
+    assert spans(replace(rows, sessions=np.array(list("11111122")))) == [[0, 1], [2, 3], [4, 5], [6, 7]]
+    # Subjects recorded at once.
+    at_once = replace(set_of(blank, blank, [0] * 8, 1), subjects=np.array(list("ABABABAB")))
+    assert spans(at_once) == [[0, 2, 4, 6], [1, 3, 5, 7]]
+    single = set_of(blank, blank, [0, 1, 0, 1, 0, 1, 0, 0], 1)
+    assert spans(single) == [[6, 7]]
+    assert spans(replace(single, independent=True)) == []
 
 
 def test_rows_in_which_nothing_is_held_belong_to_their_movement_and_say_while_when_it_is_complete() -> None:

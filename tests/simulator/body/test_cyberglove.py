@@ -11,7 +11,7 @@ from thenar.simulator.body.cyberglove import (
     SENSORS,
     USED,
     ZEROS,
-    Calibration,
+    SubjectCalibration,
     common_joints,
     raw_joints,
     sensors_deg,
@@ -95,7 +95,7 @@ def test_a_posture_feels_the_same_in_any_company_and_in_any_shape(postures: np.n
 @pytest.mark.parametrize("shift", [-ZERO_SPREAD, ZERO_SPREAD])
 def test_no_posture_that_a_hand_can_take_leaves_the_bytes_of_the_oddest_subject(gain: float, shift: float) -> None:
     steps, zeros, angles = GAINS * gain, ZEROS + shift, sensors_deg(ENDS)
-    calibration = Calibration((1.0 - zeros) * steps, (255.0 - zeros) * steps)
+    calibration = SubjectCalibration((1.0 - zeros) * steps, (255.0 - zeros) * steps)
     lost = np.abs(calibration.degrees(calibration.bytes(angles)) - angles)
     # Only rounding to the nearest byte is lost: nothing was clipped at 1 or 255.
     assert (lost <= 0.5 * steps + 1e-9).all()
@@ -103,12 +103,12 @@ def test_no_posture_that_a_hand_can_take_leaves_the_bytes_of_the_oddest_subject(
 
 @pytest.mark.parametrize("subject", SUBJECTS[:5])
 def test_every_byte_comes_back_as_it_was(subject: str) -> None:
-    calibration = Calibration.of_subject(3, subject)
+    calibration = SubjectCalibration.of_subject(3, subject)
     np.testing.assert_array_equal(calibration.bytes(calibration.degrees(EVERY_BYTE)), EVERY_BYTE)
 
 
 def test_what_is_out_of_range_is_clipped_and_no_byte_is_nought() -> None:
-    calibration = Calibration.nominal()
+    calibration = SubjectCalibration.nominal()
     assert set(calibration.bytes(np.full((1, 18), -1e6)).ravel().tolist()) == {1}
     assert set(calibration.bytes(np.full((1, 18), 1e6)).ravel().tolist()) == {255}
 
@@ -120,7 +120,7 @@ def test_gains_are_those_of_published_calibrations_and_differ_between_subjects()
     for sensor, gain in zip(SENSORS, GAINS.tolist(), strict=True):
         low, high = own.get(sensor) or published[sensor.rsplit("_", 1)[1]]
         assert low <= gain <= high, sensor
-    subjects = [Calibration.of_subject(3, subject) for subject in SUBJECTS]
+    subjects = [SubjectCalibration.of_subject(3, subject) for subject in SUBJECTS]
     gains = np.array([subject.step_deg / GAINS - 1.0 for subject in subjects])
     shifts = np.array([1.0 - subject.low_deg / subject.step_deg - ZEROS for subject in subjects])
     for found, spread in ((gains, GAIN_SPREAD), (shifts, ZERO_SPREAD)):
@@ -131,7 +131,7 @@ def test_gains_are_those_of_published_calibrations_and_differ_between_subjects()
 
 def test_a_subject_keeps_a_calibration_and_shares_it_with_nobody() -> None:
     first, again, other, elsewhere = (
-        Calibration.of_subject(*whose).low_deg.tobytes() for whose in [(3, "A"), (3, "A"), (3, "B"), (4, "A")]
+        SubjectCalibration.of_subject(*whose).low_deg.tobytes() for whose in [(3, "A"), (3, "A"), (3, "B"), (4, "A")]
     )
     assert first == again
     assert len({first, other, elsewhere}) == 3
@@ -139,7 +139,7 @@ def test_a_subject_keeps_a_calibration_and_shares_it_with_nobody() -> None:
 
 @pytest.mark.parametrize("subject", SUBJECTS)
 def test_common_codes_mean_the_same_angle_whoever_wears_the_glove(subject: str) -> None:
-    calibration, joints = Calibration.of_subject(3, subject), common_joints()
+    calibration, joints = SubjectCalibration.of_subject(3, subject), common_joints()
     codes = calibration.common_codes(EVERY_BYTE)
     assert codes.dtype == np.uint16
     assert codes.shape == (255, USED)
@@ -151,7 +151,7 @@ def test_common_codes_mean_the_same_angle_whoever_wears_the_glove(subject: str) 
 
 
 def test_raw_joints_are_read_as_the_typical_subjects() -> None:
-    degrees = Calibration.nominal().degrees(EVERY_BYTE)
+    degrees = SubjectCalibration.nominal().degrees(EVERY_BYTE)
     for place, joint in enumerate(raw_joints()):
         np.testing.assert_allclose(joint.value(EVERY_BYTE[:, place]), degrees[:, place], atol=1e-9)
     assert tuple(joint.name for joint in raw_joints()) == SENSORS[:USED]

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.body.hand import CAPSULES, Hand, Size
-from thenar.simulator.body.layout import STANDS_OUT_MM, Switches, murakami160
+from thenar.simulator.body.layout import STANDS_OUT_MM, SwitchPlaces, murakami160
 
 LAYOUT = murakami160()
 SIZES = st.builds(Size, length_mm=st.floats(160.0, 215.0), breadth_mm=st.floats(72.0, 98.0))
@@ -18,7 +18,7 @@ FLAT = np.zeros((20, 1))
 
 def own_axes(hand: Hand) -> tuple[np.ndarray, np.ndarray]:
     """Return the tops of all switches on the axes of their capsules: (s, 3), and the capsules (s,)."""
-    switches = Switches(hand, LAYOUT)
+    switches = SwitchPlaces(hand, LAYOUT)
     return switches.places, switches.capsules
 
 
@@ -70,7 +70,7 @@ def test_no_two_contacts_of_a_capsule_share_a_place(size: Size) -> None:
 @given(st.integers(0, 19), st.floats(-0.5, 1.0))
 def test_switches_go_with_the_capsules_they_sit_on(joint: int, angle: float) -> None:
     hand = Hand(Size(185.0, 83.0))
-    switches = Switches(hand, LAYOUT)
+    switches = SwitchPlaces(hand, LAYOUT)
     skeleton = hand.skeleton(FLAT + angle * np.eye(20)[:, [joint]])
     relative = switches.tops(skeleton) - skeleton.origins[switches.capsules]
     own = np.einsum("sxkn,sxn->sk", skeleton.frames[switches.capsules], relative)
@@ -80,7 +80,7 @@ def test_switches_go_with_the_capsules_they_sit_on(joint: int, angle: float) -> 
 def test_radial_switches_lie_on_the_radial_side() -> None:
     hand = Hand(Size(185.0, 83.0))
     skeleton = hand.skeleton(FLAT)
-    tops = Switches(hand, LAYOUT).tops(skeleton)[..., 0]
+    tops = SwitchPlaces(hand, LAYOUT).tops(skeleton)[..., 0]
     for patch, top in zip(LAYOUT, tops, strict=True):
         if 3 <= patch.capsule < 15 and abs(patch.around_deg) > 60.0:
             middle = skeleton.origins[patch.capsule, :, 0]

@@ -13,7 +13,7 @@ import numpy as np
 from thenar.compiler.elementary import Floats
 from thenar.simulator.body.condition import Thing
 from thenar.simulator.body.hand import CAPSULES, DOF, LIMITS_DEG, Hand, Skeleton
-from thenar.simulator.body.layout import Switches, murakami160
+from thenar.simulator.body.layout import SwitchPlaces, murakami160
 from thenar.simulator.body.shapes import Box, Cylinder, Pose, Shape, Sphere
 from thenar.simulator.contact.model import GRAVITY, STIFFNESS, Contact, Load, split, torques
 
@@ -209,7 +209,7 @@ def solve(load: Load) -> Contact:
     pair = Pair(hand, condition.thing, condition.held.down)
     rests = [pair.rest(*commands) for commands in zip(angles.T, load.pose, moments.T, strict=True)]
     angles, pose, capsules_n, residual_n, residual_nmm, at_rest = map(np.array, zip(*rests, strict=True))
-    switches = Switches(hand, murakami160())
+    switches = SwitchPlaces(hand, murakami160())
     gaps = Pose.of(pose.T).distance(shape, switches.tops(hand.skeleton(angles.T)))[0]
     forces_n, between_n = split(switches, _REACH_MM - gaps, capsules_n.T)
     return Contact(

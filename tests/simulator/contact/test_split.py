@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from thenar.simulator.body.hand import CAPSULES, Hand, Size
-from thenar.simulator.body.layout import Switches, murakami160
+from thenar.simulator.body.layout import SwitchPlaces, murakami160
 from thenar.simulator.contact.model import split
 
-SWITCHES = Switches(Hand(Size(185.0, 83.0)), murakami160())
+SWITCHES = SwitchPlaces(Hand(Size(185.0, 83.0)), murakami160())
 N_SWITCHES = len(SWITCHES.capsules)
 # Many at the surface and outside, so that capsules of which no switch, one or all touch come up.
 DEPTHS_MM = st.sampled_from((-5.0, -1e-9, 0.0)) | st.floats(1e-15, 10.0)

@@ -4,7 +4,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.hand import HandShape, MapError
 from thenar.drivers.errors import ThenarError
-from thenar.simulator.body.layout import Switches, murakami160
+from thenar.simulator.body.layout import SwitchPlaces, murakami160
 from thenar.simulator.handmaps.handmap import HAND, PARTS, RADIUS_MM, hand_map, rays
 
 Floats = NDArray[np.float64]
@@ -41,7 +41,7 @@ def distances(places: Floats) -> Floats:
 
 def on_the_hand() -> Floats:
     """Return where the switches of the flat, neutral hand lie in space (s, 3)."""
-    return Switches(HAND, murakami160()).tops(HAND.skeleton(np.zeros((20, 1))))[:, :, 0]
+    return SwitchPlaces(HAND, murakami160()).tops(HAND.skeleton(np.zeros((20, 1))))[:, :, 0]
 
 
 def test_every_switch_of_the_layout_has_one_place_in_its_order(glove: HandShape) -> None:

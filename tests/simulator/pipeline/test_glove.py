@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.simulator.body.cyberglove import Calibration, sensors_deg
+from thenar.simulator.body.cyberglove import SubjectCalibration, sensors_deg
 from thenar.simulator.pipeline import glove
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting, frame_times
@@ -84,7 +84,7 @@ def test_bytes_are_those_of_the_subjects_calibration(
     batch, setting = make_batch(range(2)), make_setting()
     batch.sensors_deg = np.linspace(-200.0, 200.0, 2 * 3 * 18).reshape(2, 3, 18)
     take("glove.encode", batch, setting)
-    expected = Calibration.of_subject(setting.seed, batch.condition.subject).bytes(batch.sensors_deg)
+    expected = SubjectCalibration.of_subject(setting.seed, batch.condition.subject).bytes(batch.sensors_deg)
     np.testing.assert_array_equal(batch.raw, expected)
     assert batch.raw.min() == 1
     assert batch.raw.max() == 255

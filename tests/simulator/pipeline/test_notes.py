@@ -2,7 +2,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.contact.model import Contact
+from thenar.simulator.pipeline.batch import SLID_OUT_MM, Batch
 from thenar.simulator.pipeline.report import UnsettledGrasp, notes_of
 
 
@@ -31,16 +32,10 @@ def test_an_object_that_slid_out_of_the_hand_is_called_that(make_batch: Callable
 
 
 def test_residuals_are_those_of_settled_repetitions(make_batch: Callable[..., Batch]) -> None:
-    found = notes_of(went_through(make_batch()))
-    assert (found.residual_n, found.residual_nmm) == (0.5, 4.0)
-    assert found.between_n == 0.75
-
-
-def test_residuals_that_are_no_numbers_are_of_no_settled_repetition(make_batch: Callable[..., Batch]) -> None:
     batch = went_through(make_batch())
     batch.residual_n[1] = np.nan
     found = notes_of(batch)
-    assert found.residual_n == 0.5
+    assert (found.residual_n, found.residual_nmm, found.between_n) == (0.5, 4.0, 0.75)
     assert "nan N" in found.unsettled[0].why
 
 
@@ -53,3 +48,14 @@ def test_frames_that_did_not_arrive_are_counted_and_repetitions_of_which_none_di
     assert found.lost_frames == 3
     assert found.unsettled[0].why == "no frame arrived whole"
     assert "come to rest" in found.unsettled[1].why
+
+
+def test_an_object_that_slid_out_of_the_hand_has_not_settled(make_batch: Callable[..., Batch]) -> None:
+    batch = make_batch(range(3))
+    batch.posture_deg, batch.pose = np.zeros((3, 20)), np.ones((3, 6))
+    pose = batch.pose.copy()
+    pose[:, 1] += [0.0, SLID_OUT_MM - 0.1, SLID_OUT_MM + 0.1]
+    none = np.zeros(3)
+    forces = np.zeros((3, 160))
+    batch.take(Contact(batch.posture_deg, pose, forces, np.zeros((3, 20)), none, none == 0.0, none, none, 3))
+    assert batch.settled.tolist() == [True, True, False]
