@@ -18,7 +18,7 @@ from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.live.sources import Arrivals, Taken
+from thenar.runtime.live.sources import FrameBuffer, Snapshot
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.playing.performance import Performance, of_scene
 
@@ -89,7 +89,7 @@ class Memory:
     """A feed for a glove that returns what was put into it: no device, no thread, no waiting."""
 
     def __init__(self, switches: int) -> None:
-        self._arrivals = Arrivals(switches, [(1 << switches) - 1])
+        self._arrivals = FrameBuffer(switches, [(1 << switches) - 1])
 
     def put(self, time_us: int, closed: int, sensors: bytes | None) -> None:
         """Add a frame of the switches, preceded by one of the glove unless that is None."""
@@ -97,7 +97,7 @@ class Memory:
             self._arrivals.put_glove(GloveFrame(time_us, sensors, STATUS), _LONGEST_US)
         self._arrivals.put_switches(0, SwitchFrame(time_us, closed), _LONGEST_US)
 
-    def take(self) -> Taken:
+    def take(self) -> Snapshot:
         """Return the frames that were put in."""
         return self._arrivals.take()
 

@@ -23,7 +23,7 @@ import thenar.drivers.i2c.node
 from thenar.runtime import Build, Glove
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.loading import load_harness
-from thenar.runtime.live.sources import Sources, Taken
+from thenar.runtime.live.sources import Snapshot, Sources
 from thenar.runtime.live.system import System
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.i2c import I2cDevice
@@ -63,7 +63,7 @@ class Counted:
     gloves: int = 0
     recognised: int = 0
 
-    def take(self) -> Taken:
+    def take(self) -> Snapshot:
         """Take frames from the sources, and count them."""
         taken = self.sources.take()
         switches = sum(isinstance(frame, SwitchFrame) for frame in taken.arrived)

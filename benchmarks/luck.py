@@ -22,7 +22,7 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.designs import best_designs, corrected, designs, lucks
 from thenar.compiler.frontier.equipment import Equipment, equipment_for
-from thenar.compiler.frontier.finalists import finalists, look_closely
+from thenar.compiler.frontier.finalists import evaluate_finalists, finalists
 from thenar.compiler.frontier.points import By
 from thenar.compiler.frontier.screen import screen
 from thenar.compiler.frontier.search import Search
@@ -90,7 +90,7 @@ def played(asked: tuple[int, GraspSet | None, Equipment]) -> Case:
         asking = Cache(store, lambda _done, _all: None, jobs=1)
         survey = Survey(grasp_set, SCENE, samples, None, search, cuts, equipment, asking)
         screened, _ = screen(survey)
-        closes = look_closely(survey, finalists(screened, [], search.finalists))
+        closes = evaluate_finalists(survey, finalists(screened, [], search.finalists))
     several = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
     fronts = best_designs(several)
     luck = lucks(fronts, several, screened, cuts, seed)

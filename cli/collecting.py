@@ -17,7 +17,7 @@ from thenar.runtime.calibration import load_calibration
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import SwitchFrame, now_us, old_after_us
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources, Taken
+from thenar.runtime.live.sources import NOT_YET, DeviceState, Snapshot, Sources
 from thenar.runtime.names import list_names
 from thenar.runtime.recording.guide import Guide, Journal, Key, Stage, Trial
 from thenar.runtime.recording.session import Collection, Session
@@ -42,7 +42,7 @@ _PATIENCE_US = 3_000_000
 class Devices(Protocol):
     """The part of `Sources` that a collection uses."""
 
-    def take(self, at_most_us: int) -> Taken:
+    def take(self, at_most_us: int) -> Snapshot:
         """Wait for new readings and return them."""
 
     def devices(self) -> tuple[DeviceState, ...]:

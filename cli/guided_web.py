@@ -10,9 +10,9 @@ from typing import Any
 
 from msgspec import to_builtins
 
-from thenar.compiler.evaluation.sofar import SoFar, recording_so_far
+from thenar.compiler.evaluation.sofar import InterimAccuracy, recording_so_far
 from thenar.compiler.recordings.taxonomy import ANY, MOVEMENTS, Taxonomy
-from thenar.compiler.workers import Aside
+from thenar.compiler.workers import BackgroundTask
 from thenar.drivers.closing import Closing
 from thenar.runtime.hand import DrawnSwitch, DrawnTaxel, HandDrawing, Spot, drawn_joints
 from thenar.runtime.manifest import Calibration
@@ -149,7 +149,7 @@ class StudiedPage(Closing):
 
     def __init__(self, page: GuidePage, recording: Path, round_trials: int) -> None:
         self._page, self._recording, self._round = page, recording, round_trials
-        self._aside: Aside[SoFar | None] = Aside()
+        self._background: BackgroundTask[InterimAccuracy | None] = BackgroundTask()
         self._studied = -1
 
     def press(self, now_us: int, guide: Guide) -> None:
@@ -160,15 +160,15 @@ class StudiedPage(Closing):
         """Show the guide's state, and start or finish the computation."""
         self._page.show(now_us, guide, devices)
         self._fetch()
-        if self._aside.busy or guide.done < 2 or guide.done == self._studied:
+        if self._background.busy or guide.done < 2 or guide.done == self._studied:
             return
         if self._studied < 0 or abs(guide.done - self._studied) >= self._round or guide.trial is None:
             self._studied = guide.done
-            self._aside.start(recording_so_far, self._recording)
+            self._background.start(recording_so_far, self._recording)
 
     def _fetch(self) -> None:
         try:
-            found = self._aside.fetch()
+            found = self._background.fetch()
         except BrokenExecutor as wrong:
             self._page.tell({"problem": f"the accuracy so far could not be computed: {wrong}"})
             return
@@ -181,5 +181,5 @@ class StudiedPage(Closing):
 
     def close(self) -> None:
         """Stop computing the accuracy, and close the page."""
-        self._aside.close()
+        self._background.close()
         self._page.close()

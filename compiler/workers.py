@@ -168,7 +168,7 @@ def _end_after(parent: int) -> None:
     os._exit(1)
 
 
-class Aside(Generic[Result]):
+class BackgroundTask(Generic[Result]):
     """A background process for one task at a time, which yields to everything else on the machine.
 
     It ends when this process does, however this process ends.
@@ -192,7 +192,7 @@ class Aside(Generic[Result]):
         self._results, there = context.Pipe(duplex=False)
         # Block its signals before it exists: a Ctrl-C is for this process.
         with _safe_paths(), _interrupts_held():
-            self._process = context.Process(target=_aside, args=(os.getpid(), there, work, task), daemon=True)
+            self._process = context.Process(target=_background, args=(os.getpid(), there, work, task), daemon=True)
             self._process.start()
         there.close()
 
@@ -220,7 +220,7 @@ class Aside(Generic[Result]):
             self._process = None
 
 
-def _aside(parent: int, there: Any, work: Callable[[Task], Result], task: Task) -> None:
+def _background(parent: int, there: Any, work: Callable[[Task], Result], task: Task) -> None:
     _end_with_parent(parent)
     with suppress(OSError):
         os.nice(10)

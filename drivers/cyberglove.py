@@ -34,12 +34,12 @@ from .cyberglove_protocol import (
     find_reply,
     mask_of,
     masked_sensors,
+    period_us,
     period_words,
     query,
     sending_us,
     setting,
     shortest_us,
-    told_us,
 )
 from .errors import DeviceError, SettingError
 from .serial_line import SerialLine
@@ -81,7 +81,7 @@ class Dialogue:
     def __init__(self, line: SerialLine) -> None:
         self._line = line
 
-    def hush(self) -> None:
+    def stop_stream(self) -> None:
         """End a stream and drop its remaining bytes. Raises DeviceError if it does not end."""
         end = monotonic() + _LONGEST_S
         while monotonic() < end:
@@ -98,7 +98,7 @@ class Dialogue:
         reply = None
         for attempt in range(_TRIES):
             if attempt:
-                self.hush()
+                self.stop_stream()
             reply = self._asked_once(command)
             if reply is not None and reply.error is None:
                 return reply.values
@@ -122,7 +122,7 @@ def _complaint(command: Command, reply: Reply | None, baud: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class GloveSetup:
     """The requested configuration of a glove.
 
     words    the period (`cyberglove_protocol.period_words`)
@@ -182,7 +182,7 @@ def find_line(url: str, rates: Sequence[int]) -> SerialLine:
         line = SerialLine(url, baud)
         try:
             dialogue = Dialogue(line)
-            dialogue.hush()
+            dialogue.stop_stream()
             dialogue.ask(query("G"))
         except DeviceError as reason:
             line.close()
@@ -198,7 +198,7 @@ def find_line(url: str, rates: Sequence[int]) -> SerialLine:
     raise DeviceError(f"{url}: no CyberGlove replies at {tried} baud: check its power and the cable") from failure
 
 
-def set_up(line: SerialLine, wanted: Wanted) -> GloveInfo:
+def set_up(line: SerialLine, wanted: GloveSetup) -> GloveInfo:
     """Identify a box that replies, and configure how it sends records.
 
     Raises DeviceError if it does not reply or is not a supported glove.
@@ -221,7 +221,7 @@ def set_up(line: SerialLine, wanted: Wanted) -> GloveInfo:
     filtered = _optional(dialogue, query("F")) not in (None, b"\0")
     if wanted.filtered not in (None, filtered):
         odd += (f"Its digital filter stays {'on' if filtered else 'off'}, contrary to the setting.",)
-    period = told_us(wanted.words)
+    period = period_us(wanted.words)
     shortest = shortest_us(len(places), line.baud, status=status, filtered=filtered)
     if wanted.poll:
         shortest += sending_us(len(POLL), line.baud)
@@ -251,7 +251,7 @@ def _masked(dialogue: Dialogue, mask: bytes) -> bool:
     return masked_sensors(says) == masked_sensors(mask) and _optional(dialogue, query("N")) == count
 
 
-def _configured(dialogue: Dialogue, wanted: Wanted) -> tuple[bool, tuple[str, ...]]:
+def _configured(dialogue: Dialogue, wanted: GloveSetup) -> tuple[bool, tuple[str, ...]]:
     """Configure the box; return whether its records will carry the status byte, and notes on rejected settings."""
     words = b"".join(word.to_bytes(2, "big") for word in (FASTEST if wanted.poll else wanted.words))
     dialogue.ask(setting("T", words))
@@ -271,7 +271,7 @@ def _until_ready(dialogue: Dialogue, url: str) -> tuple[str, ...]:
     """Poll until the box is ready. Sources disagree on the meanings of 1 and 2: both pass, with a note."""
     end = monotonic() + _READY_S
     while (state := dialogue.ask(query("G"))[0]) != READY and monotonic() < end:
-        dialogue.hush()
+        dialogue.stop_stream()
     if state == 0:
         raise DeviceError(f"{url}: the CyberGlove's box is not initialised and has no glove: is one plugged in?")
     return () if state == READY else (f"?G returns {state}, not {READY}: the glove is unplugged or not initialised.",)
@@ -313,7 +313,7 @@ def _optional(dialogue: Dialogue, command: Command) -> bytes | None:
     try:
         return dialogue.ask(command)
     except DeviceError:
-        dialogue.hush()
+        dialogue.stop_stream()
         return None
 
 
@@ -347,7 +347,7 @@ class CyberGlove(Closing):
         self.url = url
         self.counts = RecordCounts()
         self._rates = BAUD_RATES if baud is None else (baud,)
-        self._wanted = Wanted(
+        self._wanted = GloveSetup(
             period_words(rate_hz),
             poll=mode == "poll",
             sensors=sensors,
@@ -439,7 +439,7 @@ class CyberGlove(Closing):
     def _ask(self, command: Command) -> bytes:
         line = self._opened()
         dialogue = Dialogue(line)
-        dialogue.hush()
+        dialogue.stop_stream()
         try:
             return dialogue.ask(command)
         finally:
@@ -467,7 +467,7 @@ class CyberGlove(Closing):
         if not self._expected:
             self._expected, self._heard_at, self._quiet_from = True, now, now
         self._poll_at = now + _POLLED_S
-        self._due = max(self._due + told_us(self._wanted.words) / 1e6, now)
+        self._due = max(self._due + period_us(self._wanted.words) / 1e6, now)
 
     @property
     def _given_up_at(self) -> float:

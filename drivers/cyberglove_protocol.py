@@ -192,7 +192,7 @@ def period_words(rate_hz: float | None) -> Words:
     return round(ticks / times), times
 
 
-def told_us(words: Words) -> float:
+def period_us(words: Words) -> float:
     """Return the period in microseconds that the words encode; 0 for the fastest."""
     return words[0] * words[1] * 1e6 / TICKS_HZ
 

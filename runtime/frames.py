@@ -103,7 +103,7 @@ class Newest(Generic[F]):
         return self.frame if now_us <= self.expires_us else None
 
 
-class Rewired:
+class BitRemap:
     """Converts a set of a device's bits to a set of switches, as given by `pairs` (bit, switch).
 
     A call costs a lookup as long as nothing changes: a hand rests for many scans.

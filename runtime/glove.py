@@ -17,7 +17,7 @@ from .harness.wiring import Harness
 from .harness.writing import harness_to_toml
 from .live.health import Health
 from .live.recogniser import Moment
-from .live.sources import Taken
+from .live.sources import Snapshot
 from .live.system import System
 from .policy import Policy
 from .preshape.loading import preshape_selector
@@ -34,7 +34,7 @@ _REPORT_US = 1_000_000
 class Feed(Protocol):
     """The origin of frames: usually the devices of the harness."""
 
-    def take(self) -> Taken:
+    def take(self) -> Snapshot:
         """Return the newest frames, and all that arrived since the last call, after waiting for something new."""
 
 

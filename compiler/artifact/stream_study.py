@@ -17,7 +17,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from thenar.runtime.live.decision import Decision, SequentialTest, Standing
+from thenar.runtime.live.decision import Decision, Ranking, SequentialTest
 from thenar.runtime.policy import Policy
 from thenar.runtime.recipe import Inputs, Recipe
 from thenar.runtime.scores import LANE_OFFSET
@@ -253,7 +253,7 @@ class _StreamScores:
         """Return the states (rules, T) that the rules announce."""
         none, states = self.model.n_types, []
         for tick, row in enumerate((self.lanes + LANE_OFFSET).tolist()):
-            standing = Standing(tuple(row))
+            standing = Ranking(tuple(row))
             decided = [rule.update(tick * TICK_US, standing) for rule in rules]
             states.append([none if state is None else state for state in decided])
         return np.array(states, np.intp).T

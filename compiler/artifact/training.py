@@ -139,7 +139,7 @@ def cross_validated(
     folds = [(place, fold) for place, cut in enumerate(cuts) for fold in cut.folds]
     predicted = np.empty((len(cuts), len(samples.labels)), np.intp)
     scores = np.empty((len(samples.labels), samples.n_classes))
-    knows = [learns_none(samples, cut) for cut in cuts]
+    knows = [trained_with_rest(samples, cut) for cut in cuts]
     # Segments are learned from folds that know rows in which nothing is held, if there are any.
     scored = next((place for place, rows in enumerate(knows) if rows.all()), 0)
     tasks = ((place, fold, test) for place, fold in folds)
@@ -180,7 +180,7 @@ def rates_of_recipe(
     return () if tested is None else tested.rates
 
 
-def learns_none(samples: Samples, cut: "Cut") -> NDArray[np.bool_]:
+def trained_with_rest(samples: Samples, cut: "Cut") -> NDArray[np.bool_]:
     """Return which rows (n,) are tested by a fold whose training rows include some in which nothing is held.
 
     If none do, return all rows. When only one subject's whole movements were recorded, the fold that tests this subject
@@ -229,7 +229,7 @@ def detection_of(
     if not (none.any() or (predicted == samples.n_types).any()):
         return ()
     said = (predicted == samples.n_types).astype(np.intp)
-    knows = np.ones(len(none), bool) if cut is None else learns_none(samples, cut)
+    knows = np.ones(len(none), bool) if cut is None else trained_with_rest(samples, cut)
     held, empty = (
         {rate.unit: rate for rate in _rates(protocol, samples, said, none.astype(np.intp), rows & knows, seed, cut)}
         for rows in (~none, none)

@@ -94,7 +94,7 @@ Function = Literal["classify", "update"]
 FUNCTIONS: tuple[Function, ...] = ("classify", "update")
 
 
-class Carried(Struct, frozen=True):
+class BundledFirmware(Struct, frozen=True):
     """Whether a build has the folder `firmware/`, and which of its files differ from those generated for it now."""
 
     present: bool
@@ -111,14 +111,14 @@ def made_firmware(manifest: Manifest, tables: IntegerTables, scan: ScanMap | Non
     return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, f"firmware {fit.words}"
 
 
-def carried_firmware(folder: Path, build: Build) -> Carried:
+def bundled_firmware(folder: Path, build: Build) -> BundledFirmware:
     """Compare the firmware in the build `folder` with the firmware generated now."""
     if not (folder / FIRMWARE_NAME).is_dir():
-        return Carried(False, ())
+        return BundledFirmware(False, ())
     made, _ = made_firmware(build.manifest, build.tables, build.scan)
     now = {name: text.encode() for name, text in made.items()}
     names = [f"{FIRMWARE_NAME}/{name}" for name in LIBRARY_FILES]
-    return Carried(True, tuple(name for name in names if now.get(name) != _content(folder / name)))
+    return BundledFirmware(True, tuple(name for name in names if now.get(name) != _content(folder / name)))
 
 
 def _content(path: Path) -> bytes | None:
@@ -319,7 +319,7 @@ class FirmwareVerification(Struct, frozen=True, kw_only=True):
     extreme: int
     random: int
     checks: tuple[TargetCheck, ...]
-    carried: Carried
+    carried: BundledFirmware
 
     @property
     def holds(self) -> bool:
@@ -365,7 +365,7 @@ def verify_firmware(
         extreme=len(extreme),
         random=len(random),
         checks=tuple(checks),
-        carried=carried_firmware(Path(folder), build),
+        carried=bundled_firmware(Path(folder), build),
     )
 
 

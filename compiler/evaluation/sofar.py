@@ -47,7 +47,7 @@ class TypeSoFar:
 
 
 @dataclass(frozen=True, slots=True)
-class SoFar:
+class InterimAccuracy:
     """The accuracy of a collection so far, and of each type, starting with those for which more trials help most.
 
     Only the trials of types with two or more count in `total`; it may be 0, with an interval of 0..1.
@@ -60,7 +60,7 @@ class SoFar:
     types: tuple[TypeSoFar, ...]
 
 
-def recognition_so_far(grasp_set: GraspSet) -> SoFar:
+def recognition_so_far(grasp_set: GraspSet) -> InterimAccuracy:
     """Return the accuracy for a set's trials, each predicted from all others.
 
     Types are ordered by the lower end of their interval, which is low for types that are mistaken for others and for
@@ -82,7 +82,7 @@ def recognition_so_far(grasp_set: GraspSet) -> SoFar:
         found.append(TypeSoFar(name, len(own), *_rate(own == number, len(own) > 1), taken_for))
     counts = (np.bincount(truth) > 1)[truth]
     types = tuple(sorted(found, key=lambda one: one.low))
-    return SoFar(int(counts.sum()), *_rate((given == truth)[counts], bool(counts.any())), types)
+    return InterimAccuracy(int(counts.sum()), *_rate((given == truth)[counts], bool(counts.any())), types)
 
 
 def _rate(hits: NDArray[np.bool_], known: bool) -> tuple[int, float, float]:
@@ -116,7 +116,7 @@ def left_out_scores(inputs: Floats, label: NDArray[np.intp], trial: NDArray[np.i
     return scores
 
 
-def recording_so_far(recording: Path) -> SoFar | None:
+def recording_so_far(recording: Path) -> InterimAccuracy | None:
     """Return the accuracy for the trials of a recording so far; None while they have fewer than two types."""
     grasp_set, _ = import_recordings([recording])
     return recognition_so_far(grasp_set) if len(np.unique(grasp_set.labels)) > 1 else None

@@ -10,13 +10,13 @@ import numpy as np
 from ..evaluation.luck import Draws
 from ..evaluation.rates import Rate
 from ..trainers.base import TRAINERS, Training
-from .finalists import Close
+from .finalists import EvaluatedFinalist
 from .latency import POLICIES
 from .points import DecisionKind, Latency, Point, PointSetting, Time, front
 from .price import PricedTables, Wired
 from .screen import Screened
 from .search import Candidate, Shape
-from .survey import Cuts, Judged
+from .survey import Cuts, TrialAccuracy
 from .timing.classify_times import Classified
 from .timing.scan_times import NO_TIME
 
@@ -29,7 +29,7 @@ class Design:
     measured  time of classifying, simulated or measured; None: the model's estimate
     """
 
-    close: Close
+    close: EvaluatedFinalist
     tables: PricedTables
     classified: Classified
     wired: Wired | None
@@ -37,7 +37,7 @@ class Design:
     measured: Time | None = None
 
     @property
-    def judged(self) -> Judged:
+    def judged(self) -> TrialAccuracy:
         """The evaluation of these tables by which points are chosen."""
         return self.close.tables[self.tables.tabled]
 
@@ -70,7 +70,7 @@ class Design:
 Latencies = Mapping[tuple[Design, DecisionKind], Latency]
 
 
-def designs(close: Close, read: Time = NO_TIME) -> Iterator[Design]:
+def designs(close: EvaluatedFinalist, read: Time = NO_TIME) -> Iterator[Design]:
     """Yield all designs of a finalist, whose joints take `read`."""
     for tables in close.priced:
         if tables.classified is not None:
@@ -96,13 +96,13 @@ def lucks(
     screened: Sequence[Screened],
     cuts: Cuts,
     seed: int,
-) -> dict[Judged, float]:
+) -> dict[TrialAccuracy, float]:
     """Return the optimism of the accuracies of tables on the fronts of frame time and of the number of switches.
 
     A point is the best of everything cheaper than the next point of its front: tables of finalists, and placements that
     were only screened. Of two fronts the greater optimism counts.
     """
-    quickest: dict[tuple[Close, Shape], float] = {}
+    quickest: dict[tuple[EvaluatedFinalist, Shape], float] = {}
     for design in several:
         key = (design.close, design.tables.tabled.shape)
         quickest[key] = min(design.frame.us, quickest.get(key, np.inf))
@@ -119,7 +119,7 @@ def lucks(
     most = max(each.repeats for each in judged)
     hits = np.array([each.hits * (most // each.repeats) for each in judged])
     draws = Draws.of(hits, cuts.people if cuts.by == "new subject" else np.arange(hits.shape[1]), seed)
-    found: dict[Judged, float] = {}
+    found: dict[TrialAccuracy, float] = {}
     prices: tuple[Callable[[Design], float], ...] = (lambda design: design.frame.us, lambda design: design.n_switches)
     for best, price, cost in zip(fronts, prices, costs, strict=True):
         limits = [*(price(design) for design in best[1:]), np.inf]
@@ -137,7 +137,7 @@ def _effort(design: Design) -> tuple[float, ...]:
 def points_of(
     several: Sequence[Design],
     latencies: Latencies,
-    luck: Mapping[Judged, float],
+    luck: Mapping[TrialAccuracy, float],
     names: Callable[[Candidate], Sequence[str]],
     training: Callable[[Candidate], Training],
     joints: Callable[[Candidate], Sequence[str]] = lambda _: (),

@@ -13,7 +13,7 @@ from .points import STEP, By, front
 from .price import PricedTables, Tabled, price
 from .screen import Screened
 from .search import NO_SWITCHES, SHAPES, Candidate, Search, Shape
-from .survey import Cuts, Judged, Survey, Tally
+from .survey import Cuts, FoldHits, Survey, TrialAccuracy
 
 # Share of the best accuracy; the least gain that counts on a front of screened rates; the threshold of a tie.
 _USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
@@ -24,7 +24,7 @@ _DEEPER = 0.002
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Close:
+class EvaluatedFinalist:
     """A finalist: its evaluation after every stage (by the ensemble) and with each of the tables; with the same tables,
     its accuracy on single frames (none: a trial has one), and on trials in the other folds (none: only one subject);
     the costs of the tables worth building; the time of choosing its switches.
@@ -32,7 +32,7 @@ class Close:
 
     screened: Screened
     stages: dict[int, Rate]
-    tables: dict[Tabled, Judged]
+    tables: dict[Tabled, TrialAccuracy]
     frames: dict[Tabled, Rate]
     other: dict[Tabled, Rate]
     priced: tuple[PricedTables, ...]
@@ -79,12 +79,12 @@ def _spread(mine: list[Screened]) -> list[Screened]:
     order = list(dict.fromkeys([best, min(level, key=lambda one: len(one.columns))]))
     left = [one for one in mine if one not in order]
     while left:
-        order.append(max(left, key=lambda one: min(_unlike(one, known) for known in order)))
+        order.append(max(left, key=lambda one: min(_distance(one, known) for known in order)))
         left.remove(order[-1])
     return order
 
 
-def _unlike(one: Screened, other: Screened) -> float:
+def _distance(one: Screened, other: Screened) -> float:
     return abs(_errors(one) - _errors(other)) + abs(log(one.frame_us / other.frame_us))
 
 
@@ -99,7 +99,7 @@ def _different(screened: Sequence[Screened]) -> list[Screened]:
     )[::-1]
 
 
-def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...]:
+def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[EvaluatedFinalist, ...]:
     """Return the finalists with all evaluations.
 
     All are trained to the last round in the folds of the first repeat. In the others, those that gain nothing by more
@@ -110,7 +110,7 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
     typical = survey.typical(choices)
     survey.choose(choices, cuts.others)
     survey.choose_joints(choices, cuts.others)
-    survey.settle(typical, cuts.others)
+    survey.tune(typical, cuts.others)
     fits = survey.fit(choices, cuts.screening, lambda one: (searches[one].stages, searches[one].tabled))
     rows = len(cuts.trials)
     depths = {one: depth_of(searches[one], [fits[one, fold] for fold in cuts.screening], rows) for one in choices}
@@ -133,7 +133,7 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
     ]
     prices = survey.cache.ask(calls)
     return tuple(
-        Close(one, *judged[one.choice], priced, survey.choosing_s(one.choice))
+        EvaluatedFinalist(one, *judged[one.choice], priced, survey.choosing_s(one.choice))
         for one, priced in zip(chosen, prices, strict=True)
     )
 
@@ -148,7 +148,7 @@ def papers_depth(search: Search) -> Search:
     return replace(search, rounds=min(100, search.rounds))
 
 
-def depth_of(search: Search, fits: Sequence[Tally], rows: int) -> Search:
+def depth_of(search: Search, fits: Sequence[FoldHits], rows: int) -> Search:
     """Return the search with the rounds worth training, by the folds of the first repeat, of `rows` rows."""
     few = papers_depth(search)
     correct = [
@@ -158,7 +158,7 @@ def depth_of(search: Search, fits: Sequence[Tally], rows: int) -> Search:
     return search if gained > _DEEPER * rows else few
 
 
-def worthwhile(tables: Mapping[Tabled, Judged]) -> tuple[Tabled, ...]:
+def worthwhile(tables: Mapping[Tabled, TrialAccuracy]) -> tuple[Tabled, ...]:
     """Return, for each shape, the tables of the fewest rounds that reach that shape's best accuracy."""
     found = []
     for shape in dict.fromkeys(tabled.shape for tabled in tables):
@@ -169,10 +169,10 @@ def worthwhile(tables: Mapping[Tabled, Judged]) -> tuple[Tabled, ...]:
 
 
 def _judged(
-    cuts: Cuts, search: Search, fits: Mapping[Fold, Tally]
-) -> tuple[dict[int, Rate], dict[Tabled, Judged], dict[Tabled, Rate], dict[Tabled, Rate]]:
-    """Return a finalist's evaluation as in Close: after every stage; with each of the tables, of trials and of frames;
-    and with them in the other folds.
+    cuts: Cuts, search: Search, fits: Mapping[Fold, FoldHits]
+) -> tuple[dict[int, Rate], dict[Tabled, TrialAccuracy], dict[Tabled, Rate], dict[Tabled, Rate]]:
+    """Return the rates of an EvaluatedFinalist: after every stage; with each of the tables, by trials and frames; and
+    with them in the other folds.
     """
     places = {
         Tabled(rounds, Shape(*shape)): (row, column)
@@ -180,7 +180,7 @@ def _judged(
         for column, shape in enumerate(SHAPES)
     }
 
-    def tables(by: By) -> dict[Tabled, Judged]:
+    def tables(by: By) -> dict[Tabled, TrialAccuracy]:
         return {
             each: cuts.judged(by, {fold: fit.tables[row][column] for fold, fit in fits.items()})
             for each, (row, column) in places.items()

@@ -29,7 +29,7 @@ from ..text import INDEPENDENT, sentence
 from .cache import Cache, Report, Store
 from .designs import Design, Latencies, best_designs, designs, lucks, points_of
 from .equipment import equipment_for
-from .finalists import Close, finalists, look_closely
+from .finalists import EvaluatedFinalist, evaluate_finalists, finalists
 from .latency import POLICIES, Pace, latencies
 from .marks import choices_to_mark, marks_of, own_build
 from .measure import measured
@@ -123,7 +123,7 @@ def find_frontier(
         Deployment target, one of `thenar.compiler.frontier.targets.TARGETS`.
     search : Search, optional
         Size of the search. Baselines that are not installed are left out.
-    wanted : Wanted, optional
+    wanted : PointGoal, optional
         Which point to pick.
     build : Path, optional
         A build folder, to be marked on the pictures.
@@ -168,8 +168,8 @@ def find_frontier(
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
-        cache = Cache(store, report or _unheard, _ROUNDS, jobs=jobs)
-        with _taken_back_if_refused(made, store):
+        cache = Cache(store, report or _no_progress, _ROUNDS, jobs=jobs)
+        with _remove_created_on_error(made, store):
             records = _records(grasp_set, harness, target, joint_us, record_time, filtered)
             equipment = equipment_for(target, _wirings(grasp_set, harness, target), cache, records)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
@@ -185,7 +185,7 @@ def find_frontier(
 
 
 @contextmanager
-def _taken_back_if_refused(made: Sequence[Path], store: Store) -> Iterator[None]:
+def _remove_created_on_error(made: Sequence[Path], store: Store) -> Iterator[None]:
     """Remove files and folders that a run made if its request is refused; files added by others meanwhile stay."""
     try:
         yield
@@ -310,7 +310,7 @@ def _found(
     screened += screen_fewer(survey, finalists([one for one in screened if one.choice.joints], (), _FEWER))
     screened += screen_others(survey, several)
     named = choices_to_mark(n_elements, survey.n_joints, search.trainers[0], most)
-    closes = look_closely(survey, finalists(screened, list(named), search.finalists))
+    closes = evaluate_finalists(survey, finalists(screened, list(named), search.finalists))
     every = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
     by_time, by_switches = best_designs(every)
     kept, skipped = measured(list(dict.fromkeys([*by_time, *by_switches])), survey.equipment, survey.cache)
@@ -375,7 +375,7 @@ def _latencies(survey: Survey, replay: Replay, kept: Sequence[Design]) -> Latenc
     }
 
 
-def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search) -> tuple[Tried, ...]:
+def _tried(screened: Sequence[Screened], closes: Sequence[EvaluatedFinalist], search: Search) -> tuple[Tried, ...]:
     """Return everything that was screened, and the finalists after every stage of their training."""
     searches = {name: search.alone(name) for name in search.trainers}
     first = [(one, searches[one.choice.trainer].screened, one.judged.rate) for one in screened]
@@ -396,5 +396,5 @@ def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search
     )
 
 
-def _unheard(_done: int, _total: int) -> None:
+def _no_progress(_done: int, _total: int) -> None:
     pass

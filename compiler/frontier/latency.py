@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from thenar.runtime.live.decision import Decision, SequentialTest, Standing
+from thenar.runtime.live.decision import Decision, Ranking, SequentialTest
 from thenar.runtime.policy import Policy
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.segmenting.live import LiveSegments
@@ -37,7 +37,7 @@ LEAST_STEP_US = 1_000
 # The deciding method: by candidates under a policy, or by segments, of a model (None: the default model).
 Deciding = Policy | SegmentModel | None
 # Takes a frame's time and standing; returns what is decided on, None for nothing.
-Decide = Callable[[int, Standing], int | None]
+Decide = Callable[[int, Ranking], int | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ def decisions(tables: IntegerTables, frames: Stretches, policy: Deciding) -> Dec
     types: list[int | None] = []
     lanes = map(tuple, (frames.scores + LANE_OFFSET).tolist())
     for stretch, row in zip(frames.times, lanes, strict=True):
-        standing = Standing(row)
+        standing = Ranking(row)
         for time_us in stretch:
             decided = decide(time_us, standing)
             if not types or decided != types[-1]:
@@ -117,7 +117,7 @@ def _by_segments(tables: IntegerTables, model: SegmentModel | None) -> Decide:
     model = model or SegmentModel.usual(tables.n_classes, has_none=False, scale=tables.scale)
     live = LiveSegments(model, [str(number) for number in range(tables.n_classes)], Policy().lag_us or 0)
 
-    def decide(time_us: int, standing: Standing) -> int | None:
+    def decide(time_us: int, standing: Ranking) -> int | None:
         segment = live.update(time_us, standing.lanes)
         return None if segment.state == "forming" else segment.label
 

@@ -11,7 +11,7 @@ from ..evaluation.rates import Rate
 from ..placement.methods.base import BEST, PAPERS
 from ..recordings.graspset import GraspSet
 from .equipment import Equipment
-from .finalists import Close, papers_tables
+from .finalists import EvaluatedFinalist, papers_tables
 from .points import FrontierError, Mark, PlacementChoice
 from .search import Candidate
 from .survey import Survey
@@ -37,7 +37,7 @@ def choices_to_mark(
     return alone | (with_joints if n_joints else {})
 
 
-def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Survey) -> tuple[Mark, ...]:
+def marks_of(named: dict[Candidate, str], closes: Sequence[EvaluatedFinalist], survey: Survey) -> tuple[Mark, ...]:
     """Return the marks of those choices that were fully evaluated, with the paper's rounds."""
     found, tabled = [], papers_tables(survey.search)
     for close in closes:

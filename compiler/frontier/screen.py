@@ -8,7 +8,7 @@ from ..samples import Columns
 from .points import Curve
 from .price import Tabled, price
 from .search import JOINTS, NO_SWITCHES, Candidate, Shape, available_inputs, curve_placements, tried_placements
-from .survey import Judged, Survey
+from .survey import Survey, TrialAccuracy
 
 # The frame time hardly depends on the numbers of rounds and rows: tables of few suffice.
 _TABLED = Tabled(12, Shape(16))
@@ -20,7 +20,7 @@ class Screened:
 
     choice: Candidate
     columns: Columns
-    judged: Judged
+    judged: TrialAccuracy
     frame_us: float
 
     @property
@@ -78,16 +78,18 @@ def screen_others(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, 
 
 def _rates(
     survey: Survey, choices: Sequence[Candidate], baselines: Sequence[Candidate] = ()
-) -> dict[Candidate, Judged]:
-    """Return the rates of choices and baselines; baselines choose within the folds only and settle nothing."""
+) -> dict[Candidate, TrialAccuracy]:
+    """Return the rates of choices and baselines; baselines choose within the folds only and tune nothing."""
     search, cuts, every = survey.search, survey.cuts, [*choices, *baselines]
-    survey.settle(survey.typical(choices), (cuts.everything, *cuts.screening))
+    survey.tune(survey.typical(choices), (cuts.everything, *cuts.screening))
     rounds = {name: search.alone(name).screened for name in search.trainers}
     fits = survey.fit(every, cuts.screening, lambda one: ((rounds[one.trainer],), ()))
     return {one: cuts.judged(cuts.by, {fold: fits[one, fold].stages[-1] for fold in cuts.screening}) for one in every}
 
 
-def _screened(survey: Survey, choices: Sequence[Candidate], rates: Mapping[Candidate, Judged]) -> tuple[Screened, ...]:
+def _screened(
+    survey: Survey, choices: Sequence[Candidate], rates: Mapping[Candidate, TrialAccuracy]
+) -> tuple[Screened, ...]:
     """Return the choices that can be built."""
     calls = []
     for choice in choices:
@@ -103,7 +105,7 @@ def _screened(survey: Survey, choices: Sequence[Candidate], rates: Mapping[Candi
     return tuple(found)
 
 
-def _curve(survey: Survey, name: str, rates: dict[Candidate, Judged]) -> Curve:
+def _curve(survey: Survey, name: str, rates: dict[Candidate, TrialAccuracy]) -> Curve:
     """Return a method's rates by the mean number of switches that it kept in the folds, switches alone."""
     folds, points = survey.cuts.screening, {}
     for choice, judged in rates.items():

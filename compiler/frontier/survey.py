@@ -98,7 +98,7 @@ class Cuts:
         every = (*(fold for folds in self.repeats for fold in folds), *self.subjects)
         return tuple(fold for fold in every if fold not in self.screening)
 
-    def judged(self, by: By, packed: Mapping[Fold, bytes]) -> "Judged":
+    def judged(self, by: By, packed: Mapping[Fold, bytes]) -> "TrialAccuracy":
         """Return the rate of this kind, given the packed bits of each fold's trials, over the available repeats."""
         repeats = [folds for folds in self.folds(by) if packed.keys() >= set(folds)]
         hits = np.zeros((len(repeats), len(self.people)), np.intp)
@@ -109,7 +109,7 @@ class Cuts:
         everyone = np.arange(len(self.people))
         groups = self.people if by == "new subject" else None
         rate = Rate.predicted(hits, np.ones_like(everyone), everyone, of=by, groups=groups)
-        return Judged(rate, hits.sum(axis=0), len(repeats))
+        return TrialAccuracy(rate, hits.sum(axis=0), len(repeats))
 
     def frames(self, packed: Mapping[Fold, bytes]) -> Rate:
         """Return the rate of single frames by which points are chosen, by the packed bits of each fold's rows."""
@@ -123,7 +123,7 @@ class Cuts:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class TrialAccuracy:
     """A rate of trials, and in how many of `repeats` each trial (m,) was predicted rightly."""
 
     rate: Rate
@@ -131,14 +131,14 @@ class Judged:
     repeats: int
 
 
-class Ladder(Struct, frozen=True):
+class PlacementPath(Struct, frozen=True):
     """The placements of a method, one for each parameter, and their total time."""
 
     columns: tuple[Columns, ...]
     seconds: float
 
 
-class Tally(Struct, frozen=True):
+class FoldHits(Struct, frozen=True):
     """Correctly predicted trials of a fold, by their numbers, eight to the byte.
 
     stages  after every stage           tables  by the tables of each shape after each tabled stage (stages x shapes)
@@ -234,7 +234,7 @@ class Survey:
         return self._inputs[key]
 
     def training(self, choice: Candidate, fold: Fold | None = None) -> Training:
-        """Return the training of a choice on the training rows of a fold, or on all rows; call `settle` first."""
+        """Return the training of a choice on the training rows of a fold, or on all rows; call `tune` first."""
         fold = fold or self.cuts.everything
         return (
             self._trainings.get((choice.trainer, choice.inputs, fold))
@@ -250,7 +250,7 @@ class Survey:
         kept = {one: len(self.columns(one, self.cuts.everything)) for mine in alike.values() for one in mine}
         return [min(mine, key=lambda one: abs(kept[one] - _TYPICAL)) for mine in alike.values()]
 
-    def settle(self, typical: Sequence[Candidate], folds: Sequence[Fold]) -> None:
+    def tune(self, typical: Sequence[Candidate], folds: Sequence[Fold]) -> None:
         """Select open settings on the training rows of these folds, as `compile` does: by typical choices, once for all
         of the same trainer and inputs.
         """
@@ -320,7 +320,7 @@ class Survey:
         choices: Sequence[Candidate],
         folds: Sequence[Fold],
         depth: Callable[[Candidate], Depth],
-    ) -> dict[tuple[Candidate, Fold], Tally]:
+    ) -> dict[tuple[Candidate, Fold], FoldHits]:
         """Return the tallies of every choice in every fold, trained to its `depth`."""
         places = [(choice, fold) for choice in choices for fold in folds]
         calls = [
@@ -340,12 +340,12 @@ class Survey:
 @stored(1)
 def choose_path(
     samples: Samples, rows: Rows, method: str, parameters: tuple[float, ...], ports: PortCosts | None
-) -> Ladder:
+) -> PlacementPath:
     """Choose switches from some rows by one method, for all of its parameters."""
     began = time.perf_counter()
     choose = METHODS[method].chooser(samples.rows(rows), ports)
     columns = tuple(choose(parameter) for parameter in parameters)
-    return Ladder(columns, time.perf_counter() - began)
+    return PlacementPath(columns, time.perf_counter() - began)
 
 
 @stored(1)
@@ -372,7 +372,7 @@ def fit_stages(
     tabled: tuple[int, ...],
     shapes: tuple[Shape, ...],
     training: Training,
-) -> Tally:
+) -> FoldHits:
     """Train once on a fold's training rows, on the switches `columns` and the joints; test at every stage.
 
     Rows get the most frequent type if a placement has no switch that varies.
@@ -382,14 +382,14 @@ def fit_stages(
     if not (train.inputs != train.inputs[0]).any():
         same = np.full(len(test.labels), np.bincount(train.labels).argmax())
         trials, frames = _packed(same, test)
-        return Tally((trials,) * len(stages), *(((each,) * len(shapes),) * len(tabled) for each in (trials, frames)))
+        return FoldHits((trials,) * len(stages), *(((each,) * len(shapes),) * len(tabled) for each in (trials, frames)))
     rounds = (*stages, *tabled)
     models = dict(zip(rounds, training.stages(train, rounds), strict=True))
     predictions = (winners(model_scores(models[stage], test.switches, test.codes)) for stage in stages)
     by_stage = tuple(_packed(predicted, test)[0] for predicted in predictions)
     scores = [collapse(models[stage], kept.n_switches) for stage in tabled]
     found = [[_packed(_predicted(each, shape, train, test), test) for shape in shapes] for each in scores]
-    return Tally(by_stage, *(tuple(tuple(each[which] for each in row) for row in found) for which in (0, 1)))
+    return FoldHits(by_stage, *(tuple(tuple(each[which] for each in row) for row in found) for which in (0, 1)))
 
 
 def _predicted(scores: ScoreTables, shape: Shape, train: Samples, test: Samples) -> Rows:
@@ -401,7 +401,7 @@ def _predicted(scores: ScoreTables, shape: Shape, train: Samples, test: Samples)
 
 
 def _packed(predictions: Rows, test: Samples) -> tuple[bytes, bytes]:
-    """Return which trials, in the order of their numbers, and which rows were predicted rightly; see Tally."""
+    """Return which trials, in the order of their numbers, and which rows were predicted rightly; see FoldHits."""
     _, first, trials = np.unique(test.trials, return_index=True, return_inverse=True)
     right = np.packbits(decided(predictions[None], trials)[0] == test.labels[first]).tobytes()
     return right, np.packbits(predictions == test.labels).tobytes() if len(first) < len(trials) else b""

@@ -86,7 +86,7 @@ def read_cells(table: Table, columns: Columns, selection: Selection) -> Read:
         joints=_joints(reader, selection),
     )
     none = nothing_held(columns, labels)
-    _lend(readings, none, columns, reader)
+    _fill_from_next_grasp(readings, none, columns, reader)
     keep = reader.complete(columns.missing)
     warnings = _dropped(readings, keep, reader.missing)
     missing = {name: _kept(mask, keep) for name, mask in reader.missing.items()}
@@ -100,7 +100,7 @@ def read_cells(table: Table, columns: Columns, selection: Selection) -> Read:
     independent = columns.frames == "independent"
     trial_ids = np.arange(len(readings.rows)) if independent else readings.trial_ids()
     if untold:
-        _check_told(table.what, trial_ids)
+        _require_trial_column(table.what, trial_ids)
     if columns.time is not None:
         order = in_time(trial_ids, readings.time)
         readings = readings.kept(order)
@@ -139,7 +139,7 @@ def nothing_held(columns: Columns, labels: NDArray[np.str_]) -> NDArray[np.bool_
     return np.array(none, np.bool_)[where]
 
 
-def _lend(readings: Readings, none: NDArray[np.bool_], columns: Columns, reader: "_Reader") -> None:
+def _fill_from_next_grasp(readings: Readings, none: NDArray[np.bool_], columns: Columns, reader: "_Reader") -> None:
     """Allow cells to be empty in rows in which nothing is held.
 
     This applies to the label, if an empty one means none, and to object, session and trial, which are taken from the
@@ -201,7 +201,7 @@ def _joints(reader: "_Reader", selection: Selection) -> NDArray[np.float64]:
     return joints
 
 
-def _check_told(what: str, trial_ids: NDArray[np.intp]) -> None:
+def _require_trial_column(what: str, trial_ids: NDArray[np.intp]) -> None:
     """Raise ColumnsError if rows may be frames of one trial, and nothing says whether they are."""
     shared = np.bincount(trial_ids)[trial_ids] > 1
     if shared.any():

@@ -93,7 +93,7 @@ def offset_of(slope: Slope) -> float:
 # consecutive switches keeps the span, so smaller groups do as well.
 GROUP_SIZE = 5
 
-# Scales that `kindest_scale` tries, evenly spaced down to four fifths of the finest.
+# Scales that `least_disruptive_scale` tries, evenly spaced down to four fifths of the finest.
 TRIED, _TRIED_OF_ALL = 32, 160
 _LARGEST = 127  # entry of a slope's row
 
@@ -119,7 +119,7 @@ def finest_scale(tables: ScoreTables, limit: float, widest: int, grid: int = 1) 
     return fits
 
 
-def kindest_scale(
+def least_disruptive_scale(
     tables: ScoreTables, finest: float, bits: NDArray[np.bool_], codes: NDArray[np.uint16], grid: int = 1
 ) -> float:
     """Return, of `finest` and slightly coarser scales, the one at which the fewest rows change class.
@@ -279,7 +279,7 @@ def quantise(
     while True:
         scale = finest_scale(balanced, limit - room, 2**entry_bits - 1, grid)
         if entry_bits < 16:
-            scale = kindest_scale(balanced, scale, bits, codes, grid)
+            scale = least_disruptive_scale(balanced, scale, bits, codes, grid)
         bias = _whole_bias(balanced, scale, grid, means)
         beyond = reach(replace(balanced, bias=bias / scale), scale, grid=grid) - limit
         if grid == 1 or beyond <= 0:

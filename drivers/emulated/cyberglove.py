@@ -11,7 +11,7 @@ from threading import Condition, Thread
 from time import monotonic
 
 from ..closing import Closing
-from ..cyberglove_protocol import TICKS_HZ, digitising_us, shortest_us, told_us
+from ..cyberglove_protocol import TICKS_HZ, digitising_us, period_us, shortest_us
 from .cyberglove_box import Action, CyberGloveBox, Doubts, GloveState
 from .serial_line import PtyLine
 
@@ -109,7 +109,7 @@ class EmulatedCyberGlove(Closing):
             return
         settings = self.state.settings
         words = int.from_bytes(settings["T"][:2], "big"), int.from_bytes(settings["T"][2:], "big")
-        period = told_us(words)
+        period = period_us(words)
         shortest = shortest_us(
             self._count(), self._line.baud, status=self.state.is_on("U"), filtered=self.state.is_on("F")
         )

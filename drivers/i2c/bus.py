@@ -8,8 +8,8 @@ from time import monotonic, sleep
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
 from .chips import Chip, Conversion, Converter, Reading
-from .keeper import Keeper, PlacedChip, Route
-from .node import MOST_MESSAGES, REFUSED, Node, Query, Run, Way
+from .node import MOST_MESSAGES, REFUSED, BatchMode, Node, Query, Run
+from .supervisor import ChipSupervisor, PlacedChip, Route
 from .tca9548a import ADDRESSES, CHANNELS
 
 
@@ -46,7 +46,7 @@ class Group:
     ports: tuple[tuple[int, Port], ...]
 
 
-def cut(ports: Sequence[Port], way: Way) -> Iterator[Group]:
+def cut(ports: Sequence[Port], way: BatchMode) -> Iterator[Group]:
     """Return the groups that read the ports of all present chips, in order."""
     gathered: list[tuple[int, Port]] = []
     for number, port in enumerate(ports):
@@ -60,11 +60,11 @@ def cut(ports: Sequence[Port], way: Way) -> Iterator[Group]:
         yield Group(gathered[0][1].member.route, tuple(gathered))
 
 
-def _fits(port: Port, gathered: Sequence[Port], way: Way) -> bool:
+def _fits(port: Port, gathered: Sequence[Port], way: BatchMode) -> bool:
     last = gathered[-1]
-    if way in (Way.PORT, Way.SMBUS) or port.member.route != last.member.route:
+    if way in (BatchMode.PORT, BatchMode.SMBUS) or port.member.route != last.member.route:
         return False
-    if way is Way.CHIP and port.member is not last.member:
+    if way is BatchMode.CHIP and port.member is not last.member:
         return False
     return sum(other.query.messages for other in gathered) + port.query.messages <= MOST_MESSAGES
 
@@ -72,7 +72,7 @@ def _fits(port: Port, gathered: Sequence[Port], way: Way) -> bool:
 class Scan:
     """Ports in a fixed order, read by as few transfers as the adapter allows."""
 
-    def __init__(self, node: Node, keeper: Keeper, ports: Sequence[Port]) -> None:
+    def __init__(self, node: Node, keeper: ChipSupervisor, ports: Sequence[Port]) -> None:
         self._node = node
         self._keeper = keeper
         self._ports = ports
@@ -122,7 +122,7 @@ class Scan:
     def _one_by_one(self, group: Group, error: OSError) -> list[bytes | None]:
         """Read the ports of a failed transfer one by one; if the adapter rejects batches, reduce them from then on."""
         if error.errno in REFUSED and self._way is self._node.way:  # else it was lowered since `_plan`
-            self._node.way = self._way.lower() if len(group.ports) > 1 else Way.SMBUS
+            self._node.way = self._way.lower() if len(group.ports) > 1 else BatchMode.SMBUS
         self._keeper.routes.forget()
         return [self._alone(port) for _, port in group.ports]
 
@@ -143,7 +143,7 @@ class Scan:
         else:
             believed = port.believed == (reply, member.checked)
         if not believed:
-            self._keeper.feel()
+            self._keeper.check_bus_stuck()
             if member.present:
                 self._keeper.check(member)
             again = self._alone(port)
@@ -157,7 +157,7 @@ class Scan:
 class _Converting:
     """A converter in a scan: its remaining steps, the one that converts, and the time until which it is busy."""
 
-    def __init__(self, node: Node, keeper: Keeper, member: PlacedChip) -> None:
+    def __init__(self, node: Node, keeper: ChipSupervisor, member: PlacedChip) -> None:
         self._node, self._keeper, self._member = node, keeper, member
         self._conversions: dict[int, Conversion] = {}
         self._left: deque[int] = deque()
@@ -209,7 +209,7 @@ class Interleaved:
     the first later one that is ready is read ahead. `thenar.runtime.scanning.timing` models the same order.
     """
 
-    def __init__(self, node: Node, keeper: Keeper, groups: Sequence[Sequence[Port]]) -> None:
+    def __init__(self, node: Node, keeper: ChipSupervisor, groups: Sequence[Sequence[Port]]) -> None:
         self._scans = [Scan(node, keeper, group) for group in groups]
         slow: dict[PlacedChip, _Converting] = {}
         self._slow: dict[int, _Converting] = {}
@@ -291,7 +291,7 @@ class I2cBus(Closing):
         _refuse_clashes(device, chips)
         self.chips = tuple(PlacedChip(device, at.chip, at.address, at.used, _route(at)) for at in chips)
         self._node = Node(device)
-        self._keeper = Keeper(self._node, self.chips, check_every_s)
+        self._keeper = ChipSupervisor(self._node, self.chips, check_every_s)
 
     def open(self) -> None:
         """Set up every chip and detect which batches the adapter supports. A missing chip is absent, not an error.
@@ -302,7 +302,7 @@ class I2cBus(Closing):
         # Registers, not ports, each twice: this tests batches of two chips and of two reads of one chip.
         control = [_control(member) for member in self.chips]
         trial = Scan(self._node, self._keeper, [port for port in control for _ in range(2)])
-        for _ in Way:
+        for _ in BatchMode:
             trial.read()
 
     def prepare(self, ports: Sequence[PortRead]) -> Scan:

@@ -58,7 +58,7 @@ NOBODY = 0x7F
 Run = Callable[[], list[bytes]]
 
 
-class Way(Enum):
+class BatchMode(Enum):
     """Batching of reads, from the fastest to the one that always works.
 
     i2c-gpio accepts any batch; designware (Raspberry Pi 5, many PCs) one address a transfer, else EINVAL; bcm2835
@@ -70,9 +70,9 @@ class Way(Enum):
     PORT = "one transfer per port"
     SMBUS = "one SMBus transfer per port"
 
-    def lower(self) -> "Way":
+    def lower(self) -> "BatchMode":
         """Return the next less demanding way; for the last, itself."""
-        ways = list(Way)
+        ways = list(BatchMode)
         return ways[min(ways.index(self) + 1, len(ways) - 1)]
 
 
@@ -103,7 +103,7 @@ class Node:
             raise SettingError(f"{shortened(repr(device))} {fault}")
         self.device = device
         self.transfers = 0
-        self.way = Way.CHANNEL
+        self.way = BatchMode.CHANNEL
         self._bus: SMBus | None = None
 
     @property
@@ -126,7 +126,7 @@ class Node:
 
     def find_way(self) -> None:
         """Start with the fastest way that the open adapter may support."""
-        self.way = Way.CHANNEL if self._bus is not None and self._bus.funcs & _FUNC_I2C else Way.SMBUS
+        self.way = BatchMode.CHANNEL if self._bus is not None and self._bus.funcs & _FUNC_I2C else BatchMode.SMBUS
 
     def close(self) -> None:
         """Close the node; no transfers are possible until it is reopened."""
@@ -144,7 +144,7 @@ class Node:
         """Write bytes in one transfer."""
         bus = self._ready()
         self.transfers += 1
-        if self.way is not Way.SMBUS:
+        if self.way is not BatchMode.SMBUS:
             from smbus2 import i2c_msg
 
             bus.i2c_rdwr(i2c_msg.write(address, data))
@@ -160,7 +160,7 @@ class Node:
     def prepare(self, queries: Sequence[Query]) -> Run:
         """Return a function that makes all queries in one transfer and returns the replies; SMBus allows one query."""
         bus = self._ready()
-        if self.way is Way.SMBUS:
+        if self.way is BatchMode.SMBUS:
             (query,) = queries
             return lambda: [self._by_smbus(bus, query)]
         from smbus2 import i2c_msg

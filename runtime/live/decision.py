@@ -29,9 +29,9 @@ from dataclasses import dataclass, field
 from ..scores import odds, softmax
 
 
-class Standing:
-    """The K scores of a frame (2^15 too high). For a build that refuses frames there are K + 1 of them (`or_none`), and
-    none is the last class.
+class Ranking:
+    """The K scores of a frame (2^15 too high). A build that refuses frames has K + 1 (`with_none_class`): none is
+    the last class.
     """
 
     __slots__ = ("_odds", "candidate", "lanes")
@@ -62,9 +62,9 @@ class Standing:
             self._odds = scale, (total := odds(self.lanes, scale))
         return softmax(self.lanes, number, scale, total)
 
-    def or_none(self, lead: int) -> "Standing":
+    def with_none_class(self, lead: int) -> "Ranking":
         """Return the same with none, the last class, `lead` steps above the best, or below it if that is negative."""
-        return Standing((*self.lanes, max(self.lanes) + lead))
+        return Ranking((*self.lanes, max(self.lanes) + lead))
 
 
 @dataclass(slots=True)
@@ -99,7 +99,7 @@ class Decision:
     _since_us: int = 0
     _supported_us: int = 0
 
-    def update(self, time_us: int, standing: Standing, *, whole: bool = True) -> int:
+    def update(self, time_us: int, standing: Ranking, *, whole: bool = True) -> int:
         """Return the decided class after the frame of `time_us`; `whole`: no input of it is lost."""
         if whole:
             self._whole_us = time_us
@@ -152,7 +152,7 @@ class SequentialTest:
     def __post_init__(self) -> None:
         self.threshold = math.ceil(self.scale * math.log((self.classes - 1) / self.error_rate))
 
-    def update(self, time_us: int, standing: Standing, *, whole: bool = True) -> int | None:
+    def update(self, time_us: int, standing: Ranking, *, whole: bool = True) -> int | None:
         """Return the class of the last test that ended, None if none did lately; `whole`: no input is lost."""
         if self.held is not None and time_us - self._decided_us > self.longest_us:
             self.held = None

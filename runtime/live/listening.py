@@ -43,7 +43,7 @@ _LEAST_S = 0.3
 _NO_RATE = "the rows came all at once: set rate_hz to the number of rows a second"
 
 
-class Heard(msgspec.Struct, frozen=True):
+class ColumnGuess(msgspec.Struct, frozen=True):
     """A received column: its least and greatest number, and its proposed use."""
 
     column: str
@@ -56,7 +56,7 @@ class Proposal(msgspec.Struct, frozen=True):
     """The stream that fits a sender, its columns, and remarks on oddities, in sentences."""
 
     stream: StreamWiring
-    columns: tuple[Heard, ...]
+    columns: tuple[ColumnGuess, ...]
     rows: int
     remarks: tuple[str, ...]
 
@@ -175,7 +175,8 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], every: str, r
     if measured and (faults := _faults(stream, timed)):
         remarks.append(f"counted: {faults}")
     heard = (
-        Heard(name, min(found, default=None), max(found, default=None), kinds[name]) for name, found in numbers.items()
+        ColumnGuess(name, min(found, default=None), max(found, default=None), kinds[name])
+        for name, found in numbers.items()
     )
     return Proposal(stream, tuple(heard), len(came), tuple(remarks))
 

@@ -15,7 +15,7 @@ from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
 from ..scores import LiveScores
 from ..segmenting.live import LiveSegments, Segment
 from ..tables import IntegerTables
-from .decision import Decision, SequentialTest, Standing
+from .decision import Decision, Ranking, SequentialTest
 from .quarantine import Quarantine
 
 
@@ -107,19 +107,19 @@ class LiveRecognizer:
             self.quarantine.look_at_joints(self._joints.newest.time_us, codes)
         joints_lost = self._all_joints if codes is None else 0
         frame = self._trusted(read, joints_lost)
-        dull = self.quarantine.out[1] | (self._joints.lost if codes else 0)
-        if codes is not self._scored[0] or dull != self._scored[1]:
-            self._scores.joints(codes, dull)
-            self._scored = codes, dull
+        lost_joints = self.quarantine.out[1] | (self._joints.lost if codes else 0)
+        if codes is not self._scored[0] or lost_joints != self._scored[1]:
+            self._scores.joints(codes, lost_joints)
+            self._scored = codes, lost_joints
         closed, lost = (0, self._all_switches) if frame is None else (frame.closed & ~frame.lost, frame.lost)
-        standing = Standing(lanes := self._scores.lanes(closed, lost))
-        missing = self._missing.of(lost, dull | joints_lost)
+        standing = Ranking(lanes := self._scores.lanes(closed, lost))
+        missing = self._missing.of(lost, lost_joints | joints_lost)
         if read is not None:
             self.quarantine.look(read, lanes, lost)
         refused = False
         if self._rejector is not None:
-            refused = self._rejector.refuses(lanes, closed, lost, codes, lost_joints=dull)
-            standing = standing.or_none(self._none_leads[refused])
+            refused = self._rejector.refuses(lanes, closed, lost, codes, lost_joints=lost_joints)
+            standing = standing.with_none_class(self._none_leads[refused])
         seen_us = max(newest.time_us, self._joints.newest.time_us)
         if missing.too_much:
             self._decider.forget()
@@ -136,7 +136,7 @@ class LiveRecognizer:
         self,
         now_us: int,
         unix_us: int,
-        standing: Standing,
+        standing: Ranking,
         missing: "Missing",
         decided: int | None,
         seen_us: int,

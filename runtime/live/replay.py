@@ -8,7 +8,7 @@ from pathlib import Path
 from thenar.drivers.errors import SettingError
 
 from ..build import Build
-from ..frames import GloveFrame, Rewired, SwitchFrame
+from ..frames import BitRemap, GloveFrame, SwitchFrame
 from ..harness.loading import parse_harness
 from ..names import list_names
 from ..policy import Policy
@@ -158,7 +158,7 @@ class _Inputs:
                 f"{name} was recorded without {list_names(lacking)}, which the build reads: use a build "
                 "of the recorded inputs, or record all inputs of the build"
             )
-        self._turn = Rewired(pairs)
+        self._turn = BitRemap(pairs)
         self._taxels = Taxels(session.taxels, list(levels.values()), session.taxel_calibration, harness.taxel_settings)
         self._levels = 0, self._taxels.owned
 

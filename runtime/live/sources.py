@@ -64,7 +64,7 @@ class DeviceState:
     faults: int = 0
 
 
-class Keeper(Generic[T]):
+class DeviceThread(Generic[T]):
     """Keeps `device` open and passes every sample to `take`, in a separate thread, until it is closed.
 
     A SettingError ends it unless the device was open before: `failure` then holds it, for callers that wait.
@@ -146,7 +146,7 @@ class Keeper(Generic[T]):
 
 
 @dataclass(frozen=True, slots=True)
-class Taken:
+class Snapshot:
     """The newest frames at `time_us`; all that arrived since the last time; the glove's record if it is current."""
 
     time_us: int
@@ -156,7 +156,7 @@ class Taken:
     measured: GloveFrame | None
 
 
-class Arrivals:
+class FrameBuffer:
     """Frames from the threads of the devices, for the one thread that takes them.
 
     Each part reads some of the switches: `owned` are those of each, which share no switch; switches that no part owns
@@ -195,7 +195,7 @@ class Arrivals:
             self._wait_for_taking(frame)
             self._condition.notify_all()
 
-    def take(self, patience_us: Callable[[], int] | None = None, at_most_us: int = _LONGEST_WAIT_US) -> Taken:
+    def take(self, patience_us: Callable[[], int] | None = None, at_most_us: int = _LONGEST_WAIT_US) -> Snapshot:
         """Return the newest frames, and all that arrived since the last call.
 
         If nothing has arrived, wait for it, but no longer than at_most_us: until the first of the current frames
@@ -215,7 +215,7 @@ class Arrivals:
             arrived = tuple(self._waiting)
             self._waiting.clear()
             glove = self.glove
-            return Taken(now, self.switches, glove.frame, arrived, glove.frame if now <= glove.expires_us else None)
+            return Snapshot(now, self.switches, glove.frame, arrived, glove.frame if now <= glove.expires_us else None)
 
     def fresh_for_us(self, now_us: int) -> int | None:
         """Return the microseconds until the first of the current frames expires; None: none is current. `take` calls it
@@ -297,14 +297,14 @@ class Sources:
         self._devices = tuple(source for _, source in made)
         self._readers = tuple(source for kind, source in made if kind.reads == "switches")
         self._gloves = tuple(source for kind, source in made if kind.reads == "joints")
-        self._arrivals = Arrivals(len(switch_names), [reader.owned for reader in self._readers])
+        self._arrivals = FrameBuffer(len(switch_names), [reader.owned for reader in self._readers])
         if sensors is not None:
             for device in self._devices:
                 device.read_only(sensors)
-        self.take: Callable[..., Taken] = partial(self._arrivals.take, self._patience_us)
+        self.take: Callable[..., Snapshot] = partial(self._arrivals.take, self._patience_us)
         self.changed = True
         self._keepers = [
-            Keeper[SwitchFrame | GloveFrame](source.name, source, self._taking(source), self._change)
+            DeviceThread[SwitchFrame | GloveFrame](source.name, source, self._taking(source), self._change)
             for source in self._devices
         ]
 

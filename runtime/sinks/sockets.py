@@ -60,8 +60,8 @@ class SocketLines(Sink):
         "_details",
         "_dropped",
         "_error",
-        "_knocks",
         "_listener",
+        "_listener_poll",
         "_lost",
         "_readers",
         "_sent",
@@ -80,8 +80,8 @@ class SocketLines(Sink):
         """Serve `listener`; `clock` gives seconds. With `detail`, readers also get the details of grasps."""
         listener.setblocking(False)
         self._listener = listener
-        self._knocks = select.poll()
-        self._knocks.register(listener, select.POLLIN)
+        self._listener_poll = select.poll()
+        self._listener_poll.register(listener, select.POLLIN)
         self._where = where
         self._tidy = tidy
         self._clock = clock
@@ -104,7 +104,7 @@ class SocketLines(Sink):
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Accept new readers, and send every reader the line."""
-        self._let_in()
+        self._accept_clients()
         if self._readers:
             self._send_all(encode(grasp, preshape, angles))
 
@@ -125,17 +125,17 @@ class SocketLines(Sink):
         if self._readers:
             self._send_all(encode_task(progress))
 
-    def _let_in(self) -> None:
-        if self._listener.fileno() < 0 or not self._knocks.poll(0):
+    def _accept_clients(self) -> None:
+        if self._listener.fileno() < 0 or not self._listener_poll.poll(0):
             return
         try:
             with suppress(BlockingIOError):
                 for _ in range(_KNOCKS):
-                    self._seat(*self._listener.accept())
+                    self._add_client(*self._listener.accept())
         except OSError as reason:  # gone before it was accepted, or no descriptors left
             self._error = reason.strerror or str(reason)
 
-    def _seat(self, reader: socket.socket, peer: Any) -> None:
+    def _add_client(self, reader: socket.socket, peer: Any) -> None:
         host = _host(reader, peer)
         if self._has_room(host):
             self._readers.append(_Reader(reader, host))

@@ -8,7 +8,7 @@ from thenar.drivers.i2c.bus import ChipAt, I2cBus, Interleaved, PortRead
 from thenar.drivers.i2c.chips import Conversion, Converter
 from thenar.drivers.spi.chips import SpiChip
 
-from ..frames import PERIODS, Mask, Rewired, SwitchFrame, now_us
+from ..frames import PERIODS, BitRemap, Mask, SwitchFrame, now_us
 from ..harness.wiring import Debounce, Harness
 from ..names import list_names
 from ..published import Count
@@ -53,7 +53,7 @@ class _PortSwitches(_Port):
     def __init__(self, port: Port, debounce: Debounce) -> None:
         super().__init__(debounce)
         self._inverted = 0 if port.closed_high else sum(1 << bit for bit, _ in port.switches)
-        self._switches = Rewired(port.switches)
+        self._switches = BitRemap(port.switches)
         self.targets = self._switches.targets
 
     def _states(self, reply: int | None, time_us: int) -> tuple[Mask, Mask]:

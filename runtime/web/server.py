@@ -148,7 +148,7 @@ class Server(Closing):
             self._respond, access_log=None, logger=_quiet, keepalive_timeout=_FETCH_S, lingering_time=0
         )
         with self._listener:
-            working = [asyncio.create_task(self._let_in()), asyncio.create_task(self._tick())]
+            working = [asyncio.create_task(self._accept_clients()), asyncio.create_task(self._tick())]
             self._started.set()
             try:
                 closing = asyncio.create_task(self._closing.wait())
@@ -168,7 +168,7 @@ class Server(Closing):
                 await asyncio.gather(*(page.close(WSCloseCode.GOING_AWAY) for page in self._pages))
                 await self._server.shutdown(_CLOSING_S)
 
-    async def _let_in(self) -> None:
+    async def _accept_clients(self) -> None:
         self._listener.setblocking(False)
         while True:
             try:

@@ -16,7 +16,7 @@ from thenar.drivers.errors import SettingError
 from thenar.runtime import Build, Glove
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.live.sources import Taken
+from thenar.runtime.live.sources import Snapshot
 from thenar.runtime.live.system import System
 from thenar.runtime.recording.session import Session
 from thenar.runtime.recording.writer import Recorder
@@ -218,14 +218,14 @@ class Played:
         self._kept = [switch.column for switch in Build.load(build).manifest.switches]
         self._held, self._stop, self._frames = held, stop, 0
 
-    def take(self) -> Taken:
+    def take(self) -> Snapshot:
         time_us, (closed, code) = 10_000 * self._frames, readings(self._held[self._frames])
         self._frames += 1
         if self._frames == len(self._held):
             self._stop.set()
         glove = GloveFrame(time_us, bytes([code]) + bytes(17), 3)
         switches = SwitchFrame(time_us, sum(1 << bit for bit, column in enumerate(self._kept) if closed >> column & 1))
-        return Taken(time_us, switches, glove, (), glove)
+        return Snapshot(time_us, switches, glove, (), glove)
 
 
 def test_a_live_glove_says_where_the_hand_is_in_its_task_and_in_its_sinks(

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from thenar.compiler.workers import MOST_JOBS, Aside, in_workers, workers_of
+from thenar.compiler.workers import MOST_JOBS, BackgroundTask, in_workers, workers_of
 
 
 def squared_where(number: int) -> tuple[int, int]:
@@ -137,14 +137,14 @@ def failed(number: int) -> int:
     raise ValueError(f"{number} is too many")
 
 
-def fetched(aside: Aside[Any]) -> Any:
+def fetched(aside: BackgroundTask[Any]) -> Any:
     while (answer := aside.fetch()) is None:
         time.sleep(0.01)
     return answer
 
 
 def test_work_aside_is_done_in_another_process_one_piece_after_the_other() -> None:
-    aside = Aside[tuple[int, int]]()
+    aside = BackgroundTask[tuple[int, int]]()
     assert (aside.busy, aside.fetch()) == (False, None)
     for number in (3, 4):
         aside.start(squared_where, number)
@@ -156,7 +156,7 @@ def test_work_aside_is_done_in_another_process_one_piece_after_the_other() -> No
 
 @pytest.mark.parametrize(("work", "said"), [(failed, "ValueError: 7 is too many"), (killed, "its process ended")])
 def test_what_is_wrong_with_work_aside_is_told(work: Any, said: str) -> None:
-    aside = Aside[Any]()
+    aside = BackgroundTask[Any]()
     aside.start(work, 7)
     with pytest.raises(BrokenExecutor, match=said):
         fetched(aside)
@@ -169,7 +169,7 @@ def slept(number: int) -> None:
 
 
 def test_work_aside_that_is_not_wanted_any_more_is_ended() -> None:
-    aside = Aside[None]()
+    aside = BackgroundTask[None]()
     aside.start(slept, 3600)
     process = aside._process.pid
     aside.close()

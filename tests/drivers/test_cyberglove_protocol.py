@@ -24,12 +24,12 @@ from thenar.drivers.cyberglove_protocol import (
     encode,
     find_reply,
     masked_sensors,
+    period_us,
     period_words,
     query,
     sending_us,
     setting,
     shortest_us,
-    told_us,
 )
 from thenar.drivers.errors import SettingError
 
@@ -161,7 +161,7 @@ def test_the_told_period_is_the_nearest_but_for_the_rounding_of_two_words(rate_h
     words = period_words(rate_hz)
     assert all(0 < word <= 0xFFFF for word in words)
     # Half a tick in the product of the words, and half a tick in each of its factors' multiples.
-    assert abs(told_us(words) * 0.1152 - 115_200 / rate_hz) <= 0.5 + words[1] / 2
+    assert abs(period_us(words) * 0.1152 - 115_200 / rate_hz) <= 0.5 + words[1] / 2
 
 
 @pytest.mark.parametrize("rate_hz", [0.0, -1.0, nan, inf, 1e-9])

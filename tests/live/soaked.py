@@ -23,7 +23,7 @@ from thenar.runtime import Build, Glove
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.live.sources import Arrivals, Taken
+from thenar.runtime.live.sources import FrameBuffer, Snapshot
 from thenar.runtime.recording.writer import LiveRecorder
 
 WINDOW = 10_000
@@ -64,7 +64,7 @@ class Feed:
     def __init__(self, rows: Path, switches: int, clock: Clock) -> None:
         self._clock = clock
         self._switches = switches
-        self._arrivals = Arrivals(switches, [(1 << switches) - 1])
+        self._arrivals = FrameBuffer(switches, [(1 << switches) - 1])
         with np.load(rows) as held:
             self._closed = [sum(1 << k for k, shut in enumerate(row) if shut) for row in held["bits"].tolist()]
             self._sensors = [row.tobytes() for row in held["sensors"]]
@@ -79,7 +79,7 @@ class Feed:
         closed = self._closed[row] ^ (1 << frame // 8 % self._switches)
         self._arrivals.put_switches(0, SwitchFrame(now, closed), LONGEST_US)
 
-    def take(self) -> Taken:
+    def take(self) -> Snapshot:
         """Return what came in."""
         return self._arrivals.take()
 

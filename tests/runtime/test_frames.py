@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.runtime.frames import Newest, Pauses, Rewired, SwitchFrame
+from thenar.runtime.frames import BitRemap, Newest, Pauses, SwitchFrame
 
 MASKS = st.integers(0, 255)
 PAIRS = st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)), unique_by=(lambda p: p[0], lambda p: p[1]))
@@ -59,7 +59,7 @@ def test_it_is_so_for_every_switch_by_itself(steps: list[tuple[int, int]], pause
 def test_every_bit_goes_to_its_switch_whatever_was_asked_before(
     pairs: list[tuple[int, int]], states: list[int]
 ) -> None:
-    rewired = Rewired(pairs)
+    rewired = BitRemap(pairs)
     for bits in states:
         closed = {switch for bit, switch in pairs if bits >> bit & 1}
         assert rewired(bits) == sum(1 << switch for switch in closed)
@@ -67,4 +67,4 @@ def test_every_bit_goes_to_its_switch_whatever_was_asked_before(
 
 @given(PAIRS)
 def test_the_targets_are_all_its_switches(pairs: list[tuple[int, int]]) -> None:
-    assert Rewired(pairs).targets == Rewired(pairs)(2**41 - 1)
+    assert BitRemap(pairs).targets == BitRemap(pairs)(2**41 - 1)

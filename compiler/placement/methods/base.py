@@ -55,7 +55,7 @@ class Method:
         The parameters that a frontier tries, up to the number of switches.
     nested : bool
         Whether the first of M switches are those of a smaller M, so that one ranking serves all M, with limits too.
-    all_too : bool
+    try_all_switches : bool
         Whether a frontier also tries to keep all switches.
     tried : {"always", "wired", "unwired", "never"}
         When a frontier tries it by default: "wired" if the glove's actual wiring is known.
@@ -81,7 +81,7 @@ class Method:
     uses_ports: bool = False
     sizes: tuple[int, ...] = COARSE
     nested: bool = False
-    all_too: bool = False
+    try_all_switches: bool = False
     tried: Literal["always", "wired", "unwired", "never"] = "never"
     imports: str = ""
     install: str = ""
@@ -120,7 +120,7 @@ class Method:
         """Return the parameters that a frontier tries among `n_switches` switches."""
         if not self.by_number:
             return self.sizes
-        return (*(size for size in self.sizes if size < n_switches), *([n_switches] if self.all_too else []))
+        return (*(size for size in self.sizes if size < n_switches), *([n_switches] if self.try_all_switches else []))
 
     def chooser(self, samples: Samples, ports: PortCosts | None = None) -> Chooser:
         """Do the expensive work, and return the kept switches as a function of the parameter.

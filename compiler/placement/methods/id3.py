@@ -84,7 +84,7 @@ def entropy_brought(tree: Tree) -> list[int]:
     return [round(Fraction(node.gain) * node.size * 2**_BITS) for node in tree.nodes]
 
 
-def errors_spared(tree: Tree, X: NDArray[np.bool_], labels: NDArray[np.intp]) -> list[int]:
+def error_reduction(tree: Tree, X: NDArray[np.bool_], labels: NDArray[np.intp]) -> list[int]:
     """Return by how many each node's decision lowers the errors on rows X (n, d), of class numbers `labels` (n,).
 
     X holds the tree's bits: every decision has a child for every value.
@@ -200,7 +200,7 @@ def _reduced_error(samples: Samples, _: PortCosts | None) -> Chooser:
     tree = grow_id3(samples.switches[~held_out], samples.labels[~held_out])
     # Numbers of the tree's classes; each has rows in the growing part.
     labels = np.searchsorted(np.array(tree.classes), samples.labels[held_out])
-    path = weakest_links(tree, errors_spared(tree, samples.switches[held_out], labels))
+    path = weakest_links(tree, error_reduction(tree, samples.switches[held_out], labels))
     return lambda most: path.placement(most, path.n_useless)
 
 

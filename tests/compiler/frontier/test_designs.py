@@ -7,13 +7,13 @@ import pytest
 
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.designs import Design, best_designs, designs, lucks, points_of
-from thenar.compiler.frontier.finalists import Close
+from thenar.compiler.frontier.finalists import EvaluatedFinalist
 from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, PlacementChoice, Time
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Search, Shape
-from thenar.compiler.frontier.survey import Cuts, Judged
+from thenar.compiler.frontier.survey import Cuts, TrialAccuracy
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes, records_of
 from thenar.compiler.samples import Samples
@@ -32,13 +32,15 @@ def trained(choice: Candidate) -> Training:
     return Search().alone(choice.trainer).training
 
 
-def judged(rate: float) -> Judged:
-    return Judged(
+def judged(rate: float) -> TrialAccuracy:
+    return TrialAccuracy(
         Rate.counted((round(1000 * rate),), 1000, of="pooled"), (np.arange(1000) < 1000 * rate).astype(np.intp), 1
     )
 
 
-def close_of(switches: int = 20, rate: float = 0.9, scan_us: float = 500.0, classify_us: float = 50.0) -> Close:
+def close_of(
+    switches: int = 20, rate: float = 0.9, scan_us: float = 500.0, classify_us: float = 50.0
+) -> EvaluatedFinalist:
     scan = ScanTimes(scan_us, 4, 2, "wire")
     wired = (Wired("mcp23017", 400_000, scan),) if switches else ()
     tables = PricedTables(TABLED, b"", Classified(classify_us, "model", 900, 30), wired, 1.25)
@@ -46,7 +48,7 @@ def close_of(switches: int = 20, rate: float = 0.9, scan_us: float = 500.0, clas
     screened = Screened(
         Candidate(choice, "switches" if switches else "joints"), tuple(range(switches)), judged(rate), classify_us
     )
-    return Close(screened, {}, {TABLED: judged(rate)}, {}, {}, (tables,), 2.0)
+    return EvaluatedFinalist(screened, {}, {TABLED: judged(rate)}, {}, {}, (tables,), 2.0)
 
 
 def simulated(design: Design, us: float) -> Design:
@@ -77,7 +79,7 @@ def test_luck_is_the_same_however_often_the_same_folds_are_repeated() -> None:
         for switches in range(1, 9):
             close = close_of(switches, 0.9, classify_us=50.0 + switches)
             hits = (random.random(200) < 0.8).astype(np.intp)
-            judged_so = Judged(Rate.counted((int(hits.sum()),), 200, of="pooled"), repeats * hits, repeats)
+            judged_so = TrialAccuracy(Rate.counted((int(hits.sum()),), 200, of="pooled"), repeats * hits, repeats)
             close = replace(close, tables={TABLED: judged_so}, screened=replace(close.screened, judged=judged_so))
             several.append(next(designs(close)))
         fronts = best_designs(several)

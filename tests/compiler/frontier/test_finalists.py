@@ -7,12 +7,12 @@ from thenar.compiler.frontier.points import PlacementChoice
 from thenar.compiler.frontier.price import Tabled
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import NO_SWITCHES, Candidate, Search, Shape
-from thenar.compiler.frontier.survey import Judged, Tally
+from thenar.compiler.frontier.survey import FoldHits, TrialAccuracy
 from thenar.runtime.recipe import Inputs
 
 
-def judged(rate: float) -> Judged:
-    return Judged(Rate.counted((round(10_000 * rate),), 10_000, of="pooled"), np.arange(1), 1)
+def judged(rate: float) -> TrialAccuracy:
+    return TrialAccuracy(Rate.counted((round(10_000 * rate),), 10_000, of="pooled"), np.arange(1), 1)
 
 
 def _screened(size: int, rate: float, frame_us: float, inputs: Inputs = "switches", method: str = "id3") -> Screened:
@@ -66,7 +66,7 @@ def test_a_placement_that_is_slow_but_small_is_a_finalist() -> None:
     assert set(finalists([quick, small], [], 2)) == {quick, small}
 
 
-def rates_of(shape: Shape, *rates: tuple[int, float]) -> dict[Tabled, Judged]:
+def rates_of(shape: Shape, *rates: tuple[int, float]) -> dict[Tabled, TrialAccuracy]:
     return {Tabled(rounds, shape): judged(rate) for rounds, rate in rates}
 
 
@@ -94,13 +94,13 @@ def test_rounds_beyond_the_papers_are_followed_where_they_win_more_than_a_fifth_
 ) -> None:
     search = Search(methods=("id3",), baselines=())
     correct = [450 + (late if stage > 100 else 0) for stage in search.stages]
-    fits = [Tally(tuple(map(right, counts)), (), ()) for counts in (correct, [450] * len(correct))]
+    fits = [FoldHits(tuple(map(right, counts)), (), ()) for counts in (correct, [450] * len(correct))]
     assert depth_of(search, fits, 1000).rounds == rounds
 
 
 def test_a_search_of_few_rounds_is_followed_to_its_end() -> None:
     search = Search(methods=("id3",), baselines=(), rounds=50)
-    assert depth_of(search, [Tally(tuple(map(right, range(len(search.stages)))), (), ())], 10) == search
+    assert depth_of(search, [FoldHits(tuple(map(right, range(len(search.stages)))), (), ())], 10) == search
 
 
 def test_what_is_followed_less_far_is_the_beginning_of_what_is() -> None:

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.frontier.latency import NOTHING, Stretches, decisions, stretches
-from thenar.runtime.live.decision import Decision, SequentialTest, Standing
+from thenar.runtime.live.decision import Decision, Ranking, SequentialTest
 from thenar.runtime.policy import Policy
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
@@ -27,7 +27,7 @@ def frame_by_frame(frames: Stretches, policy: Policy) -> list[int]:
     found = []
     for times, scores in zip(frames.times, frames.scores, strict=True):
         for time_us in times:
-            standing = Standing(tuple((scores + LANE_OFFSET).tolist()))
+            standing = Ranking(tuple((scores + LANE_OFFSET).tolist()))
             held = decider.update(time_us, standing)
             found.append(NOTHING if held is None else held)
     return found

@@ -11,13 +11,13 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.designs import Design
 from thenar.compiler.frontier.equipment import Equipment
-from thenar.compiler.frontier.finalists import Close
+from thenar.compiler.frontier.finalists import EvaluatedFinalist
 from thenar.compiler.frontier.measure import measured, unmeasured
 from thenar.compiler.frontier.points import PlacementChoice, Time
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Shape
-from thenar.compiler.frontier.survey import Judged
+from thenar.compiler.frontier.survey import TrialAccuracy
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
 from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, ScanTimes
@@ -31,9 +31,9 @@ def design_of(model: ClassifyModel) -> Design:
     scan = ScanTimes(500.0, 4, 2, "wire")
     wired = Wired("mcp23017", 400_000, scan)
     priced = PricedTables(Tabled(1, Shape(16)), tables_to_bytes(tables), model.cost(tables), (wired,), 1.0)
-    judged = Judged(Rate.counted((9,), 10, of="pooled"), np.arange(10), 1)
+    judged = TrialAccuracy(Rate.counted((9,), 10, of="pooled"), np.arange(10), 1)
     screened = Screened(Candidate(PlacementChoice("id3", 6.0), "switches"), tuple(range(6)), judged, 1.0)
-    close = Close(screened, {}, {}, {}, {}, (priced,), 1.0)
+    close = EvaluatedFinalist(screened, {}, {}, {}, {}, (priced,), 1.0)
     assert priced.classified is not None
     return Design(close, priced, priced.classified, wired, Time(0.0, "wire"))
 

@@ -11,7 +11,7 @@ from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.frontier.search import SHAPES, Search
-from thenar.compiler.frontier.survey import Cuts, Tally, choose_path, fit_stages
+from thenar.compiler.frontier.survey import Cuts, FoldHits, choose_path, fit_stages
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.recordings.graspset import GraspSet
@@ -42,7 +42,7 @@ def counted(packed: bytes) -> int:
     return int.from_bytes(packed).bit_count()
 
 
-def fit_of(samples: Samples, cuts: Cuts, stages: tuple[int, ...], columns: tuple[int, ...] = COLUMNS) -> Tally:
+def fit_of(samples: Samples, cuts: Cuts, stages: tuple[int, ...], columns: tuple[int, ...] = COLUMNS) -> FoldHits:
     return fit_stages(samples, cuts.screening[0], columns, stages, stages, SHAPES, SEARCH.training)
 
 

@@ -15,7 +15,7 @@ from thenar.compiler.tables.quantise import (
     TRIED,
     balance,
     finest_scale,
-    kindest_scale,
+    least_disruptive_scale,
     quantise,
     reach,
     span,
@@ -105,8 +105,8 @@ def test_coarse_steps_are_those_that_change_the_fewest_rows(
         return int(np.count_nonzero(scores.argmax(axis=1) != winners(stumps.scores(np.hstack(rows)))))
 
     counts = [changed(finest * (1 - i / 160)) for i in range(TRIED)]
-    assert kindest_scale(tables, finest, *rows) == finest * (1 - counts.index(min(counts)) / 160)
-    assert quantise(unbalanced, *rows, entry_bits=5).scale == kindest_scale(tables, finest, *rows)
+    assert least_disruptive_scale(tables, finest, *rows) == finest * (1 - counts.index(min(counts)) / 160)
+    assert quantise(unbalanced, *rows, entry_bits=5).scale == least_disruptive_scale(tables, finest, *rows)
 
 
 @given(seed=seeds)

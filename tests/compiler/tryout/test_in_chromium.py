@@ -94,7 +94,7 @@ def trier(new_chromium: Callable[..., webdriver.Chrome]) -> Iterator[Trier]:
     driver.quit()
 
 
-ASK = "return arguments[0].map(([bits, codes, lost, dull]) => thenar.recognise(bits, codes, lost, dull))"
+ASK = "return arguments[0].map(([bits, codes, lost, lost_joints]) => thenar.recognise(bits, codes, lost, lost_joints))"
 
 
 def rows_of(build: Build, grasp_set: GraspSet) -> tuple[np.ndarray, np.ndarray]:
@@ -113,16 +113,16 @@ def frames_of(build: Build, grasp_set: GraspSet, lossy: bool) -> list[list[list[
     """Return frames: bits, codes, and what is lost of both; of losses, each input in every seventh row."""
     bits, codes = rows_of(build, grasp_set)
     random = np.random.default_rng(11)
-    lost, dull = (lossy & (random.random(shape) < 1 / 7) for shape in (bits.shape, codes.shape))
-    parts = (bits.astype(int), codes.astype(int), lost.astype(int), dull.astype(int))
+    lost, lost_joints = (lossy & (random.random(shape) < 1 / 7) for shape in (bits.shape, codes.shape))
+    parts = (bits.astype(int), codes.astype(int), lost.astype(int), lost_joints.astype(int))
     return [[part.tolist() for part in row] for row in zip(*parts, strict=True)]
 
 
 def differing(build: Build, frames: list[list[list[int]]], answers: list[dict[str, Any]]) -> list[int]:
     """Return the numbers of the frames of which the page says something else than Python."""
     found = []
-    for number, ((bits, codes, lost, dull), told) in enumerate(zip(frames, answers, strict=True)):
-        flags = [np.array(each, bool) for each in (bits, lost, dull)]
+    for number, ((bits, codes, lost, lost_joints), told) in enumerate(zip(frames, answers, strict=True)):
+        flags = [np.array(each, bool) for each in (bits, lost, lost_joints)]
         said = build.recognise(flags[0], np.array(codes, np.uint16), flags[1], flags[2])
         lanes = build.scorer.lanes_without(flags[0], np.array(codes, np.uint16), flags[1], flags[2])
         scores = [lane - 32768 for lane in lanes]
@@ -178,9 +178,9 @@ def test_a_build_with_a_class_of_none_and_one_that_refuses_say_none_as_python_do
         frames += [[[bit] * s, [code] * j, [0] * s, [0] * j] for bit in (0, 1) for code in (0, 65535)]
         # Of grasps, more and more switches lost, down to none that is known to be closed.
         frames += [
-            [bits, codes, [1] * lost + [0] * (s - lost), dull]
+            [bits, codes, [1] * lost + [0] * (s - lost), lost_joints]
             for lost in range(s + 1)
-            for bits, codes, _, dull in frames[:9]
+            for bits, codes, _, lost_joints in frames[:9]
         ]
         answers = trier.script(ASK, frames)
         assert differing(build, frames, answers) == []

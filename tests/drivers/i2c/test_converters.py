@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from thenar.drivers.emulated.i2c_wire import Adapter, Message, Station, Wire
 from thenar.drivers.i2c import bus as module
-from thenar.drivers.i2c import keeper as keeper_module
+from thenar.drivers.i2c import supervisor
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
 from thenar.drivers.i2c.chips import CHIPS
-from thenar.drivers.i2c.node import Node, Query, Run, Way
+from thenar.drivers.i2c.node import BatchMode, Node, Query, Run
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.scanmap import Port
@@ -57,7 +57,7 @@ class WorldNode(Node):
         pass
 
     def find_way(self) -> None:
-        self.way = Way.PORT
+        self.way = BatchMode.PORT
 
     def claim(self, address: int) -> None:
         pass
@@ -80,7 +80,7 @@ class WorldNode(Node):
 def opened(monkeypatch: pytest.MonkeyPatch, world: World, places: Sequence[Place]) -> I2cBus:
     WorldNode.world = world
     monkeypatch.setattr(module, "Node", WorldNode)
-    for each in (module, keeper_module):
+    for each in (module, supervisor):
         monkeypatch.setattr(each, "monotonic", world.clock)
     monkeypatch.setattr(module, "sleep", world.sleep)
     chips = [ChipAt(CHIPS[kind], address, frozenset(range(4)), mux, channel) for kind, address, mux, channel in places]

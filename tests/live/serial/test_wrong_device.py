@@ -14,7 +14,7 @@ from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.line_reader import LineReader
 from thenar.runtime.harness.wiring import GloveWiring, Harness, StreamWiring
-from thenar.runtime.live.sources import Keeper
+from thenar.runtime.live.sources import DeviceThread
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.cyberglove import GloveDevice
 from thenar.runtime.sources.rows import RowSource
@@ -101,7 +101,7 @@ def test_the_right_device_is_read_again_when_it_returns(kind: str, wrong: str, s
     with PtyLine(tmp_path / "right") as line, PtyLine(tmp_path / "wrong") as elsewhere:
         lead(link, line)
         right = RIGHT[kind](line)
-        keeper = Keeper("device", device(kind, link), lambda _frame: frames.put(monotonic()))
+        keeper = DeviceThread("device", device(kind, link), lambda _frame: frames.put(monotonic()))
         keeper.start()
         try:
             frames.get(timeout=LONG_S)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.runtime.live.decision import Decision, Standing
+from thenar.runtime.live.decision import Decision, Ranking
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -22,7 +22,7 @@ def decide(frames: list[tuple[int, tuple[int, ...]]]) -> list[tuple[int, int, in
     decision, time_us, found = Decision(LEAD, DWELL, HOLD), 1000, []
     for wait, scores in frames:
         time_us += wait
-        standing = Standing(scores)
+        standing = Ranking(scores)
         found.append((time_us, standing.candidate, decision.update(time_us, standing)))
     return found
 
@@ -89,12 +89,12 @@ def test_the_same_frame_again_is_no_new_evidence() -> None:
 
 def test_after_unknown_the_first_candidate_is_taken_at_once() -> None:
     decision = Decision(LEAD, DWELL, HOLD)
-    assert decision.update(0, Standing((9, 0, 0))) == 0
-    decision.update(1, Standing((0, 9, 0)))
+    assert decision.update(0, Ranking((9, 0, 0))) == 0
+    decision.update(1, Ranking((0, 9, 0)))
     decision.forget()
     assert decision.held is None
-    assert decision.update(2, Standing((0, 0, 1))) == 2
-    assert decision.update(50, Standing((0, 9, 0))) == 2
+    assert decision.update(2, Ranking((0, 0, 1))) == 2
+    assert decision.update(50, Ranking((0, 9, 0))) == 2
 
 
 A, B, C = (110, 100, 100), (100, 110, 100), (100, 100, 110)
@@ -103,7 +103,7 @@ A, B, C = (110, 100, 100), (100, 110, 100), (100, 100, 110)
 def follow(frames: Sequence[tuple[int, tuple[int, ...], bool]]) -> list[int]:
     """What is decided after each frame of a time, scores, and whether it is whole."""
     decision = Decision(LEAD, DWELL, HOLD)
-    return [decision.update(time_us, Standing(scores), whole=whole) for time_us, scores, whole in frames]
+    return [decision.update(time_us, Ranking(scores), whole=whole) for time_us, scores, whole in frames]
 
 
 def test_frames_with_lost_inputs_never_displace_a_decision_on_whole_frames() -> None:
@@ -135,7 +135,7 @@ def test_a_whole_frame_of_any_kind_keeps_the_decision_from_getting_too_old() -> 
 
 def test_what_was_forgotten_is_not_kept_against_frames_with_lost_inputs() -> None:
     decision = Decision(LEAD, DWELL, HOLD)
-    decision.update(0, Standing(A))
+    decision.update(0, Ranking(A))
     decision.forget()
-    assert decision.update(10, Standing(B), whole=False) == 1
-    assert decision.update(20, Standing(A), whole=True) == 0
+    assert decision.update(10, Ranking(B), whole=False) == 1
+    assert decision.update(20, Ranking(A), whole=True) == 0

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from thenar.runtime import Build
 from thenar.runtime.frames import SwitchFrame
-from thenar.runtime.live.decision import Standing
+from thenar.runtime.live.decision import Ranking
 from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.manifest import Rejection
 from thenar.runtime.policy import Policy
@@ -125,8 +125,8 @@ def test_with_none_a_standing_is_that_of_one_more_class(make_build: MakeBuild, d
     build = make_build(data.draw(st.integers(0, 9)), joints=0)
     lead = data.draw(st.integers(-40, 40))
     lanes = build.scorer.lanes(np.array([data.draw(st.booleans()) for _ in range(6)]), [])
-    plain = Standing(lanes)
-    both, none = plain.or_none(lead), len(lanes)
+    plain = Ranking(lanes)
+    both, none = plain.with_none_class(lead), len(lanes)
     assert both.candidate == (none if lead > 0 else plain.candidate)
     assert both.lanes[none] - max(lanes) == lead
     for held in range(none):

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from thenar.runtime.live.decision import SequentialTest, Standing
+from thenar.runtime.live.decision import Ranking, SequentialTest
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -29,7 +29,7 @@ def scores(random: np.random.Generator, true: int, classes: int, distance: float
 def run(test: SequentialTest, lanes: np.ndarray) -> tuple[int | None, int]:
     """Feed frames until the first decision; return it and how many frames it took."""
     for number, row in enumerate(lanes.tolist()):
-        found = test.update(number * FRAME_US, Standing(tuple(row)))
+        found = test.update(number * FRAME_US, Ranking(tuple(row)))
         if found is not None:
             return found, number + 1
     return None, len(lanes)
@@ -78,46 +78,46 @@ def test_a_lower_error_rate_takes_more_frames() -> None:
 def test_it_decides_at_the_threshold_and_not_one_step_below() -> None:
     threshold = math.ceil(SCALE * math.log(2 / 0.1))
     assert SequentialTest(3, SCALE, 0.1, FOREVER).threshold == threshold
-    assert SequentialTest(3, SCALE, 0.1, FOREVER).update(0, Standing((threshold, 0, 0))) == 0
-    assert SequentialTest(3, SCALE, 0.1, FOREVER).update(0, Standing((threshold, 1, 0))) is None
+    assert SequentialTest(3, SCALE, 0.1, FOREVER).update(0, Ranking((threshold, 0, 0))) == 0
+    assert SequentialTest(3, SCALE, 0.1, FOREVER).update(0, Ranking((threshold, 1, 0))) is None
 
 
 def test_an_answer_stands_until_the_next_or_until_its_time_is_over() -> None:
     test = SequentialTest(2, 1.0, 0.1, 100)
-    assert test.update(0, Standing((50, 0))) == 0
-    assert test.update(40, Standing((0, 0))) == 0
-    assert test.update(60, Standing((0, 50))) == 1
-    assert test.update(160, Standing((0, 0))) == 1
-    assert test.update(161, Standing((0, 0))) is None
+    assert test.update(0, Ranking((50, 0))) == 0
+    assert test.update(40, Ranking((0, 0))) == 0
+    assert test.update(60, Ranking((0, 50))) == 1
+    assert test.update(160, Ranking((0, 0))) == 1
+    assert test.update(161, Ranking((0, 0))) is None
 
 
 def test_evidence_that_is_too_old_is_dropped() -> None:
     test = SequentialTest(2, 1.0, 0.1, 100)
-    assert test.update(0, Standing((2, 0))) is None
-    assert test.update(101, Standing((2, 0))) is None
-    assert test.update(201, Standing((2, 0))) == 0
+    assert test.update(0, Ranking((2, 0))) is None
+    assert test.update(101, Ranking((2, 0))) is None
+    assert test.update(201, Ranking((2, 0))) == 0
 
 
 def test_a_frame_that_is_seen_twice_counts_once() -> None:
     test = SequentialTest(2, 1.0, 0.1, FOREVER)
-    assert [test.update(5, Standing((2, 0))) for _ in range(9)] == [None] * 9
-    assert test.update(6, Standing((2, 0))) == 0
+    assert [test.update(5, Ranking((2, 0))) for _ in range(9)] == [None] * 9
+    assert test.update(6, Ranking((2, 0))) == 0
 
 
 def test_frames_nearer_than_the_spacing_do_not_count() -> None:
     test = SequentialTest(2, 1.0, 0.1, FOREVER, spacing_us=30)
-    assert [test.update(time_us, Standing((2, 0))) for time_us in (0, 10, 29)] == [None] * 3
-    assert test.update(30, Standing((2, 0))) == 0
+    assert [test.update(time_us, Ranking((2, 0))) for time_us in (0, 10, 29)] == [None] * 3
+    assert test.update(30, Ranking((2, 0))) == 0
 
 
 def test_forgetting_drops_the_answer_and_the_evidence() -> None:
     test = SequentialTest(2, 1.0, 0.1, FOREVER)
-    test.update(0, Standing((50, 0)))
-    test.update(1, Standing((2, 0)))
+    test.update(0, Ranking((50, 0)))
+    test.update(1, Ranking((2, 0)))
     test.forget()
     assert test.held is None
-    assert test.update(1, Standing((2, 0))) is None
-    assert test.update(2, Standing((2, 0))) == 0
+    assert test.update(1, Ranking((2, 0))) is None
+    assert test.update(2, Ranking((2, 0))) == 0
 
 
 FOR_0, FOR_1 = (2, 0), (0, 2)
@@ -126,7 +126,7 @@ FOR_0, FOR_1 = (2, 0), (0, 2)
 def follow(frames: list[tuple[int, tuple[int, int], bool]]) -> list[int | None]:
     """Return what two frames in agreement decide on, for up to 100 us, after each frame, whole or not."""
     test = SequentialTest(2, 1.0, 0.1, 100)
-    return [test.update(time_us, Standing(scores), whole=whole) for time_us, scores, whole in frames]
+    return [test.update(time_us, Ranking(scores), whole=whole) for time_us, scores, whole in frames]
 
 
 def test_frames_with_lost_inputs_end_no_test_while_an_answer_of_whole_frames_holds() -> None:

@@ -13,7 +13,7 @@ from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.live import sources as module
 from thenar.runtime.live.recogniser import LiveRecognizer
-from thenar.runtime.live.sources import RETRY_S, Arrivals, Keeper
+from thenar.runtime.live.sources import RETRY_S, DeviceThread, FrameBuffer
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import LiveGrasp
 
@@ -35,7 +35,7 @@ def joined(monkeypatch: pytest.MonkeyPatch) -> Joined:
     def at(
         switches: int, owned: Sequence[int], frames: Sequence[tuple[int, int, SwitchFrame, int]], now: int
     ) -> SwitchFrame | None:
-        arrivals, clock = Arrivals(switches, owned), [0]
+        arrivals, clock = FrameBuffer(switches, owned), [0]
         with monkeypatch.context() as patched:
             patched.setattr(module, "now_us", lambda: clock[0])
             for clock[0], part, frame, longest_us in frames:
@@ -46,8 +46,8 @@ def joined(monkeypatch: pytest.MonkeyPatch) -> Joined:
     return at
 
 
-def made() -> Arrivals:
-    return Arrivals(3, [0b111])
+def made() -> FrameBuffer:
+    return FrameBuffer(3, [0b111])
 
 
 def switches_only(make_build: MakeBuild, period_us: int) -> LiveRecognizer:
@@ -97,7 +97,7 @@ def test_parts_that_fall_silent_are_lost_though_nothing_came_and_are_so_once(
     """Two boards at 1 kHz under a recogniser that waits 20 ms: one falls silent, then the other."""
     clock, live = [50_000], switches_only(make_build, 10_000)
     monkeypatch.setattr(module, "now_us", lambda: clock[0])
-    arrivals = Arrivals(6, [0b000111, 0b111000])
+    arrivals = FrameBuffer(6, [0b000111, 0b111000])
 
     def step(now: int) -> LiveGrasp:
         clock[0] = now
@@ -129,7 +129,7 @@ def test_a_part_that_falls_silent_later_than_another_one_read_is_lost_at_once(
 
 def test_a_silent_bus_does_not_take_a_living_glove_down_with_it(make_build: MakeBuild) -> None:
     build = make_build()
-    arrivals = Arrivals(6, [0b111111])
+    arrivals = FrameBuffer(6, [0b111111])
     names = ("j0", "j1", "j2")
     recognizer = LiveRecognizer(build, sensor_names=names, switch_period_us=PERIOD_US, glove_period_us=PERIOD_US)
     now = now_us()
@@ -145,7 +145,7 @@ def test_a_silent_bus_does_not_take_a_living_glove_down_with_it(make_build: Make
 
 
 def test_what_is_fresh_is_so_until_it_expires(monkeypatch: pytest.MonkeyPatch) -> None:
-    arrivals, clock = Arrivals(2, [0b01, 0b10]), [1000]
+    arrivals, clock = FrameBuffer(2, [0b01, 0b10]), [1000]
     monkeypatch.setattr(module, "now_us", lambda: clock[0])
 
     def fresh_for_us(now: int) -> int | None:
@@ -255,7 +255,7 @@ class Kept:
         self.device = Device()
         self.taken: Queue[int] = Queue()
         self.changes: Queue[tuple[bool, str]] = Queue()
-        self.keeper = Keeper("thing", self.device, self.taken.put, self._changed)
+        self.keeper = DeviceThread("thing", self.device, self.taken.put, self._changed)
         self.keeper.start()
 
     def _changed(self) -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from thenar.compiler import grow_id3
 from thenar.compiler.placement.methods.base import METHODS
-from thenar.compiler.placement.methods.id3 import cost_aware_order, errors_spared, every_third, weakest_links
+from thenar.compiler.placement.methods.id3 import cost_aware_order, error_reduction, every_third, weakest_links
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.samples import Samples
 
@@ -54,7 +54,7 @@ def test_reduced_error_pruning_grows_on_two_thirds_and_prunes_on_the_rest(sample
     out = every_third(samples.labels)
     tree = grow_id3(samples.switches[~out], samples.labels[~out])
     numbers = np.array([tree.classes.index(label) for label in samples.labels[out].tolist()], dtype=np.intp)
-    path = weakest_links(tree, errors_spared(tree, samples.switches[out], numbers))
+    path = weakest_links(tree, error_reduction(tree, samples.switches[out], numbers))
     assert METHODS["id3-rep"].chooser(samples)(10) == path.placement(10, path.n_useless)
 
 

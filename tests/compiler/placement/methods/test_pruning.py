@@ -12,7 +12,7 @@ from sklearn.tree import DecisionTreeClassifier
 
 from thenar.compiler import grow_id3
 from thenar.compiler.placement.gain import gain_bits
-from thenar.compiler.placement.methods.id3 import entropy_brought, errors_spared, weakest_links
+from thenar.compiler.placement.methods.id3 import entropy_brought, error_reduction, weakest_links
 from thenar.compiler.placement.tree import Node, Tree
 
 Bits = npt.NDArray[np.bool_]
@@ -89,7 +89,7 @@ def test_errors_are_counted_on_the_rows_held_out(seed: int, n: int) -> None:
     X, y = random.random((n + 20, 5)) < 0.5, random.integers(0, 3, n + 20)
     y[:3] = [0, 1, 2]
     tree = grow_id3(X[:20], y[:20])
-    spared = errors_spared(tree, X[20:], y[20:])
+    spared = error_reduction(tree, X[20:], y[20:])
     root = int((y[20:] != tree.nodes[0].majority).sum())
     assert root - sum(spared) == int((tree.predict(X[20:]) != y[20:]).sum())
     assert all(spared[number] == 0 for number, node in enumerate(tree.nodes) if node.input is None)

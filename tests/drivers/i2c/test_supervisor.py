@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from thenar.drivers.emulated.i2c_wire import Adapter, Message, Station, Wire
 from thenar.drivers.errors import DeviceError
 from thenar.drivers.i2c.chips import CHIPS, Conversion, Converter, expanders
-from thenar.drivers.i2c.keeper import ImpostorError, Keeper, PlacedChip, read_back, set_up, whats_there
 from thenar.drivers.i2c.node import Node, Query, Run
+from thenar.drivers.i2c.supervisor import ChipSupervisor, ImpostorError, PlacedChip, identify_chip, read_back, set_up
 
 
 class DeadNode(Node):
@@ -37,7 +37,7 @@ class DeadNode(Node):
 def test_an_adapter_that_is_gone_is_noticed_whatever_it_says_of_its_chips(code: int) -> None:
     node = DeadNode(code)
     chips = [PlacedChip(node.device, CHIPS["mcp23017"], address, frozenset(), None) for address in (0x20, 0x21)]
-    keeper = Keeper(node, chips, check_every_s=1.0)
+    keeper = ChipSupervisor(node, chips, check_every_s=1.0)
     keeper.begin()
     assert not any(chip.present for chip in chips)
     node.gone = True
@@ -129,7 +129,7 @@ def test_a_chip_that_is_another_is_found_out_unless_all_its_pins_are_low(said: s
 def test_what_is_there_instead_is_named_and_its_pins_are_left_inputs(there: str) -> None:
     address = address_of(there, "tca6424a")  # all but a pcf8574a can be there
     node = node_with(there, address, 0xA5A5A5)
-    assert whats_there(node, address) == f"something that behaves like a {there}"
+    assert identify_chip(node, address) == f"something that behaves like a {there}"
     reading = CHIPS[there].readings[-1]
     if reading.high:  # pull-ups are for pins in use: the direction register tells
         assert node.query(Query(address, b"\x00", 1)) == b"\xff"
@@ -139,7 +139,7 @@ def test_what_is_there_instead_is_named_and_its_pins_are_left_inputs(there: str)
 
 
 def test_what_is_nothing_known_is_called_so() -> None:
-    assert whats_there(WireNode("pcf8574", 0x21), 0x20) == "something unknown"
+    assert identify_chip(WireNode("pcf8574", 0x21), 0x20) == "something unknown"
 
 
 def test_a_chip_left_in_bank_1_by_a_crash_is_brought_back_to_bank_0() -> None:

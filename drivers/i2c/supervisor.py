@@ -114,7 +114,7 @@ def read_back(node: Node, chip: Chip, address: int, write: Write) -> bytes:
     return node.query(Query(address, write.data[:1] if chip.registers else b"", len(write.expect)))
 
 
-def whats_there(node: Node, address: int) -> str:
+def identify_chip(node: Node, address: int) -> str:
     """Describe the device at an address: the first kind whose set-up succeeds, which leaves its pins inputs.
 
     Kinds without registers come last, since probing for registers drives their pins.
@@ -135,7 +135,7 @@ def _behaves_like(node: Node, chip: Chip, address: int) -> bool:
 
 @dataclass(eq=False, slots=True)
 class PlacedChip:
-    """A chip at its location on the bus at `device`, and its health, which only its keeper changes.
+    """A chip at its location on the bus at `device`, and its health, which only its supervisor changes.
 
     `errors` counts failures, including those that a retry fixed; `last_error` stays. `due` is the time of its next
     check; `checked` counts its checks; `zeros` is their number when zeros from it were last confirmed.
@@ -169,7 +169,7 @@ class PlacedChip:
         self.last_error = error
 
 
-class Keeper:
+class ChipSupervisor:
     """The chips of one bus.
 
     `revision` changes whenever a chip comes or goes; `due` is the time of the next call of `attend`; `trouble`
@@ -226,7 +226,7 @@ class Keeper:
                 self._note(member, error)
                 self.routes.forget()
                 if error.errno in (errno.ETIMEDOUT, errno.EBUSY):  # each may last a second: retry no more
-                    self.feel()
+                    self.check_bus_stuck()
                 if self.trouble or not left:
                     self._lose(member, error)
                     break
@@ -239,7 +239,7 @@ class Keeper:
         if fine is False:
             self._bring_up(member, TRIES)
 
-    def feel(self) -> None:
+    def check_bus_stuck(self) -> None:
         """Detect a stuck bus: an unused address must not be acknowledged."""
         code: int | None = None
         try:
@@ -298,10 +298,10 @@ class Keeper:
         return True
 
     def _refuse(self, member: PlacedChip) -> None:
-        self.feel()  # a line held low looks like a reply of every chip
+        self.check_bus_stuck()  # a line held low looks like a reply of every chip
         if self.trouble:
             return
-        there = whats_there(self._node, member.address)
+        there = identify_chip(self._node, member.address)
         found = f"{member.named} is not there, but {there}: check the harness and the chip's address pins"
         # The first failure may also come from an intermittent supply or contact during the set-up.
         member.due = monotonic() + (RETRY_IMPOSTOR_S if found == member.last_error else RETRY_S)
@@ -325,12 +325,12 @@ class Keeper:
         if error.errno == errno.ENODEV:  # no device there, on some adapters; on most, the adapter itself is gone
             self._renew()
         elif error.errno not in NOBODY_THERE:
-            self.feel()
+            self.check_bus_stuck()
 
     def _unstick(self) -> None:
-        """Reopen the node; then the reads of `feel` clock SCL, which frees a chip that waits within a byte."""
+        """Reopen the node; then reads that clock SCL free a chip that waits within a byte."""
         self._renew()
-        self.feel()
+        self.check_bus_stuck()
         for member in self._members:
             member.due = monotonic() + (RETRY_S if self.trouble else 0.0)
 
