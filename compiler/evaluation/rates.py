@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thenar.runtime.manifest import Of, Unit
+from thenar.runtime.names import list_names
 from thenar.runtime.recipe import Recipe
 
 from ..samples import decided
@@ -166,10 +167,15 @@ class Rate:
 
 
 def placement_words(options: Recipe) -> str:
-    """Return a placement method with its settings in words: "elimination, keep 16, the best 3 joints"."""
-    by = f"S = {options.prune}" if options.keep is None else f"keep {options.keep}"
-    joints = "" if options.keep_joints is None else f", the best {counted(options.keep_joints, 'joint')}"
-    return f"{options.placement}, {by}{joints}"
+    """Return a placement method with its settings and limits in words: "elimination, keep 16, the best 3 joints"."""
+    words = [options.placement, f"S = {options.prune}" if options.keep is None else f"keep {options.keep}"]
+    words += [] if options.keep_joints is None else [f"the best {counted(options.keep_joints, 'joint')}"]
+    words += [f"with {list_names(options.keep_these)}"] if options.keep_these else []
+    words += [f"without {list_names(options.never)}"] if options.never else []
+    words += [] if options.apart_mm is None else [f"{options.apart_mm:g} mm apart"]
+    words += [] if options.at_most_taxels is None else [f"at most {counted(options.at_most_taxels, 'taxel')}"]
+    words += [] if options.budget_us is None else [f"within {options.budget_us:g} us"]
+    return ", ".join([*words, *(["robust"] if options.robust else [])])
 
 
 def rated(

@@ -306,7 +306,7 @@ def test_the_recipe_of_the_tables_is_the_one_that_is_asked_for(grasps: str, caps
     assert run(["evaluate", grasps, *tables, *recipe, "--json"]) == 0
     study = json.loads(capsys.readouterr().out)
     compositions, baselines = study["tables"]
-    assert compositions["recipe"]["method"] == "elimination, keep 2"
+    assert compositions["recipe"]["method"] == "elimination, keep 2, without s0"
     assert compositions["recipe"]["trainer"] == "chosen from the training rows"
     selected = next(row for row in compositions["rows"] if row["name"] == "VI")
     assert selected["switches"]["most"] == 2
