@@ -190,3 +190,24 @@ def test_a_wrong_prediction_of_a_recording_is_marked_by_a_sign_and_in_words(brow
         whole = browser.script("return document.getElementById('whole').getAttribute('aria-label')")
         assert whole.endswith("2 labelled spans, 4 predictions, wrong in 2 spans")
         browser.driver.get("about:blank")
+
+
+def test_a_calibration_whose_glove_falls_silent_is_grey_and_says_its_age(browser: Any) -> None:
+    pose = {
+        **{"step": 1, "stage": "ready", "number": 1, "total": 2, "name": "Flat hand", "instruction": "Lay it flat."},
+        **{"picture": None, "left_s": 0.0, "problems": [], "offered": {}, "silent": False},
+        **{"bytes": [80], "flat": None, "concerned": [True], "states": [""]},
+    }
+    first = [message("sensors", names=["thumb_mcp"], subject="anna"), message("hand", HAND)]
+    with Server("calibrate", "127.0.0.1:0", token=None, hello=lambda: first) as server:
+        browser.open(server.url)
+        for number in range(5):
+            server.publish("pose", message("pose", pose, time_us=10_000 * number, age_us=1_000))
+        browser.wait(lambda: browser.text("sees") == "all 1 sensors are measured")
+        # Nothing more comes: the run has stopped.
+        old = "return document.documentElement.classList.contains('old')"
+        browser.wait(lambda: browser.script(old) and browser.text("age").startswith("this is "))
+        assert browser.text("glove-state").startswith("glove: silent since ")
+        server.publish("pose", message("pose", pose, time_us=9_000_000, age_us=1_000))
+        browser.wait(lambda: not browser.script(old))
+        browser.driver.get("about:blank")
