@@ -123,9 +123,9 @@ def test_ctrl_c_exits_with_130_and_leaves_the_old_build_alone(set_file: Path, bu
         "import sys, pathlib\n"
         "from thenar.compiler.artifact import compile as module\n"
         "from thenar.cli import run\n"
-        "train = module.train\n"
-        f"def slow(*a): pathlib.Path({str(ready)!r}).touch(); return [train(*a) for _ in range(10**6)][0]\n"
-        "module.train = slow\n"
+        "fit = module.Recogniser.fit\n"
+        f"def slow(*a, **k): pathlib.Path({str(ready)!r}).touch(); return [fit(*a, **k) for _ in range(10**6)][0]\n"
+        "module.Recogniser.fit = slow\n"
         "sys.exit(run(sys.argv[1:]))"
     )
     done = _interrupt([sys.executable, "-c", program, "compile", str(set_file), "-o", str(build_folder)], ready)
