@@ -25,7 +25,7 @@ from rich.table import Table
 
 from thenar.compiler import TRAINERS
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.tables.collapse import Model, collapse
 from thenar.compiler.tables.quantise import quantise
@@ -63,7 +63,7 @@ class Ours:
 
     def predictor(self, fold: Fold) -> Predictor:
         """Return the predictor of rows that matches the firmware of a fold."""
-        layout = arrange(self.integers(fold))
+        layout = Layout(self.integers(fold))
         return lambda rows: layout.scores(*split(rows, joints=self.joints)).argmax(axis=1)
 
 
@@ -111,7 +111,7 @@ class Line:
 def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Line:
     """Return the line of a trainer, on the first fold."""
     fold = cuts[CUTS[0]][0]
-    layout, frames = arrange(what.integers(fold)), split(fold.asked, joints=what.joints)
+    layout, frames = Layout(what.integers(fold)), split(fold.asked, joints=what.joints)
     cost = of_ours(layout, AVR, layout.frame_bytes(*frames), layout.scores(*frames))
     return Line(what.name, rates(cuts, what.predictor), cost)
 
@@ -157,7 +157,7 @@ def print_changes(cuts: Mapping[str, list[Fold]], what: Ours) -> None:
     """Print the cost of update() after changes of two switches."""
     fold = cuts[CUTS[0]][0]
     integers = what.integers(fold)
-    layout = arrange(integers)
+    layout = Layout(integers)
     changed = split(two_changed(fold, CHANGES, joints=what.joints), joints=what.joints)
     cost = of_ours(layout, AVR, layout.frame_bytes(*changed), layout.scores(*changed), changes=True)
     CONSOLE.print(f"{what.name}, two switches changed: {' | '.join(cost.cells)}")

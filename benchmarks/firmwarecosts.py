@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.classifier import classifier_files
+from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.simavr import harness
 from thenar.compiler.firmware.targets import Target
@@ -66,7 +66,7 @@ def of_ours(
     update() runs for every frame but the first, which has no predecessor. The bytes of a frame are written directly
     into its input: nothing has to be copied.
     """
-    files = classifier_files("glove", numbered(layout.tables), layout, avr=True)
+    files = Library("glove", numbered(layout.tables), layout).files
     called = ("classify", "update") if changes else ("classify",)
     body = " ".join(f"thenar_glove_{function}(&glove);" for function in ("init", *called))
     main = f'#include "thenar_glove.h"\nthenar_glove glove;\nint main(void) {{ for (;;) {{ {body} }} }}\n'

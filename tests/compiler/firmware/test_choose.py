@@ -6,7 +6,7 @@ import pytest
 
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.choose import fit_for, largest_classifier, smallest_fit
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.tables.quantise import integer_scores
@@ -95,7 +95,7 @@ def test_builds_that_lack_a_kind_of_input_fit_too(make_tables: MakeTables, switc
     tables = make_tables(1, switches=switches, joints=joints)
     frames = np.ones((1, switches), bool), np.full((1, joints), 7, np.uint16)
     for target in TARGETS.values():
-        assert np.array_equal(fit_for(target, tables).layout.scores(*frames), arrange(tables).scores(*frames))
+        assert np.array_equal(fit_for(target, tables).layout.scores(*frames), Layout(tables).scores(*frames))
 
 
 def test_tables_without_inputs_are_refused(make_tables: MakeTables) -> None:

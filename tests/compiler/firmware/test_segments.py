@@ -151,6 +151,6 @@ def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along
 
 
 def test_more_types_than_a_byte_numbers_are_refused() -> None:
-    assert segment_files("hand", SegmentModel.usual(254, True, 9.0), avr=True)
+    assert segment_files("hand", SegmentModel.usual(254, True, 9.0))
     with pytest.raises(FirmwareError, match="255 grasp types: the segment decoder takes at most 254"):
-        segment_files("hand", SegmentModel.usual(255, True, 9.0), avr=True)
+        segment_files("hand", SegmentModel.usual(255, True, 9.0))

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from thenar.compiler.firmware import simavr
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.sensors import Sensors, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.tools import STRICT, call, find, workshop
@@ -96,7 +96,7 @@ def library(request: pytest.FixtureRequest, make_tables: MakeTables, describe: D
         hand = [SensorCalibration(f"j{n}", first, 0.0, last, value) for n, (first, last, value) in enumerate(lines)]
         sensors = sensors_of(manifest, calibration=GloveCalibration(sensors=tuple(hand)))
 
-    return lambda avr: Library("hand", manifest, arrange(tables), avr=avr, glove=sensors)
+    return lambda avr: Library("hand", manifest, Layout(tables), glove=sensors)
 
 
 def python_s(sensors: Sensors, readings: range) -> list[int]:

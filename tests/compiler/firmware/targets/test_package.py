@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from ruamel.yaml import YAML
 
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.package import Package
 from thenar.runtime.manifest import Manifest
@@ -89,7 +89,7 @@ def written(make_tables: MakeTables, describe: Describe, tmp_path: Path) -> Writ
         tables = make_tables()
         manifest = describe(tables)
         named = replace(manifest, grasps=(grasp, *manifest.grasps[1:]))
-        for name, text in TARGETS[target].files(Library("hand", named, arrange(tables), avr)).items():
+        for name, text in TARGETS[target].files(Library("hand", named, Layout(tables), avr)).items():
             path = tmp_path / "thenar_hand" / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
@@ -137,7 +137,7 @@ def test_the_package_builds_by_itself_tests_itself_and_is_found_where_it_is_inst
     tool: Tool, written: Written, tmp_path: Path, avr: bool
 ) -> None:
     cmake = tool("cmake")
-    out = built(cmake, written("generic", avr=avr), f"-DCMAKE_C_FLAGS={STRICT}")
+    out = built(cmake, written("generic"), f"-DCMAKE_C_FLAGS={STRICT}")
     assert "100% tests passed" in run(tool("ctest"), "--test-dir", out)
     run(cmake, "--install", out, "--prefix", tmp_path / "there")
     user = tmp_path / "user"
