@@ -167,7 +167,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     callback=lambda _context, _parameter, bits: int(bits),
     default="16",
     show_default=True,
-    help="Bits per table entry. With 8, steps are coarser and the firmware is smaller.",
+    help="Bits per table entry: with 8, steps are coarser.",
 )
 @click.option(
     "--width", type=click.IntRange(4, 16), default=16, show_default=True, help="Bits that every sum of scores fits."

@@ -9,6 +9,7 @@ from textwrap import wrap
 from thenar.firmware_templates.rendering import file_text, render
 from thenar.runtime.manifest import Rejection
 from thenar.runtime.softmax import Softmax
+from thenar.runtime.tables import Slope
 
 from .layout import Bins, Layout, Rows
 from .segments import SEGMENT_FILES, segment_files
@@ -67,7 +68,7 @@ class Library:
 
     @cached_property
     def whole(self) -> dict[str, str]:
-        """The classifier, the files that convert readings to codes, and the decoder of segments if the build has one."""
+        """The classifier, what converts readings to codes, and the decoder of segments if the build has one."""
         return self.files | self.codes | self.segments
 
     @cached_property
@@ -98,8 +99,10 @@ def number_lines(numbers: Iterable[object]) -> list[str]:
 
 
 def _lines(cells: Iterable[str]) -> list[str]:
+    """Return cells without breaks as lines, separated by commas."""
     text = ", ".join(cells)
-    return wrap(f"{text},", COLUMNS, initial_indent=_INDENT, subsequent_indent=_INDENT, break_on_hyphens=False) if text else []
+    width = COLUMNS - len(_INDENT)
+    return [_INDENT + line for line in wrap(f"{text},", width, break_on_hyphens=False)] if text else []
 
 
 def _values(name: str, names: Names, layout: Layout, notes: Sequence[str]) -> dict[str, object]:
@@ -126,15 +129,10 @@ def _values(name: str, names: Names, layout: Layout, notes: Sequence[str]) -> di
         "columns": ", ".join(map(comment, names.grasps)),
         "rows": [*_row_lines(layout.start[None], layout, "START"), *_section_lines(names, layout)],
         "slopes": _row_lines([line.row.astype(int) for line in tables.slopes], layout, "SLOPES"),
-        "lines": [
-            f"{_INDENT}{{{line.joint}u, {line.low}u, {line.high - line.low}u, {max(line.gain, 0)}u, {max(-line.gain, 0)}u}},"
-            for line in tables.slopes
-        ],
+        "lines": [f"{_INDENT}{_line(line)}," for line in tables.slopes],
         "bins": [f"{_INDENT}{_bins(each)}," for each in own],
         "n_bins": len(own),
-        "grids": [
-            f"{_INDENT}{{{len(across.thresholds) + 1}u, {_bins(down)}, {_bins(across)}}}," for down, across in zip(pairs[::2], pairs[1::2], strict=True)
-        ],
+        "grids": [f"{_INDENT}{_grid(*pair)}," for pair in zip(pairs[::2], pairs[1::2], strict=True)],
         "thresholds": number_lines(f"{step}u" for step in layout.thresholds),
         "means": [line for row in layout.means.astype("int16").tolist() for line in number_lines(row)],
         "rejection": _rejection(names.rejection),
@@ -144,6 +142,15 @@ def _values(name: str, names: Names, layout: Layout, notes: Sequence[str]) -> di
 
 def _bins(bins: Bins) -> str:
     return f"{{{bins.joint}u, {bins.first_threshold}u, {bins.half}u, {bins.first_row}u}}"
+
+
+def _grid(down: Bins, across: Bins) -> str:
+    return f"{{{len(across.thresholds) + 1}u, {_bins(down)}, {_bins(across)}}}"
+
+
+def _line(line: Slope) -> str:
+    left, right = max(line.gain, 0), max(-line.gain, 0)
+    return f"{{{line.joint}u, {line.low}u, {line.high - line.low}u, {left}u, {right}u}}"
 
 
 def _section_lines(names: Names, layout: Layout) -> Iterable[str]:

@@ -1,8 +1,8 @@
 """The cost of a classifier on a target: the core's, which is the same for every build, and that of its tables.
 
-Flash is the size of the compiled core and the exact bytes of the tables, RAM exact. Time is a sum of a few terms, whose
-coefficients `benchmarks/firmwarefit.py` fits to the cycles that simavr counts, or the instructions that qemu counts, for
-the slowest of many frames. A slow test bounds the errors.
+Flash is the size of the compiled core and the exact bytes of the tables, RAM is exact. Time is a sum of a few terms,
+whose coefficients `benchmarks/firmwarefit.py` fits to the cycles that simavr counts, or the instructions that qemu
+counts, for the slowest of many frames. A slow test bounds the errors.
 """
 
 from collections.abc import Mapping

@@ -108,14 +108,14 @@ class Layout:
     @property
     def sections(self) -> tuple[tuple[str, tuple[int, ...], Rows], ...]:
         """The rows after the start: "switches" or "joints", their numbers, and the rows of a section (m, K)."""
-        tables, found = self.tables, []
-        for group in self.groups:
-            found.append(("switches", group, _sums(tables.switch_rows[group[0] : group[-1] + 1])))
-        for joint in self.binned:
-            found.append(("joints", (joint,), tables.joint_rows[joint].astype(np.int64)))
-        for pair in tables.pairs:
-            found.append(("joints", pair.joints, pair.rows.astype(np.int64).reshape(-1, tables.n_classes)))
-        return tuple(found)
+        tables = self.tables
+        rows = tables.switch_rows
+        switches = [("switches", group, _sums(rows[group[0] : group[-1] + 1])) for group in self.groups]
+        bins = [("joints", (joint,), tables.joint_rows[joint].astype(np.int64)) for joint in self.binned]
+        grids = [
+            ("joints", pair.joints, pair.rows.astype(np.int64).reshape(-1, tables.n_classes)) for pair in tables.pairs
+        ]
+        return (*switches, *bins, *grids)
 
     @cached_property
     def bins(self) -> tuple[Bins, ...]:
@@ -142,7 +142,9 @@ class Layout:
     def means(self) -> Rows:
         """What each missing input adds to an open switch, or to code 0 of a joint, (s + j, K): switches first."""
         tables = self.tables
-        joints = [mean - rows[0] for mean, rows in zip(tables.joint_means.astype(np.int64), tables.joint_rows, strict=True)]
+        joints = [
+            mean - rows[0] for mean, rows in zip(tables.joint_means.astype(np.int64), tables.joint_rows, strict=True)
+        ]
         for line in tables.slopes:
             joints[line.joint] = joints[line.joint] - line.of(np.zeros(1, np.uint16))[0]
         return np.vstack([tables.switch_means.astype(np.int64), *joints])
@@ -162,7 +164,7 @@ class Layout:
 
     @property
     def memory(self) -> int:
-        """The words of 16 bits that a hand needs: inputs, scores, found rows, distances and which inputs are missing."""
+        """The words of 16 bits that a hand needs: inputs, scores, found rows, distances, which inputs are missing."""
         tables = self.tables
         small = len(tables.slopes) + -(-(tables.n_switches + tables.n_joints) // 8)
         return self.frame_size // 2 + 2 * self.row_pairs + self.found + -(-small // 2)

@@ -24,7 +24,7 @@ def test_probability_and_margin_are_pythons_in_c(shared_library: SharedLibrary, 
     tables = replace(tables, scale=scale)
     library = shared_library(Library("hand", numbered(tables), Layout(tables)).files)
     hand, memory = (ctypes.c_void_p * 64)(), (ctypes.c_int16 * 512)()
-    library.thenar_init(hand, ctypes.c_char.in_dll(library, "thenar_hand_model"), memory)
+    library.thenar_init(hand, ctypes.byref(ctypes.c_char.in_dll(library, "thenar_hand_model")), memory)
     first = Layout(tables).frame_size // 2  # scores follow the inputs
     softmax = Softmax(scale)
     for reach in (0, 3, 40, 900, 9000, 32767):

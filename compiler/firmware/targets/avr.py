@@ -73,7 +73,23 @@ _avr = partial(
 
 _ATMEGA328P = _avr(
     name="avr328p",
-    formula=Formula(cycles={}, flash=0, ram=0),
+    formula=Formula(
+        cycles={
+            "one": 378.1,
+            "blocks": 136.5,
+            "classes": 34.9,
+            "bytes": 71.78,
+            "groups": 33.38,
+            "rows": 112.9,
+            "lines": 122.9,
+            "distances": 73.62,
+            "shifts": 6.288,
+            "bins": 121.9,
+            "halves": 30.26,
+        },
+        flash=2288,
+        ram=60,
+    ),
     part="atmega328p",
     rank=10,
     flags=("-mmcu=atmega328p", "-Os"),
@@ -84,7 +100,23 @@ _ATMEGA328P = _avr(
 
 _ATMEGA2560 = _avr(
     name="avr2560",
-    formula=Formula(cycles={}, flash=0, ram=0),
+    formula=Formula(
+        cycles={
+            "one": 379.1,
+            "blocks": 136.6,
+            "classes": 34.9,
+            "bytes": 71.77,
+            "groups": 33.38,
+            "rows": 112.9,
+            "lines": 122.9,
+            "distances": 73.58,
+            "shifts": 6.299,
+            "bins": 123.9,
+            "halves": 30.26,
+        },
+        flash=2292,
+        ram=60,
+    ),
     part="atmega2560",
     rank=11,
     flags=("-mmcu=atmega2560", "-Os"),

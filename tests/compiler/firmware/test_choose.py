@@ -1,15 +1,11 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.choose import fit_for, largest_classifier, smallest_fit
-from thenar.compiler.firmware.layout import Layout
-from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
+from thenar.compiler.firmware.choose import features, fit_for, largest_classifier, smallest_fit
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.tables.quantise import integer_scores
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -30,22 +26,15 @@ def wide_tables(make_tables: MakeTables) -> IntegerTables:
 def test_a_fit_costs_what_the_formula_of_its_target_says(tables: IntegerTables, part: str) -> None:
     fit = fit_for(TARGETS[part], tables)
     assert fit.layout.tables is tables
-    assert fit.cost == (None if fit.target.formula is None else fit.target.formula.cost(fit.layout))
+    assert fit.cost == (None if fit.target.formula is None else fit.target.formula.cost(fit.layout, avr=fit.target.avr))
     assert fit.target is (SMALL if part == "arduino" else TARGETS[part])
 
 
-@pytest.mark.parametrize("part", list(TARGETS))
-def test_scores_are_the_proved_ones_however_wide_the_entries_are(
-    tables: IntegerTables, wide_tables: IntegerTables, part: str
-) -> None:
-    """Rows of a build that was compiled with 16 table bits may fit in bytes, and are exact there too."""
-    for each, width in ((tables, 8), (wide_tables, 16)):
-        layout = fit_for(TARGETS[part], each).layout
-        assert layout.entry_bits == width
-        frames = joined(extreme_frames(each), random_frames(each, 200, 1))
-        scores = integer_scores(each, frames.bits, frames.codes)
-        assert np.abs(scores).max() > 127
-        assert np.array_equal(layout.scores(frames.bits, frames.codes), scores)
+def test_switches_share_look_ups_where_there_is_flash_for_it(make_tables: MakeTables, tables: IntegerTables) -> None:
+    small = make_tables(switches=8, joints=0)
+    assert [fit_for(SMALL, each).layout.group for each in (small, tables)] == [4, 1]
+    assert fit_for(TARGETS["avr2560"], tables).layout.group == 4
+    assert fit_for(TARGETS["host"], tables).layout.group == 4
 
 
 def test_a_fit_is_said_in_a_sentence(tables: IntegerTables) -> None:
@@ -53,10 +42,10 @@ def test_a_fit_is_said_in_a_sentence(tables: IntegerTables) -> None:
         fit = fit_for(part, tables)
         assert fit.cost is not None
         assert fit.words == (
-            f"for {part.title or part.part}: 8-bit entries, about {fit.cost.cycles} {unit} a frame, "
+            f"for {part.title or part.part}: {features(fit.layout)}, about {fit.cost.cycles} {unit} a frame, "
             f"{fit.cost.flash} bytes of flash, {fit.cost.ram} of RAM"
         )
-    assert fit_for(TARGETS["host"], tables).words == "for this machine: 8-bit entries"
+    assert fit_for(TARGETS["host"], tables).words == "for this machine: 4 switches a look-up"
 
 
 def test_what_takes_too_much_flash_or_ram_is_refused_with_a_remedy(wide_tables: IntegerTables) -> None:
@@ -93,9 +82,8 @@ def test_the_smallest_part_that_holds_a_build_is_found(make_tables: MakeTables, 
 @pytest.mark.parametrize(("switches", "joints"), [(0, 3), (5, 0), (1, 0)])
 def test_builds_that_lack_a_kind_of_input_fit_too(make_tables: MakeTables, switches: int, joints: int) -> None:
     tables = make_tables(1, switches=switches, joints=joints)
-    frames = np.ones((1, switches), bool), np.full((1, joints), 7, np.uint16)
     for target in TARGETS.values():
-        assert np.array_equal(fit_for(target, tables).layout.scores(*frames), Layout(tables).scores(*frames))
+        assert fit_for(target, tables).layout.tables is tables
 
 
 def test_tables_without_inputs_are_refused(make_tables: MakeTables) -> None:

@@ -68,27 +68,24 @@ def test_a_classifier_with_a_wrong_entry_fails_its_check(
 ) -> None:
     tables = make_tables()
     files = files_for(Layout(tables), describe(tables))
-    wrong = re.sub(
-        r"START\((-?\d+), ", lambda found: f"START({int(found[1]) + 1}, ", files["thenar_hand_tables.c"], count=1
-    )
-    assert wrong != files["thenar_hand_tables.c"]
-    done = make(files | {"thenar_hand_tables.c": wrong}, "check")
+    wrong = re.sub(r" START\((-?\d+), ", lambda found: f" START({int(found[1]) + 1}, ", files["thenar_hand.c"], count=1)
+    assert wrong != files["thenar_hand.c"]
+    done = make(files | {"thenar_hand.c": wrong}, "check")
     assert done.returncode != 0
     assert "predictions differ from Python's\n" in done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong"),
-    [("{0, 1}, {0, 2},", "{0, 2}, {0, 1},"), ('"grasp 0",\n    "grasp 1"', '"grasp 1",\n    "grasp 0"')],
+    ("name", "right", "wrong"),
+    [("thenar.c", "number / 8u]", "0u]"), ("thenar_hand.c", '"grasp 1\\000"', '"grasp 7\\000"')],
 )
 def test_a_wrong_bit_of_a_switch_and_a_wrong_name_fail_the_check(
-    make: Make, make_tables: MakeTables, describe: Describe, right: str, wrong: str
+    make: Make, make_tables: MakeTables, describe: Describe, name: str, right: str, wrong: str
 ) -> None:
     tables = make_tables()
     files = files_for(Layout(tables), describe(tables))
-    text = files["thenar_hand_tables.c"]
-    assert text.count(right) == 1
-    done = make(files | {"thenar_hand_tables.c": text.replace(right, wrong)}, "check")
+    assert right in files[name]
+    done = make(files | {name: files[name].replace(right, wrong)}, "check")
     assert done.returncode != 0
     assert "predictions differ from Python's" in done.stdout + done.stderr
 

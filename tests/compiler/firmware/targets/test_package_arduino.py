@@ -195,7 +195,7 @@ def test_keywords_are_words_of_the_header_a_tab_and_a_kind(make_tables: MakeTabl
     rows = [line.split("\t") for line in (made / "keywords.txt").read_text().splitlines()]
     assert {kind for _, kind in rows} == {"KEYWORD1", "KEYWORD2", "LITERAL1"}
     assert all(re.search(rf"\b{word}\b", header) for word, _ in rows)
-    assert ["thenar_hand_classify", "KEYWORD2"] in rows
+    assert ["thenar_classify", "KEYWORD2"] in rows
 
 
 def test_names_that_are_no_words_of_c_do_no_harm(

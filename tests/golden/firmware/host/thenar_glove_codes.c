@@ -3,8 +3,11 @@
    thenar 0.1.0, template codes/thenar_NAME_codes.c.j2. */
 #include "thenar_glove_codes.h"
 
-#define IN_FLASH
+#ifdef __AVR__
+#define COPY(to, from) ((void)memcpy_P(&(to), &(from), sizeof(to)))
+#else
 #define COPY(to, from) ((to) = (from))
+#endif
 
 #define SENSORS THENAR_GLOVE_SENSORS
 #define FARTHEST 65535
@@ -16,7 +19,7 @@ typedef struct {
     int64_t second;
 } point_codes;
 
-static const point_codes points[SENSORS] IN_FLASH = {
+static const point_codes points[SENSORS] THENAR_FLASH = {
     {INT64_C(16777216), INT64_C(4278190080)},
     {INT64_C(16777216), INT64_C(4278190080)},
 };
@@ -26,7 +29,7 @@ typedef struct {
     int32_t second;
 } point_readings;
 
-static const point_readings known[SENSORS] IN_FLASH = {
+static const point_readings known[SENSORS] THENAR_FLASH = {
     {0, 0},
     {0, 0},
 };
@@ -120,12 +123,11 @@ uint16_t thenar_glove_code_of(const thenar_glove_codes *codes, uint16_t sensor, 
     return code;
 }
 
-void thenar_glove_set_reading(
-    thenar_glove *glove, const thenar_glove_codes *codes, uint16_t sensor, int32_t reading)
+void thenar_glove_set_reading(thenar *hand, const thenar_glove_codes *codes, uint16_t sensor, int32_t reading)
 {
     const uint16_t code = thenar_glove_code_of(codes, sensor, reading);
 
     if (sensor < THENAR_GLOVE_JOINTS) {
-        glove->input.codes[sensor] = (thenar_glove_code)((code < UINT8_MAX) ? code : UINT8_MAX);
+        thenar_set_code(hand, sensor, code);
     }
 }

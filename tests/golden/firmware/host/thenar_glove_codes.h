@@ -52,8 +52,7 @@ bool thenar_glove_calibrated(const thenar_glove_codes *codes, uint16_t sensor);
 uint16_t thenar_glove_code_of(const thenar_glove_codes *codes, uint16_t sensor, int32_t reading);
 
 /** Put a reading into the input: the code of a joint. */
-void thenar_glove_set_reading(
-    thenar_glove *glove, const thenar_glove_codes *codes, uint16_t sensor, int32_t reading);
+void thenar_glove_set_reading(thenar *hand, const thenar_glove_codes *codes, uint16_t sensor, int32_t reading);
 
 #ifdef __cplusplus
 }
