@@ -63,18 +63,17 @@ def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> 
     """
     if target.any_part:
         return smallest_fit(tables, flash=flash)
-    if target.formula is None:
-        return Fit(target, Layout(tables), None)
     if flash is not None and flash > target.flash:
         raise FirmwareError(
             f"the classifier cannot be allowed {flash} bytes of flash: {target.named} has {target.flash} bytes"
         )
     *faster, smallest = GROUPS
+    share = target.flash // _FAST_SHARE
     allowed = largest_classifier(target) if flash is None else flash
     for group in faster:
         with suppress(FirmwareError):
             fit = _fit(target, tables, group, allowed)
-            if fit.cost is not None and fit.cost.flash <= target.flash // _FAST_SHARE:
+            if fit.cost is None or fit.cost.flash <= share:
                 return fit
     return _fit(target, tables, smallest, allowed)
 
@@ -82,13 +81,14 @@ def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> 
 def _fit(target: Target, tables: IntegerTables, group: int, allowed: int) -> Fit:
     """Return the fit with a layout, in `allowed` bytes of flash. Raises FirmwareError if it does not fit."""
     layout = Layout(tables, group)
+    if target.formula is None:
+        return Fit(target, layout, None)
     rows = 4 * layout.row_pairs * layout.n_rows
     if target.avr and rows > _LARGEST_ARRAY:
         raise FirmwareError(
             f"the rows need {rows} bytes, but an array of an AVR has at most {_LARGEST_ARRAY}: compile with "
             "``linear`` 0 ``max_bins`` 16, or with fewer ``rounds``"
         )
-    assert target.formula is not None
     cost = target.formula.cost(layout, avr=target.avr)
     if cost.flash > allowed or cost.ram > target.ram:
         raise FirmwareError(

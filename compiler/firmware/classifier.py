@@ -126,7 +126,7 @@ def _values(name: str, names: Names, layout: Layout, notes: Sequence[str]) -> di
         "group": layout.group,
         "found": layout.found,
         "softmax": Softmax(tables.scale),
-        "columns": ", ".join(map(comment, names.grasps)),
+        "columns": _remark(f"The entries of a row: {', '.join(map(comment, names.grasps))}."),
         "rows": [*_row_lines(layout.start[None], layout, "START"), *_section_lines(names, layout)],
         "slopes": _row_lines([line.row.astype(int) for line in tables.slopes], layout, "SLOPES"),
         "lines": [f"{_INDENT}{_line(line)}," for line in tables.slopes],

@@ -20,7 +20,7 @@ void thenar_segment_start(thenar_segmenter *stream, const thenar_segment_model *
     stream->at = (uint16_t *)(stream->ticks + model->lag);
     stream->waiting = stream->at + model->rings;
     stream->begun = (uint8_t *)(stream->waiting + model->waiting);
-    for (uint8_t *byte = (uint8_t *)memory; byte < stream->begun + (2u * masks * model->lag); byte++) {
+    for (uint8_t *byte = (uint8_t *)memory; byte < (stream->begun + (2u * masks * model->lag)); byte++) {
         *byte = 0u;
     }
     /* More expensive than any continuation: nothing ends before the first tick. */

@@ -73,7 +73,7 @@ def test_no_more_flash_is_allowed_than_the_part_has(tables: IntegerTables) -> No
 
 def test_the_smallest_part_that_holds_a_build_is_found(make_tables: MakeTables, tables: IntegerTables) -> None:
     assert smallest_fit(tables).target is SMALL
-    large = make_tables(classes=20, switches=40, joints=16, bins=20, reach=100)
+    large = make_tables(classes=20, switches=40, joints=16, bins=30, reach=20)
     assert smallest_fit(large, kind="avr").target is TARGETS["avr2560"]
     with pytest.raises(FirmwareError, match="an array of an AVR has at most 32767"):
         smallest_fit(make_tables(classes=60, switches=60, joints=20, bins=60, reach=100), kind="avr")

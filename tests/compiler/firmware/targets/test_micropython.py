@@ -17,6 +17,7 @@ from thenar.compiler.firmware.probes import Predictions, Probes, lost_inputs
 from thenar.compiler.firmware.segments import LAG_US
 from thenar.compiler.firmware.sensors import Sensor, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.tables.quantise import integer_scores
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Rejection, Threshold
@@ -129,7 +130,7 @@ def test_margin_probability_and_refusal_are_python_s(
     bits = np.arange(tables.n_switches)[np.newaxis] % 3 == 0
     codes = 40 * np.arange(tables.n_joints, dtype=np.uint16)[np.newaxis]
     layout = Layout(tables)
-    scores = layout.scores(bits, codes)[0]
+    scores = integer_scores(tables, bits, codes)[0]
     best = int(scores.argmax())
     k, j = tables.n_classes, tables.n_joints
     least = [32767 if each == best else -32768 for each in range(k)]  # refused for its score alone

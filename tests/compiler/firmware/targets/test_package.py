@@ -83,13 +83,13 @@ unsigned glove_works(void) { return thenar_hand_check(); }
 
 @pytest.fixture
 def written(make_tables: MakeTables, describe: Describe, tmp_path: Path) -> Written:
-    """Return what writes the package "hand" of a target, as it is for an AVR where `avr`."""
+    """Return what writes the package "hand" of a target."""
 
-    def written(target: str, avr: bool = False, grasp: str = "grasp 0") -> Path:
+    def written(target: str, grasp: str = "grasp 0") -> Path:
         tables = make_tables()
         manifest = describe(tables)
         named = replace(manifest, grasps=(grasp, *manifest.grasps[1:]))
-        for name, text in TARGETS[target].files(Library("hand", named, Layout(tables), avr)).items():
+        for name, text in TARGETS[target].files(Library("hand", named, Layout(tables))).items():
             path = tmp_path / "thenar_hand" / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)

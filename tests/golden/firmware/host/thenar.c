@@ -32,7 +32,7 @@ void thenar_init(thenar *hand, const thenar_model *model, uint16_t *memory)
     hand->distances = (uint8_t *)(hand->found + model->found);
     hand->lost = hand->distances + model->lines;
     hand->n_lost = 0u;
-    for (uint8_t *byte = hand->switches; byte < hand->lost + bytes; byte++) {
+    for (uint8_t *byte = hand->switches; byte < (hand->lost + bytes); byte++) {
         *byte = 0u;
     }
 }
@@ -144,7 +144,7 @@ static void find_distances(const thenar *hand)
     const thenar_line *line = hand->model->each_line;
     uint8_t *distance = hand->distances;
 
-    for (const uint8_t *const end = distance + hand->model->lines; distance < end; distance++) {
+    for (const uint8_t *const end = &distance[hand->model->lines]; distance < end; distance++) {
         const unsigned code = codes[THENAR_READ_16(&line->joint)];
         const unsigned low = THENAR_READ_16(&line->low);
         const unsigned span = THENAR_READ_16(&line->span);
@@ -188,7 +188,7 @@ static void add_means(thenar *hand)
     const thenar_model *const model = hand->model;
     const int16_t *mean = model->means;
 
-    for (uint16_t input = 0u; input < model->switches + model->joints; input++) {
+    for (uint16_t input = 0u; input < (model->switches + model->joints); input++) {
         const bool lost = bit_of(hand->lost, input);
 
         for (uint16_t k = 0u; k < model->classes; k++) {
@@ -250,7 +250,7 @@ uint16_t thenar_decide(const thenar *hand, uint16_t grasp)
         closed = (uint16_t)(closed + (bit_of(hand->switches, number) ? 1u : 0u));
         missing = (uint16_t)(missing + (bit_of(hand->lost, number) ? 1u : 0u));
     }
-    refused = (closed + missing < THENAR_READ_16(&rejection->closed[2u * grasp]))
+    refused = ((closed + missing) < THENAR_READ_16(&rejection->closed[2u * grasp]))
         || (closed > THENAR_READ_16(&rejection->closed[(2u * grasp) + 1u])) || is_outside(hand, rejection, grasp);
     if (hand->n_lost == 0u) {
         refused = refused || (hand->scores[grasp] < (int16_t)THENAR_READ_16(&rejection->least_scores[grasp]));
@@ -321,7 +321,7 @@ uint16_t thenar_name(const thenar_model *model, uint16_t grasp, char *text, uint
         from++;
     }
     while ((grasp < model->names) && (THENAR_READ_8(&from[length]) != 0)) {
-        if (length + 1u < size) {
+        if ((length + 1u) < size) {
             text[length] = (char)THENAR_READ_8(&from[length]);
         }
         length++;

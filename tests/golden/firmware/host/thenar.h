@@ -126,7 +126,7 @@ typedef struct {
     uint16_t n_lost;
 } thenar;
 
-/** Initialise: all switches open, all codes 0, nothing missing; `memory` has as many words as the tables' header says. */
+/** Initialise: all switches open, all codes 0, nothing missing. The tables' header has the words of `memory`. */
 void thenar_init(thenar *hand, const thenar_model *model, uint16_t *memory);
 
 /** Set whether a switch is closed. Ignored while it is missing, and for numbers that the model has not. */

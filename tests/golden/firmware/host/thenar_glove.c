@@ -7,8 +7,8 @@
 #define PAIR THENAR_PAIR
 #define SLOPES THENAR_SLOPES
 
-/* The entries of a row: power grip, tip pinch, lateral pinch. */
 static const thenar_pair rows[] THENAR_FLASH = {
+    /* The entries of a row: power grip, tip pinch, lateral pinch. */
     START(120, -40), START(7, 0), START(0, 0), START(0, 0),
 
     /* switches: thumb tip, index tip, index middle, middle tip */

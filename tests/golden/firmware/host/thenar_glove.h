@@ -1,6 +1,6 @@
 /**
  * @file thenar_glove.h
- * @brief The numbers of 6 switches and 2 joints and of 3 grasp types, and the tables that recognise these.
+ * @brief The numbers and tables of 3 grasp types from 6 switches and 2 joints of a glove.
  *
  * Layout for this machine: 4 switches a look-up.
  * From the tables 0123456789abcdef; thenar 0.1.0, template tables/thenar_NAME.h.j2.
