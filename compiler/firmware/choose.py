@@ -14,8 +14,8 @@ from .targets import TARGETS, Target
 _NOTE_WIDTH = 114
 # avr-gcc cannot make a larger object.
 _LARGEST_ARRAY = 32767
-# Switches share look-ups, which takes more flash and less time, while the classifier takes at most this share of it.
-_FAST_SHARE = 4
+# Switches share look-ups, which takes more flash and less time, unless the classifier then takes half of the flash.
+_FAST_SHARE = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +58,7 @@ def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> 
     """Return the fit of `tables` on a target, whose flash the classifier may fill up to `flash` bytes, by default
     `largest_classifier`.
 
-    Of the layouts, it is the fastest that takes a quarter of the flash or less; otherwise the smallest. Raises
+    Of the layouts, it is the fastest that takes half of the part's flash or less; otherwise the smallest. Raises
     FirmwareError if it does not fit, or the part has less flash than `flash`.
     """
     if target.any_part:

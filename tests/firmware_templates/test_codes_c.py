@@ -55,7 +55,7 @@ class Codes:
     """The C of some sensors, begun."""
 
     def __init__(self, library: ctypes.CDLL, sensors: int) -> None:
-        self.library, self.state = library, (ctypes.c_int32 * (2 * sensors))()
+        self.library, self.state = library, (ctypes.c_int32 * (16 * sensors))()  # more than a sensor's line takes
         library.thenar_hand_codes_init(self.state)
         library.thenar_hand_calibrate.restype = library.thenar_hand_calibrated.restype = ctypes.c_bool
 
