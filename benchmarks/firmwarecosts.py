@@ -58,7 +58,7 @@ def _linked(folder: Path, sources: Mapping[str, str], part: str, include: Sequen
     return int(text) + int(data), int(data) + int(bss)
 
 
-def of_ours(layout: Layout, target: Target, frames: Frames, expected: NDArray[np.int64]) -> Cost:
+def of_ours(layout: Layout, target: Target, frames: Frames, expected: NDArray[np.integer]) -> Cost:
     """Return the cost of thenar's classifier for frames with known scores (n, K).
 
     The bytes of a frame are written directly into its inputs: nothing has to be copied.

@@ -172,7 +172,7 @@ def test_any_tables_give_python_s_results(
 ) -> None:
     tool("gcc")
     joints = max(joints, int(switches == 0))
-    terms = {"pairs": min(more, joints // 2)} if paired else {"lines": min(more, joints)}
+    terms: dict[str, Any] = {"pairs": min(more, joints // 2)} if paired else {"lines": min(more, joints)}
     tables = made(make_tables, seed, classes=classes, switches=switches, joints=joints, **terms)
     is_exact(tables, HOST, random_frames(tables, 60, seed), same_as_python, GROUPS[seed % 3])
 

@@ -21,7 +21,8 @@ def test_costs_of_fifty_builds_are_near_those_of_the_formula(cores: Any, name: s
     sys.path.append(str(BENCHMARKS))
     from firmwarefit import errors, measured
 
-    target, points = TARGETS[name], []
+    target = TARGETS[name]
+    points: list[Any] = []
     assert target.formula is not None
     for seed in range(UNSEEN, UNSEEN + 2 * BUILDS):
         if len(points) < BUILDS and (point := measured(name, seed)) is not None:

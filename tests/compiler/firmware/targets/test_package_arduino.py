@@ -53,10 +53,10 @@ def glove(manifest: Manifest) -> Harness:
 def library(describe: Describe, tmp_path: Path) -> Callable[..., Path]:
     """Return what writes the library "hand" of a layout."""
 
-    def library(layout: Layout, avr: bool = True, known: bool = True) -> Path:
+    def library(layout: Layout, known: bool = True) -> Path:
         manifest = on_pins(describe(layout.tables))
         sensors = sensors_of(manifest, glove(manifest)) if known and manifest.joints else None
-        for name, text in TARGETS["arduino"].files(Files("hand", manifest, layout, avr, glove=sensors)).items():
+        for name, text in TARGETS["arduino"].files(Files("hand", manifest, layout, glove=sensors)).items():
             path = tmp_path / "thenar_hand" / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)

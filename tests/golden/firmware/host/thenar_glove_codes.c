@@ -100,8 +100,12 @@ static void prepare(thenar_glove_line *line, const point_codes *codes)
     line->mask = (UINT32_C(0x10000) << line->shift) - 1u;
     inexact = (2u * line->window) + 2u;
     line->safe = 0u;
+    line->exact = false;
     if ((((steep * line->window) >> (8u - line->shift)) < HIGHEST_VALUE) && (line->mask > inexact)) {
+        const uint64_t dropped = (uint64_t)((1u << (8u - line->shift)) - 1u);
+
         line->safe = line->mask - inexact;
+        line->exact = ((step % span) == 0) && (((steep | ((uint64_t)rest / (uint64_t)span)) & dropped) == 0u);
     }
 }
 
@@ -111,11 +115,14 @@ static uint16_t code_on(const thenar_glove_line *line, uint16_t sensor, int32_t 
     const int32_t held = (reading < -FARTHEST) ? -FARTHEST : ((reading > FARTHEST) ? FARTHEST : reading);
     const int32_t distance = line->falls ? (line->from - held) : (held - line->from);
     const uint32_t value = line->offset + (line->gain * (uint32_t)distance);
+    const uint32_t rest = value & line->mask;
+    const bool sure = line->exact || ((rest - 1u) < line->safe);
     uint16_t code;
 
-    if ((distance >= 0) && ((uint32_t)distance <= line->window) && (((value & line->mask) - 1u) < line->safe)) {
-        const int32_t whole = line->base + (int32_t)((uint16_t)(value >> 16) >> line->shift);
+    if (sure && (distance >= 0) && ((uint32_t)distance <= line->window)) {
+        int32_t whole = line->base + (int32_t)((uint16_t)(value >> 16) >> line->shift);
 
+        whole -= ((rest == 0u) && ((whole % 2) != 0)) ? 1 : 0; /* halfway between two */
         code = (whole < 0) ? 0u : ((whole > UINT16_MAX) ? UINT16_MAX : (uint16_t)whole);
     } else {
         const point_readings at = {line->readings[0], line->readings[1]};

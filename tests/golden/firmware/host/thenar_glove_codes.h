@@ -40,6 +40,7 @@ typedef struct {
     uint32_t mask;       /* the parts of a code, */
     uint32_t safe;       /* and the largest rest whose code no rounding changes */
     uint8_t shift;
+    bool exact; /* nothing was rounded */
     bool falls; /* codes rise where readings fall */
 } thenar_glove_line;
 
