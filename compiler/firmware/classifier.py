@@ -118,7 +118,7 @@ def _values(name: str, names: Names, layout: Layout, notes: Sequence[str]) -> di
         "classes": tables.n_classes,
         "switches": tables.n_switches,
         "joints": tables.n_joints,
-        "none": none_of(names),
+        "nothing_held": none_of(names),
         "names": [string(f"{answer}\0") for answer in answers[:-1]] + [string(answers[-1])],
         "name_bytes": 1 + max(len(answer.encode()) for answer in answers),
         "memory": layout.memory,
