@@ -85,7 +85,10 @@ uint16_t thenar_probability(const thenar *hand, uint16_t grasp) { return (uint16
 uint16_t thenar_name(const thenar_model *model, uint16_t grasp, char *text, uint16_t size)
 {
     text[0] = '\\0';
-    return (uint16_t)(0u * (grasp + size + model->classes));
+    (void)model;
+    (void)grasp;
+    (void)size;
+    return 0u;
 }
 """
 

@@ -66,7 +66,7 @@ static uint16_t nearest(const point_readings *at, const point_codes *codes, int3
     return (code < most) ? (uint16_t)code : most;
 }
 
-#define HIGHEST_VALUE UINT64_C(0xFE000000) /* leaves room for an offset */
+#define HIGHEST_VALUE 0xFE000000u /* leaves room for an offset */
 
 /* Prepare what most readings need: the code of a reading is `base`, and the upper bits of offset + gain * distance from
    `from`. Both factors are rounded down. Rests that this could change, and codes midway, are left to nearest(). */
@@ -97,7 +97,7 @@ static void prepare(thenar_glove_line *line, const point_codes *codes)
     }
     line->offset = (uint32_t)(((uint64_t)rest / (uint64_t)span) >> (8u - line->shift));
     line->gain = (uint32_t)(steep >> (8u - line->shift));
-    line->mask = (UINT32_C(0x10000) << line->shift) - 1u;
+    line->mask = ((uint32_t)0x10000u << line->shift) - 1u;
     inexact = (2u * line->window) + 2u;
     line->safe = 0u;
     line->exact = false;
