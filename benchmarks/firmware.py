@@ -17,7 +17,7 @@ from functools import cache
 from typing import Any
 
 from firmwarecosts import Cost, of_ours, of_peer
-from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split, two_changed
+from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split
 from firmwarepeers import peers
 from rich.console import Console
 from rich.progress import track
@@ -25,64 +25,55 @@ from rich.table import Table
 
 from thenar.compiler import TRAINERS
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.choose import fit_for
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.tables.collapse import Model, collapse
-from thenar.compiler.tables.quantise import quantise
+from thenar.compiler.tables.quantise import integer_scores, quantise
 from thenar.runtime.tables import IntegerTables
 
 AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
-CHANGES, SLOW_ROWS = 500, 20  # rows in which two switches change; rows for a peer on the larger part
+SLOW_ROWS = 20  # rows for a peer on the larger part
 CONSOLE = Console(width=170)
 COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "differing", "front")
 
 
 @dataclass(frozen=True)
 class Ours:
-    """A trainer with `settings`, with entries and sums of these widths, and with or without joints."""
+    """A trainer with `settings`, with entries of `bits`, and with or without joints."""
 
     trainer: str
     bits: int
     settings: tuple[tuple[str, Any], ...] = ()
     joints: bool = True
-    width: int = 16
 
     @property
     def name(self) -> str:
         """The name in the table."""
         given = "".join(f", {name} {value}" for name, value in self.settings if name in ("max_bins", "linear"))
-        sums = "" if self.width == 16 else f", sums of {self.width}"
         alone = "" if self.joints else ", switches only"
-        return f"thenar, {self.trainer}{given}, {self.bits} bit{sums}{alone}"
+        return f"thenar, {self.trainer}{given}, {self.bits} bit{alone}"
 
     def integers(self, fold: Fold) -> IntegerTables:
         """Return the integer tables of a fold."""
         samples = fold.samples(joints=self.joints)
         tables = collapse(_trained(self.trainer, self.settings, fold, self.joints), SWITCHES)
-        return quantise(tables, samples.switches, samples.codes, self.width, self.bits)
+        return quantise(tables, samples.switches, samples.codes, 16, self.bits)
 
     def predictor(self, fold: Fold) -> Predictor:
         """Return the predictor of rows that matches the firmware of a fold."""
-        layout = arrange(self.integers(fold))
-        return lambda rows: layout.scores(*split(rows, joints=self.joints)).argmax(axis=1)
+        tables = self.integers(fold)
+        return lambda rows: integer_scores(tables, *split(rows, joints=self.joints)).argmax(axis=1)
 
 
 BINS = ("max_bins", 8)
 # The pull of a line is that of scikit-learn's logistic regression with C = 1, which the peers take.
-FEW, LINE = (("max_bins", 5),), (("linear", 1), ("penalty", 0.5))
+FEW, LINE = (("max_bins", 4),), (("linear", 1), ("penalty", 0.5))
 OURS = (
     Ours("logitboost", 16, (("rounds", 100), BINS)),
-    Ours("logitboost", 8, (("rounds", 100), BINS)),
     Ours("logit", 16, (BINS,)),
-    Ours("logit", 8, (BINS,)),
-    Ours("logit", 8, FEW, width=9),
-    Ours("logit", 8, FEW, width=8),
-    Ours("logit", 8, (("max_bins", 4),), width=8),
-    Ours("logit", 8, (("max_bins", 3),), width=8),
+    Ours("logit", 16, FEW),
     Ours("logit", 8, LINE),
-    Ours("logitboost", 8, (("rounds", 100), BINS), joints=False),
-    Ours("logit", 8, (BINS,), joints=False),
-    Ours("logit", 8, (BINS,), joints=False, width=8),
+    Ours("logit", 16, (BINS,), joints=False),
 )
 
 
@@ -111,8 +102,9 @@ class Line:
 def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Line:
     """Return the line of a trainer, on the first fold."""
     fold = cuts[CUTS[0]][0]
-    layout, frames = arrange(what.integers(fold)), split(fold.asked, joints=what.joints)
-    cost = of_ours(layout, AVR, layout.frame_bytes(*frames), layout.scores(*frames))
+    tables, frames = what.integers(fold), split(fold.asked, joints=what.joints)
+    layout = fit_for(AVR, tables).layout
+    cost = of_ours(layout, AVR, layout.frame_bytes(*frames), integer_scores(tables, *frames))
     return Line(what.name, rates(cuts, what.predictor), cost)
 
 
@@ -153,16 +145,6 @@ def _on_front(line: Line, lines: Sequence[Line]) -> bool:
     return not any(other.beats(line) for other in lines if other.compared)
 
 
-def print_changes(cuts: Mapping[str, list[Fold]], what: Ours) -> None:
-    """Print the cost of update() after changes of two switches."""
-    fold = cuts[CUTS[0]][0]
-    integers = what.integers(fold)
-    layout = arrange(integers)
-    changed = split(two_changed(fold, CHANGES, joints=what.joints), joints=what.joints)
-    cost = of_ours(layout, AVR, layout.frame_bytes(*changed), layout.scores(*changed), changes=True)
-    CONSOLE.print(f"{what.name}, two switches changed: {' | '.join(cost.cells)}")
-
-
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -178,8 +160,6 @@ def main() -> None:
     title = f"{SWITCHES} switches in {PORTS} bytes + {JOINTS} joints, 14 grasp types, {AVR.part}, -Os, filling included"
     CONSOLE.print(table(title, lines, lambda line: True))
     CONSOLE.print(table("The front", lines, lambda line: line.compared and _on_front(line, lines)))
-    for what in OURS:
-        print_changes(cuts, what)
 
 
 if __name__ == "__main__":

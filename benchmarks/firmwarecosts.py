@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.classifier import classifier_files
+from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.simavr import harness
 from thenar.compiler.firmware.targets import Target
@@ -58,28 +58,23 @@ def _linked(folder: Path, sources: Mapping[str, str], part: str, include: Sequen
     return int(text) + int(data), int(data) + int(bss)
 
 
-def of_ours(
-    layout: Layout, target: Target, frames: Frames, expected: NDArray[np.int64], *, changes: bool = False
-) -> Cost:
-    """Return the cost of thenar's classifier for frames with known scores (n, K); with `changes`, update()'s cost.
+def of_ours(layout: Layout, target: Target, frames: Frames, expected: NDArray[np.integer]) -> Cost:
+    """Return the cost of thenar's classifier for frames with known scores (n, K).
 
-    update() runs for every frame but the first, which has no predecessor. The bytes of a frame are written directly
-    into its input: nothing has to be copied.
+    The bytes of a frame are written directly into its inputs: nothing has to be copied.
     """
-    files = classifier_files("glove", numbered(layout.tables), layout, avr=True)
-    called = ("classify", "update") if changes else ("classify",)
-    body = " ".join(f"thenar_glove_{function}(&glove);" for function in ("init", *called))
-    main = f'#include "thenar_glove.h"\nthenar_glove glove;\nint main(void) {{ for (;;) {{ {body} }} }}\n'
-    program = {**files, "main.c": main}
+    files = Library("glove", numbered(layout.tables), layout).files
+    body = "thenar_init(&hand, &thenar_glove_model, memory); for (;;) thenar_classify(&hand);"
+    state = "uint16_t memory[THENAR_GLOVE_MEMORY];\nthenar hand;\n"
+    program = {**files, "main.c": f'#include "thenar_glove.h"\n{state}int main(void) {{ {body} }}\n'}
     with workshop(program) as folder:
         flash, ram = _linked(folder, program, target.part)
-    results = target.run(files, "glove", layout, frames, incremental=changes)
+    results = target.run(files, "glove", layout, frames)
     assert results.cost is not None
     assert results.stack is not None
     wrong = (results.scores != expected).any(axis=1) | (results.classes != expected.argmax(axis=1))
-    cycles = results.cost[1 if changes else 0 :]
-    most, differing = int(cycles.max()), int(np.count_nonzero(wrong))
-    return Cost(target.part, int(np.median(cycles)), most, flash, ram, results.stack, differing, len(frames))
+    middle, most, differing = int(np.median(results.cost)), results.most, int(np.count_nonzero(wrong))
+    return Cost(target.part, middle, most, flash, ram, results.stack, differing, len(frames))
 
 
 def of_peer(

@@ -79,14 +79,3 @@ def rates(cuts: Mapping[str, list[Fold]], train: Callable[[Fold], Predictor]) ->
         right = sum(int(np.count_nonzero(train(fold)(fold.asked) == fold.truth)) for fold in parts)
         found.append(100 * right / sum(len(fold.truth) for fold in parts))
     return tuple(found)
-
-
-def two_changed(fold: Fold, changes: int, *, joints: bool) -> Rows:
-    """Return rows each of which differs from the previous one in two switches, seeded."""
-    rng = np.random.default_rng(SEED)
-    rows = [fold.asked[0]]
-    for _ in range(changes):
-        row = rows[-1].copy()
-        row[rng.choice(SWITCHES, 2, replace=False)] ^= 1
-        rows.append(row)
-    return np.array(rows)[:, : SWITCHES + JOINTS * joints]

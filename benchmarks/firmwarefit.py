@@ -1,9 +1,10 @@
-"""Fit the formula of a target's costs: cycles or instructions, flash and RAM, of random builds.
+"""Fit the formula of a target's costs: cycles or instructions of random builds; and the flash and RAM of the core.
 
     python benchmarks/firmwarefit.py [TARGET ...]
 
 Every build is compiled and run in simavr or qemu, on extreme and random frames. The coefficients, none negative, have
-the least largest relative error; they are printed as they stand in the target's file.
+the least largest relative error; they are printed as they stand in the target's file. The core has the same bytes of
+flash and RAM in every build, but for a few that the compiler aligns.
 """
 
 import argparse
@@ -22,8 +23,8 @@ from scipy.optimize import linprog
 
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.costs import NAME_BYTES, terms
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.costs import NAME_BYTES, Formula, terms
+from thenar.compiler.firmware.layout import GROUPS, Layout
 from thenar.compiler.firmware.measuring import sizes
 from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
 from thenar.compiler.firmware.targets import TARGETS, Target
@@ -32,30 +33,22 @@ from thenar.runtime.tables import COARSE, IntegerTables, Slope
 
 FITTED = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "rv32imac")
 FRAMES = 200
-DRAWS = (*range(80), *range(1000, 1050))
-TIME_TERMS = (
-    *("one", "word classes", "byte classes", "passes", "class passes", "lookups", "kept lookups", "words", "entries"),
-    *("offsets", "split words", "fields", "bins", "thresholds", "searches", "lines", "line sums"),
-)
-FLASH_TERMS = (
-    *("one", "word classes", "byte classes", "passes", "class passes", "lookups", "kept lookups", "words"),
-    *("split words", "found", "found words", "split code", "fields", "bins", "thresholds", "lines", "line sums"),
-    *("rows", "padded rows", "tables"),
-)
-RAM_TERMS = (
-    *("one", "word classes", "byte classes", "class passes", "found", "kept found", "sum words", "compared codes"),
-    *("ports", "input"),
-)
+DRAWS = range(60)
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """The terms of a build, and its measured time, flash without names, and RAM."""
+    """A build, its terms and its measured time, flash without names, and RAM."""
 
-    terms: Mapping[str, float]
+    layout: Layout
     time: int
     flash: int
     ram: int
+
+    @property
+    def terms(self) -> Mapping[str, int]:
+        """How often each term of the time occurs."""
+        return terms(self.layout)
 
 
 def drawn(seed: int) -> IntegerTables:
@@ -80,8 +73,10 @@ def drawn(seed: int) -> IntegerTables:
         return np.sort(random.choice(250, count, replace=False) + first).astype(np.uint16)
 
     thresholds = tuple(steps(joint) for joint in range(joints))
+    gain = int(random.integers(-4, 4))
+    span = 240 >> gain if gain > 0 else 240 << -gain
     slopes = tuple(
-        Slope(joint, 3, 240, 0, (random.integers(-9, 10, classes) * last).astype(np.int8))
+        Slope(joint, 3, 3 + span, gain, (random.integers(-9, 10, classes) * last).astype(np.int8))
         for joint in range(joints - lines, joints)
     )
     return IntegerTables(
@@ -105,20 +100,21 @@ def runner(target: Target) -> Any:
     return import_module("qemu").CORES[target.name]
 
 
-def measured(name: str, tables: IntegerTables) -> Point | None:
-    """Return a build's point on a target; None where it does not fit."""
-    target, layout = TARGETS.named(name), arrange(tables)
+def measured(name: str, seed: int) -> Point | None:
+    """Return the point of a drawn build on a target; None where it does not fit."""
+    target, tables = TARGETS.named(name), drawn(seed)
+    layout = Layout(tables, GROUPS[seed % len(GROUPS)])
     plain = numbered(tables)
     names = replace(plain, grasps=tuple(f"{grasp:.<{NAME_BYTES - 1}}" for grasp in plain.grasps))
-    library = Library("glove", names, layout, target.avr)
+    library = Library("glove", names, layout)
     frames = joined(extreme_frames(tables), random_frames(tables, FRAMES, 1))
     sent = layout.frame_bytes(frames.bits, frames.codes)
     try:
         found = runner(target).run(library.files, "glove", layout, sent)
-        flash, _, ram = sizes(library, target)
+        flash, ram = sizes(library, target)
     except FirmwareError:
         return None
-    return Point(terms(layout), found.most, flash - NAME_BYTES * (tables.n_classes + 1), ram)
+    return Point(layout, found.most, flash - NAME_BYTES * tables.n_classes, ram)
 
 
 def fitted(names: Sequence[str], points: Sequence[Point], values: Sequence[int]) -> dict[str, float]:
@@ -133,10 +129,16 @@ def fitted(names: Sequence[str], points: Sequence[Point], values: Sequence[int])
     return {name: float(f"{each:.4g}") for name, each in zip(names, found[:-1], strict=True) if each > 0.05}
 
 
-def errors(coefficients: Mapping[str, float], points: Sequence[Point], values: Sequence[int]) -> NDArray[np.float64]:
-    """Return the relative errors of a fit."""
-    sums = np.array([sum(each * point.terms[name] for name, each in coefficients.items()) for point in points])
-    return sums / np.array(values, np.float64) - 1
+def errors(formula: Formula, points: Sequence[Point], *, avr: bool) -> dict[str, NDArray[np.float64]]:
+    """Return the relative errors of time, flash and RAM."""
+    costs = [formula.cost(point.layout, avr=avr) for point in points]
+    names = [NAME_BYTES * point.layout.tables.n_classes for point in points]
+    pairs = {
+        "time": [(cost.cycles, point.time) for cost, point in zip(costs, points, strict=True)],
+        "flash": [(cost.flash - n, point.flash) for cost, point, n in zip(costs, points, names, strict=True)],
+        "ram": [(cost.ram, point.ram) for cost, point in zip(costs, points, strict=True)],
+    }
+    return {part: np.divide(*np.array(each, np.float64).T) - 1 for part, each in pairs.items()}
 
 
 def main() -> None:
@@ -145,14 +147,18 @@ def main() -> None:
     parser.add_argument("targets", nargs="*", default=FITTED, metavar="TARGET")
     asked = parser.parse_args()
     for name in asked.targets:
+        avr = TARGETS.named(name).avr
         with ProcessPoolExecutor(2) as pool:
-            points = [point for point in pool.map(partial(measured, name), map(drawn, DRAWS)) if point]
-        print(f"{name}: {len(points)} builds\nformula=Formula(")
-        for part, names in (("time", TIME_TERMS), ("flash", FLASH_TERMS), ("ram", RAM_TERMS)):
-            values = [getattr(point, part) for point in points]
-            found = fitted(names, points, values)
-            print(f"    {found},  # {100 * np.abs(errors(found, points, values)).max():.1f} % at most")
-        print(")", flush=True)
+            points = [point for point in pool.map(partial(measured, name), DRAWS) if point]
+        tables = np.array([point.layout.table_bytes(avr=avr) for point in points])
+        flash = np.array([point.flash for point in points]) - tables
+        ram = np.array([point.ram - 2 * point.layout.memory for point in points])
+        cycles = fitted([*points[0].terms], points, [point.time for point in points])
+        formula = Formula(cycles, int(np.median(flash)), int(np.median(ram)))
+        print(f"{name}: {len(points)} builds; flash {flash.min()} to {flash.max()}, RAM {ram.min()} to {ram.max()}")
+        print(f"formula={formula},", flush=True)
+        for part, found in errors(formula, points, avr=avr).items():
+            print(f"    # {part}: {100 * np.abs(found).max():.1f} % at most", flush=True)
 
 
 if __name__ == "__main__":

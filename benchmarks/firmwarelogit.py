@@ -7,9 +7,10 @@ bits finer than the rest. They are followed by groups of switches, fields of the
 above the minimum of a class. No sum exceeds 16 bits, which is checked for all possible rows.
 """
 
-import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import product
 
 import numpy as np
 from firmwaredata import JOINTS, PORTS, SWITCHES, Fold, Labels, Rows, split
@@ -18,15 +19,22 @@ from scipy.optimize import minimize
 from scipy.special import logsumexp
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.firmware.assembly import FLAGS, group_lines
-from thenar.compiler.firmware.layout import Field
-
 _LIMIT, _BYTE = 32767, 255
 # scikit-learn's C of the refit of a pruned model: fewer weights need less of a pull. The full model has 1.
 REFIT_C = 3.0
 _SUMS = (2, 4, 6, 8, 10, 12, 14, 18, 20, 22, 24, 26, 28)  # r17:r16 are the operands, r31:r30 the pointer
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """`width` bits of the byte of a port from `bit` on, which become the bits of a group from `to` on."""
+
+    port: int
+    bit: int
+    width: int
+    to: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +107,7 @@ class IntegerLogit:
         lines += [f"ldi r16, {len(_SUMS)}", "ldi r17, 0"]
         first = 0
         for fields, table in zip(self.groups.fields, self.tables, strict=True):
-            # Y, by which thenar's own loads its frame, is two sums here.
-            lines += [re.sub(r"ldd +(r\d+), Y\+(\d+)", _loaded, line) for line in group_lines(fields)]
+            lines += _group_lines(fields)
             lines += ["mul r30, r16", "movw r30, r0"]
             lines += [f"subi r30, lo8(-(rows + {first}))", f"sbci r31, hi8(-(rows + {first}))"]
             for register in _SUMS:
@@ -155,8 +162,43 @@ class IntegerLogit:
         return lines
 
 
-def _loaded(by_y: re.Match[str]) -> str:
-    return f"lds {by_y[1]}, input + {int(by_y[2]) - FLAGS}"
+def _group_lines(fields: Sequence[Field]) -> list[str]:
+    """Return the instructions that assemble a group's byte in r30 from its fields; they may change r31."""
+    lines: list[str] = []
+    for field in fields:
+        register = "r31" if lines else "r30"
+        moved = [line.format(register) for line in _moved(field.bit, field.width, field.to)]
+        one_by_one = register == "r31" and 2 * field.width <= len(moved) + 1
+        lines.append(f"lds {register}, input + {field.port}")
+        if one_by_one:
+            for bit in range(field.width):
+                lines += [f"sbrc r31, {field.bit + bit}", f"ori r30, {1 << (field.to + bit):#04x}"]
+        else:
+            lines += [*moved, *(["or r30, r31"] if register == "r31" else [])]
+    return lines
+
+
+def _moved(bit: int, width: int, to: int) -> tuple[str, ...]:
+    """Return the shortest instructions that move `width` bits of a register from `bit` to `to` and clear the others;
+    `{}` is the register.
+    """
+
+    def after(moves: tuple[str, ...], place: int) -> int | None:
+        for move in moves:
+            place = (place + 4) % 8 if move == "swap" else place + (1 if move == "lsl" else -1)
+            if not 0 <= place < 8:
+                return None
+        return place
+
+    wanted = dict(zip(range(bit, bit + width), range(to, to + width), strict=True))
+    found: list[tuple[str, ...]] = []
+    for moves in (each for count in range(5) for each in product(("swap", "lsl", "lsr"), repeat=count)):
+        places = {place: after(moves, place) for place in range(8)}
+        if all(places[place] == end for place, end in wanted.items()):
+            others = any(end is not None for place, end in places.items() if place not in wanted)
+            mask = (f"andi {{}}, {((1 << width) - 1) << to:#04x}",) if others else ()
+            found.append((*(f"{move} {{}}" for move in moves), *mask))
+    return min(found, key=len)
 
 
 def _saved(how: str) -> list[str]:

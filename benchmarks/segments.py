@@ -34,6 +34,7 @@ from thenar.compiler.firmware.tools import (
     find,
     workshop,
 )
+from thenar.firmware_templates.rendering import file_text
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.system import System
 from thenar.runtime.segmenting.decoder import Decoder
@@ -45,34 +46,25 @@ _SANITIZE = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover
 Lanes = NDArray[np.int16]
 Flags = NDArray[np.bool_]
 
-# The part of the classifier that the decoder needs: its scores.
-_HEADER = """\
-#ifndef THENAR_HAND_H
-#define THENAR_HAND_H
-#include <stdbool.h>
-#include <stdint.h>
-typedef uint8_t thenar_hand_class;
-typedef struct {{ int16_t scores[{lanes}]; }} thenar_hand;
-#endif
-"""
 _COMMON = """\
 #include "thenar_hand_segments.h"
 struct record {{ int16_t lanes[{lanes}]; uint8_t best, refused; }};
 struct record record;
-static thenar_hand glove;
-static thenar_hand_segmenter stream;
+int16_t scores[{lanes}];
+uint16_t memory[THENAR_HAND_SEGMENT_MEMORY];
+thenar_segmenter stream;
 uint8_t decide(void);
 uint8_t copy(void);
 __attribute__((noinline, noclone)) uint8_t copy(void)
 {{
     for (uint8_t lane = 0u; lane < {lanes}u; lane++)
-        glove.scores[lane] = record.lanes[lane];
+        scores[lane] = record.lanes[lane];
     return record.best;
 }}
 __attribute__((noinline, noclone)) uint8_t decide(void)
 {{
     const uint8_t best = copy();
-    return thenar_hand_segment_push(&stream, &glove, best, record.refused != 0u);
+    return thenar_segment_push(&stream, scores, best, record.refused != 0u);
 }}
 """
 _MAINS = {
@@ -80,7 +72,7 @@ _MAINS = {
 #include <stdio.h>
 int main(void)
 {{
-    thenar_hand_segment_start(&stream);
+    thenar_segment_start(&stream, &thenar_hand_segment_model, memory);
     while (fread(&record, sizeof record, 1, stdin) == 1)
         (void)putchar(decide());
     return fflush(stdout) != 0;
@@ -89,7 +81,7 @@ int main(void)
     "avr": """\
 int main(void)
 {{
-    thenar_hand_segment_start(&stream);
+    thenar_segment_start(&stream, &thenar_hand_segment_model, memory);
     for (;;)
         (void){function}();
 }}
@@ -107,7 +99,7 @@ int main(void)
     const uint32_t given = semihosting_open("frames", 6, SEMIHOSTING_RB);
     const uint32_t results = semihosting_open("predictions", 11, SEMIHOSTING_WB);
     bool whole = true;
-    thenar_hand_segment_start(&stream);
+    thenar_segment_start(&stream, &thenar_hand_segment_model, memory);
     while (semihosting_read(given, &record, sizeof record)) {{
         const uint8_t state = decide();
         whole = semihosting_write(results, &state, 1) && whole;
@@ -140,13 +132,12 @@ def records(lanes: Lanes, refused: Flags) -> bytes:
 def sources(model: SegmentModel, kind: str, function: str = "decide") -> dict[str, str]:
     """Return path -> text of a program around the decoder."""
     values = {"lanes": model.n_lanes, "function": function}
-    header, main = (text.format(**values) for text in (_HEADER, _COMMON + _MAINS[kind]))
-    files = segment_files(_NAME, model, avr=kind == "avr")
-    return {**files, "thenar_hand.h": header, "main.c": main}
+    main = (_COMMON + _MAINS[kind]).format(**values)
+    return {**segment_files(_NAME, model), "thenar.h": file_text("core/thenar.h"), "main.c": main}
 
 
 def _compiled(files: Mapping[str, str]) -> list[str]:
-    return sorted(path for path in files if path.endswith((".c", ".S")))
+    return sorted(path for path in files if path.endswith(".c"))
 
 
 def _lag(ticks: int) -> str:
@@ -180,7 +171,7 @@ def run_avr(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run:
             call([*command, "-c", *parts], folder)
             sizes = call(["avr-size", *(path.rsplit(".", 1)[0] + ".o" for path in parts)], folder)
             flash = sum(int(line.split()[0]) + int(line.split()[1]) for line in sizes.decode().splitlines()[1:])
-            ram = int(words["stream"][3], 16)
+            ram = sum(int(words[symbol][3], 16) for symbol in ("stream", "memory"))
         shape = np.dtype([("record", "u1", size), ("state", "u1"), ("r25", "u1"), ("cycles", "<u4"), ("stack", "<u2")])
         runs.append(np.frombuffer(printed, shape))
     timed, copied = runs

@@ -73,7 +73,7 @@ class _Command(click.Command):
     "--name",
     default="glove",
     show_default=True,
-    help="Name of files and functions, thenar_NAME, or of the sketch: a to z, digits and _, at most 32.",
+    help="Name of the tables, thenar_NAME, or of the sketch: a to z, digits and _, at most 32.",
 )
 @click.option(
     "--flash-limit",
@@ -126,7 +126,7 @@ def command(
         raise click.UsageError("glove.toml names its calibration: leave out --calibration, or --glove.")
     loaded = Build.load(build)
     sensors = _sensors(loaded, calibration, glove)
-    firmware = Firmware(loaded.tables, loaded.manifest, target, name, flash_limit, loaded.scan, sensors)
+    firmware = Firmware(loaded.tables, loaded.manifest, target, name, flash_limit, sensors)
     fit = firmware.fit
     measured = None
     if measure:

@@ -165,7 +165,7 @@ def print_firmware(found: "FirmwareVerification") -> None:
     console = out()
     console.print(f"firmware, on {found.rows} rows, {found.extreme} extreme and {found.random} random frames:")
     for check in found.checks:
-        console.print(f"  {check.part}, {_HOW[check.function]}{_MISSING[check.missing]}: {_outcome(check)}")
+        console.print(f"  {check.part}, {check.layout}{_MISSING[check.missing]}: {_outcome(check)}")
         if check.misnamed:
             console.print(f"    {check.misnamed} of the grasp types have ANOTHER NAME")
         if check.first is not None:
@@ -179,7 +179,6 @@ def print_firmware(found: "FirmwareVerification") -> None:
         console.print("  the build carries the firmware that thenar makes of it now")
 
 
-_HOW = {"classify": "every frame from nothing", "update": "every frame from the one before"}
 _MISSING = {False: "", True: ", inputs missing"}
 
 

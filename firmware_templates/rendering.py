@@ -2,6 +2,7 @@
 
 from functools import lru_cache
 from importlib.metadata import version
+from importlib.resources import files
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -37,3 +38,8 @@ def render(template: str, **values: object) -> str:
     """
     origin = f"thenar {_version()}, template {template}."
     return _environment().get_template(template).render(origin=origin, **values)
+
+
+def file_text(path: str) -> str:
+    """Return the text of a file below this package that is no template, such as "core/thenar.c"."""
+    return files(__package__).joinpath(path).read_text()

@@ -66,7 +66,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     ] = None
     table_bits: Annotated[
         TableBits,
-        _choice("tables", "Bits per table entry. With 8, steps are coarser and the firmware is smaller."),
+        _choice("tables", "Bits per table entry: with 8, steps are coarser."),
     ] = 16
     max_bins: Annotated[
         Annotated[int, Meta(ge=2, le=2**53)] | None, _choice("training", "The most bins of a joint.")

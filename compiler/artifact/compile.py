@@ -278,7 +278,7 @@ class BuildAssembly:
         files[HAND_NAME] = hand_to_bytes(self._drawn(undrawn))
         described = manifest_to_bytes(replace(undrawn, hand_sha256=_sha256(files[HAND_NAME])))
         manifest = manifest_from_bytes(described)
-        firmware, note = made_firmware(manifest, self.integers, self.scan)
+        firmware, note = made_firmware(manifest, self.integers)
         if (page := self._page(manifest, files[TABLES_NAME], files[HAND_NAME])) is not None:
             files[TRY_NAME] = page
         report = BuildReport(

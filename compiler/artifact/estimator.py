@@ -88,7 +88,7 @@ class Build(LoadedBuild):
         FirmwareError
             If the build does not fit the target.
         """
-        files = Firmware(self.tables, self.manifest, target, name, flash, self.scan).files()
+        files = Firmware(self.tables, self.manifest, target, name, flash).files()
         write_folder(files, Path(folder), overwrite=overwrite)
         return tuple(Path(folder) / path for path in files)
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import compress, product
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from msgspec import Struct
@@ -17,7 +16,6 @@ from thenar.runtime.build import Build
 from thenar.runtime.files import read_file
 from thenar.runtime.manifest import Calibration, Manifest, Switch
 from thenar.runtime.names import list_names, nearest
-from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
 
@@ -25,7 +23,6 @@ from ..firmware import FirmwareError
 from ..firmware.choose import Fit, features, fit_for, smallest_fit
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library
 from ..firmware.generate import LARGEST
-from ..firmware.layout import ports_of_scan
 from ..firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames, states_of
 from ..firmware.targets import TARGETS
 from ..firmware.targets import kinds as every_kind
@@ -90,8 +87,6 @@ def _check_calibration(kind: str, built: Calibration, recorded: Joint) -> None:
 
 RANDOM_FRAMES = 10_000
 _SEED = 1
-Function = Literal["classify", "update"]
-FUNCTIONS: tuple[Function, ...] = ("classify", "update")
 
 
 class BundledFirmware(Struct, frozen=True):
@@ -101,11 +96,11 @@ class BundledFirmware(Struct, frozen=True):
     outdated: tuple[str, ...]
 
 
-def made_firmware(manifest: Manifest, tables: IntegerTables, scan: ScanMap | None) -> tuple[dict[str, str], str]:
+def made_firmware(manifest: Manifest, tables: IntegerTables) -> tuple[dict[str, str], str]:
     """Return path in the build -> text of its firmware, and a sentence on its target, or on why there is none."""
     try:
-        fit = smallest_fit(tables, ports=ports_of_scan(scan))
-        made = Library(LIBRARY_NAME, manifest, fit.layout, fit.target.avr, fit.notes()).whole
+        fit = smallest_fit(tables)
+        made = Library(LIBRARY_NAME, manifest, fit.layout, fit.notes()).whole
     except FirmwareError as reason:
         return {}, f"no firmware: {reason}"
     return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, f"firmware {fit.words}"
@@ -115,7 +110,7 @@ def bundled_firmware(folder: Path, build: Build) -> BundledFirmware:
     """Compare the firmware in the build `folder` with the firmware generated now."""
     if not (folder / FIRMWARE_NAME).is_dir():
         return BundledFirmware(False, ())
-    made, _ = made_firmware(build.manifest, build.tables, build.scan)
+    made, _ = made_firmware(build.manifest, build.tables)
     now = {name: text.encode() for name, text in made.items()}
     names = [f"{FIRMWARE_NAME}/{name}" for name in LIBRARY_FILES]
     return BundledFirmware(True, tuple(name for name in names if now.get(name) != _content(folder / name)))
@@ -150,21 +145,19 @@ class Difference(Struct, frozen=True):
 class TargetCheck(Struct, frozen=True, kw_only=True):
     """The result for one part.
 
-    layout     how wide its entries are
+    layout     how many switches share a look-up
     missing    whether inputs are missing in every frame; in every second frame it is a single one
     frames     how many were classified; `differing` of them differ from Python in a score, grasp type, margin,
                probability or state of a segment
     shares     whether margins and probabilities were requested: on an AVR only where inputs are missing
     states     whether the states of the decoder of segments were: not on an AVR, nor of a build without segments
     first      the first differing frame
-    misnamed   how many grasp types thenar_NAME_grasp names differently from the manifest; None: not tested, on an AVR
+    misnamed   how many grasp types thenar_name() names differently from the manifest; None: not tested, on an AVR
     worst      the cost of the slowest call, in `unit`; `stack`: bytes of stack that a call needs; None: not counted
     """
 
     part: str
     layout: str
-    # "classify": every frame from scratch; "update": from the changes since the previous frame.
-    function: Function
     missing: bool
     shares: bool
     states: bool = False
@@ -196,11 +189,11 @@ class FirmwareTrial:
         lanes = [without(bits, codes, lost[:switches], lost[switches:]) for bits, codes, lost in frames]
         return np.array(lanes) - LANE_OFFSET
 
-    def check(self, fit: Fit, function: Function, *, missing: bool = False) -> TargetCheck:
+    def check(self, fit: Fit, *, missing: bool = False) -> TargetCheck:
         """Compile the classifier with layout `fit` and compare its results with Python's. Raises FirmwareError."""
-        found = self._run(fit, incremental=function == "update", lost=self._lost if missing else None)
+        found = self._run(fit, lost=self._lost if missing else None)
         scores = self._scores_without if missing else self._scores
-        # On an AVR only classify() is timed; held(), which rejects, runs on the frames with missing inputs.
+        # On an AVR only classify() is timed; decide(), which rejects, runs on the frames with missing inputs.
         bare = fit.target.avr and not missing
         classes = scores.argmax(axis=1) if bare else self._classes(scores, missing=missing)
         wrong = (found.scores != scores).any(axis=1) | (found.classes != classes)
@@ -210,7 +203,6 @@ class FirmwareTrial:
         return TargetCheck(
             part=fit.target.part,
             layout=features(fit.layout),
-            function=function,
             missing=missing,
             shares=said is not None,
             frames=len(wrong),
@@ -259,11 +251,11 @@ class FirmwareTrial:
             return None
         return sum(name != grasp for name, grasp in zip(found.names, self._build.grasps, strict=True))
 
-    def _run(self, fit: Fit, *, incremental: bool, lost: Lost | None) -> Predictions:
+    def _run(self, fit: Fit, *, lost: Lost | None) -> Predictions:
         layout, target = fit.layout, fit.target
-        files = target.sources(Library(LIBRARY_NAME, self._build.manifest, layout, target.avr))
+        files = target.sources(Library(LIBRARY_NAME, self._build.manifest, layout))
         frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
-        return target.run(files, LIBRARY_NAME, layout, frames, incremental=incremental, lost=lost)
+        return target.run(files, LIBRARY_NAME, layout, frames, lost=lost)
 
     def _difference(self, frame: int, found: Predictions, *, missing: bool) -> Difference:
         scores = self._scores_without if missing else self._scores
@@ -338,9 +330,8 @@ def verify_firmware(
     """Compile the classifier for `kinds` and compare it with Python: every row, extreme frames, 10,000 random frames.
 
     "host" runs with the address and undefined behaviour sanitizers, "avr" is the smallest AVR that fits the classifier.
-    Each classifies every frame from scratch, then once more from the changes between frames, then both again with
-    inputs missing, one at a time and several at once. Except on "avr", set_switch() also sets every switch and every
-    name is read.
+    Each classifies every frame, then once more with inputs missing, one at a time and several at once. Except on "avr",
+    every name is read.
     Raises FirmwareError where a tool is missing, a kind is not in `firmware.targets.kinds()`, or the build does not fit
     a part; otherwise raises as `verify` does.
     """
@@ -354,12 +345,12 @@ def verify_firmware(
     bits, codes = select_inputs(grasp_set, build.manifest)
     extreme, random = extreme_frames(build.tables), random_frames(build.tables, RANDOM_FRAMES, _SEED)
     trial = FirmwareTrial(build, Probes(bits, codes), extreme, random)
-    runs = list(product(fits, (False, True), FUNCTIONS))
+    runs = list(product(fits, (False, True)))
     checks: list[TargetCheck] = []
-    for fit, missing, function in runs:
+    for fit, missing in runs:
         if progress is not None:
             progress(len(checks), len(runs))
-        checks.append(trial.check(fit, function, missing=missing))
+        checks.append(trial.check(fit, missing=missing))
     return FirmwareVerification(
         rows=len(bits),
         extreme=len(extreme),
@@ -371,6 +362,5 @@ def verify_firmware(
 
 def _fit(build: Build, kind: str) -> Fit:
     """Return the smallest part of a kind that fits, with its layout."""
-    tables, ports = build.tables, ports_of_scan(build.scan)
     first, *more = (target for target in TARGETS.values() if target.kind == kind)
-    return smallest_fit(tables, kind=kind, ports=ports) if more else fit_for(first, tables, ports=ports)
+    return smallest_fit(build.tables, kind=kind) if more else fit_for(first, build.tables)

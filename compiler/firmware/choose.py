@@ -8,12 +8,14 @@ from thenar.runtime.tables import IntegerTables
 
 from . import FirmwareError
 from .costs import Cost
-from .layout import Layout, Ports, arrange
+from .layout import GROUPS, Layout
 from .targets import TARGETS, Target
 
 _NOTE_WIDTH = 114
 # avr-gcc cannot make a larger object.
 _LARGEST_ARRAY = 32767
+# Switches share look-ups, which takes more flash and less time, unless the classifier then takes half of the flash.
+_FAST_SHARE = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,9 +38,8 @@ class Fit:
 
 
 def features(layout: Layout) -> str:
-    """Return how wide the entries of a layout are, in words."""
-    halves = ", the upper halves of steps" if layout.entry_shift else ""
-    return f"{layout.entry_bits}-bit entries{' and sums' if layout.sum_bits == 8 else halves}"
+    """Return how many switches share a look-up, in words."""
+    return f"{layout.group} switches a look-up" if layout.group > 1 else "one switch a look-up"
 
 
 def in_words(cost: Cost, target: Target) -> str:
@@ -53,38 +54,52 @@ def largest_classifier(target: Target) -> int:
     return min(target.flash * 3 // 4, target.most_flash)
 
 
-def fit_for(target: Target, tables: IntegerTables, flash: int | None = None, ports: Ports | None = None) -> Fit:
+def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> Fit:
     """Return the fit of `tables` on a target, whose flash the classifier may fill up to `flash` bytes, by default
-    `largest_classifier`; `ports` are the wiring of the switches, as in `arrange`.
+    `largest_classifier`.
 
-    Raises FirmwareError if it does not fit, or the part has less flash than `flash`.
+    Of the layouts, it is the fastest that takes half of the part's flash or less; otherwise the smallest. Raises
+    FirmwareError if it does not fit, or the part has less flash than `flash`.
     """
     if target.any_part:
-        return smallest_fit(tables, flash=flash, ports=ports)
-    layout = arrange(tables, ports)
-    if target.formula is None:
-        return Fit(target, layout, None)
+        return smallest_fit(tables, flash=flash)
     if flash is not None and flash > target.flash:
         raise FirmwareError(
             f"the classifier cannot be allowed {flash} bytes of flash: {target.named} has {target.flash} bytes"
         )
-    rows = layout.n_rows * layout.parts.width * len(layout.parts.firsts) * layout.entry_bits // 8
+    *faster, smallest = GROUPS
+    share = target.flash // _FAST_SHARE
+    allowed = largest_classifier(target) if flash is None else flash
+    for group in faster:
+        with suppress(FirmwareError):
+            fit = _fit(target, tables, group, allowed)
+            if fit.cost is None or fit.cost.flash <= share:
+                return fit
+    return _fit(target, tables, smallest, allowed)
+
+
+def _fit(target: Target, tables: IntegerTables, group: int, allowed: int) -> Fit:
+    """Return the fit with a layout, in `allowed` bytes of flash. Raises FirmwareError if it does not fit."""
+    layout = Layout(tables, group)
+    if target.formula is None:
+        return Fit(target, layout, None)
+    rows = 4 * layout.row_pairs * layout.n_rows
     if target.avr and rows > _LARGEST_ARRAY:
         raise FirmwareError(
             f"the rows need {rows} bytes, but an array of an AVR has at most {_LARGEST_ARRAY}: compile with "
             "``linear`` 0 ``max_bins`` 16, or with fewer ``rounds``"
         )
-    allowed, cost = largest_classifier(target) if flash is None else flash, target.formula.cost(layout)
+    cost = target.formula.cost(layout, avr=target.avr)
     if cost.flash > allowed or cost.ram > target.ram:
         raise FirmwareError(
             f"the classifier takes about {cost.flash} bytes of flash and {cost.ram} of RAM on {target.named}, but "
-            f"{allowed} and {target.ram} are allowed: compile with a higher ``prune``, fewer ``rounds`` or "
-            "``table_bits`` 8, or use a larger part"
+            f"{allowed} and {target.ram} are allowed: compile with a higher ``prune``, fewer ``rounds`` or a smaller "
+            "``max_bins``, or use a larger part"
         )
     return Fit(target, layout, cost)
 
 
-def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = None, ports: Ports | None = None) -> Fit:
+def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = None) -> Fit:
     """Return the smallest part that holds the tables, of those that builds carry firmware for, or those of `kind`;
     in `flash` bytes where given, or in all of the part's flash if that is less: then of parts whose flash is estimated.
 
@@ -98,5 +113,5 @@ def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = N
     *smaller, largest = sorted(candidates, key=lambda target: target.flash)
     for target in smaller:
         with suppress(FirmwareError):
-            return fit_for(target, tables, flash and min(flash, target.flash), ports)
-    return fit_for(largest, tables, flash and min(flash, largest.flash), ports)
+            return fit_for(target, tables, flash and min(flash, target.flash))
+    return fit_for(largest, tables, flash and min(flash, largest.flash))

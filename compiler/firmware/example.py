@@ -127,7 +127,6 @@ def example_values(library: "Library", wiring: Wiring) -> dict[str, object]:
     """Return the values for the example's template."""
     sensors, pins, known = library.sensors, wiring.pins, wiring.known
     parts = None if known is None else wiring.of_part
-    text = f"thenar_{library.name}_grasp(grasp)"
     said = [comment(f"{sensor.name}: {' and '.join(sensor.says)}") for sensor in sensors.every]
     analog = _analog_names(known, len(said))
     names = [comment(library.names.switches[number].name) for number in wiring.switches]
@@ -145,7 +144,6 @@ def example_values(library: "Library", wiring: Wiring) -> dict[str, object]:
         "address_pins": pins[len(names) :][:_ADDRESS_PINS],
         "address_pins_behind_registers": pins[_REGISTER_PINS:][:_ADDRESS_PINS],
         "output_pins": analog[: -(-len(said) // _ON_MULTIPLEXER)],
-        "text": f"(const __FlashStringHelper *){text}" if library.avr else text,
     }
 
 

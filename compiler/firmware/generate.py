@@ -11,14 +11,12 @@ from functools import cached_property
 from pathlib import Path
 
 from thenar.runtime.files import read_file
-from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.tables import IntegerTables
 
 from ..publication import check_folder, entries, publish_folder
 from . import FirmwareError
 from .choose import Fit, fit_for
 from .classifier import LIBRARY_NAME, Library
-from .layout import ports_of_scan
 from .sensors import Sensors
 from .targets import TARGETS, Target
 from .words import Names, check_name
@@ -31,7 +29,6 @@ class Firmware:
     names        the names of grasp types, switches and joints: a build's manifest, or words.numbered(tables)
     name         of its files and functions: lower-case letters, digits and _, at most 32
     flash        how many bytes of flash the classifier may take; None: three quarters of the part's
-    scan         how the build's harness is read, if it has one: a library takes its switches from these readings
     sensors      the known sensors of the glove whose readings a library converts; None: only the names are known
 
     Raises FirmwareError if the name cannot be used in C; MemberError if there is no such target.
@@ -42,7 +39,6 @@ class Firmware:
     target: str
     name: str = LIBRARY_NAME
     flash: int | None = None
-    scan: ScanMap | None = None
     sensors: Sensors | None = None
 
     def __post_init__(self) -> None:
@@ -56,11 +52,11 @@ class Firmware:
     @cached_property
     def fit(self) -> Fit:
         """The part of the target, and the layout of the build. Raises FirmwareError if it does not fit."""
-        return fit_for(self._target, self.tables, self.flash, ports_of_scan(self.scan))
+        return fit_for(self._target, self.tables, self.flash)
 
     def library(self, notes: Sequence[str] = ()) -> Library:
         """Return the classifier alone, with lines for its opening comments."""
-        return Library(self.name, self.names, self.fit.layout, self.fit.target.avr, tuple(notes), self.sensors)
+        return Library(self.name, self.names, self.fit.layout, tuple(notes), self.sensors)
 
     def files(self, notes: Sequence[str] | None = None) -> dict[str, str]:
         """Return path -> text of the firmware; the result is deterministic.

@@ -6,31 +6,28 @@ from . import FirmwareError
 from .choose import Fit
 from .classifier import Library
 from .costs import Unit
-from .probes import Predictions, Probes, changing_frames, extreme_frames, joined, random_frames
+from .probes import Predictions, Probes, extreme_frames, joined, random_frames
 from .targets import Target
 from .tools import STRICT, call, find, workshop
 
 _RANDOM = 2000
 # The linker can remove uncalled code only if it has a separate section.
 _SECTIONS = ("-ffunction-sections", "-fdata-sections")
+_CALLED = tuple(f"thenar_{function}" for function in ("init", "set_switch", "set_code", "classify", "name"))
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """The measured cost of a classifier: its slowest frame in `unit`, by classify() and by update(), bytes of stack
-    (None where not measured), flash and RAM.
+    """The measured cost of a classifier: its slowest frame in `unit`; bytes of stack (None: not measured), flash, RAM.
 
-    flash is the total, flash_classify the part of it in a program that never calls update() and never marks an input as
-    missing.
+    flash is that of a program that calls init(), set_switch(), set_code(), classify() and name().
     """
 
     part: str
     time: int
-    update_time: int
     unit: Unit
     stack: int | None
     flash: int
-    flash_classify: int
     ram: int
 
     @property
@@ -38,8 +35,7 @@ class Measured:
         """The measurements, as a sentence."""
         stack = "" if self.stack is None else f" and {self.stack} of stack"
         return (
-            f"Measured on {self.part}: at most {self.time} {self.unit} a frame, {self.update_time} by update(); "
-            f"{self.flash} bytes of flash, {self.flash_classify} where only classify() is called; "
+            f"Measured on {self.part}: at most {self.time} {self.unit} a frame; {self.flash} bytes of flash; "
             f"{self.ram} bytes of RAM{stack}."
         )
 
@@ -52,20 +48,9 @@ def measure(library: Library, fit: Fit) -> Measured:
     target = fit.target
     if lack := target.missing():
         raise FirmwareError(f"firmware for {target.part} cannot be measured here: {lack}")
-    tried = slow_frames(library)
-    predictions = run_counted(library, target, tried)
-    updated = run_counted(library, target, joined(changing_frames(library.layout.tables), tried), incremental=True)
-    flash, flash_classify, ram = sizes(library, target)
-    return Measured(
-        part=target.part,
-        time=predictions.most,
-        update_time=updated.most,
-        unit=predictions.unit,
-        stack=None if predictions.stack is None or updated.stack is None else max(predictions.stack, updated.stack),
-        flash=flash,
-        flash_classify=flash_classify,
-        ram=ram,
-    )
+    predictions = run_counted(library, target, slow_frames(library))
+    flash, ram = sizes(library, target)
+    return Measured(target.part, predictions.most, predictions.unit, predictions.stack, flash, ram)
 
 
 def slow_frames(library: Library) -> Probes:
@@ -74,34 +59,32 @@ def slow_frames(library: Library) -> Probes:
     return joined(extreme_frames(tables), random_frames(tables, _RANDOM, seed=1))
 
 
-def run_counted(library: Library, target: Target, frames: Probes, *, incremental: bool = False) -> Predictions:
+def run_counted(library: Library, target: Target, frames: Probes) -> Predictions:
     """Return the predictions and their cost on a target that counts it; raise FirmwareError elsewhere."""
     sent = library.layout.frame_bytes(frames.bits, frames.codes)
-    predictions = target.run(library.files, library.name, library.layout, sent, incremental=incremental)
+    predictions = target.run(library.files, library.name, library.layout, sent)
     if predictions.cost is None:
         raise FirmwareError(f"nothing was counted on {target.part}")
     return predictions
 
 
-def sizes(library: Library, target: Target) -> tuple[int, int, int]:
-    """Return the bytes of flash of the compiled files, of flash where only classify() is called, and of RAM."""
+def sizes(library: Library, target: Target) -> tuple[int, int]:
+    """Return the bytes of flash and of RAM of a classifier and a hand, without functions that are not called."""
     if target.compiler is None or target.size is None:
         raise FirmwareError(
             f"the target {target.name} has no compiler or no program `size` here: nothing can be measured"
         )
-    sources = sorted(path for path in library.files if path.endswith((".c", ".S")))
     name = f"thenar_{library.name}"
-    called = [f"-Wl,-u,{name}_{function}" for function in ("init", "classify", "set_switch", "grasp")]
-    rest = [f"-Wl,-u,{name}_{function}" for function in ("update", "lose_switch", "lose_joint")]
-    glove = f'#include "{name}.h"\nextern {name} glove;\n{name} glove;\n'
-    with workshop({**library.files, "glove.c": glove}) as folder:
+    sources = sorted(path for path in library.files if path.endswith(".c"))
+    called = [f"-Wl,-u,{symbol}" for symbol in ("hand", "memory", f"{name}_model", *_CALLED)]
+    hand = f'#include "{name}.h"\nextern thenar hand;\nextern uint16_t memory[];\nthenar hand;\n'
+    hand += f"uint16_t memory[THENAR_{library.name.upper()}_MEMORY];\n"
+    with workshop({**library.files, "hand.c": hand}) as folder:
         compiling = [find(target.compiler), *target.flags]
-        call([*compiling, *STRICT, *_SECTIONS, "-c", *sources, "glove.c"], folder)
-        # Common variables have no address, and no size for `size`, until they are linked.
-        objects = [path.rsplit(".", 1)[0] + ".o" for path in (*sources, "glove.c")]
-        linked = [*compiling, "-r", "-nostdlib", f"-Wl,-d,--gc-sections,-e,{name}_classify,-u,glove", *objects, *called]
-        call([*linked, *rest, "-o", "whole.elf"], folder)
-        call([*linked, "-o", "classify.elf"], folder)
-        sizes = call([find(target.size), "whole.elf", "classify.elf"], folder).decode().splitlines()[1:]
-    (text, data, bss), (less_text, less_data, _) = (map(int, line.split()[:3]) for line in sizes)
-    return text + data, less_text + less_data, data + bss
+        call([*compiling, *STRICT, *_SECTIONS, "-c", *sources, "hand.c"], folder)
+        objects = [path.replace(".c", ".o") for path in (*sources, "hand.c")]
+        linking = [*compiling, "-nostartfiles", "-nostdlib", "-Wl,--gc-sections,-e,thenar_classify", *called]
+        call([*linking, *objects, "-lgcc", "-o", "linked.elf"], folder)
+        line = call([find(target.size), "linked.elf"], folder).decode().splitlines()[1]
+    text, data, bss = map(int, line.split()[:3])
+    return text + data, data + bss

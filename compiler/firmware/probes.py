@@ -18,9 +18,10 @@ from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
+from ..tables.quantise import integer_scores
 from . import FirmwareError
 from .costs import Unit
-from .layout import Layout, code_bits
+from .layout import Layout
 from .segments import lag_of
 from .words import string
 
@@ -71,9 +72,9 @@ def names_in(printed: bytes, layout: Layout) -> tuple[tuple[str, ...], bytes]:
 
     Raises FirmwareError if there are fewer.
     """
-    *names, rest = printed.split(b"\0", len(layout.start))
-    if len(names) < len(layout.start):
-        raise FirmwareError(f"the program printed {len(names)} names for {len(layout.start)} grasp types")
+    *names, rest = printed.split(b"\0", layout.tables.n_classes)
+    if len(names) < layout.tables.n_classes:
+        raise FirmwareError(f"the program printed {len(names)} names for {layout.tables.n_classes} grasp types")
     return tuple(name.decode(errors="replace") for name in names), rest
 
 
@@ -83,7 +84,7 @@ def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Predictions:
 
     Raises FirmwareError unless there is one for every frame.
     """
-    size, classes = len(layout.start) + 3, len(layout.start)
+    size, classes = layout.tables.n_classes + 3, layout.tables.n_classes
     if len(printed) not in (whole := [2 * each * len(frames) for each in (size, size + 1)]):
         raise FirmwareError(f"the program printed {len(printed)} bytes for {len(frames)} frames of {2 * size} bytes")
     with_states = len(frames) > 0 and len(printed) == whole[1]
@@ -106,48 +107,34 @@ def states_of(model: SegmentModel, scores: NDArray[np.integer], refused: NDArray
 
 
 def record_files(
-    name: str,
-    layout: Layout,
-    machine: Literal["host", "avr"],
-    function: Literal["classify", "update"],
-    *,
-    lost: bool = False,
-    segments: bool = False,
+    name: str, layout: Layout, machine: Literal["host", "avr"], *, lost: bool = False, segments: bool = False
 ) -> dict[str, str]:
-    """Return the files, name -> text, of the program that calls `function` of the classifier `name` for every frame.
+    """Return the files, name -> text, of the program that classifies every frame with the tables `name`.
 
-    For classify() it writes the ports' bytes into the input; for update() it calls set_switch() for every switch. With
-    `lost`, frames have the format of `with_lost`; with `segments`, it also pushes each to the decoder of segments.
+    With `lost`, frames have the format of `with_lost`; with `segments`, it also pushes each to the decoder of segments.
     """
-    values = record_values(name, layout, function, lost=lost) | {"segments": segments}
+    values = record_values(name, layout, lost=lost) | {"segments": segments}
     files = {"main.c": render(f"checking/{machine}_main.c.j2", **values)}
     if machine == "avr" and not lost:
         return files
-    values["places"] = [f"{{{port}, {bit}}}" for port, bit in layout.places] if function == "update" else []
     return files | {"record.h": render("checking/record.h.j2", **values, named=machine != "avr")}
 
 
-def record_values(
-    name: str, layout: Layout, function: Literal["classify", "update"], *, lost: bool = False
-) -> dict[str, Any]:
-    """Return the values for the template of a program, in any language, that calls `function` for every frame.
+def record_values(name: str, layout: Layout, *, lost: bool = False) -> dict[str, Any]:
+    """Return the values for the template of a program, in any language, that classifies every frame.
 
     It reads the file "frames" and writes the file "predictions", or stdin and stdout: first the names, then the input
     of `answers_from`.
     """
+    tables, lost_bytes = layout.tables, _lost_bytes(layout) if lost else 0
     return {
         "name": name,
-        "function": function,
-        "lost_bytes": _lost_bytes(layout) if lost else 0,
+        "lost_bytes": lost_bytes,
         "stream_ticks": STREAM_TICKS,
-        "classes": len(layout.start),
-        "ports": len(layout.ports),
-        "places": list(layout.places),
-        "switches": layout.tables.n_switches,
-        "padding": layout.padding,
-        "joints": layout.tables.n_joints,
-        "code_bytes": layout.code_bits // 8,
-        "frame_bytes": layout.frame_size + (_lost_bytes(layout) if lost else 0),
+        "classes": tables.n_classes,
+        "switches": tables.n_switches,
+        "joints": tables.n_joints,
+        "frame_bytes": layout.frame_size + lost_bytes,
     }
 
 
@@ -167,7 +154,6 @@ def with_lost(frames: Frames, lost: Lost | None) -> Frames:
 
 
 _BYTE, _WORD = 0xFF, 0xFFFF
-_CHANGING = 40
 _BETWEEN = 9  # codes of a slope, its ends included
 
 
@@ -207,15 +193,6 @@ def extreme_frames(tables: IntegerTables) -> Probes:
         rest[:, joint] = codes
         frames.append(Probes(np.full((len(codes), s), closed), rest))
     return joined(*frames)
-
-
-def changing_frames(tables: IntegerTables) -> Probes:
-    """Return 40 frames, each with every input changed from the one before: of neighbouring switches one opens and the
-    other closes, and joints alternate between 0 and the highest code.
-    """
-    odd = np.arange(_CHANGING)[:, np.newaxis] % 2
-    bits = np.arange(tables.n_switches) % 2 == odd
-    return Probes(bits, np.tile(np.where(odd, _top(tables), 0), (1, tables.n_joints)).astype(np.uint16))
 
 
 def random_frames(tables: IntegerTables, n: int, seed: int) -> Probes:
@@ -258,7 +235,8 @@ def turns(tables: IntegerTables, joint: int) -> NDArray[np.uint16]:
 
 
 def _top(tables: IntegerTables) -> int:
-    return _BYTE if code_bits(tables) == 8 else _WORD
+    steps = [int(tables.steps_of(joint)[-1]) for joint in range(tables.n_joints) if len(tables.steps_of(joint))]
+    return _WORD if max([0, *steps, *(slope.high - 1 for slope in tables.slopes)]) >= _BYTE else _BYTE
 
 
 DRAWN = 16  # frames in addition to the two extreme ones
@@ -270,10 +248,10 @@ def check_header(name: str, layout: Layout, grasps: Sequence[str]) -> str:
     """Return thenar_NAME_check.h: frames, the expected predictions, the types' names, and a function that compares."""
     frames = self_test_frames(layout)
     what = ("every switch open, lowest codes", "every switch closed, highest codes", *DRAWN * ("drawn",))
-    predictions = layout.scores(frames.bits, frames.codes)
+    predictions = integer_scores(layout.tables, frames.bits, frames.codes)
     rows = zip(what, np.packbits(frames.bits, axis=1, bitorder="little"), frames.codes, predictions, strict=True)
     checks = [_check(*row) for row in rows]
-    values = {"name": name, "upper": name.upper(), "classes": len(layout.start), "count": len(checks)}
+    values = {"name": name, "upper": name.upper(), "classes": layout.tables.n_classes, "count": len(checks)}
     inputs = {"switches": layout.tables.n_switches, "joints": layout.tables.n_joints}
     return render("checking/check.h.j2", **values, **inputs, checks=checks, names=[string(each) for each in grasps])
 

@@ -1,9 +1,9 @@
-"""The decoder of segments: C99 for every target, and the values for other languages."""
+"""The decoder of segments: the core's files and the costs of a build in C, and the values for other languages."""
 
 from dataclasses import dataclass
 from typing import Any
 
-from thenar.firmware_templates.rendering import render
+from thenar.firmware_templates.rendering import file_text, render
 from thenar.runtime.segmenting.model import SegmentModel
 
 from . import FirmwareError
@@ -34,10 +34,14 @@ class _Ring:
     width: int
 
 
-def segment_files(name: str, model: SegmentModel, *, avr: bool) -> dict[str, str]:
-    """Return the texts of thenar_`name`_segments.h and .c, which with `avr` keep their tables in an AVR's flash.
+SEGMENT_FILES = ("thenar_segments.h", "thenar_segments.c")
+"""The decoder itself, which is the same for every build."""
 
-    They extend the classifier of the same name. Raises FirmwareError if there are too many states.
+
+def segment_files(name: str, model: SegmentModel) -> dict[str, str]:
+    """Return the texts of the decoder, and of the costs thenar_`name`_segments.h and .c.
+
+    Raises FirmwareError if there are too many states.
     """
     values = decoder_values(model)
     limit = -(-model.most * 256 // model.gain) << model.shift
@@ -47,13 +51,13 @@ def segment_files(name: str, model: SegmentModel, *, avr: bool) -> dict[str, str
         "upper": name.upper(),
         "limit": min(limit, 65535),
         "clipped": clipped,
-        "avr": avr,
         "one_leave": len(set(model.leave)) == 1,
     }
-    return {
-        f"thenar_{name}_segments{ending}": render(f"segments/thenar_NAME_segments{ending}.j2", **values)
+    costs = {
+        f"thenar_{name}_segments{ending}": render(f"tables/thenar_NAME_segments{ending}.j2", **values)
         for ending in (".h", ".c")
     }
+    return {path: file_text(f"core/{path}") for path in SEGMENT_FILES} | costs
 
 
 def decoder_values(model: SegmentModel) -> dict[str, Any]:

@@ -194,14 +194,13 @@ def _grid(name: str, limits: Range, first: int, last: int) -> Grid:
     return Grid(int(low), int(high), first, last)
 
 
-def codes_files(name: str, sensors: Sensors, *, code_bits: int, avr: bool) -> dict[str, str]:
+def codes_files(name: str, sensors: Sensors) -> dict[str, str]:
     """Return the texts of thenar_`name`_codes.h and .c, which extend the classifier; empty for a build of switches."""
     if not sensors.every:
         return {}
     values = {
         "name": name,
         "upper": name.upper(),
-        "avr": avr,
         "sensors": sensors.every,
         "n_joints": len(sensors.joints),
         "n_taxels": len(sensors.taxels),
@@ -212,7 +211,6 @@ def codes_files(name: str, sensors: Sensors, *, code_bits: int, avr: bool) -> di
             + ["which levels of a taxel are closed"] * bool(sensors.taxels)
         ),
         "known": sensors.known,
-        "clipped": code_bits == 8,
         "grids": any(sensor.grid for sensor in sensors.every),
         "words": identifiers([sensor.name for sensor in sensors.every]),
         "comments": [comment(f"{sensor.name}: {' and '.join(sensor.says)}") for sensor in sensors.every],

@@ -12,12 +12,10 @@ from functools import lru_cache
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
-from typing import Literal
 
 import numpy as np
 
 from . import FirmwareError
-from .assembly import FLAGS, glove_size
 from .layout import Layout
 from .probes import Frames, Lost, Predictions, check_frames, record_files, with_lost
 from .tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lacking, workshop
@@ -87,39 +85,37 @@ def run(
     part: str,
     flags: Sequence[str],
     *,
-    incremental: bool = False,
     lost: Lost | None = None,
 ) -> Predictions:
     """Return the predictions of the classifier `name` in `files` (file name -> text, for AVR) for frames (n, F).
 
-    `cost` is the cycles from the first instruction of thenar_NAME_classify to the end of its return, without the call;
+    `cost` is the cycles from the first instruction of thenar_classify to the end of its return, without the call;
     `stack` the maximum of all frames, the return address included.
 
-    incremental  each prediction comes from update(), given the change since the previous frame, instead of classify()
-    lost         (n, s + j) inputs that are missing in each frame: cycles and stack are not measured then, and margin
-                 and probability are returned as well
+    lost  (n, s + j) inputs that are missing in each frame: cycles and stack are not measured then, and margin
+          and probability are returned as well
 
     Raises FirmwareError if compiler or simulator are missing, the files do not compile without warnings or do not fit,
     or the program returns no predictions.
     """
     check_frames(frames, layout)
-    function: Literal["classify", "update"] = "update" if incremental else "classify"
     command = [find(AVR_COMPILER), *STRICT, *flags]
     program = harness("simavr_classify")
-    main = record_files(name, layout, "avr", function, lost=lost is not None)
-    sent, entry = with_lost(frames, lost), function if lost is None else "predict"
+    main = record_files(name, layout, "avr", lost=lost is not None)
+    sent, entry = with_lost(frames, lost), "classify" if lost is None else "predict"
     with workshop({**files, **main}) as folder:
         sources = sorted(path for path in (*files, *main) if path.endswith((".c", ".S")))
         call([*command, *sources, "-o", "classifier.elf"], folder)
         found = _symbols(folder)
-        glove, scores = _symbol(found, "glove", glove_size(layout)), 2 * len(layout.start)
-        given, said, size = glove + 2 * scores + FLAGS, glove, scores
-        if lost is not None:
-            size = scores + _WORDS
-            given = _symbol(found, f"thenar_{name}_record", sent.shape[1])
-            said = _symbol(found, f"thenar_{name}_said", size)
+        size = 2 * layout.tables.n_classes
+        if lost is None:
+            given = _symbol(found, "memory", 2 * layout.memory)
+            said = given + layout.frame_size  # scores follow the inputs
+        else:
+            size += _WORDS
+            given, said = _symbol(found, "thenar_record", sent.shape[1]), _symbol(found, "thenar_said", size)
         spans = f"{given:#x}:{sent.shape[1]}", f"{said:#x}:{size}"
-        places = (hex(_symbol(found, symbol)) for symbol in (f"thenar_{name}_{entry}", "_end"))
+        places = (hex(_symbol(found, symbol)) for symbol in (f"thenar_{entry}", "_end"))
         printed = call([str(program), part, str(_CLOCK_HZ), "classifier.elf", *places, *spans], folder, sent.tobytes())
     predictions = _answers(printed, len(frames), layout, words=0 if lost is None else _WORDS)
     return predictions if lost is None else replace(predictions, cost=None, unit="", stack=None)
@@ -144,19 +140,17 @@ def _symbol(found: Mapping[str, tuple[int, int]], name: str, size: int | None = 
 
 def _answers(printed: bytes, frames: int, layout: Layout, *, words: int) -> Predictions:
     """Return the predictions; `words` is the size of type, margin and probability, 0 where these were not requested."""
-    classes = len(layout.start)
+    classes = layout.tables.n_classes
     said = [("said", "<u2", (words // 2,))] if words else []
     counted = [("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")]
     record = np.dtype([("scores", "<i2", (classes,)), *said, *counted])
     if len(printed) != frames * record.itemsize:
         raise FirmwareError(f"the simulator gave {len(printed)} bytes for {frames} frames of {record.itemsize} bytes")
     records = np.frombuffer(printed, record)
-    # A class of one byte is returned in r24; r25 is then undefined.
-    grasps = records["grasp"] if classes > 256 else records["grasp"] & 0xFF
     stack = int(records["stack"].max()) if frames else None
     return Predictions(
         records["scores"].astype(np.int16),
-        grasps.astype(np.uint16),
+        records["grasp"].astype(np.uint16),
         margins=records["said"][:, 1].astype(np.uint16) if words else None,
         shares=records["said"][:, 2].astype(np.uint16) if words else None,
         cost=records["cycles"].astype(np.uint32),

@@ -131,14 +131,6 @@ def joint_in_words(joint: Calibration) -> str:
     return f"{joint.name}: code {first[0]} = {first[1]:g} {joint.unit}, {last[0]} = {last[1]:g} {joint.unit}"
 
 
-def switches_in_words(numbers: Sequence[int]) -> str:
-    """Return the switches in words: "switches 3 to 7", or a list where they are not consecutive."""
-    first, last = numbers[0], numbers[-1]
-    if list(numbers) == list(range(first, last + 1)):
-        return f"switches {first} to {last}" if last > first else f"switch {first}"
-    return "switches " + ", ".join(map(str, numbers))
-
-
 def comment(text: str) -> str:
     """Return `text` in one line of ASCII that is safe inside a C comment: it neither ends nor opens one."""
     escaped = "".join(char if " " <= char <= "~" else _escape(char) for char in text)

@@ -17,7 +17,7 @@ from .timing.classify_times import ClassifyModel, fitting
 from .timing.python_times import classify_us
 
 
-@stored(1, where="machine")
+@stored(2, where="machine")
 def count_steps(content: bytes, model: ClassifyModel) -> float:
     """Compile the classifier of tables and run it; return the cycles of the slowest frame.
 
@@ -33,7 +33,7 @@ def steps_of(fit: Fit) -> float:
     """Compile a classifier for its part and run it; return the cycles of the slowest of the frames that should take
     longest and of extreme ones. Raises FirmwareError.
     """
-    library = Library(LIBRARY_NAME, numbered(fit.layout.tables), fit.layout, fit.target.avr)
+    library = Library(LIBRARY_NAME, numbered(fit.layout.tables), fit.layout)
     return float(run_counted(library, fit.target, slow_frames(library)).most)
 
 

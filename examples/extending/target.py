@@ -1,4 +1,4 @@
-"""A firmware target of your own: the classifier as one header for C++17, as header-only libraries are."""
+"""A firmware target of your own: the classifier as one header for C++20, as header-only libraries are."""
 
 import re
 from dataclasses import dataclass
@@ -26,9 +26,10 @@ class SingleHeader(Target):
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text: the library's header and sources in one."""
         name = f"thenar_{library.name}"
-        declared = library.files[f"{name}.h"]
-        parts = (library.files[f"{name}{part}"] for part in ("_tables.h", "_tables.c", ".c"))
-        defined = re.sub(r'#include "thenar_.*\n', "", "\n".join(parts))
+        declared, defined = (
+            re.sub(r'#include "thenar.*\n', "", "\n".join(library.files[part] for part in parts))
+            for parts in (("thenar.h", f"{name}.h"), ("thenar_block.h", "thenar.c", f"{name}.c"))
+        )
         switch = f"{name.upper()}_IMPLEMENTATION"
         return {f"{name}.hpp": HEADER.format(name=name, switch=switch, declared=declared, defined=defined)}
 
@@ -36,7 +37,7 @@ class SingleHeader(Target):
 MEMBER = SingleHeader(
     name="cpp",
     part="cpp",
-    help="one header for C++17",
+    help="one header for C++20",
     next_step="copy {folder}/*.hpp to where your compiler finds it",
     flash=256 << 10,
     ram=64 << 10,

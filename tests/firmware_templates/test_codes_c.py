@@ -10,7 +10,7 @@ import pytest
 
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.sensors import Sensor, Sensors, sensors_of
 from thenar.compiler.firmware.words import Numbered, numbered
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
@@ -42,9 +42,10 @@ TAKE = """
 uint32_t take(const thenar_hand_codes *codes, uint16_t sensor, int32_t reading);
 uint32_t take(const thenar_hand_codes *codes, uint16_t sensor, int32_t reading)
 {
-    thenar_hand glove;
-    thenar_hand_init(&glove);
-    thenar_hand_set_reading(&glove, codes, sensor, reading);
+    uint16_t memory[THENAR_HAND_MEMORY];
+    thenar hand;
+    thenar_init(&hand, &thenar_hand_model, memory);
+    thenar_hand_set_reading(&hand, codes, sensor, reading);
     %s
 }
 """
@@ -54,7 +55,7 @@ class Codes:
     """The C of some sensors, begun."""
 
     def __init__(self, library: ctypes.CDLL, sensors: int) -> None:
-        self.library, self.state = library, (ctypes.c_int32 * (2 * sensors))()
+        self.library, self.state = library, (ctypes.c_int32 * (16 * sensors))()  # more than a sensor's line takes
         library.thenar_hand_codes_init(self.state)
         library.thenar_hand_calibrate.restype = library.thenar_hand_calibrated.restype = ctypes.c_bool
 
@@ -74,8 +75,8 @@ def compiled(shared_library: SharedLibrary) -> Callable[..., Codes]:
     def compiled(
         names: Numbered, sensors: Sensors | None = None, take: str = "return 0u;", highest: int = 900
     ) -> Codes:
-        layout = arrange(tables_of(names, highest))
-        files = Library("hand", names, layout, avr=False, glove=sensors).whole
+        layout = Layout(tables_of(names, highest))
+        files = Library("hand", names, layout, glove=sensors).whole
         library = shared_library({**files, "sweep.c": SWEEP, "take.c": TAKE % take}, "-Wall", "-Wextra", "-Wconversion")
         return Codes(library, len((sensors or sensors_of(names)).every))
 
@@ -240,7 +241,7 @@ def test_a_taxel_s_levels_close_as_a_run_closes_them(
     harness = load_harness(tmp_path / "glove.toml")
     names = names_of([joint("a", "raw", (1, 1.0, 255, 255.0))], switches)
     sensors = sensors_of(names, harness)
-    codes = compiled(names, sensors, take="return glove.input.switches[0];")
+    codes = compiled(names, sensors, take="return hand.switches[0];")
     lines = TaxelCalibration(unit="N", taxels=(TaxelLine("pad", 900, 222, 2.5),)) if calibrated else None
     grid = _Grid((0, 1023), 0, steps_of((0, 1023)))
     for reading in range(-3, 1030):
@@ -251,11 +252,11 @@ def test_a_taxel_s_levels_close_as_a_run_closes_them(
     assert codes.library.take(codes.state, 0, 900) == 0  # another sensor closes nothing
 
 
-def test_a_reading_goes_into_the_input_held_to_what_a_code_has_room_for(compiled: Callable[..., Codes]) -> None:
+def test_a_reading_goes_into_the_input(compiled: Callable[..., Codes]) -> None:
     names = names_of([joint("a"), joint("b")])
-    codes = compiled(names, take="return glove.input.codes[1];", highest=254)
+    codes = compiled(names, take="return hand.codes[1];", highest=254)
     assert codes.calibrate(1, 0, 100)  # 0 and 90 degrees: codes 500 and 680
-    assert codes.library.take(codes.state, 1, 0) == 255
+    assert codes.library.take(codes.state, 1, 0) == 500
     assert codes.library.take(codes.state, 1, -200) == 140
     assert codes.library.take(codes.state, 0, 7) == 0
 
@@ -273,7 +274,7 @@ def test_what_a_glove_does_not_know_is_said() -> None:
 
 def test_a_build_of_switches_alone_has_no_codes() -> None:
     names = names_of([])
-    whole = Library("hand", names, arrange(tables_of(names, 9)), avr=False).whole
+    whole = Library("hand", names, Layout(tables_of(names, 9))).whole
     assert not [path for path in whole if "codes" in path]
 
 

@@ -4,14 +4,9 @@
 #include "semihosting.h"
 #include "ticks.h"
 
-/* The compiler is given NAME, a classifier's, and FUNCTION, _classify or _update. */
-#define JOINED_AGAIN(name, part) thenar_##name##part
-#define JOINED(name, part) JOINED_AGAIN(name, part)
-#define NAMED(part) JOINED(NAME, part)
+typedef uint16_t predict_function(thenar *);
 
-typedef NAMED(_class) predict_function(NAMED() *);
-
-static NAMED(_class) grasp;
+static uint16_t grasp;
 
 void thenar_fault(void);
 void thenar_fault(void)
@@ -23,7 +18,7 @@ void thenar_fault(void)
 }
 
 /* One instruction. */
-__attribute__((naked)) static NAMED(_class) nothing(__attribute__((unused)) NAMED() *unused)
+__attribute__((naked)) static uint16_t nothing(__attribute__((unused)) thenar *unused)
 {
 #ifdef __riscv
     __asm volatile("ret");
@@ -36,7 +31,7 @@ __attribute__((noinline, noclone)) static uint32_t ticks_of(predict_function *fu
 {
     const uint32_t before = ticks_left();
 
-    grasp = function(&glove);
+    grasp = function(&hand);
     return (before - ticks_left()) & TICKS_MOST;
 }
 
@@ -49,6 +44,7 @@ int main(void)
 {
     static uint8_t frame[FRAME_BYTES];
     static uint8_t prediction[PREDICTION_BYTES + 4u];
+    static char text[NAME_BYTES];
     const uint32_t frames = semihosting_open("frames", 6, SEMIHOSTING_RB);
     const uint32_t predictions = semihosting_open("predictions", 11, SEMIHOSTING_WB);
 
@@ -56,17 +52,17 @@ int main(void)
     put32(prediction, ticks_of(nothing));
     bool whole = true;
 
-    NAMED(_init)(&glove);
+    thenar_init(&hand, MODEL, memory);
     for (unsigned k = 0; k < CLASSES; ++k) {
-        const char *const type = NAMED(_grasp)((NAMED(_class))k);
+        const unsigned bytes = name_of(k, text);
 
-        whole = semihosting_write(predictions, type, name_bytes(type)) && whole;
+        whole = semihosting_write(predictions, text, bytes) && whole;
     }
     whole = semihosting_write(predictions, prediction, 4) && whole;
 
     while (semihosting_read(frames, frame, sizeof frame)) {
         take_frame(frame);
-        put32(prediction + PREDICTION_BYTES, ticks_of(NAMED(FUNCTION)));
+        put32(prediction + PREDICTION_BYTES, ticks_of(thenar_classify));
         give_prediction(grasp, prediction);
         whole = semihosting_write(predictions, prediction, sizeof prediction) && whole;
     }

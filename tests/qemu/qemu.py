@@ -12,7 +12,6 @@ E31.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,15 +60,13 @@ class Core:
         layout: Layout,
         frames: Frames,
         *,
-        incremental: bool = False,
         lost: Lost | None = None,
         limit_s: float = LIMIT_S,
     ) -> Predictions:
         """Return the predictions of the classifier `name` for frames (n, F), as `Target.run` does, with their costs."""
         check_frames(frames, layout)
-        function: Literal["classify", "update"] = "update" if incremental else "classify"
         segments = f"thenar_{name}_segments.c" in files
-        record = record_files(name, layout, "host", function, lost=lost is not None, segments=segments)["record.h"]
+        record = record_files(name, layout, "host", lost=lost is not None, segments=segments)["record.h"]
         main = {path: (_HERE / path).read_text() for path in ("main.c", "ticks.h")}
         given: dict[str, str | bytes] = {
             **files,
@@ -77,7 +74,7 @@ class Core:
             "record.h": record,
             "frames": with_lost(frames, lost).tobytes(),
         }
-        written = self.emulate(given, limit_s, (*STRICT, f"-DNAME={name}", f"-DFUNCTION=_{function}"))
+        written = self.emulate(given, limit_s)
         return self._counted(written, frames, layout)
 
     def emulate(
@@ -101,7 +98,7 @@ class Core:
 
     def _counted(self, written: bytes, frames: Frames, layout: Layout) -> Predictions:
         """Return the predictions of the output: names, ticks of one instruction, each prediction and its ticks."""
-        size = 2 * len(layout.start) + 10
+        size = 2 * layout.tables.n_classes + 10
         names, written = names_in(written, layout)
         if len(frames) and len(written) == 4 + (size + 2) * len(frames):  # each with a state
             size += 2

@@ -27,9 +27,9 @@ class Avr(Target):
         """Return path -> text: the library, a Makefile (program, size, flash) and an initial main()."""
         from thenar.firmware_templates.rendering import render
 
-        name, layout = library.name, library.layout
+        name, tables = library.name, library.layout.tables
         values = {"name": name, "part": self.part, "programmer": self.programmer, "objects": library.objects}
-        inputs = {"switches": layout.tables.n_switches, "joints": layout.tables.n_joints}
+        inputs = {"switches": tables.n_switches, "joints": tables.n_joints}
         return {
             **library.whole,
             "Makefile": render("avr_library/Makefile.j2", **values),
@@ -49,13 +49,12 @@ class Avr(Target):
         layout: "Layout",
         frames: "Frames",
         *,
-        incremental: bool = False,
         lost: "Lost | None" = None,
     ) -> "Predictions":
         """Return the predictions for frames (n, F) in simavr, as in the base class, with their cycles and stack."""
         from ..simavr import run
 
-        return run(files, name, layout, frames, self.part, self.flags, incremental=incremental, lost=lost)
+        return run(files, name, layout, frames, self.part, self.flags, lost=lost)
 
 
 # `lpm` reaches the first 64 KiB of the flash, which the tables share with all other constants. The clocks are those of
@@ -76,48 +75,20 @@ _ATMEGA328P = _avr(
     name="avr328p",
     formula=Formula(
         cycles={
-            "word classes": 17.25,
-            "byte classes": 13.85,
-            "class passes": 6.879,
-            "lookups": 17.48,
-            "kept lookups": 1.979,
-            "entries": 4.099,
-            "offsets": 1.073,
-            "fields": 1.624,
-            "bins": 8.079,
-            "thresholds": 2.822,
-            "searches": 3.08,
-            "lines": 24.94,
-            "line sums": 2.97,
+            "one": 378.1,
+            "blocks": 136.5,
+            "classes": 34.9,
+            "bytes": 71.78,
+            "groups": 33.38,
+            "rows": 112.9,
+            "lines": 122.9,
+            "distances": 73.62,
+            "shifts": 6.288,
+            "bins": 121.9,
+            "halves": 30.26,
         },
-        flash={
-            "one": 606.4,
-            "word classes": 44.16,
-            "byte classes": 41.78,
-            "passes": 30.85,
-            "lookups": 28.53,
-            "kept lookups": 23.61,
-            "words": 2.299,
-            "split words": 0.6298,
-            "found": 26.87,
-            "found words": 0.2661,
-            "fields": 5.778,
-            "bins": 196.3,
-            "thresholds": 12.42,
-            "lines": 114.1,
-            "line sums": 3.144,
-            "rows": 1.188,
-            "tables": 0.2109,
-        },
-        ram={
-            "one": 6.538,
-            "word classes": 4.188,
-            "byte classes": 3.894,
-            "found": 1.912,
-            "kept found": 1.016,
-            "compared codes": 0.7032,
-            "input": 0.6822,
-        },
+        flash=2288,
+        ram=60,
     ),
     part="atmega328p",
     rank=10,
@@ -131,49 +102,20 @@ _ATMEGA2560 = _avr(
     name="avr2560",
     formula=Formula(
         cycles={
-            "one": 1.099,
-            "word classes": 18.22,
-            "byte classes": 14.28,
-            "class passes": 6.133,
-            "lookups": 19.76,
-            "kept lookups": 2.517,
-            "entries": 4.061,
-            "offsets": 1.038,
-            "fields": 1.775,
-            "bins": 8.297,
-            "thresholds": 2.834,
-            "searches": 3.029,
-            "lines": 26.38,
-            "line sums": 3.005,
+            "one": 379.1,
+            "blocks": 136.6,
+            "classes": 34.9,
+            "bytes": 71.77,
+            "groups": 33.38,
+            "rows": 112.9,
+            "lines": 122.9,
+            "distances": 73.58,
+            "shifts": 6.299,
+            "bins": 123.9,
+            "halves": 30.26,
         },
-        flash={
-            "one": 612.9,
-            "word classes": 44.63,
-            "byte classes": 41.84,
-            "passes": 22.68,
-            "lookups": 28.98,
-            "kept lookups": 23.87,
-            "words": 1.969,
-            "split words": 0.4869,
-            "found": 26.56,
-            "found words": 0.4267,
-            "fields": 5.621,
-            "bins": 195.6,
-            "thresholds": 12.44,
-            "lines": 113.0,
-            "line sums": 3.217,
-            "rows": 1.19,
-            "tables": 0.2199,
-        },
-        ram={
-            "one": 6.538,
-            "word classes": 4.188,
-            "byte classes": 3.894,
-            "found": 1.912,
-            "kept found": 1.016,
-            "compared codes": 0.7032,
-            "input": 0.6822,
-        },
+        flash=2292,
+        ram=60,
     ),
     part="atmega2560",
     rank=11,

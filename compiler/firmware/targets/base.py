@@ -55,7 +55,7 @@ class Target:
     """
 
     avr: ClassVar[bool] = False
-    """Whether an AVR's assembly adds up the rows: costs are then in cycles."""
+    """Whether it is an AVR: costs are then in cycles."""
 
     name: str
     part: str
@@ -108,15 +108,12 @@ class Target:
         layout: "Layout",
         frames: "Frames",
         *,
-        incremental: bool = False,
         lost: "Lost | None" = None,
     ) -> "Predictions":
         """Return the predictions of the classifier `name` for frames (n, F), uint8 from `layout.frame_bytes`.
 
-        files        from `sources`: path -> text
-        incremental  each prediction comes from update(), given the change since the previous frame, not from classify()
-        lost         (n, s + j) bool: the switches and the joints that are missing in each frame; costs are then not
-                     counted
+        files  from `sources`: path -> text
+        lost   (n, s + j) bool: the switches and the joints that are missing in each frame; costs are then not counted
 
         Raises FirmwareError if a tool is missing, or the files do not compile without warnings, do not fit, or do not
         run.

@@ -49,12 +49,11 @@ class Host(Target):
         layout: "Layout",
         frames: "Frames",
         *,
-        incremental: bool = False,
         lost: "Lost | None" = None,
         compiler: str | None = None,
         sanitize: bool = True,
     ) -> "Predictions":
-        """Return the predictions for frames (n, F), as in the base class; update() gets its switches by set_switch().
+        """Return the predictions for frames (n, F), as in the base class.
 
         compiler  "gcc" or "clang"; by default the first that is installed
         sanitize  with the address and undefined behaviour sanitizers: a finding is an error
@@ -67,7 +66,6 @@ class Host(Target):
             name,
             layout,
             "host",
-            "update" if incremental else "classify",
             lost=lost is not None,
             segments=f"thenar_{name}_segments.c" in files,
         )

@@ -99,7 +99,6 @@ class MicroPython(Target):
         layout: "Layout",
         frames: "Frames",
         *,
-        incremental: bool = False,
         lost: "Lost | None" = None,
     ) -> "Predictions":
         """Return the Python module's predictions for frames (n, F), as in the base class, in the Unix port."""
@@ -112,7 +111,7 @@ class MicroPython(Target):
         check_frames(frames, layout)
         if lack := self.missing():
             raise FirmwareError(lack)
-        values = record_values(name, layout, "update" if incremental else "classify", lost=lost is not None)
+        values = record_values(name, layout, lost=lost is not None)
         main = render("checking/record.py.j2", **values)
         with workshop({**files, "main.py": main, "frames": with_lost(frames, lost).tobytes()}) as folder:
             # As a Python package the Unix port ends with 0 whatever happens, and prints errors to stdout.

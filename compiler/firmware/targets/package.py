@@ -17,9 +17,12 @@ if TYPE_CHECKING:
 
 _VERSION = "1.0.0"
 
-_TYPES = ("class", "switch", "code")
-_FUNCTIONS = ("init", "set_switch", "classify", "update", "margin", "probability", "grasp")
-_CONSTANTS = ("CLASSES", "SWITCHES", "PORTS", "JOINTS")
+_FUNCTIONS = (
+    *("init", "set_switch", "set_code", "lose_switch", "lose_joint"),
+    *("classify", "decide", "margin", "probability", "name"),
+)
+_OF_CODES = ("codes_init", "calibrate", "calibrated", "code_of", "set_reading")
+_CONSTANTS = ("CLASSES", "SWITCHES", "JOINTS", "MEMORY", "NAME_BYTES")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,9 +65,8 @@ class Package(Target):
                 (n, *map(markdown, (sensor.name, *sensor.says))) for n, sensor in enumerate(library.sensors.every)
             ],
             "sentence": f"Recognises {len(grasps)} grasp types from {inputs_in_words(**counts)} of a glove.",
-            "sources": [path for path in library.whole if path.endswith((".c", ".S"))],
+            "sources": library.sources,
             "headers": [f"src/{path}" for path in library.whole if path.endswith(".h")],
-            "assembly": any(path.endswith(".S") for path in library.whole),
             "words": _keywords(name, names.segments is not None, bool(library.sensors.every)),
         }
         return {
@@ -99,14 +101,14 @@ _BESIDE = (
 
 def _keywords(name: str, segments: bool, codes: bool) -> list[tuple[str, str]]:
     """Return each word of the library with its keyword class in the Arduino editor."""
-    of_codes = ("codes_init", "calibrate", "calibrated", "code_of", "set_reading") * codes
-    kinds = {
-        "KEYWORD1": (*_TYPES, *("codes",) * codes, *("segmenter",) * segments),
-        "KEYWORD2": (*_FUNCTIONS, *of_codes, *("segment_start", "segment_push") * segments),
-    }
-    words = [(f"thenar_{name}", "KEYWORD1")]
-    words += [(f"thenar_{name}_{word}", kind) for kind, ours in kinds.items() for word in ours]
-    return [*words, *((f"THENAR_{name.upper()}_{word}", "LITERAL1") for word in _CONSTANTS)]
+    own = f"thenar_{name}"
+    types = ["thenar", *[f"{own}_codes"] * codes, *["thenar_segmenter"] * segments]
+    functions = [f"thenar_{word}" for word in _FUNCTIONS]
+    functions += [f"thenar_segment_{word}" for word in ("start", "push")] * segments
+    functions += [f"{own}_{word}" for word in _OF_CODES] * codes
+    constants = [f"{own}_model", *(f"{own}_{word}".upper() for word in _CONSTANTS)]
+    kinds = {"KEYWORD1": types, "KEYWORD2": functions, "LITERAL1": constants}
+    return [(word, kind) for kind, words in kinds.items() for word in words]
 
 
 M0PLUS, M4 = (target.formula for target in _CORTEX_M)

@@ -1,6 +1,6 @@
 """A 32-bit RISC-V core with multiplication and compressed instructions: RV32IMAC, as in a GD32VF103 or an FE310."""
 
-from ..costs import RAM_OF_32_BITS, Formula
+from ..costs import Formula
 from ..tools import RISCV_COMPILER
 from .base import Target
 
@@ -16,34 +16,19 @@ MEMBER = Target(
     clock_hz=108_000_000,
     formula=Formula(
         cycles={
-            "one": 3.74,
-            "word classes": 5.295,
-            "byte classes": 5.719,
-            "class passes": 1.495,
-            "lookups": 4.262,
-            "kept lookups": 1.654,
-            "words": 1.918,
-            "split words": 3.927,
-            "fields": 1.511,
-            "bins": 10.43,
-            "thresholds": 2.089,
-            "searches": 8.181,
-            "lines": 10.08,
-            "line sums": 1.448,
+            "one": 71.2,
+            "blocks": 40.15,
+            "classes": 8.067,
+            "bytes": 7.477,
+            "groups": 9.115,
+            "rows": 13.82,
+            "lines": 16.65,
+            "distances": 18.55,
+            "bins": 20.07,
+            "halves": 8.599,
         },
-        flash={
-            "one": 256.3,
-            "word classes": 54.65,
-            "byte classes": 63.34,
-            "found": 85.79,
-            "split code": 20.16,
-            "fields": 35.81,
-            "thresholds": 16.55,
-            "lines": 12.85,
-            "padded rows": 0.8083,
-            "tables": 1.392,
-        },
-        ram=RAM_OF_32_BITS,
+        flash=1418,
+        ram=34,
     ),
     compiler=RISCV_COMPILER,
     size=(("riscv64-unknown-elf-size",), "binutils-riscv64-unknown-elf"),

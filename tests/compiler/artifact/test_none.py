@@ -154,9 +154,12 @@ def test_without_refusal_the_firmware_says_nothing_of_it(moved: GraspSet, tmp_pa
     held = moved.without_none()
     for refuse in (0.0, 0.01):
         compile_build(held, tmp_path / f"{refuse}", rounds=5, folds=0, refuse=refuse, jobs=1)
-    texts = [(tmp_path / f"{refuse}" / "firmware" / "thenar_glove.h").read_text() for refuse in (0.0, 0.01)]
-    assert ["THENAR_GLOVE_NONE 3u" in text for text in texts] == [False, True]
-    assert ["thenar_glove_held" in text for text in texts] == [False, True]
+    header, tables = (
+        [(tmp_path / f"{refuse}" / "firmware" / f"thenar_glove{end}").read_text() for refuse in (0.0, 0.01)]
+        for end in (".h", ".c")
+    )
+    assert ["THENAR_GLOVE_NONE 3u" in text for text in header] == [False, True]
+    assert [".rejection = &rejection" in text for text in tables] == [False, True]
     assert Build.load(tmp_path / "0.0").rejector is None
 
 

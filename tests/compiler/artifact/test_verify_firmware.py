@@ -13,13 +13,12 @@ from thenar.compiler.artifact.verify import verify
 from thenar.compiler.artifact.verify_firmware import FirmwareTrial, verify_firmware
 from thenar.compiler.firmware import FirmwareError, classifier
 from thenar.compiler.firmware.choose import fit_for
-from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.layout import Layout
+from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.probes import Probes, extreme_frames, random_frames
 from thenar.compiler.firmware.segments import segment_files
 from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.firmware.words import string
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import Manifest
 from thenar.runtime.segmenting.model import SegmentModel
 
 Tool = Callable[[str], str]
@@ -44,13 +43,8 @@ def test_every_score_and_type_of_every_frame_is_pythons(
         tool(name)
     found = verify_firmware(build, grasp_set, (kind,))
     assert found.holds
-    assert [check.part for check in found.checks[::4]] == PARTS[kind]
-    assert [(check.function, check.missing) for check in found.checks[:4]] == [
-        ("classify", False),
-        ("update", False),
-        ("classify", True),
-        ("update", True),
-    ]
+    assert [check.part for check in found.checks[::2]] == PARTS[kind]
+    assert [check.missing for check in found.checks[:2]] == [False, True]
     assert (found.rows, found.random) == (96, 10_000)
     for check in found.checks:
         assert (check.frames, check.differing, check.first) == (96 + found.extreme + 10_000, 0, None)
@@ -91,26 +85,31 @@ def test_builds_of_linear_joints_and_of_one_kind_of_input_are_pythons_too(
     assert verify_firmware(made.folder, grasp_set, (kind,)).holds
 
 
+def changed(monkeypatch: pytest.MonkeyPatch, path: str, change: Callable[[str], str]) -> None:
+    """Let every library have a changed file."""
+    files: Callable[[Library], dict[str, str]] = vars(Library)["files"].func
+
+    def made(library: Library) -> dict[str, str]:
+        right = files(library)
+        wrong = change(right[path])
+        assert wrong != right[path]
+        return right | {path: wrong}
+
+    monkeypatch.setattr(Library, "files", property(made))
+
+
 @pytest.mark.usefixtures("few_frames")
 def test_one_wrong_entry_is_found_with_the_first_frame_that_shows_it(
     build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tool("gcc")
-    made = classifier_files
 
-    def one_off(*arguments: object, **options: object) -> dict[str, str]:
-        files = made(*arguments, **options)  # type: ignore[arg-type]
-        first = re.compile(r"PAIR\( *(-?\d+)")
-        rows = list(first.finditer(files["thenar_glove_tables.c"]))
-        at = rows[-1]
-        wrong = f"PAIR({int(at[1]) + 1}"
-        files["thenar_glove_tables.c"] = (
-            files["thenar_glove_tables.c"][: at.start()] + wrong + files["thenar_glove_tables.c"][at.end() :]
-        )
-        return files
+    def one_off(text: str) -> str:
+        last = list(re.finditer(r"PAIR\((-?[1-9]\d*), ", text))[-1]
+        return f"{text[: last.start()]}PAIR({int(last[1]) + 1}, {text[last.end() :]}"
 
-    monkeypatch.setattr(classifier, "classifier_files", one_off)
-    some = grasp_set.rows(np.flatnonzero(grasp_set.codes[:, -1] > 100)[:2])
+    changed(monkeypatch, "thenar_glove.c", one_off)
+    some = grasp_set.rows(np.flatnonzero(grasp_set.codes[:, -1] <= 100)[:2])
     found = verify_firmware(build, some, ("host",))
     assert not found.holds
     check = found.checks[0]
@@ -132,20 +131,11 @@ def test_one_wrong_entry_is_found_with_the_first_frame_that_shows_it(
 def test_a_frame_that_the_compiled_code_does_not_refuse_is_found(
     build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    """On an AVR where inputs are missing: there the answers are those of held()."""
+    """On an AVR where inputs are missing: there the answers are those of decide()."""
     for name in TOOLS[kind]:
         tool(name)
     assert Build.load(build).rejector is not None
-    made = classifier_files
-
-    def lenient(*arguments: object, **options: object) -> dict[str, str]:
-        files = made(*arguments, **options)  # type: ignore[arg-type]
-        refuses, never = "|| too_many_outside(glove, grasp);", "|| (too_many_outside(glove, grasp) && false);"
-        assert refuses in files["thenar_glove.c"]
-        files["thenar_glove.c"] = files["thenar_glove.c"].replace(refuses, never)
-        return files
-
-    monkeypatch.setattr(classifier, "classifier_files", lenient)
+    changed(monkeypatch, "thenar.c", lambda text: text.replace("return outside > ", "return outside > 999u + "))
     found = verify_firmware(build, grasp_set, (kind,))
     wrong = [check.missing for check in found.checks if check.differing]
     assert wrong
@@ -158,7 +148,7 @@ def test_a_frame_that_the_compiled_code_does_not_refuse_is_found(
     ("right", "wrong"),
     [
         ("(uint16_t)best - (uint16_t)second)", "(uint16_t)best - (uint16_t)second + 1u)"),
-        ("own * 65535u", "own * 65534u"),
+        ("one * 65535u", "one * 65534u"),
     ],
     ids=["margin", "probability"],
 )
@@ -173,14 +163,7 @@ def test_a_margin_or_a_probability_that_is_off_is_found(
 ) -> None:
     for name in TOOLS[kind]:
         tool(name)
-    made = classifier_files
-
-    def off(*arguments: object, **options: object) -> dict[str, str]:
-        files = made(*arguments, **options)  # type: ignore[arg-type]
-        assert files["thenar_glove.c"].count(right) == 1
-        return files | {"thenar_glove.c": files["thenar_glove.c"].replace(right, wrong)}
-
-    monkeypatch.setattr(classifier, "classifier_files", off)
+    changed(monkeypatch, "thenar.c", lambda text: text.replace(right, wrong))
     found = verify_firmware(build, grasp_set, (kind,))
     assert [bool(check.differing) for check in found.checks] == [check.shares for check in found.checks]
     first = found.checks[-1].first
@@ -202,9 +185,9 @@ def test_a_state_of_a_segment_that_is_off_is_found(
 
     def off(*arguments: Any, **options: Any) -> dict[str, str]:
         files = segment_files(*arguments, **options)
-        text = files["thenar_glove_segments.c"]
+        text = files["thenar_segments.c"]
         assert text.count("ahead < gap") == 1
-        return files | {"thenar_glove_segments.c": text.replace("ahead < gap", "ahead >= gap")}
+        return files | {"thenar_segments.c": text.replace("ahead < gap", "ahead >= gap")}
 
     if wrong:
         monkeypatch.setattr(classifier, "segment_files", off)
@@ -212,7 +195,7 @@ def test_a_state_of_a_segment_that_is_off_is_found(
     rows = Probes(held.bits.repeat(9, axis=0), held.codes.repeat(9, axis=0))
     trial = FirmwareTrial(named, rows, extreme_frames(tables), random_frames(tables, 50, 1))
     for missing in (False, True):
-        found = trial.check(fit_for(TARGETS["host"], tables), "update", missing=missing)
+        found = trial.check(fit_for(TARGETS["host"], tables), missing=missing)
         assert found.states
         assert bool(found.differing) == wrong
         if found.first is not None:
@@ -221,34 +204,12 @@ def test_a_state_of_a_segment_that_is_off_is_found(
 
 
 @pytest.mark.usefixtures("few_frames")
-def test_a_switch_put_into_the_wrong_bit_is_found(
-    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    tool("gcc")
-
-    def turned(layout: Layout) -> list[str]:
-        other, one, *rest = layout.places
-        return [f"    {{{port}, {1 << bit}}}," for port, bit in (one, other, *rest)]
-
-    monkeypatch.setattr(classifier, "_place_lines", turned)
-    found = verify_firmware(build, grasp_set.rows(np.arange(2)), ("host",))
-    assert not found.holds
-    assert [check.differing > 0 for check in found.checks[:2]] == [False, True]
-    assert {check.misnamed for check in found.checks} == {0}
-
-
-@pytest.mark.usefixtures("few_frames")
 def test_names_that_are_mixed_up_are_found(
     build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tool("gcc")
-    made = classifier_files
-
-    def mixed_up(name: str, manifest: Manifest, *arguments: object, **options: object) -> dict[str, str]:
-        grasps = manifest.grasps[1::-1] + manifest.grasps[2:]
-        return made(name, structs.replace(manifest, grasps=grasps), *arguments, **options)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(classifier, "classifier_files", mixed_up)
+    one, two = (string(f"{grasp}\0") for grasp in Build.load(build).grasps[:2])
+    changed(monkeypatch, "thenar_glove.c", lambda text: text.replace(one, "?").replace(two, one).replace("?", two))
     found = verify_firmware(build, grasp_set.rows(np.arange(2)), ("host",))
     assert not found.holds
     assert [(check.differing, check.misnamed) for check in found.checks[:2]] == [(0, 2), (0, 2)]
@@ -263,11 +224,11 @@ def test_what_does_not_hold_of_firmware_does_not_hold_of_the_build(
     assert verify(folder, grasp_set).firmware is None
     assert verify(folder, grasp_set, ("host",)).holds
     (folder / "firmware" / "thenar_glove.c").write_text("/* mine */\n")
-    (folder / "firmware" / "thenar_glove_avr.S").unlink()
+    (folder / "firmware" / "thenar.h").unlink()
     whole = verify(folder, grasp_set, ("host",))
     changed = whole.firmware
     assert changed is not None
-    assert changed.carried.outdated == ("firmware/thenar_glove.c", "firmware/thenar_glove_avr.S")
+    assert changed.carried.outdated == ("firmware/thenar.h", "firmware/thenar_glove.c")
     assert not changed.holds
     assert not whole.holds
 

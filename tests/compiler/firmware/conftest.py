@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from thenar.compiler.firmware import simavr
 from thenar.compiler.firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, random_frames
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
@@ -113,3 +114,11 @@ def same_as_python() -> Callable[..., None]:
             assert answers.shares.tolist() == shares
 
     return compare
+
+
+@pytest.fixture
+def avr(tool: Callable[[str], str]) -> None:
+    """Need an AVR's compiler and simulator."""
+    tool("avr-gcc")
+    if simavr.missing() is not None:
+        tool("libsimavr-dev")

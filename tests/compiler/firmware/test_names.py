@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.names import fault
@@ -55,7 +55,7 @@ def test_whatever_names_hold_the_c_compiles_without_a_warning(
     thenar: str,
 ) -> None:
     tables = make_tables(classes=5, switches=5, joints=2)
-    plain, layout = describe(tables), arrange(tables)
+    plain, layout = describe(tables), Layout(tables)
     manifest = replace(
         plain,
         thenar=thenar,
@@ -63,10 +63,10 @@ def test_whatever_names_hold_the_c_compiles_without_a_warning(
         switches=tuple(replace(switch, name=name) for switch, name in zip(plain.switches, names[5:10], strict=True)),
         joints=tuple(replace(joint, name=name) for joint, name in zip(plain.joints, names[10:], strict=True)),
     )
-    library = Library("hand", manifest, layout, avr=True, notes=tuple(names))
+    library = Library("hand", manifest, layout, notes=tuple(names))
     files = TARGETS["host"].files(library)
     arduino = TARGETS["arduino"].files(library)
-    plainly = TARGETS["arduino"].files(Library("hand", plain, layout, avr=True))
+    plainly = TARGETS["arduino"].files(Library("hand", plain, layout))
     for name, text in (files | arduino).items():
         assert text.isascii(), name
         assert all(line.isprintable() or name == "Makefile" for line in text.replace("\t", " ").splitlines()), name

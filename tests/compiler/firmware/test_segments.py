@@ -109,14 +109,14 @@ def test_on_an_avr_a_tick_of_14_types_and_none_takes_the_cycles_and_the_memory_t
 ) -> None:
     """Cycles of a simulated part are no times: they are the same on every machine."""
     for name in ("usual", "learnt", "each type its own", "no class none"):
-        ram = 1038 if name == "learnt" else 456
+        ram = 1050 if name == "learnt" else 468
         model = runs.models()[name]
         lanes, refused = _lanes(runs, model, 300, 1)
         run = runs.run_avr(model, lanes, refused, LAG)
-        assert run.cycles.max() <= 6000
-        assert run.flash <= 1700
+        assert run.cycles.max() <= 7900
+        assert run.flash <= 2200
         assert run.ram <= ram
-        assert run.stack <= 40
+        assert run.stack <= 44
 
 
 def _learnt(tables: IntegerTables, describe: Callable[[IntegerTables], Manifest]) -> Manifest:
@@ -141,7 +141,7 @@ def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along
     assert more >= {"thenar_glove_segments.h", "thenar_glove_segments.c"}
     if isinstance(TARGETS[target], Package):
         assert "/src/thenar_glove_segments.c\n" in files["CMakeLists.txt"]
-        assert "thenar_glove_segment_push\tKEYWORD2" in files["keywords.txt"]
+        assert "thenar_segment_push\tKEYWORD2" in files["keywords.txt"]
         return
     if "Makefile" not in files:
         return
@@ -151,6 +151,6 @@ def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along
 
 
 def test_more_types_than_a_byte_numbers_are_refused() -> None:
-    assert segment_files("hand", SegmentModel.usual(254, True, 9.0), avr=True)
+    assert segment_files("hand", SegmentModel.usual(254, True, 9.0))
     with pytest.raises(FirmwareError, match="255 grasp types: the segment decoder takes at most 254"):
-        segment_files("hand", SegmentModel.usual(255, True, 9.0), avr=True)
+        segment_files("hand", SegmentModel.usual(255, True, 9.0))

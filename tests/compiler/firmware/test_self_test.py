@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.layout import Layout, arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import CHECKS, check_header, self_test_frames, turns
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
@@ -31,7 +31,7 @@ SHAPES = {
 
 
 def files_for(layout: Layout, manifest: Manifest) -> dict[str, str]:
-    library = Library("hand", manifest, layout, avr=False)
+    library = Library("hand", manifest, layout)
     files = TARGETS["host"].files(library)
     assert {path: files[path] for path in library.files} == library.files
     return files
@@ -57,7 +57,7 @@ def test_a_folder_checks_itself_without_a_warning(
     make: Make, make_tables: MakeTables, describe: Describe, shape: str
 ) -> None:
     tables = make_tables(**SHAPES[shape])
-    files = files_for(arrange(tables), describe(tables))
+    files = files_for(Layout(tables), describe(tables))
     assert [line for text in files.values() for line in text.splitlines() if len(line) > 120] == []
     done = make(files, "CFLAGS=-O2 -Werror", "check")
     assert (done.returncode, done.stdout + done.stderr) == (0, AGREED)
@@ -67,28 +67,25 @@ def test_a_classifier_with_a_wrong_entry_fails_its_check(
     make: Make, make_tables: MakeTables, describe: Describe
 ) -> None:
     tables = make_tables()
-    files = files_for(arrange(tables), describe(tables))
-    wrong = re.sub(
-        r"START\((-?\d+), ", lambda found: f"START({int(found[1]) + 1}, ", files["thenar_hand_tables.c"], count=1
-    )
-    assert wrong != files["thenar_hand_tables.c"]
-    done = make(files | {"thenar_hand_tables.c": wrong}, "check")
+    files = files_for(Layout(tables), describe(tables))
+    wrong = re.sub(r" START\((-?\d+), ", lambda found: f" START({int(found[1]) + 1}, ", files["thenar_hand.c"], count=1)
+    assert wrong != files["thenar_hand.c"]
+    done = make(files | {"thenar_hand.c": wrong}, "check")
     assert done.returncode != 0
     assert "predictions differ from Python's\n" in done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong"),
-    [("{0, 1}, {0, 2},", "{0, 2}, {0, 1},"), ('"grasp 0",\n    "grasp 1"', '"grasp 1",\n    "grasp 0"')],
+    ("name", "right", "wrong"),
+    [("thenar.c", "number / 8u]", "0u]"), ("thenar_hand.c", '"grasp 1\\000"', '"grasp 7\\000"')],
 )
 def test_a_wrong_bit_of_a_switch_and_a_wrong_name_fail_the_check(
-    make: Make, make_tables: MakeTables, describe: Describe, right: str, wrong: str
+    make: Make, make_tables: MakeTables, describe: Describe, name: str, right: str, wrong: str
 ) -> None:
     tables = make_tables()
-    files = files_for(arrange(tables), describe(tables))
-    text = files["thenar_hand_tables.c"]
-    assert text.count(right) == 1
-    done = make(files | {"thenar_hand_tables.c": text.replace(right, wrong)}, "check")
+    files = files_for(Layout(tables), describe(tables))
+    assert right in files[name]
+    done = make(files | {name: files[name].replace(right, wrong)}, "check")
     assert done.returncode != 0
     assert "predictions differ from Python's" in done.stdout + done.stderr
 
@@ -97,7 +94,7 @@ def test_make_builds_says_the_size_and_cleans_up(
     make: Make, make_tables: MakeTables, describe: Describe, tmp_path: Path
 ) -> None:
     tables = make_tables()
-    files = files_for(arrange(tables), describe(tables))
+    files = files_for(Layout(tables), describe(tables))
     assert make(files).returncode == 0
     assert (tmp_path / "libthenar_hand.a").exists()
     size = make({}, "size")
@@ -111,7 +108,7 @@ def test_what_a_changed_file_is_part_of_is_made_again(
     make: Make, make_tables: MakeTables, describe: Describe, changed: str
 ) -> None:
     tables = make_tables()
-    assert make(files_for(arrange(tables), describe(tables)), "check").returncode == 0
+    assert make(files_for(Layout(tables), describe(tables)), "check").returncode == 0
     again = make({}, "-n", "-W", changed, "check").stdout
     assert ("-c -o thenar_hand.o thenar_hand.c" in again) == (changed != "thenar_hand_check.h")
     assert "check.c" in again
@@ -119,7 +116,7 @@ def test_what_a_changed_file_is_part_of_is_made_again(
 
 def test_the_frames_are_the_extreme_ones_and_others_at_the_thresholds(make_tables: MakeTables) -> None:
     tables = make_tables(switches=9, joints=4)
-    frames = self_test_frames(arrange(tables))
+    frames = self_test_frames(Layout(tables))
     assert frames.bits.shape == (CHECKS, 9)
     assert frames.codes.shape == (CHECKS, 4)
     assert (frames.bits[0].any(), frames.bits[1].all()) == (False, True)
@@ -131,7 +128,7 @@ def test_the_frames_are_the_extreme_ones_and_others_at_the_thresholds(make_table
 
 def test_the_answers_in_the_check_are_those_of_the_build(make_tables: MakeTables, describe: Describe) -> None:
     tables = make_tables()
-    layout = arrange(tables)
+    layout = Layout(tables)
     frames, build = self_test_frames(layout), Build(describe(tables), tables)
     scores = [build.scores(bits, codes) for bits, codes in zip(frames.bits, frames.codes, strict=True)]
     text = "".join(check_header("hand", layout, build.grasps).split())

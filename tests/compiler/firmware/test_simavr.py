@@ -9,11 +9,12 @@ import thenar.simulator.scenes
 from thenar.compiler import compile_build
 from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.firmware import FirmwareError, simavr
-from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.layout import Layout, arrange
+from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import Predictions, Probes, random_frames
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.firmware_templates.rendering import file_text
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
@@ -25,36 +26,33 @@ Probed = Callable[[IntegerTables, int], Probes]
 Compare = Callable[[Predictions, IntegerTables, Probes], None]
 
 SMALL, LARGE = TARGETS["avr328p"], TARGETS["avr2560"]
-HEADER = """
-#include <stdint.h>
-typedef struct { int16_t scores[2], start[2]; uint8_t flags[2], switches[1], rest[4]; } thenar_test;
-void thenar_test_init(thenar_test *glove);
-uint8_t thenar_test_classify(thenar_test *glove);
-uint8_t thenar_test_update(thenar_test *glove);
+TABLES = """
+#define THENAR_TEST_MEMORY 12u
+extern const thenar_model thenar_test_model;
 """
 # A hundred turns more where the switch is closed; eight bytes on the stack. The grasp is the switch.
 SOURCE = """
 #include "thenar_test.h"
-void thenar_test_init(thenar_test *glove)
+const thenar_model thenar_test_model;
+void thenar_init(thenar *hand, const thenar_model *model, uint16_t *memory)
 {
-    glove->flags[0] = 0;
+    hand->model = model;
+    hand->switches = (uint8_t *)memory;
+    hand->scores = (int16_t *)(memory + 1);
 }
-uint8_t thenar_test_classify(thenar_test *glove)
+uint16_t thenar_classify(thenar *hand)
 {
-    const uint8_t closed = glove->switches[0];
+    const uint8_t closed = hand->switches[0];
     uint8_t turns = (uint8_t)(1u + 100u * closed);
     __asm__ volatile (".rept 8\\n push r0\\n .endr\\n .rept 8\\n pop r0\\n .endr\\n"
                       "1: dec %0\\n brne 1b" : "+r" (turns));
-    glove->scores[0] = closed;
-    glove->scores[1] = -2;
+    hand->scores[0] = closed;
+    hand->scores[1] = -2;
     return closed;
 }
-uint8_t thenar_test_update(thenar_test *glove)
-{
-    return thenar_test_classify(glove);
-}
 """
-BY_HAND = {"thenar_test.h": HEADER, "thenar_test.c": SOURCE}
+HEADER = '#include "thenar.h"\n' + TABLES
+BY_HAND = {"thenar.h": file_text("core/thenar.h"), "thenar_test.h": HEADER, "thenar_test.c": SOURCE}
 BOTH = pytest.mark.parametrize("target", [SMALL, LARGE], ids=["328P", "2560"])
 
 
@@ -88,52 +86,29 @@ def one_switch() -> IntegerTables:
     )
 
 
-def answered(
-    tables: IntegerTables, describe: Describe, layout: Layout, target: Target, frames: Probes, incremental: bool = False
-) -> Predictions:
-    files = classifier_files("test", describe(tables), layout, avr=True)
+def answered(tables: IntegerTables, describe: Describe, layout: Layout, target: Target, frames: Probes) -> Predictions:
+    files = Library("test", describe(tables), layout).files
     given = layout.frame_bytes(frames.bits, frames.codes)
-    return target.run(files, "test", layout, given, incremental=incremental)
+    return target.run(files, "test", layout, given)
 
 
 @BOTH
-@pytest.mark.parametrize("incremental", [False, True], ids=["classify", "update"])
 def test_every_score_of_recordings_is_that_of_the_build(
-    recorded: tuple[Build, GraspSet], same_as_python: Compare, target: Target, incremental: bool
+    recorded: tuple[Build, GraspSet], same_as_python: Compare, target: Target
 ) -> None:
     build, grasps = recorded
     frames = Probes(*select_inputs(grasps, build.manifest))
-    layout = arrange(build.tables)
-    files = classifier_files("test", build.manifest, layout, avr=True)
+    layout = Layout(build.tables)
+    files = Library("test", build.manifest, layout).files
     given = layout.frame_bytes(frames.bits, frames.codes)
-    same_as_python(target.run(files, "test", layout, given, incremental=incremental), build.tables, frames)
-
-
-@BOTH
-@pytest.mark.parametrize("entry_bits", [16, 8])
-@pytest.mark.parametrize("highest", [254, 900], ids=["codes of 8 bits", "codes of 16 bits"])
-@pytest.mark.parametrize("incremental", [False, True], ids=["classify", "update"])
-def test_every_score_is_pythons_on_all_extreme_frames_and_random_ones(
-    make_tables: MakeTables,
-    describe: Describe,
-    probed: Probed,
-    same_as_python: Compare,
-    target: Target,
-    entry_bits: int,
-    highest: int,
-    incremental: bool,
-) -> None:
-    tables = make_tables(seed=entry_bits + highest, highest=highest, reach=20 if entry_bits == 8 else 300)
-    layout = arrange(tables)
-    frames = probed(tables, 1000)
-    same_as_python(answered(tables, describe, layout, target, frames, incremental), tables, frames)
+    same_as_python(target.run(files, "test", layout, given), build.tables, frames)
 
 
 @BOTH
 def test_stack_cycles_and_answers_are_those_of_the_function_alone(target: Target) -> None:
     """A classifier by hand: its stack is eight bytes and the return address, its loop takes three cycles a turn."""
     tables = one_switch()
-    layout = arrange(tables)
+    layout = Layout(tables)
     frames = layout.frame_bytes(np.array([[False], [True]]), np.empty((2, 0), np.uint16))
     answers = target.run(BY_HAND, "test", layout, frames)
     assert answers.cost is not None
@@ -147,7 +122,7 @@ def test_ten_thousand_frames_take_seconds(make_tables: MakeTables, describe: Des
     tables = make_tables(seed=2, classes=14, switches=33, joints=16)
     frames = random_frames(tables, 10_000, seed=3)
     begun = children_s()
-    answered(tables, describe, arrange(tables), SMALL, frames)
+    answered(tables, describe, Layout(tables), SMALL, frames)
     print(f"{children_s() - begun:.1f} s")
     assert children_s() - begun < 15
 
@@ -162,25 +137,25 @@ def children_s() -> float:
     ("changed", "said"),
     [
         ({"thenar_test.c": "int unused(void) { int x; return 0; }"}, "unused variable"),
-        ({"thenar_test.h": HEADER.replace("switches[1]", "switches[2]")}, "glove has 16 bytes"),
-        ({"thenar_test.c": SOURCE.replace("thenar_test_classify", "other")}, "thenar_test_classify"),
+        ({"thenar_test.h": HEADER.replace("12u", "14u")}, "memory has 28 bytes"),
+        ({"thenar_test.c": SOURCE.replace("thenar_classify", "other")}, "thenar_classify"),
         ({"thenar_test.c": SOURCE.replace("brne", "rjmp")}, "does not return within"),
     ],
     ids=["warning", "another frame", "no classify", "hangs"],
 )
 def test_files_that_are_no_such_classifier_are_an_error(changed: dict[str, str], said: str) -> None:
-    layout = arrange(one_switch())
+    layout = Layout(one_switch())
     with pytest.raises(FirmwareError, match=said):
-        SMALL.run({**BY_HAND, **changed}, "test", layout, np.ones((1, 1), np.uint8))
+        SMALL.run({**BY_HAND, **changed}, "test", layout, np.ones((1, 2), np.uint8))
 
 
 def test_frames_of_another_size_are_refused() -> None:
     with pytest.raises(FirmwareError, match="this layout takes uint8"):
-        SMALL.run(BY_HAND, "test", arrange(one_switch()), np.zeros((1, 2), np.uint8))
+        SMALL.run(BY_HAND, "test", Layout(one_switch()), np.zeros((1, 3), np.uint8))
 
 
 def test_no_frames_have_no_answers() -> None:
-    answers = SMALL.run(BY_HAND, "test", arrange(one_switch()), np.zeros((0, 1), np.uint8))
+    answers = SMALL.run(BY_HAND, "test", Layout(one_switch()), np.zeros((0, 2), np.uint8))
     assert (answers.scores.shape, answers.stack) == ((0, 2), None)
 
 

@@ -12,11 +12,12 @@ import pytest
 from msgspec import structs
 
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.layout import Layout, arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import Predictions, Probes, lost_inputs
 from thenar.compiler.firmware.segments import LAG_US
 from thenar.compiler.firmware.sensors import Sensor, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.tables.quantise import integer_scores
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Rejection, Threshold
@@ -49,23 +50,21 @@ def interpreter(tool: Callable[[str], str]) -> None:
 
 def answers(layout: Layout, manifest: Manifest, frames: Probes, **how: Any) -> Predictions:
     sent = layout.frame_bytes(frames.bits, frames.codes)
-    return TARGET.run(TARGET.sources(Library("hand", manifest, layout, avr=False)), "hand", layout, sent, **how)
+    return TARGET.run(TARGET.sources(Library("hand", manifest, layout)), "hand", layout, sent, **how)
 
 
-@pytest.mark.parametrize("incremental", [False, True], ids=["classify", "update"])
 def test_every_score_is_python_s_with_inputs_missing_too(
     make_tables: MakeTables,
     describe: Describe,
     probed: Probed,
     same_as_python: SameAsPython,
-    incremental: bool,
 ) -> None:
     tables = make_tables(**SHAPES["small"])
     frames = probed(tables, 500)
-    lost = lost_inputs(tables, len(frames), 3) if incremental else None
-    found = answers(arrange(tables), describe(tables), frames, incremental=incremental, lost=lost)
-    same_as_python(found, tables, frames, lost)
-    assert found.names == describe(tables).grasps
+    for lost in (None, lost_inputs(tables, len(frames), 3)):
+        found = answers(Layout(tables), describe(tables), frames, lost=lost)
+        same_as_python(found, tables, frames, lost)
+        assert found.names == describe(tables).grasps
 
 
 def with_slopes(tables: IntegerTables) -> IntegerTables:
@@ -95,7 +94,7 @@ def test_so_it_is_for_tables_of_any_shape(
     tables = {"slopes": with_slopes, "pairs": with_pairs}.get(shape, lambda same: same)(tables)
     frames = probed(tables, 60)
     gone = lost_inputs(tables, len(frames), 3) if lost else None
-    found = answers(arrange(tables), describe(tables), frames, incremental=lost, lost=gone)
+    found = answers(Layout(tables), describe(tables), frames, lost=gone)
     same_as_python(found, tables, frames, gone)
 
 
@@ -107,9 +106,9 @@ for number in range(0, {switches}, 3):
 for joint in range({joints}):
     glove.set_code(joint, 40 * joint)
 grasp = glove.classify()
-print(glove.margin(), *[glove.probability(k) for k in range({classes})], glove.held(grasp))
+print(glove.margin(), *[glove.probability(k) for k in range({classes})], glove.decide(grasp))
 glove.lose_switch(1, True)
-print(glove.held(grasp))
+print(glove.decide(grasp))
 print(library.NONE, library.NAMES[library.NONE])
 """
 
@@ -130,14 +129,14 @@ def test_margin_probability_and_refusal_are_python_s(
     tables = make_tables(**SHAPES["small"])
     bits = np.arange(tables.n_switches)[np.newaxis] % 3 == 0
     codes = 40 * np.arange(tables.n_joints, dtype=np.uint16)[np.newaxis]
-    layout = arrange(tables)
-    scores = layout.scores(bits, codes)[0]
+    layout = Layout(tables)
+    scores = integer_scores(tables, bits, codes)[0]
     best = int(scores.argmax())
     k, j = tables.n_classes, tables.n_joints
     least = [32767 if each == best else -32768 for each in range(k)]  # refused for its score alone
     rejection = Rejection(0.05, tuple(least), ((0, 12),) * k, (((0, 65535),) * j,) * k, 0)
     manifest = structs.replace(describe(tables), rejection=rejection)
-    files = TARGET.sources(Library("hand", manifest, layout, avr=False))
+    files = TARGET.sources(Library("hand", manifest, layout))
     program = MORE.format(switches=tables.n_switches, joints=j, classes=k)
     said, with_a_switch_lost, of_none = printed(files, program, tmp_path).splitlines()
     margin, *shares = map(int, said.split())
@@ -169,7 +168,7 @@ def test_a_segmenter_says_its_newest_state_and_whether_it_is_of_the_segment_that
     model = structs.replace(SegmentModel.usual(tables.n_classes, False, tables.scale / 8), enter=(40,) * 7)
     manifest = structs.replace(describe(tables), segments=model)
     ticks, stream, still = 480, 160, 17
-    files = TARGET.sources(Library("hand", manifest, arrange(tables), avr=False))
+    files = TARGET.sources(Library("hand", manifest, Layout(tables)))
     program = FOLLOWING.format(ticks=ticks, stream=stream, still=still, switches=tables.n_switches)
     first, *lines = printed(files, program, tmp_path).splitlines()
     assert first == f"{model.tick_us} {LAG_US // model.tick_us} none"
@@ -221,7 +220,7 @@ def test_readings_become_python_s_codes(
         joints = tuple(structs.replace(joint, unit="ohm", code_a=0, code_b=508, value_b=1016.0) for joint in joints)
     manifest = structs.replace(manifest, switches=(low, high, *manifest.switches[2:]), joints=joints)
     sensors = sensors_of(manifest, parse_harness(STREAM, "glove.toml") if known else None)
-    library = Library("hand", manifest, arrange(tables), avr=False, glove=sensors)
+    library = Library("hand", manifest, Layout(tables), glove=sensors)
     readings = range(-90, 1100)
     count = len(sensors.every)
     given = {"sensors": count, "classes": tables.n_classes, "first": readings.start, "last": readings.stop}

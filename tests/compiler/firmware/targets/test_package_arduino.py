@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.compiler.firmware.classifier import Library as Files
-from thenar.compiler.firmware.layout import Layout, arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.sensors import sensors_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
@@ -53,10 +53,10 @@ def glove(manifest: Manifest) -> Harness:
 def library(describe: Describe, tmp_path: Path) -> Callable[..., Path]:
     """Return what writes the library "hand" of a layout."""
 
-    def library(layout: Layout, avr: bool = True, known: bool = True) -> Path:
+    def library(layout: Layout, known: bool = True) -> Path:
         manifest = on_pins(describe(layout.tables))
         sensors = sensors_of(manifest, glove(manifest)) if known and manifest.joints else None
-        for name, text in TARGETS["arduino"].files(Files("hand", manifest, layout, avr, glove=sensors)).items():
+        for name, text in TARGETS["arduino"].files(Files("hand", manifest, layout, glove=sensors)).items():
             path = tmp_path / "thenar_hand" / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
@@ -111,7 +111,7 @@ def test_the_example_prints_the_grasp_that_python_finds(
     entry_bits: int,
 ) -> None:
     tables = make_tables(**ON_A_BOARD[board], reach=20 if entry_bits == 8 else 300)
-    elf = sketch(library(arrange(tables)), board)
+    elf = sketch(library(Layout(tables)), board)
     build = Build(describe(tables), tables)
     # Nothing is wired: pulled up, every switch is open; the simulator's analog inputs are at 0 V.
     codes = np.ones(tables.n_joints, np.uint16)
@@ -140,13 +140,13 @@ def first_line(simavr: str, elf: Path, part: str) -> str:
 def test_an_example_for_more_inputs_than_the_board_has_reads_them_by_other_parts(
     make_tables: MakeTables, library: Library, sketch: Sketch, inputs: dict[str, int]
 ) -> None:
-    sketch(library(arrange(make_tables(**inputs))), "uno")
+    sketch(library(Layout(make_tables(**inputs))), "uno")
 
 
 def test_an_example_for_more_inputs_than_multiplexers_bring_says_so(
     make_tables: MakeTables, library: Library, sketch: Sketch
 ) -> None:
-    made = library(arrange(make_tables(switches=2, joints=97, bins=3)))
+    made = library(Layout(make_tables(switches=2, joints=97, bins=3)))
     with pytest.raises(
         AssertionError, match=r"#error .this board has too few analog inputs, even for one to each multi"
     ):
@@ -159,17 +159,17 @@ def test_an_example_for_more_inputs_than_multiplexers_bring_says_so(
 def test_a_build_without_switches_or_without_joints_has_an_example_too(
     make_tables: MakeTables, library: Library, sketch: Sketch, inputs: dict[str, int]
 ) -> None:
-    sketch(library(arrange(make_tables(**inputs))), "uno")
+    sketch(library(Layout(make_tables(**inputs))), "uno")
 
 
 def test_a_mega_takes_33_switches_and_16_joints(make_tables: MakeTables, library: Library, sketch: Sketch) -> None:
-    sketch(library(arrange(make_tables(classes=14, switches=33, joints=16))), "mega")
+    sketch(library(Layout(make_tables(classes=14, switches=33, joints=16))), "mega")
 
 
 def test_it_refuses_readings_of_which_nothing_is_known(
     make_tables: MakeTables, library: Library, sketch: Sketch
 ) -> None:
-    made = library(arrange(make_tables(highest=1000)), known=False)
+    made = library(Layout(make_tables(highest=1000)), known=False)
     assert "{0, 0}, /* j0: code 0 and code 50 */" in (made / "examples/Recognise/Recognise.ino").read_text()
     for given in ("-DCALIBRATED=1", "-DSHOW_READINGS"):
         sketch(made, "uno", given)
@@ -178,7 +178,7 @@ def test_it_refuses_readings_of_which_nothing_is_known(
 
 
 def test_the_properties_are_those_that_the_specification_asks_for(make_tables: MakeTables, library: Library) -> None:
-    lines = (library(arrange(make_tables())) / "library.properties").read_text().splitlines()
+    lines = (library(Layout(make_tables())) / "library.properties").read_text().splitlines()
     fields = dict(line.split("=", 1) for line in lines)
     # The page that `url` names is whoever's who publishes the library: one that is empty is worse than none.
     given = ["name", "version", "author", "maintainer", "sentence", "paragraph", "category", "architectures"]
@@ -190,25 +190,25 @@ def test_the_properties_are_those_that_the_specification_asks_for(make_tables: M
 
 
 def test_keywords_are_words_of_the_header_a_tab_and_a_kind(make_tables: MakeTables, library: Library) -> None:
-    made = library(arrange(make_tables()))
-    header = "".join((made / "src" / f"thenar_hand{part}.h").read_text() for part in ("", "_codes"))
+    made = library(Layout(make_tables()))
+    header = "".join((made / "src" / f"thenar{part}.h").read_text() for part in ("", "_hand", "_hand_codes"))
     rows = [line.split("\t") for line in (made / "keywords.txt").read_text().splitlines()]
     assert {kind for _, kind in rows} == {"KEYWORD1", "KEYWORD2", "LITERAL1"}
     assert all(re.search(rf"\b{word}\b", header) for word, _ in rows)
-    assert ["thenar_hand_classify", "KEYWORD2"] in rows
+    assert ["thenar_classify", "KEYWORD2"] in rows
 
 
 def test_names_that_are_no_words_of_c_do_no_harm(
     make_tables: MakeTables, describe: Describe, library: Library, sketch: Sketch, tmp_path: Path
 ) -> None:
     tables = make_tables(switches=2, joints=1)
-    layout = arrange(tables)
+    layout = Layout(tables)
     manifest = describe(tables)
     names = ["*/ int \\", "tip\n#error \u00e9"]
     switches = tuple(replace(switch, name=name) for switch, name in zip(manifest.switches, names, strict=True))
     joints = (replace(manifest.joints[0], name="roll ??/"),)
     made = library(layout)
     named = replace(manifest, switches=switches, joints=joints)
-    odd = TARGETS["arduino"].files(Files("hand", named, layout, avr=True))
+    odd = TARGETS["arduino"].files(Files("hand", named, layout))
     (made / "examples/Recognise/Recognise.ino").write_text(odd["examples/Recognise/Recognise.ino"])
     sketch(made, "uno", "-DCALIBRATED=1")

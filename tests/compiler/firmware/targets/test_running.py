@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.manifest import Manifest
@@ -21,7 +21,6 @@ UNITS = {
 }
 
 
-@pytest.mark.parametrize("incremental", [False, True], ids=["classify", "update"])
 @pytest.mark.parametrize("part", list(UNITS))
 def test_every_target_answers_as_python_does(
     request: pytest.FixtureRequest,
@@ -31,17 +30,16 @@ def test_every_target_answers_as_python_does(
     probed: Callable[[IntegerTables, int], Probes],
     same_as_python: Callable[[Predictions, IntegerTables, Probes], None],
     part: str,
-    incremental: bool,
 ) -> None:
     target = TARGETS[part]
     runs = target if target.kind else request.getfixturevalue("cores")[part]
     if (missing := runs.missing()) is not None:
         tool(missing.split()[0])
     tables = make_tables(classes=7, switches=12, joints=4)
-    layout, frames = arrange(tables), probed(tables, 500)
-    files = classifier_files("hand", describe(tables), layout, avr=target.avr)
+    layout, frames = Layout(tables), probed(tables, 500)
+    files = Library("hand", describe(tables), layout).files
     sent = layout.frame_bytes(frames.bits, frames.codes)
-    answers = runs.run(files, "hand", layout, sent, incremental=incremental)
+    answers = runs.run(files, "hand", layout, sent)
     same_as_python(answers, tables, frames)
     assert answers.unit == UNITS[part]
     assert (answers.cost is None) == (part == "host")

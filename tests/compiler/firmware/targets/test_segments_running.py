@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import STREAM_TICKS, Lost, Predictions, Probes, states_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
@@ -34,11 +34,11 @@ def running(request: pytest.FixtureRequest, tool: Callable[[str], str]) -> Runni
         tool(missing.split()[0])
 
     def run(manifest: Manifest, tables: IntegerTables, frames: Probes, lost: Lost | None) -> Predictions:
-        layout = arrange(tables)
-        library = Library("hand", manifest, layout, avr=False)
+        layout = Layout(tables)
+        library = Library("hand", manifest, layout)
         files = target.sources(library) if target.kind else library.files | library.segments
         sent = layout.frame_bytes(frames.bits, frames.codes)
-        found: Predictions = runs.run(files, "hand", layout, sent, incremental=lost is not None, lost=lost)
+        found: Predictions = runs.run(files, "hand", layout, sent, lost=lost)
         return found
 
     return run

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.example import BOARDS, ArduinoBoard, Wiring, example_values
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.sensors import Sensors, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.package import Package
@@ -168,11 +168,11 @@ def test_every_frame_is_answered_as_by_python(
 ) -> None:
     target, board, switches, joints, taxels, parts = case
     build = build_of(make_tables, describe, switches, joints, taxels)
-    manifest, layout = build.manifest, arrange(build.tables)
+    manifest, layout = build.manifest, Layout(build.tables)
     ranges = ", ".join(f"{joint.name} = [0, 1016]" for joint in manifest.joints)
     harness = parse_harness(GLOVE.format(ranges, "pad = [0, 1023]" * taxels), "g") if joints + taxels else None
     sensors = sensors_of(manifest, harness)
-    library = Library("hand", manifest, layout, avr=False, glove=sensors if known and joints + taxels else None)
+    library = Library("hand", manifest, layout, glove=sensors if known and joints + taxels else None)
     package = TARGETS[target]
     assert isinstance(package, Package)
     wiring = Wiring.of(library, package.example_pins)
@@ -246,7 +246,7 @@ def test_what_is_printed_is_what_the_sketch_chooses_on_each_board(
     text, expected = "", []
     for joints, switches in product((0, 1, 6, 7, 16, 17), range(1, 71)):
         build = build_of(make_tables, describe, switches, joints, 0)
-        library = Library("hand", build.manifest, arrange(build.tables), avr=False)
+        library = Library("hand", build.manifest, Layout(build.tables))
         wiring, sketch = Wiring.of(library), TARGETS["arduino"].files(library)["examples/Recognise/Recognise.ino"]
         for board in BOARDS.values():
             parts = wiring.on(board)
@@ -275,7 +275,7 @@ def chosen(sketch: str, given: dict[str, int]) -> str:
 def test_a_library_says_which_boards_the_example_fits(make_tables: MakeTables) -> None:
     def said(switches: int, joints: int, target: str = "arduino") -> str:
         tables = make_tables(switches=switches, joints=joints, bins=3)
-        return TARGETS[target].said(Library("hand", numbered(tables), arrange(tables), avr=False))
+        return TARGETS[target].said(Library("hand", numbered(tables), Layout(tables)))
 
     assert said(9, 3) == "the example Recognise fits Arduino Uno and Nano and Mega as it is"
     assert said(16, 0) == "the example Recognise fits Arduino Uno and Nano and Mega as it is"
@@ -292,6 +292,6 @@ def test_a_library_says_which_boards_the_example_fits(make_tables: MakeTables) -
 
 def test_the_example_for_a_part_with_too_few_pins_does_not_compile(make_tables: MakeTables) -> None:
     tables = make_tables(switches=9, joints=17, bins=3)
-    library = Library("hand", numbered(tables), arrange(tables), avr=False)
+    library = Library("hand", numbered(tables), Layout(tables))
     sketch = TARGETS["esp32c3"].files(library)["examples/Recognise/Recognise.ino"]
     assert '\n#error "an esp32c3 has too few pins, even with multiplexers: read the inputs in another way"\n' in sketch

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS, Target, kinds, timed
 from thenar.drivers.members import MemberError
 from thenar.runtime.tables import IntegerTables
@@ -44,7 +44,7 @@ def test_a_target_that_is_none_is_refused_with_those_that_are() -> None:
 
 def test_a_target_without_a_simulator_says_so(make_tables: Callable[..., IntegerTables]) -> None:
     core = Target(name="rv64", part="rv64gc", help="a core", flash=1 << 17, ram=1 << 14)
-    layout = arrange(make_tables())
+    layout = Layout(make_tables())
     assert core.missing() == "thenar has no simulator of an rv64gc"
     with pytest.raises(FirmwareError, match="no simulator of an rv64gc"):
         core.run({}, "hand", layout, np.zeros((1, 5), np.uint8))

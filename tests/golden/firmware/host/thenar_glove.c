@@ -1,395 +1,93 @@
-/* thenar_glove.c: integer arithmetic; the header describes its use.
+/* thenar_glove.c: the tables of 3 grasp types; thenar.h says how they are read.
 
-   From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.c.j2. */
-#include "thenar_glove_tables.h"
+   From the tables 0123456789abcdef; thenar 0.1.0, template tables/thenar_NAME.c.j2. */
+#include "thenar_glove.h"
 
-void thenar_glove_init(thenar_glove *glove)
-{
-    uint8_t *const bytes = (uint8_t *)glove;
+#define START THENAR_START
+#define PAIR THENAR_PAIR
+#define SLOPES THENAR_SLOPES
 
-    for (uint16_t at = 0u; at < sizeof *glove; at++) {
-        bytes[at] = 0u;
-    }
-    for (uint_fast16_t part = 0u; part < PARTS; part++) {
-        for (uint_fast16_t lane = 0u; lane < LANES; lane++) {
-            glove->start[part][lane] = thenar_glove_start[part][lane];
-        }
-    }
-}
+static const thenar_pair rows[] THENAR_FLASH = {
+    /* The entries of a row: power grip, tip pinch, lateral pinch. */
+    START(120, -40), START(7, 0), START(0, 0), START(0, 0),
 
-void thenar_glove_set_switch(thenar_glove *glove, thenar_glove_switch number, bool closed)
-{
-    if (number < THENAR_GLOVE_SWITCHES) {
-        uint8_t *const port = &glove->input.switches[READ_BYTE(thenar_glove_places[number].port)];
-        const uint8_t bit = READ_BYTE(thenar_glove_places[number].bit);
+    /* switches: thumb tip, index tip, index middle, middle tip */
+    PAIR(310, 205), PAIR(-80, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(-45, 260), PAIR(33, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(265, 465), PAIR(-47, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(90, -12), PAIR(-7, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(400, 193), PAIR(-87, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(45, 248), PAIR(26, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(355, 453), PAIR(-54, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(150, -300), PAIR(41, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(460, -95), PAIR(-39, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(105, -40), PAIR(74, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(415, 165), PAIR(-6, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(240, -312), PAIR(34, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(550, -107), PAIR(-46, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(195, -52), PAIR(67, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(505, 153), PAIR(-13, 0), PAIR(0, 0), PAIR(0, 0),
 
-        *port = (uint8_t)(closed ? (*port | bit) : (*port & (uint8_t)~bit));
-    }
-}
+    /* switches: palm radial, palm ulnar */
+    PAIR(400, -390), PAIR(-120, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(77, -8), PAIR(260, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(477, -398), PAIR(140, 0), PAIR(0, 0), PAIR(0, 0),
 
-const char *thenar_glove_grasp(thenar_glove_class grasp)
-{
-    return thenar_glove_names[(grasp < 3u) ? grasp : 3u];
-}
+    /* joints: thumb_rotation */
+    PAIR(-200, 180), PAIR(90, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(-90, 100), PAIR(80, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(10, 20), PAIR(30, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(250, -170), PAIR(-60, 0), PAIR(0, 0), PAIR(0, 0),
 
-uint16_t thenar_glove_margin(const thenar_glove *glove)
-{
-    int16_t best = glove->scores[0];
-    int16_t second = INT16_MIN;
+    /* joints: index_pij */
+    PAIR(-310, 40), PAIR(220, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(15, 130), PAIR(-25, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(330, -90), PAIR(-240, 0), PAIR(0, 0), PAIR(0, 0),
+};
 
-    for (uint16_t k = 1u; k < CLASSES; k++) {
-        const int16_t score = glove->scores[k];
+static const thenar_bins bins[] THENAR_FLASH = {
+    {0u, 0u, 2u, 76u},
+    {1u, 3u, 2u, 92u},
+};
 
-        if (score > best) {
-            second = best;
-            best = score;
-        } else if (score > second) {
-            second = score;
-        } else {
-            /* no second best */
-        }
-    }
-    return (uint16_t)((uint16_t)best - (uint16_t)second);
-}
+static const uint16_t thresholds[] THENAR_FLASH = {
+    60u, 61u, 140u, 90u, 200u, 65535u,
+};
 
-uint16_t thenar_glove_probability(const thenar_glove *glove, thenar_glove_class grasp)
-{
-    int16_t best = INT16_MIN;
-    uint32_t own = 0u;
-    uint32_t all = 0u;
+static const int16_t means[] THENAR_FLASH = {
+    155, 102, -40,
+    155, 102, -40,
+    155, 102, -40,
+    155, 102, -40,
+    155, 102, -40,
+    155, 102, -40,
+    201, -178, -87,
+    314, -35, -214,
+};
 
-    for (uint16_t k = 0u; k < CLASSES; k++) {
-        best = (glove->scores[k] > best) ? glove->scores[k] : best;
-    }
-    for (uint16_t k = 0u; k < CLASSES; k++) {
-        /* The lag, in 64ths of a halving of the probability, and the rest in 256ths of such a step. */
-        const uint16_t behind = (uint16_t)((uint16_t)best - (uint16_t)glove->scores[k]);
-        const uint32_t steps = (uint32_t)behind * 60511u;
-        const uint32_t halves = steps >> 22;
+static const char names[] THENAR_FLASH =
+    "power grip\000"
+    "tip pinch\000"
+    "lateral pinch";
 
-        if (halves < 16u) {
-            const uint8_t at = (uint8_t)((steps >> 16) & 63u);
-            const uint32_t above = READ_WORD(thenar_glove_powers[at]);
-            const uint32_t below = READ_WORD(thenar_glove_powers[at + 1u]);
-            const uint32_t between = (steps >> 8) & 255u;
-            const uint32_t power = (above - (((above - below) * between) >> 8)) >> halves;
-
-            all += power;
-            own = (k == grasp) ? power : own;
-        }
-    }
-    return (uint16_t)(((own * 65535u) + (all / 2u)) / all);
-}
-
-/* Open the missing switches, and set the codes of missing joints to 0. */
-static void leave_out(thenar_glove *glove)
-{
-    for (uint16_t port = 0u; port < THENAR_GLOVE_PORTS; port++) {
-        glove->input.switches[port] &= (uint8_t)~glove->lost_switches[port];
-    }
-    for (uint16_t joint = 0u; joint < THENAR_GLOVE_JOINTS; joint++) {
-        if ((glove->lost_joints[joint / 8u] & (1u << (joint % 8u))) != 0u) {
-            glove->input.codes[joint] = 0u;
-        }
-    }
-}
-
-/* Compilers that may reorder lookups load many rows before they add one, and run out of registers; and if they know the
-   size or the place of a row, they compute its address in more steps than a product takes. A core of ARMv6-M has too
-   few registers to gain from this: there all rows are found first. */
-#if defined(__GNUC__) && !defined(__ARM_ARCH_6M__)
-#define HIDE(value) __asm volatile("" : "+r"(value))
-#else
-#define HIDE(value) ((void)0)
-#endif
-/* RISC-V needs two instructions for a large constant, so it is kept in a register. */
-#if defined(__GNUC__) && defined(__riscv)
-#define KEEP(constant) HIDE(constant)
-#else
-#define KEEP(constant) ((void)0)
-#endif
-
-/* The first class of the largest sum: that sum in the upper bits of a word, and ones below. */
-typedef struct {
-    uint32_t sum;
-    uint_fast16_t grasp;
-} largest;
-
-/* Store the lower sum of a word as a score. */
-static void store(uint32_t sums, int16_t *score)
-{
-    *score = (int16_t)(uint16_t)((sums ^ 0x8000u) & 0xFFFFu);
-}
-
-/* Store both sums of a word as scores, in one access if the second comes last in memory. */
-static void store_two(uint32_t sums, int16_t *score)
-{
-    const uint32_t scores = sums ^ 0x80008000u;
-
-#if defined(__GNUC__) && (__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__)
-    __builtin_memcpy(__builtin_assume_aligned(score, sizeof scores), &scores, sizeof scores);
-#else
-    score[0] = (int16_t)(uint16_t)(scores & 0xFFFFu);
-    score[1] = (int16_t)(uint16_t)(scores >> 16);
-#endif
-}
-
-/* Make the upper bits of the word, the sum of class k, the largest sum if they are. */
-static void take(uint32_t word, uint_fast16_t k, uint32_t ones, largest *best)
-{
-    if (word > best->sum) {
-        best->sum = word | ones;
-        best->grasp = k;
-    }
-}
-
-/* Store the sums of a part as scores, and update the largest sum. */
-#define PREDICT(first, best) do { \
-    uint32_t ones = 0xFFFFu; \
-    KEEP(ones); \
-    HIDE(s0); \
-    store_two(s0, &glove->scores[0]); \
-    store(s1, &glove->scores[(first) + 2u]); \
-    take(s0 << 16, (first) + 0u, ones, (best)); \
-    take(s0, (first) + 1u, ones, (best)); \
-    take(s1 << 16, (first) + 2u, ones, (best)); \
-} while (false)
-
-#ifdef __ARM_ARCH_6M__
-#define ROW(lookup, number) found.rows[lookup]
-#else
-#define ROW(lookup, number) \
-    ((const uint32_t *)(const void *)((const uint8_t *)thenar_glove_rows + (row_bytes * (uint32_t)(number))))
-#endif
-
-/* Add a row to the sums. */
-#define ADD(row) do { \
-    const uint32_t *entry = (row); \
-    HIDE(entry); \
-    s0 += entry[0]; \
-    HIDE(s0); \
-    s1 += entry[1]; \
-    HIDE(s1); \
-} while (false)
-
-/* Replace a row in the sums. */
-#define REPLACE(before, after) do { \
-    s0 += (after)[0] - (before)[0]; \
-    HIDE(s0); \
-    s1 += (after)[1] - (before)[1]; \
-    HIDE(s1); \
-} while (false)
-
-/* To replace more rows than these takes longer than to add all. */
-#define MOST_REPLACED (LOOKUPS / 2u)
-
-/* Add the initial scores to the sums. */
-#define ADD_START(start) do { \
-    s0 += (start)[0]; \
-    s1 += (start)[1]; \
-} while (false)
-
-/* Begin the sums with the initial scores, and add all rows that have been found. */
-#define ADD_AGAIN(start) do { \
-    s0 = (start)[0]; \
-    s1 = (start)[1]; \
-    for (uint_fast16_t i = 0u; i < LOOKUPS; i++) { \
-        ADD(&glove->seen.rows[i][part * ROWS * WORDS]); \
-    } \
-} while (false)
-
-#ifdef __ARM_ARCH_6M__
-/* Find the rows that an input adds. */
-static void find(const thenar_glove_frame *input, thenar_glove_seen *found)
-{
-    found->rows[0] = thenar_glove_rows[(input->switches[0] & 0x07u)];
-    found->rows[1] = thenar_glove_rows[8u + ((((uint32_t)input->switches[0] >> 3) & 0x07u))];
-    found->rows[2] = thenar_glove_rows[16u + ((input->codes[0] <= 60u) ? 1u : 0u)
-        + ((input->codes[0] <= 61u) ? 1u : 0u)
-        + ((input->codes[0] <= 140u) ? 1u : 0u)];
-    found->rows[3] = thenar_glove_rows[20u + ((input->codes[1] <= 90u) ? 1u : 0u)
-        + ((input->codes[1] <= 200u) ? 1u : 0u)];
-}
-
-#endif
-
-static void add_up(thenar_glove *glove, largest *best)
-{
-    const uint32_t *const start = glove->start[0];
-    const thenar_glove_frame *const input = &glove->input;
-#ifdef __ARM_ARCH_6M__
-    thenar_glove_seen found;
-#else
-    uint32_t row_bytes = sizeof(thenar_glove_row);
-#endif
-    uint32_t s0 = 0u;
-    uint32_t s1 = 0u;
-
-#ifdef __ARM_ARCH_6M__
-    find(input, &found);
-#else
-    HIDE(row_bytes);
-#endif
-    ADD(ROW(0, (input->switches[0] & 0x07u)));
-    ADD(ROW(1, 8u + ((((uint32_t)input->switches[0] >> 3) & 0x07u))));
-    ADD(ROW(2, 16u + ((input->codes[0] <= 60u) ? 1u : 0u)
-            + ((input->codes[0] <= 61u) ? 1u : 0u)
-            + ((input->codes[0] <= 140u) ? 1u : 0u)));
-    ADD(ROW(3, 20u + ((input->codes[1] <= 90u) ? 1u : 0u)
-            + ((input->codes[1] <= 200u) ? 1u : 0u)));
-    ADD_START(start);
-    PREDICT(0u, best);
-}
-
-thenar_glove_class thenar_glove_classify(thenar_glove *glove)
-{
-    largest best = {0u, 0u};
-
-    glove->begun = false;
-    if (glove->missing) {
-        leave_out(glove);
-    }
-    add_up(glove, &best);
-    return (thenar_glove_class)best.grasp;
-}
-
-/* The changes since the last update(). */
-typedef struct {
-    const uint32_t *before;
-    const uint32_t *after;
-} change;
-
-typedef struct {
-    change rows[LOOKUPS];
-    change *end;
-    bool again; /* adding up all rows is faster */
-} changes;
-
-#define NOTE(lookup, row) do { \
-    const uint32_t *const after = (row); \
-    if (after != glove->seen.rows[lookup]) { \
-        end->before = glove->seen.rows[lookup]; \
-        end->after = after; \
-        end++; \
-        glove->seen.rows[lookup] = after; \
-    } \
-} while (false)
-
-static void find_changes(thenar_glove *glove, changes *changed)
-{
-    const thenar_glove_frame *const input = &glove->input;
-#ifdef __ARM_ARCH_6M__
-    thenar_glove_seen found;
-#else
-    uint32_t row_bytes = sizeof(thenar_glove_row);
-#endif
-    change *end = changed->rows;
-
-#ifdef __ARM_ARCH_6M__
-    find(input, &found);
-#else
-    HIDE(row_bytes);
-#endif
-    NOTE(0, ROW(0, (input->switches[0] & 0x07u)));
-    NOTE(1, ROW(1, 8u + ((((uint32_t)input->switches[0] >> 3) & 0x07u))));
-    NOTE(2, ROW(2, 16u + ((input->codes[0] <= 60u) ? 1u : 0u)
-            + ((input->codes[0] <= 61u) ? 1u : 0u)
-            + ((input->codes[0] <= 140u) ? 1u : 0u)));
-    NOTE(3, ROW(3, 20u + ((input->codes[1] <= 90u) ? 1u : 0u)
-            + ((input->codes[1] <= 200u) ? 1u : 0u)));
-    changed->again = !glove->begun || (end > &changed->rows[MOST_REPLACED]);
-    changed->end = end;
-}
-
-/* Renew the sums of a part: add up all rows again, or replace those that have changed. */
-static void renew(thenar_glove *glove, uint_fast16_t part, const changes *changed, largest *best)
-{
-    uint32_t *const sum = glove->sums[part];
-    const change *each = changed->rows;
-    uint32_t s0 = sum[0];
-    uint32_t s1 = sum[1];
-
-    if (changed->again) {
-        ADD_AGAIN(glove->start[part]);
-    }
-    else {
-        while (each != changed->end) {
-            REPLACE(&each->before[part * ROWS * WORDS], &each->after[part * ROWS * WORDS]);
-            each++;
-        }
-    }
-    sum[0] = s0;
-    sum[1] = s1;
-    PREDICT(0u, best);
-}
-
-thenar_glove_class thenar_glove_update(thenar_glove *glove)
-{
-    largest best = {0u, 0u};
-    changes changed;
-
-    if (glove->missing) {
-        leave_out(glove);
-    }
-    find_changes(glove, &changed);
-    glove->begun = true;
-    for (uint_fast16_t part = 0u; part < PARTS; part++) {
-        renew(glove, part, &changed, &best);
-    }
-    return (thenar_glove_class)best.grasp;
-}
-
-/* Add steps to the initial score of a class. */
-static void shift_start(thenar_glove *glove, uint16_t k, uint16_t steps)
-{
-    for (uint16_t part = 0u; part < PARTS; part++) {
-        const uint16_t at = k;
-
-        if (at < 3u) {
-            const uint16_t lane = (uint16_t)(at / 2u);
-            const uint16_t shift = (uint16_t)(16u * (at % 2u));
-
-            glove->start[part][lane] += (uint32_t)(int32_t)(int16_t)steps << shift;
-        }
-    }
-}
-
-/* Add the mean of a missing input to the initial scores, or subtract it again. */
-static void replace_by_mean(thenar_glove *glove, uint16_t input, bool lost)
-{
-    for (uint16_t k = 0u; k < CLASSES; k++) {
-        const thenar_glove_mean mean = (thenar_glove_mean)READ_WORD(thenar_glove_means[input][k]);
-        const uint16_t steps = (uint16_t)(int16_t)mean;
-
-        shift_start(glove, k, (uint16_t)(lost ? steps : (0u - steps)));
-    }
-    glove->n_lost = (uint16_t)(lost ? (glove->n_lost + 1u) : (glove->n_lost - 1u));
-    glove->missing = glove->n_lost > 0u;
-    glove->begun = false;
-}
-
-void thenar_glove_lose_switch(thenar_glove *glove, thenar_glove_switch number, bool lost)
-{
-    if (number < THENAR_GLOVE_SWITCHES) {
-        uint8_t *const port = &glove->lost_switches[READ_BYTE(thenar_glove_places[number].port)];
-        const uint8_t bit = READ_BYTE(thenar_glove_places[number].bit);
-
-        if (((*port & bit) != 0u) != lost) {
-            *port ^= bit;
-            replace_by_mean(glove, number, lost);
-        }
-    }
-}
-
-void thenar_glove_lose_joint(thenar_glove *glove, uint16_t number, bool lost)
-{
-    if (number < THENAR_GLOVE_JOINTS) {
-        uint8_t *const eight = &glove->lost_joints[number / 8u];
-        const uint8_t bit = (uint8_t)(1u << (number % 8u));
-
-        if (((*eight & bit) != 0u) != lost) {
-            *eight ^= bit;
-            replace_by_mean(glove, (uint16_t)(6u + number), lost);
-        }
-    }
-}
+const thenar_model thenar_glove_model = {
+    .classes = 3u,
+    .switches = 6u,
+    .joints = 2u,
+    .none = 3u,
+    .names = 3u,
+    .row_pairs = 4u,
+    .group = 4u,
+    .groups_of_byte = 2u,
+    .bins = 2u,
+    .lines = 0u,
+    .grids = 0u,
+    .found = 5u,
+    .step = 60511u,
+    .shift = 16u,
+    .rows = rows,
+    .each_bins = bins,
+    .thresholds = thresholds,
+    .means = means,
+    .texts = names,
+};

@@ -8,7 +8,7 @@
 
 static const struct {
     uint8_t closed[1]; /* bit b of byte i says whether switch 8 i + b is */
-    thenar_glove_code codes[THENAR_GLOVE_JOINTS];
+    uint16_t codes[THENAR_GLOVE_JOINTS];
     uint16_t grasp;
     int16_t scores[3];
 } thenar_glove_checks[THENAR_GLOVE_CHECKS] = {
@@ -236,59 +236,50 @@ static const char *const thenar_glove_grasps[3] = {
     "lateral pinch",
 };
 
-/* Fill in the input. */
-static void thenar_glove_take(thenar_glove *glove, unsigned check)
+static bool thenar_glove_agrees(thenar *hand, unsigned check)
 {
+    bool same;
+
     for (unsigned number = 0u; number < 6u; ++number) {
         const unsigned eight = thenar_glove_checks[check].closed[number / 8u];
 
-        thenar_glove_set_switch(glove, (thenar_glove_switch)number, ((eight >> (number % 8u)) & 1u) != 0u);
+        thenar_set_switch(hand, (uint16_t)number, ((eight >> (number % 8u)) & 1u) != 0u);
     }
     for (unsigned joint = 0u; joint < 2u; ++joint) {
-        glove->input.codes[joint] = thenar_glove_checks[check].codes[joint];
+        thenar_set_code(hand, (uint16_t)joint, thenar_glove_checks[check].codes[joint]);
     }
-}
-
-static bool thenar_glove_same(const char *one, const char *other)
-{
-    unsigned at = 0u;
-
-    while ((one[at] != '\0') && (one[at] == other[at])) {
-        at++;
-    }
-    return one[at] == other[at];
-}
-
-static bool thenar_glove_agrees(const thenar_glove *glove, unsigned check, uint16_t grasp)
-{
-    bool same = grasp == thenar_glove_checks[check].grasp;
-
+    same = thenar_classify(hand) == thenar_glove_checks[check].grasp;
     for (unsigned k = 0u; k < 3u; ++k) {
-        same = same && (glove->scores[k] == thenar_glove_checks[check].scores[k]);
+        same = same && (hand->scores[k] == thenar_glove_checks[check].scores[k]);
     }
     return same;
 }
 
-/* Return the number of frames whose prediction differs from Python's, by update() or by classify(), plus the number of
-   grasp types with another name. */
+static bool thenar_glove_named(unsigned grasp)
+{
+    static char text[THENAR_GLOVE_NAME_BYTES];
+    unsigned at = 0u;
+
+    (void)thenar_name(&thenar_glove_model, (uint16_t)grasp, text, THENAR_GLOVE_NAME_BYTES);
+    while ((text[at] != '\0') && (text[at] == thenar_glove_grasps[grasp][at])) {
+        at++;
+    }
+    return text[at] == thenar_glove_grasps[grasp][at];
+}
+
+/* Return the number of frames whose prediction differs from Python's, plus that of grasp types with another name. */
 static unsigned thenar_glove_check(void)
 {
-    static thenar_glove glove;
+    static uint16_t memory[THENAR_GLOVE_MEMORY];
+    static thenar hand;
     unsigned wrong = 0u;
 
-    thenar_glove_init(&glove);
+    thenar_init(&hand, &thenar_glove_model, memory);
     for (unsigned check = 0u; check < THENAR_GLOVE_CHECKS; ++check) {
-        thenar_glove_take(&glove, check);
-        const bool updated = thenar_glove_agrees(&glove, check, thenar_glove_update(&glove));
-
-        if (!updated || !thenar_glove_agrees(&glove, check, thenar_glove_classify(&glove))) {
-            wrong++;
-        }
+        wrong += thenar_glove_agrees(&hand, check) ? 0u : 1u;
     }
-    for (unsigned k = 0u; k < 3u; ++k) {
-        if (!thenar_glove_same(thenar_glove_grasp((thenar_glove_class)k), thenar_glove_grasps[k])) {
-            wrong++;
-        }
+    for (unsigned grasp = 0u; grasp < 3u; ++grasp) {
+        wrong += thenar_glove_named(grasp) ? 0u : 1u;
     }
     return wrong;
 }

@@ -3,8 +3,11 @@
    thenar 0.1.0, template codes/thenar_NAME_codes.c.j2. */
 #include "thenar_glove_codes.h"
 
-#define IN_FLASH
+#ifdef __AVR__
+#define COPY(to, from) ((void)memcpy_P(&(to), &(from), sizeof(to)))
+#else
 #define COPY(to, from) ((to) = (from))
+#endif
 
 #define SENSORS THENAR_GLOVE_SENSORS
 #define FARTHEST 65535
@@ -16,7 +19,7 @@ typedef struct {
     int64_t second;
 } point_codes;
 
-static const point_codes points[SENSORS] IN_FLASH = {
+static const point_codes points[SENSORS] THENAR_FLASH = {
     {INT64_C(16777216), INT64_C(4278190080)},
     {INT64_C(16777216), INT64_C(4278190080)},
 };
@@ -26,7 +29,7 @@ typedef struct {
     int32_t second;
 } point_readings;
 
-static const point_readings known[SENSORS] IN_FLASH = {
+static const point_readings known[SENSORS] THENAR_FLASH = {
     {0, 0},
     {0, 0},
 };
@@ -63,6 +66,74 @@ static uint16_t nearest(const point_readings *at, const point_codes *codes, int3
     return (code < most) ? (uint16_t)code : most;
 }
 
+#define HIGHEST_VALUE 0xFE000000u /* leaves room for an offset */
+
+/* Prepare what most readings need: the code of a reading is `base`, and the upper bits of offset + gain * distance from
+   `from`. Both factors are rounded down. Rests that this could change, and codes midway, are left to nearest(). */
+static void prepare(thenar_glove_line *line, const point_codes *codes)
+{
+    const bool rises = line->readings[0] < line->readings[1];
+    const int32_t begin = line->readings[rises ? 0 : 1];
+    const int32_t span = line->readings[rises ? 1 : 0] - begin;
+    const int64_t low = rises ? codes->first : codes->second;
+    const int64_t step = (rises ? codes->second : codes->first) - low;
+    const uint64_t steep = (uint64_t)((step < 0) ? -step : step) / (uint64_t)span;
+    const int64_t unit = (int64_t)span * (INT64_C(1) << FRACTION);
+    uint32_t inexact;
+
+    line->window = 4u;
+    while ((line->window < ((uint32_t)span * 4u)) && (line->window < 131072u)) {
+        line->window *= 2u;
+    }
+    line->falls = step < 0;
+    line->from = begin + (line->falls ? (int32_t)(line->window / 2u) : -(int32_t)(line->window / 2u));
+    const int64_t at_from = (low * span) + (step * ((int64_t)line->from - begin)) + (unit / 2);
+    const int64_t rest = ((at_from % unit) + unit) % unit;
+
+    line->base = (int32_t)((at_from - rest) / unit);
+    line->shift = 8u;
+    while ((line->shift > 0u) && (((steep * line->window) >> (8u - line->shift)) >= HIGHEST_VALUE)) {
+        line->shift--;
+    }
+    line->offset = (uint32_t)(((uint64_t)rest / (uint64_t)span) >> (8u - line->shift));
+    line->gain = (uint32_t)(steep >> (8u - line->shift));
+    line->mask = ((uint32_t)0x10000u << line->shift) - 1u;
+    inexact = (2u * line->window) + 2u;
+    line->safe = 0u;
+    line->exact = false;
+    if ((((steep * line->window) >> (8u - line->shift)) < HIGHEST_VALUE) && (line->mask > inexact)) {
+        const uint64_t dropped = (uint64_t)((1u << (8u - line->shift)) - 1u);
+
+        line->safe = line->mask - inexact;
+        line->exact = ((step % span) == 0) && (((steep | ((uint64_t)rest / (uint64_t)span)) & dropped) == 0u);
+    }
+}
+
+/* Return the code of a reading in the units of the readings at the points. */
+static uint16_t code_on(const thenar_glove_line *line, uint16_t sensor, int32_t reading)
+{
+    const int32_t held = (reading < -FARTHEST) ? -FARTHEST : ((reading > FARTHEST) ? FARTHEST : reading);
+    const int32_t distance = line->falls ? (line->from - held) : (held - line->from);
+    const uint32_t value = line->offset + (line->gain * (uint32_t)distance);
+    const uint32_t rest = value & line->mask;
+    const bool sure = line->exact || ((rest - 1u) < line->safe);
+    uint16_t code;
+
+    if (sure && (distance >= 0) && ((uint32_t)distance <= line->window)) {
+        int32_t whole = line->base + (int32_t)((uint16_t)(value >> 16) >> line->shift);
+
+        whole -= ((rest == 0u) && ((whole % 2) != 0)) ? 1 : 0; /* halfway between two */
+        code = (whole < 0) ? 0u : ((whole > UINT16_MAX) ? UINT16_MAX : (uint16_t)whole);
+    } else {
+        const point_readings at = {line->readings[0], line->readings[1]};
+        point_codes own;
+
+        COPY(own, points[sensor]);
+        code = nearest(&at, &own, held, UINT16_MAX);
+    }
+    return code;
+}
+
 /* Return a reading in the units of the readings at the points. */
 static int32_t coded(uint16_t sensor, int32_t reading)
 {
@@ -72,14 +143,27 @@ static int32_t coded(uint16_t sensor, int32_t reading)
     return found;
 }
 
+static void set_line(thenar_glove_codes *codes, uint16_t sensor, int32_t first, int32_t second)
+{
+    thenar_glove_line *const line = &codes->lines[sensor];
+
+    line->readings[0] = first;
+    line->readings[1] = second;
+    if (first != second) {
+        point_codes own;
+
+        COPY(own, points[sensor]);
+        prepare(line, &own);
+    }
+}
+
 void thenar_glove_codes_init(thenar_glove_codes *codes)
 {
     for (uint16_t sensor = 0u; sensor < SENSORS; ++sensor) {
         point_readings own;
 
         COPY(own, known[sensor]);
-        codes->readings[sensor][0] = own.first;
-        codes->readings[sensor][1] = own.second;
+        set_line(codes, sensor, own.first, own.second);
     }
 }
 
@@ -94,8 +178,7 @@ bool thenar_glove_calibrate(thenar_glove_codes *codes, uint16_t sensor, int32_t 
 
         line = near && (first != second) && ((first - second) <= FARTHEST) && ((second - first) <= FARTHEST);
         if (line) {
-            codes->readings[sensor][0] = first;
-            codes->readings[sensor][1] = second;
+            set_line(codes, sensor, first, second);
         }
     }
     return line;
@@ -103,7 +186,7 @@ bool thenar_glove_calibrate(thenar_glove_codes *codes, uint16_t sensor, int32_t 
 
 bool thenar_glove_calibrated(const thenar_glove_codes *codes, uint16_t sensor)
 {
-    return (sensor < SENSORS) && (codes->readings[sensor][0] != codes->readings[sensor][1]);
+    return (sensor < SENSORS) && (codes->lines[sensor].readings[0] != codes->lines[sensor].readings[1]);
 }
 
 uint16_t thenar_glove_code_of(const thenar_glove_codes *codes, uint16_t sensor, int32_t reading)
@@ -111,21 +194,16 @@ uint16_t thenar_glove_code_of(const thenar_glove_codes *codes, uint16_t sensor, 
     uint16_t code = 0u;
 
     if (thenar_glove_calibrated(codes, sensor)) {
-        const point_readings at = {codes->readings[sensor][0], codes->readings[sensor][1]};
-        point_codes own;
-
-        COPY(own, points[sensor]);
-        code = nearest(&at, &own, coded(sensor, reading), UINT16_MAX);
+        code = code_on(&codes->lines[sensor], sensor, coded(sensor, reading));
     }
     return code;
 }
 
-void thenar_glove_set_reading(
-    thenar_glove *glove, const thenar_glove_codes *codes, uint16_t sensor, int32_t reading)
+void thenar_glove_set_reading(thenar *hand, const thenar_glove_codes *codes, uint16_t sensor, int32_t reading)
 {
     const uint16_t code = thenar_glove_code_of(codes, sensor, reading);
 
     if (sensor < THENAR_GLOVE_JOINTS) {
-        glove->input.codes[sensor] = (thenar_glove_code)((code < UINT8_MAX) ? code : UINT8_MAX);
+        thenar_set_code(hand, sensor, code);
     }
 }

@@ -29,9 +29,24 @@ enum {
     THENAR_GLOVE_SENSOR_INDEX_PIJ = 1,
 };
 
-/** The readings of each sensor at its two points. A copy is another calibration. */
+/** The line of a sensor; private. */
 typedef struct {
-    int32_t readings[THENAR_GLOVE_SENSORS][2]; /* equal: unknown */
+    int32_t readings[2]; /* at its two points; equal: unknown */
+    int32_t from;        /* a reading beside them, */
+    int32_t base;        /* the whole part of its code, */
+    uint32_t offset;     /* and the rest, in parts of 2^-(16 + shift), as is */
+    uint32_t gain;       /* what a reading more adds, */
+    uint32_t window;     /* up to so many readings more, */
+    uint32_t mask;       /* the parts of a code, */
+    uint32_t safe;       /* and the largest rest whose code no rounding changes */
+    uint8_t shift;
+    bool exact; /* nothing was rounded */
+    bool falls; /* codes rise where readings fall */
+} thenar_glove_line;
+
+/** The calibration of each sensor. A copy is another one. */
+typedef struct {
+    thenar_glove_line lines[THENAR_GLOVE_SENSORS];
 } thenar_glove_codes;
 
 /** Initialise with the known readings. */
@@ -52,8 +67,7 @@ bool thenar_glove_calibrated(const thenar_glove_codes *codes, uint16_t sensor);
 uint16_t thenar_glove_code_of(const thenar_glove_codes *codes, uint16_t sensor, int32_t reading);
 
 /** Put a reading into the input: the code of a joint. */
-void thenar_glove_set_reading(
-    thenar_glove *glove, const thenar_glove_codes *codes, uint16_t sensor, int32_t reading);
+void thenar_glove_set_reading(thenar *hand, const thenar_glove_codes *codes, uint16_t sensor, int32_t reading);
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * thenar_block.h: the sums of eight grasp types, which stay in registers while rows are added; for thenar.c alone.
+ *
+ * A core of 32 bits takes two entries as one word: the sums of words are the words of the sums, modulo 2^32. They start
+ * 32768 too high, so that neither half of the last one is negative. An AVR adds entry after entry.
+ */
+#ifndef THENAR_BLOCK_H
+#define THENAR_BLOCK_H
+
+#include "thenar.h"
+
+#ifdef __AVR__
+typedef struct {
+    uint16_t a, b, c, d, e, f, g, h;
+} block;
+
+static inline void add_row(block *sums, const int16_t *row)
+{
+    sums->a += THENAR_READ_16(&row[0]);
+    sums->b += THENAR_READ_16(&row[1]);
+    sums->c += THENAR_READ_16(&row[2]);
+    sums->d += THENAR_READ_16(&row[3]);
+    sums->e += THENAR_READ_16(&row[4]);
+    sums->f += THENAR_READ_16(&row[5]);
+    sums->g += THENAR_READ_16(&row[6]);
+    sums->h += THENAR_READ_16(&row[7]);
+}
+
+#define TIMES(slope) ((uint16_t)(int16_t)(distance * (int8_t)THENAR_READ_8(slope)))
+
+static inline void add_line(block *sums, uint8_t distance, const int8_t *slopes)
+{
+    sums->a += TIMES(&slopes[0]);
+    sums->b += TIMES(&slopes[1]);
+    sums->c += TIMES(&slopes[2]);
+    sums->d += TIMES(&slopes[3]);
+    sums->e += TIMES(&slopes[4]);
+    sums->f += TIMES(&slopes[5]);
+    sums->g += TIMES(&slopes[6]);
+    sums->h += TIMES(&slopes[7]);
+}
+
+static inline void put(int16_t *scores, const block *sums)
+{
+    uint16_t *const to = (uint16_t *)scores;
+
+    to[0] = sums->a;
+    to[1] = sums->b;
+    to[2] = sums->c;
+    to[3] = sums->d;
+    to[4] = sums->e;
+    to[5] = sums->f;
+    to[6] = sums->g;
+    to[7] = sums->h;
+}
+#else
+typedef struct {
+    uint32_t a, b, c, d;
+} block;
+
+static inline void add_row(block *sums, const uint32_t *row)
+{
+    sums->a += row[0];
+    sums->b += row[1];
+    sums->c += row[2];
+    sums->d += row[3];
+}
+
+static inline void add_line(block *sums, uint8_t distance, const uint32_t *slopes)
+{
+    sums->a += distance * slopes[0];
+    sums->b += distance * slopes[1];
+    sums->c += distance * slopes[2];
+    sums->d += distance * slopes[3];
+}
+
+static inline void put_pair(int16_t *scores, uint32_t pair)
+{
+    scores[0] = (int16_t)((int32_t)(pair & 0xffffu) - 32768);
+    scores[1] = (int16_t)((int32_t)(pair >> 16) - 32768);
+}
+
+static inline void put(int16_t *scores, const block *sums)
+{
+    put_pair(&scores[0], sums->a);
+    put_pair(&scores[2], sums->b);
+    put_pair(&scores[4], sums->c);
+    put_pair(&scores[6], sums->d);
+}
+#endif
+
+#endif
