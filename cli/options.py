@@ -64,8 +64,8 @@ CHOOSING = ("placement", "keep", "levels", "keep_joints", "prune", *LIMITS, "rob
 
 
 def recipe_options(*names: str, **changes: Any) -> Callable[[Command], Command]:
-    """Return what adds an option for each of these fields of a `Recipe`, in this order; `changes` replace properties of
-    a `Choice`.
+    """Return a decorator that adds an option for each of these fields of a `Recipe`, in this order; `changes` replace
+    properties of a `Choice`.
     """
     described = choices()
 
@@ -97,7 +97,7 @@ def _recipe_option(choice: Choice) -> Callable[[Command], Command]:
 
 
 def _kind_of(choice: Choice) -> click.ParamType[Any]:
-    """Return what converts the text of an option."""
+    """Return the type that converts the text of an option."""
     if choice.name == "placement":
         return method_name
     if choice.names:

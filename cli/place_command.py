@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 @recipe_options("inputs")
 @layout_option
 @glove_option
-@recipe_options("folds", default=0, help="Measure the accuracy with the kept elements, in so many folds; 0: do not.")
+@recipe_options("folds", default=0, help="Folds that measure the accuracy with the kept elements; 0: do not.")
 @recipe_options("seed", "by")
 @trainer_option(AUTO)
 @jobs_option()

@@ -192,7 +192,7 @@ def _choice_of(name: str, hint: Any, default: Any) -> Choice:
     metas = list(_metas(hint))
     (about,) = (meta for meta in metas if meta.extra)
     more: dict[str, Any] = dict(about.extra or {})
-    # Of several types, the outermost stands first.
+    # Of several types, the outermost is first.
     range_of = next((meta for meta in metas if meta is not about), Meta())
     kind, names = _kind(hint)
     most = more.get("most", range_of.le)

@@ -145,7 +145,7 @@ class Difference(Struct, frozen=True):
 class TargetCheck(Struct, frozen=True, kw_only=True):
     """The result for one part.
 
-    layout     how many switches share a look-up
+    layout     how many switches share a lookup
     missing    whether inputs are missing in every frame; in every second frame it is a single one
     frames     how many were classified; `differing` of them differ from Python in a score, grasp type, margin,
                probability or state of a segment

@@ -14,7 +14,7 @@ from .targets import TARGETS, Target
 _NOTE_WIDTH = 114
 # avr-gcc cannot make a larger object.
 _LARGEST_ARRAY = 32767
-# Switches share look-ups, which takes more flash and less time, unless the classifier then takes half of the flash.
+# Switches share lookups, which takes more flash and less time, unless the classifier then takes half of the flash.
 _FAST_SHARE = 2
 
 
@@ -38,8 +38,8 @@ class Fit:
 
 
 def features(layout: Layout) -> str:
-    """Return how many switches share a look-up, in words."""
-    return f"{layout.group} switches a look-up" if layout.group > 1 else "one switch a look-up"
+    """Return how many switches share a lookup, in words."""
+    return f"{layout.group} switches a lookup" if layout.group > 1 else "one switch a lookup"
 
 
 def in_words(cost: Cost, target: Target) -> str:

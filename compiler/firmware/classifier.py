@@ -36,7 +36,7 @@ _FOLDER = "tables/"
 class Library:
     """The classifier for a target's files: the name of its tables, the names in it, and their layout.
 
-    name   of its own files, thenar_NAME: one that words.check_name allows
+    name   of the files, thenar_NAME: one that words.check_name allows
     notes  lines for the opening comment of its header
     glove  the known sensors of a glove; None: only the names are known
     """
@@ -107,7 +107,7 @@ def _lines(cells: Iterable[str]) -> list[str]:
 
 def _values(name: str, names: Names, layout: Layout, notes: Sequence[str]) -> dict[str, object]:
     """Return the values for the templates of the tables."""
-    tables, answers = layout.tables, answers_of(names)
+    tables, texts = layout.tables, answers_of(names)
     own, pairs = layout.bins[: len(layout.binned)], layout.bins[len(layout.binned) :]
     return {
         "name": name,
@@ -119,8 +119,8 @@ def _values(name: str, names: Names, layout: Layout, notes: Sequence[str]) -> di
         "switches": tables.n_switches,
         "joints": tables.n_joints,
         "nothing_held": none_of(names),
-        "names": [string(f"{answer}\0") for answer in answers[:-1]] + [string(answers[-1])],
-        "name_bytes": 1 + max(len(answer.encode()) for answer in answers),
+        "names": [string(f"{text}\0") for text in texts[:-1]] + [string(texts[-1])],
+        "name_bytes": 1 + max(len(text.encode()) for text in texts),
         "memory": layout.memory,
         "row_pairs": layout.row_pairs,
         "group": layout.group,

@@ -20,7 +20,7 @@ from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
 from . import FirmwareError
 
 GROUPS = (4, 2, 1)
-"""The numbers of switches that can share a look-up, the fastest first."""
+"""The numbers of switches that can share a lookup, the fastest first."""
 _BLOCK = 4  # pairs that the core adds up at once: the shortest row
 _MOST = 65535  # places of rows and thresholds are numbers of 16 bits
 
@@ -53,7 +53,7 @@ class Bins:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A layout of `tables` in which `group` switches share a look-up. Raises FirmwareError where it is too large."""
+    """A layout of `tables` in which `group` switches share a lookup. Raises FirmwareError where it is too large."""
 
     tables: IntegerTables
     group: int = GROUPS[0]
@@ -76,7 +76,7 @@ class Layout:
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
-        """The switches that share a look-up, by their numbers."""
+        """The switches that share a lookup, by their numbers."""
         count = self.tables.n_switches
         return tuple(tuple(range(at, min(at + self.group, count))) for at in range(0, count, self.group))
 

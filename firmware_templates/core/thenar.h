@@ -95,7 +95,7 @@ typedef struct {
     uint16_t none;       /* the number of "nothing is held" */
     uint16_t names;      /* how many: the classes, and "none" where it is not one of them */
     uint16_t row_pairs;  /* at least 4 */
-    uint8_t group;       /* switches that share a look-up: 1, 2 or 4 */
+    uint8_t group;       /* switches that share a lookup: 1, 2 or 4 */
     uint8_t groups_of_byte;
     uint16_t bins;       /* how many */
     uint16_t lines;

@@ -41,7 +41,7 @@ def test_a_folder_is_written_and_its_cost_told_and_what_to_do_next(
     done = thenar("firmware", build, "--target", target, "-o", tmp_path / "made")
     assert done.returncode == 0, done.stderr
     cost = r"about \d+ (cycles|instructions) a frame, \d+ bytes of flash, \d+ of RAM$"
-    assert re.search(rf"^layout for [^:]*: \w+ switch(es)? a look-up, {cost}", done.stdout, re.MULTILINE)
+    assert re.search(rf"^layout for [^:]*: \w+ switch(es)? a lookup, {cost}", done.stdout, re.MULTILINE)
     made = tmp_path / "made"
     assert done.stdout.endswith(f"{made}: firmware for {target}; {NEXT_STEP[target].format(made=made)}\n")
     assert ("Makefile" in content(made)) == ("`make " in done.stdout)

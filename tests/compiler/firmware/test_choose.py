@@ -46,7 +46,7 @@ def test_a_fit_is_said_in_a_sentence(tables: IntegerTables) -> None:
             f"for {part.title or part.part}: {features(fit.layout)}, about {fit.cost.cycles} {unit} a frame, "
             f"{fit.cost.flash} bytes of flash, {fit.cost.ram} of RAM"
         )
-    assert fit_for(TARGETS["host"], tables).words == "for this machine: 4 switches a look-up"
+    assert fit_for(TARGETS["host"], tables).words == "for this machine: 4 switches a lookup"
 
 
 def test_what_takes_too_much_flash_or_ram_is_refused_with_a_remedy(wide_tables: IntegerTables) -> None:

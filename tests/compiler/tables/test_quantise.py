@@ -51,7 +51,7 @@ shapes = st.tuples(st.integers(0, 14), st.integers(0, 4)).filter(any)
 
 
 def spans_by_counting(integers: IntegerTables, group_size: int) -> list[int]:
-    """How far apart what a look-up adds can be, for groups of up to `group_size` switches that begin anywhere."""
+    """How far apart what a lookup adds can be, for groups of up to `group_size` switches that begin anywhere."""
     spans = [int(np.ptp(rows.astype(int), axis=0).max()) for rows in integers.joint_rows]
     rows = integers.switch_rows.astype(int)
     for first in range(len(rows)):

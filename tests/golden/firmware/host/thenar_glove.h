@@ -2,7 +2,7 @@
  * @file thenar_glove.h
  * @brief The numbers and tables of 3 grasp types from 6 switches and 2 joints of a glove.
  *
- * Layout for this machine: 4 switches a look-up.
+ * Layout for this machine: 4 switches a lookup.
  * From the tables 0123456789abcdef; thenar 0.1.0, template tables/thenar_NAME.h.j2.
  */
 #ifndef THENAR_GLOVE_H

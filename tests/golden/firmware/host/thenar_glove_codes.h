@@ -32,11 +32,11 @@ enum {
 /** The line of a sensor; private. */
 typedef struct {
     int32_t readings[2]; /* at its two points; equal: unknown */
-    int32_t from;        /* a reading beside them, */
+    int32_t from;        /* a reading near them, */
     int32_t base;        /* the whole part of its code, */
     uint32_t offset;     /* and the rest, in parts of 2^-(16 + shift), as is */
     uint32_t gain;       /* what a reading more adds, */
-    uint32_t window;     /* up to so many readings more, */
+    uint32_t window;     /* for at most this many more, */
     uint32_t mask;       /* the parts of a code, */
     uint32_t safe;       /* and the largest rest whose code no rounding changes */
     uint8_t shift;
