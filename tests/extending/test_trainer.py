@@ -58,7 +58,7 @@ def test_a_trainer_of_another_package_is_chosen_by_its_name_and_makes_a_build_th
 def test_the_trainer_is_evaluated_as_the_papers_is(installed: Any, recordings: Path) -> None:
     given = ("--trainer", "naive-bayes", "--tables", "compositions", "--protocol", "nested", "--repeats", "1")
     study = json.loads(installed.thenar("evaluate", str(recordings), *given, "--json"))
-    assert study["options"]["trainer"] == "naive-bayes"
+    assert study["options"]["recipe"]["trainer"] == "naive-bayes"
     (table,) = study["tables"]
     assert table["rows"][0]["rate"]["mean"] > 0.8
 
