@@ -196,8 +196,9 @@ def command(
     chosen = {name: asked.pop(name) for name in (*CHOOSING, "folds", "seed")}
     recipe = changed(Recipe(), chosen | training)
     if streams:
-        if limit := next((name for name in LIMITS if chosen[name]), ""):
-            raise click.UsageError(f"--{limit.replace('_', '-')} is not for --streams: leave one of them out.")
+        given = {name: chosen[name] for name in LIMITS} | {"layout": layout, "glove": glove}
+        if unused := next((name for name, value in given.items() if value), ""):
+            raise click.UsageError(f"--{unused.replace('_', '-')} is not for --streams: leave one of them out.")
         _evaluate_streams(grasps, recipe, asked["subjects"], jobs, output)
         return
     asked["tables"] = tuple(name for name in TABLES if name in asked["tables"])

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from thenar.runtime.recipe import AUTO
 
@@ -93,6 +94,7 @@ def command(
     training = asked_settings(context, chosen)
     recipe = changed(Recipe(), chosen | training)
     _check(recipe, show_tree, draw)
+    _check_measured(context, recipe, training)
     keep_apart(grasps, glove, layout, draw, output)
     grasp_set = GraspSet.load(grasps)
     terms = terms_of(recipe, grasp_set, layout, glove)
@@ -116,9 +118,16 @@ def command(
         out().print(f"accuracy, {rate}")
 
 
+def _check_measured(context: click.Context, recipe: "Recipe", training: dict[str, Any]) -> None:
+    """Raise UsageError for options of an accuracy that is not measured."""
+    for name in () if recipe.folds else ("by", "seed", *training):
+        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"--{name.replace('_', '-')} is for an accuracy: add --folds, or leave it out.")
+
+
 def _check(recipe: "Recipe", show_tree: bool, draw: Path | None) -> None:
     """Raise UsageError if options conflict."""
-    from thenar.compiler.placement.methods.base import METHODS, PAPERS
+    from thenar.compiler.placement.methods.base import PAPERS
 
     for wrong, reason in (
         (wants_json() and show_tree, "--tree is for people and --json for machines: give one of them"),
@@ -130,7 +139,6 @@ def _check(recipe: "Recipe", show_tree: bool, draw: Path | None) -> None:
     ):
         if wrong:
             raise click.UsageError(reason)
-    METHODS.named(recipe.placement).check_given(recipe.keep, recipe.prune)
 
 
 def _print(placement: "Placement") -> None:

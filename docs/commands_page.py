@@ -15,8 +15,8 @@ follow are described in [the command line](commands.md).
 
 ## The recipe
 
-`compile`, `place` and `evaluate` share these choices, and `thenar.compiler.Recipe` has them as fields. After a choice
-of one part, that part and all below it are made again: placement and limits, training, tables, rates.
+`compile`, `place` and `evaluate` share these choices, and `thenar.compiler.Recipe` has them as fields. If you change
+one, its part and all later parts are computed again: placement and limits, training, tables, rates.
 
 """
 

@@ -303,7 +303,8 @@ def place(
     MemberError
         If there is no such method.
     PlacementError
-        If the set has no switches, no rows, or more grasp types than a build can hold.
+        If the set has no switches, no rows, or more grasp types than a build can hold, or if the method lacks the
+        number that it takes.
 
     Examples
     --------
@@ -312,10 +313,12 @@ def place(
     4
     """
     recipe = changed(recipe or Recipe(), changes)
+    method = METHODS.named(recipe.placement)
+    method.check_given(recipe.keep, recipe.prune)
     fingerprint, grasp_set = grasp_set.fingerprint(), grasp_set.without_none()
     samples = _samples_of(grasp_set, recipe)
     selection = select(samples, recipe, ports, limits)
-    method, chosen = METHODS.named(recipe.placement), selection.chosen
+    chosen = selection.chosen
     return Placement(
         method=method.name,
         parameter=float(recipe.keep or 0 if method.by_number else recipe.prune),

@@ -30,7 +30,7 @@ void thenar_init(thenar *hand, const thenar_model *model, uint16_t *memory)
     hand->scores = (int16_t *)(hand->codes + model->joints);
     hand->found = (uint16_t *)hand->scores + (2u * model->row_pairs);
     hand->distances = (uint8_t *)(hand->found + model->found);
-    hand->lost = hand->distances + model->lines;
+    hand->lost = hand->distances + model->n_lines;
     hand->n_lost = 0u;
     for (uint8_t *byte = hand->switches; byte < (hand->lost + bytes); byte++) {
         *byte = 0u;
@@ -75,7 +75,7 @@ void thenar_lose_joint(thenar *hand, uint16_t joint, bool lost)
     }
 }
 
-/* The number of thresholds below the joint's code, by halves. */
+/* Return how many thresholds are below the joint's code, by halving. */
 static inline unsigned bin_of(const thenar *hand, const thenar_bins *bins)
 {
     const uint16_t code = hand->codes[THENAR_READ_16(&bins->joint)];
@@ -90,7 +90,7 @@ static inline unsigned bin_of(const thenar *hand, const thenar_bins *bins)
     return below;
 }
 
-/* Switches: a group adds one row, the sum of those of its closed switches. Its rows follow the start, none for none. */
+/* Switches: a group adds one row, the sum of the rows of its closed switches; with all open it adds none. */
 static uint16_t *find_switches(const thenar *hand, uint16_t *found)
 {
     const unsigned pairs = hand->model->row_pairs;
@@ -119,15 +119,15 @@ static uint16_t *find_switches(const thenar *hand, uint16_t *found)
 static uint16_t *find_bins(const thenar *hand, uint16_t *found)
 {
     const unsigned pairs = hand->model->row_pairs;
-    const thenar_bins *bins = hand->model->each_bins;
-    const thenar_grid *grid = hand->model->each_grid;
+    const thenar_bins *bins = hand->model->bins;
+    const thenar_grid *grid = hand->model->grids;
 
-    for (unsigned left = hand->model->bins; left > 0u; left--) {
+    for (unsigned left = hand->model->n_bins; left > 0u; left--) {
         *found = (uint16_t)(THENAR_READ_16(&bins->first_row) + (bin_of(hand, bins) * pairs));
         found++;
         bins++;
     }
-    for (unsigned left = hand->model->grids; left > 0u; left--) {
+    for (unsigned left = hand->model->n_grids; left > 0u; left--) {
         const unsigned before = bin_of(hand, &grid->down) * THENAR_READ_16(&grid->width);
 
         *found = (uint16_t)(THENAR_READ_16(&grid->down.first_row) + ((before + bin_of(hand, &grid->across)) * pairs));
@@ -141,10 +141,10 @@ static uint16_t *find_bins(const thenar *hand, uint16_t *found)
 static void find_distances(const thenar *hand)
 {
     const uint16_t *const codes = hand->codes;
-    const thenar_line *line = hand->model->each_line;
+    const thenar_line *line = hand->model->lines;
     uint8_t *distance = hand->distances;
 
-    for (const uint8_t *const end = &distance[hand->model->lines]; distance < end; distance++) {
+    for (const uint8_t *const end = &distance[hand->model->n_lines]; distance < end; distance++) {
         const unsigned code = codes[THENAR_READ_16(&line->joint)];
         const unsigned low = THENAR_READ_16(&line->low);
         const unsigned span = THENAR_READ_16(&line->span);
@@ -163,7 +163,7 @@ static void add(thenar *hand, const uint16_t *end)
 {
     const uint16_t pairs = hand->model->row_pairs;
     const thenar_slopes *const slopes = hand->model->slopes;
-    const uint8_t *const last = hand->distances + hand->model->lines;
+    const uint8_t *const last = hand->distances + hand->model->n_lines;
 
     for (uint16_t next = 0u; next < pairs; next = (uint16_t)(next + 4u)) {
         const uint16_t first = ((next + 4u) <= pairs) ? next : (uint16_t)(pairs - 4u);
@@ -182,7 +182,7 @@ static void add(thenar *hand, const uint16_t *end)
     }
 }
 
-/* Missing inputs are open or at code 0, where they were added; add what their means are more. */
+/* Missing inputs were added as open, or as code 0: add the difference to their means. */
 static void add_means(thenar *hand)
 {
     const thenar_model *const model = hand->model;
@@ -311,16 +311,16 @@ uint16_t thenar_probability(const thenar *hand, uint16_t grasp)
 
 uint16_t thenar_name(const thenar_model *model, uint16_t grasp, char *text, uint16_t size)
 {
-    const char *from = model->texts;
+    const char *from = model->names;
     uint16_t length = 0u;
 
-    for (uint16_t at = 0u; (at < grasp) && (at < model->names); at++) {
+    for (uint16_t at = 0u; (at < grasp) && (at < model->n_names); at++) {
         while (THENAR_READ_8(from) != 0) {
             from++;
         }
         from++;
     }
-    while ((grasp < model->names) && (THENAR_READ_8(&from[length]) != 0)) {
+    while ((grasp < model->n_names) && (THENAR_READ_8(&from[length]) != 0)) {
         if ((length + 1u) < size) {
             text[length] = (char)THENAR_READ_8(&from[length]);
         }

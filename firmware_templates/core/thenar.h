@@ -55,7 +55,7 @@ typedef uint32_t thenar_slopes;
 extern "C" {
 #endif
 
-/** A joint that adds the row of the bin of its code: the number of thresholds below it, of 2 `half` - 1. */
+/** A joint that adds the row of the bin of its code: the bin is how many of its 2 `half` - 1 thresholds are below. */
 typedef struct {
     uint16_t joint;
     uint16_t first_threshold;
@@ -79,7 +79,7 @@ typedef struct {
     thenar_bins across;
 } thenar_grid;
 
-/** What the training recordings of each grasp type reach: frames beyond are rejected. */
+/** The limits of the training recordings of each grasp type: a frame beyond them is rejected. */
 typedef struct {
     const int16_t *least_scores; /* [classes] */
     const uint16_t *closed;      /* [classes][2]: fewest and most closed switches */
@@ -93,24 +93,24 @@ typedef struct {
     uint16_t switches;
     uint16_t joints;
     uint16_t none;       /* the number of "nothing is held" */
-    uint16_t names;      /* how many: the classes, and "none" where it is not one of them */
+    uint16_t n_names;    /* the classes, and "none" where it is not one of them */
     uint16_t row_pairs;  /* at least 4 */
     uint8_t group;       /* switches that share a lookup: 1, 2 or 4 */
     uint8_t groups_of_byte;
-    uint16_t bins;       /* how many */
-    uint16_t lines;
-    uint16_t grids;
+    uint16_t n_bins;
+    uint16_t n_lines;
+    uint16_t n_grids;
     uint16_t found;      /* the most rows that a frame adds, the start included */
     uint16_t step;       /* of the softmax, with `shift` */
     uint8_t shift;
     const thenar_pair *rows;        /* the start; each group's sums but that of none; rows of bins; rows of grids */
     const thenar_slopes *slopes;    /* a row for each line */
-    const thenar_bins *each_bins;
-    const thenar_line *each_line;
-    const thenar_grid *each_grid;
+    const thenar_bins *bins;
+    const thenar_line *lines;
+    const thenar_grid *grids;
     const uint16_t *thresholds;
     const int16_t *means;           /* [switches + joints][classes]: what a missing input adds to open, or to code 0 */
-    const char *texts;              /* the names, each with its end */
+    const char *names;              /* each with its end */
     const thenar_rejection *rejection;
 } thenar_model;
 
@@ -129,16 +129,16 @@ typedef struct {
 /** Initialise: all switches open, all codes 0, nothing missing. The tables' header has the words of `memory`. */
 void thenar_init(thenar *hand, const thenar_model *model, uint16_t *memory);
 
-/** Set whether a switch is closed. Ignored while it is missing, and for numbers that the model has not. */
+/** Set whether a switch is closed. Ignored while it is missing, and for unknown numbers. */
 void thenar_set_switch(thenar *hand, uint16_t number, bool closed);
 
 /** Set a joint's code, in the units of the recordings. Ignored while it is missing, and for unknown numbers. */
 void thenar_set_code(thenar *hand, uint16_t joint, uint16_t code);
 
-/** Set whether a switch is missing: the mean of its rows replaces it, as in Python. It is open when it is back. */
+/** Set whether a switch is missing: the mean of its rows replaces it, as in Python. Then it starts open. */
 void thenar_lose_switch(thenar *hand, uint16_t number, bool lost);
 
-/** Set whether a joint is missing: the mean of its rows replaces it, as in Python. Its code is 0 when it is back. */
+/** Set whether a joint is missing: the mean of its rows replaces it, as in Python. Then its code starts at 0. */
 void thenar_lose_joint(thenar *hand, uint16_t joint, bool lost);
 
 /** Recognise the grasp type from the inputs: the one with the largest score, the first of equal ones. */

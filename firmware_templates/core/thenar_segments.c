@@ -11,14 +11,14 @@
 
 void thenar_segment_start(thenar_segmenter *stream, const thenar_segment_model *model, uint16_t *memory)
 {
-    const uint16_t masks = (uint16_t)((model->states + 7u) / 8u);
-    const thenar_segmenter fresh = {.model = model, .newest = (uint8_t)(model->states - 1u)};
+    const uint16_t masks = (uint16_t)((model->n_states + 7u) / 8u);
+    const thenar_segmenter fresh = {.model = model, .newest = (uint8_t)(model->n_states - 1u)};
 
     *stream = fresh;
     stream->paths = (thenar_segment_path *)memory;
-    stream->ticks = (thenar_segment_tick *)(stream->paths + model->states);
+    stream->ticks = (thenar_segment_tick *)(stream->paths + model->n_states);
     stream->at = (uint16_t *)(stream->ticks + model->lag);
-    stream->waiting = stream->at + model->rings;
+    stream->waiting = stream->at + model->n_rings;
     stream->begun = (uint8_t *)(stream->waiting + model->waiting);
     for (uint8_t *byte = (uint8_t *)memory; byte < (stream->begun + (2u * masks * model->lag)); byte++) {
         *byte = 0u;
@@ -27,8 +27,8 @@ void thenar_segment_start(thenar_segmenter *stream, const thenar_segment_model *
     stream->first = 0x4000u;
     stream->none = 0x4000u;
     stream->ending = 0x4000u;
-    for (uint8_t ring = 0u; ring < model->rings; ring++) {
-        stream->at[ring] = THENAR_READ_16(&model->each_ring[ring].begin);
+    for (uint8_t ring = 0u; ring < model->n_rings; ring++) {
+        stream->at[ring] = THENAR_READ_16(&model->rings[ring].begin);
     }
 }
 
@@ -57,7 +57,7 @@ static uint16_t frame_cost(const thenar_segment_model *model, uint16_t top, int1
    return the cost at its end. */
 static uint16_t take(const thenar_segmenter *stream, uint8_t k, uint16_t entered, uint16_t cost)
 {
-    const thenar_segment_state *const state = &stream->model->each_state[k];
+    const thenar_segment_state *const state = &stream->model->states[k];
     thenar_segment_path *const path = &stream->paths[k];
     const uint16_t began = (uint16_t)(entered - path->sum);
     const uint16_t sum = (uint16_t)(path->sum + cost + THENAR_READ_16(&state->stay));
@@ -84,9 +84,9 @@ static uint16_t take(const thenar_segmenter *stream, uint8_t k, uint16_t entered
 
 static void turn_rings(const thenar_segmenter *stream)
 {
-    const thenar_segment_ring *ring = stream->model->each_ring;
+    const thenar_segment_ring *ring = stream->model->rings;
 
-    for (uint8_t number = 0u; number < stream->model->rings; number++) {
+    for (uint8_t number = 0u; number < stream->model->n_rings; number++) {
         const uint16_t next = (uint16_t)(stream->at[number] + THENAR_READ_16(&ring->width));
 
         stream->at[number] = (next == THENAR_READ_16(&ring->end)) ? THENAR_READ_16(&ring->begin) : next;
@@ -97,11 +97,11 @@ static void turn_rings(const thenar_segmenter *stream)
 static void advance(thenar_segmenter *stream, const int16_t *scores, uint16_t top, uint16_t none_cost)
 {
     const thenar_segment_model *const model = stream->model;
-    const thenar_segment_state *state = model->each_state;
-    const uint8_t types = (uint8_t)(model->states - 1u);
+    const thenar_segment_state *state = model->states;
+    const uint8_t types = (uint8_t)(model->n_states - 1u);
     uint16_t first = 0u, ending = 0u, least = 0u;
 
-    for (uint8_t eight = 0u; eight < ((model->states + 7u) / 8u); eight++) {
+    for (uint8_t eight = 0u; eight < ((model->n_states + 7u) / 8u); eight++) {
         mark(stream, stream->begun + (2u * eight * model->lag), 0u);
     }
     for (uint8_t k = 0u; k < types; k++) {
@@ -146,7 +146,7 @@ static uint8_t row_before(const thenar_segmenter *stream, uint8_t row, uint8_t t
 static uint8_t state_before(thenar_segmenter *stream)
 {
     const thenar_segment_model *const model = stream->model;
-    const uint8_t none = (uint8_t)(model->states - 1u);
+    const uint8_t none = (uint8_t)(model->n_states - 1u);
     uint8_t state = stream->newest, row = stream->row, left = model->lag;
 
     stream->same = true;
@@ -166,12 +166,12 @@ static uint8_t state_before(thenar_segmenter *stream)
         if (state == none) {
             state = stream->ticks[row].ending_of;
         } else {
-            const thenar_segment_state *const type = &model->each_state[state];
+            const thenar_segment_state *const type = &model->states[state];
             const int16_t gap = (int16_t)(THENAR_READ_16(&type->direct) - THENAR_READ_16(&type->enter));
 
             state = (stream->ticks[row].ahead < gap) ? none : stream->ticks[row].first_of;
         }
-        back = THENAR_READ_8(&model->each_state[state].least);
+        back = THENAR_READ_8(&model->states[state].least);
         if (back >= left) {
             return state;
         }
@@ -185,7 +185,7 @@ uint8_t thenar_segment_push(thenar_segmenter *stream, const int16_t *scores, uin
     const thenar_segment_model *const model = stream->model;
     const uint8_t row = (uint8_t)(((stream->row + 1u) == model->lag) ? 0u : (stream->row + 1u));
     thenar_segment_tick *const tick = &stream->ticks[row];
-    uint8_t state = (uint8_t)(model->states - 1u);
+    uint8_t state = (uint8_t)(model->n_states - 1u);
 
     stream->row = row;
     tick->ahead = (int16_t)(uint16_t)(stream->none - stream->first);

@@ -43,8 +43,8 @@ typedef struct {
 
 /** The costs of a build. The last state is "none"; the others are the grasp types, by their numbers. */
 typedef struct {
-    uint8_t states;
-    uint8_t rings;
+    uint8_t n_states;
+    uint8_t n_rings;
     uint8_t lag;       /* ticks until a tick's state is known, at most 250 */
     uint8_t shift;     /* a frame costs its lag behind the best score, shifted, times gain / 256, */
     uint16_t gain;
@@ -54,8 +54,8 @@ typedef struct {
     uint16_t refusal;  /* the cost of none in a frame that is not rejected, subtracted in one that is */
     bool scored;       /* none has a score, and no refusal */
     bool one_leave;    /* every type's end costs the same */
-    const thenar_segment_state *each_state; /* in flash */
-    const thenar_segment_ring *each_ring;   /* in flash */
+    const thenar_segment_state *states; /* in flash */
+    const thenar_segment_ring *rings;   /* in flash */
 } thenar_segment_model;
 
 /** What a segment that begins in a tick can follow; private. */

@@ -87,6 +87,8 @@ def test_a_glove_that_lacks_a_switch_says_nothing_of_its_cost(
         (["--method", "cmim", "--keep", "3", "--tree"], "--tree prints the tree of the paper's ID3"),
         (["--method", "cmim", "--keep", "3", "--draw", "a.svg"], "--draw draws the tree of the paper's ID3"),
         (["--inputs", "joints"], "there are no switches to place"),
+        (["--trainer", "logit"], "--trainer is for an accuracy: add --folds"),
+        (["--by", "trial"], "--by is for an accuracy: add --folds"),
         (["--glove", "GLOVE"], "--glove gives the scan costs"),
         (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "weighs them: elimination-cost, id3-cost"),
     ],

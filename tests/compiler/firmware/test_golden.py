@@ -1,4 +1,5 @@
-"""The firmware of a small build, byte by byte: two folders stand in tests/golden/firmware, of the others digests.
+"""The generated firmware of a small build, byte by byte: two folders stand in tests/golden/firmware, of the others
+digests. The core is no generated file: it goes into every folder as it is.
 
 After a change that is meant: pytest tests/compiler/firmware/test_golden.py --update-golden, and read the difference.
 """
@@ -11,8 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from thenar.compiler.firmware.classifier import CORE_FILES
 from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.rows import rows_files
+from thenar.firmware_templates.rendering import file_text
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch
@@ -84,7 +87,12 @@ def made(case: str) -> dict[str, str]:
     build = small_build()
     if case == "rows":
         return rows_files("board", build.manifest, parse_harness(GLOVE, "glove.toml"))
-    return Firmware(build.tables, build.manifest, case).files()
+    files = Firmware(build.tables, build.manifest, case).files()
+    core = {path: text for path, text in files.items() if Path(path).name in CORE_FILES}
+    assert {Path(path).name: text for path, text in core.items()} == {
+        name: file_text(f"core/{name}") for name in CORE_FILES
+    }
+    return {path: text for path, text in files.items() if path not in core}
 
 
 def content(folder: Path) -> dict[str, str]:

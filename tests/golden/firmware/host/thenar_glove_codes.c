@@ -68,8 +68,8 @@ static uint16_t nearest(const point_readings *at, const point_codes *codes, int3
 
 #define HIGHEST_VALUE 0xFE000000u /* leaves room for an offset */
 
-/* Prepare what most readings need: the code of a reading is `base`, and the upper bits of offset + gain * distance from
-   `from`. Both factors are rounded down. Rests that this could change, and codes midway, are left to nearest(). */
+/* Prepare the fast range: the code of a reading is `base` plus the upper bits of offset + gain * (reading - from).
+   Offset and gain are rounded down. Fractions that this could change, and codes midway, are left to nearest(). */
 static void prepare(thenar_glove_line *line, const point_codes *codes)
 {
     const bool rises = line->readings[0] < line->readings[1];

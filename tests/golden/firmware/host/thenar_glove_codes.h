@@ -32,13 +32,13 @@ enum {
 /** The line of a sensor; private. */
 typedef struct {
     int32_t readings[2]; /* at its two points; equal: unknown */
-    int32_t from;        /* a reading near them, */
-    int32_t base;        /* the whole part of its code, */
-    uint32_t offset;     /* and the rest, in parts of 2^-(16 + shift), as is */
-    uint32_t gain;       /* what a reading more adds, */
-    uint32_t window;     /* for at most this many more, */
-    uint32_t mask;       /* the parts of a code, */
-    uint32_t safe;       /* and the largest rest whose code no rounding changes */
+    int32_t from;        /* the first reading of the fast range */
+    int32_t base;        /* the whole part of its code */
+    uint32_t offset;     /* the fraction of its code, in units of 2^-(16 + shift) */
+    uint32_t gain;       /* what the next reading adds, in these units */
+    uint32_t window;     /* how many readings the fast range has */
+    uint32_t mask;       /* the bits of a fraction */
+    uint32_t safe;       /* the largest fraction that no rounding changes */
     uint8_t shift;
     bool exact; /* nothing was rounded */
     bool falls; /* codes rise where readings fall */
