@@ -120,7 +120,7 @@ def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[Eval
         for choice, depth in depths.items()
     }
     calls = [
-        price.call(
+        (
             survey.read(one.choice, cuts.everything),
             survey.names(one.choice),
             one.columns,
@@ -131,7 +131,7 @@ def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[Eval
         )
         for one in chosen
     ]
-    prices = survey.cache.ask(calls)
+    prices = survey.cache.ask(price, calls)
     return tuple(
         EvaluatedFinalist(one, *judged[one.choice], priced, survey.choosing_s(one.choice))
         for one, priced in zip(chosen, prices, strict=True)

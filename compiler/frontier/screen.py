@@ -96,9 +96,9 @@ def _screened(
         columns = survey.columns(choice, survey.cuts.everything)
         some, training = survey.read(choice, survey.cuts.everything, few=True), survey.training(choice)
         names, tabled = survey.names(choice), (_TABLED,)
-        calls.append(price.call(some, names, columns, tabled, training, survey.equipment, False))
+        calls.append((some, names, columns, tabled, training, survey.equipment, False))
     found = []
-    for choice, (priced,) in zip(choices, survey.cache.ask(calls), strict=True):
+    for choice, (priced,) in zip(choices, survey.cache.ask(price, calls), strict=True):
         us = priced.fastest_us(survey.transfer(choice).us)
         if us is not None and (priced.wired or choice.placement == NO_SWITCHES):
             found.append(Screened(choice, survey.columns(choice, survey.cuts.everything), rates[choice], us))

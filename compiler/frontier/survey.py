@@ -26,7 +26,7 @@ from ..tables.quantise import integer_scores, quantise
 from ..trainers.base import Training
 from .cache import Cache, stored
 from .equipment import Equipment
-from .points import By, Time
+from .points import By, PointTime
 from .search import NO_SWITCHES, SHAPES, TAXEL_LEVELS, Candidate, Choosing, Search, Shape
 
 # Settings are selected on the placement whose number of switches is nearest to the paper's.
@@ -197,7 +197,7 @@ class Survey:
         """How many joints a frame has."""
         return int(self.samples.codes.shape[1])
 
-    def transfer(self, choice: Candidate) -> Time:
+    def transfer(self, choice: Candidate) -> PointTime:
         """Return the time of reading the joints of a choice."""
         return self.equipment.records.of(len(self.joints(choice, self.cuts.everything)))
 
@@ -256,7 +256,7 @@ class Survey:
         """
         places = [(choice, fold) for choice in typical for fold in folds]
         calls = [
-            choose_settings.call(
+            (
                 self.inputs(choice.joints, choice.levels, fold),
                 fold.train,
                 self.columns(choice, fold),
@@ -266,7 +266,7 @@ class Survey:
             )
             for choice, fold in places
         ]
-        for (choice, fold), fitting in zip(places, self.cache.ask(calls), strict=True):
+        for (choice, fold), fitting in zip(places, self.cache.ask(choose_settings, calls), strict=True):
             self._trainings[choice.trainer, choice.inputs, fold] = Training.chosen(fitting)
 
     def choose(self, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
@@ -277,7 +277,7 @@ class Survey:
                 asked.setdefault(choice.chosen_by, {})[choice.placement.parameter] = None
         places = [(key, fold) for key in asked for fold in folds]
         calls = [
-            choose_path.call(
+            (
                 self.inputs(joints, levels, fold),
                 fold.train,
                 method,
@@ -288,7 +288,7 @@ class Survey:
             )
             for (method, joints, levels), fold in places
         ]
-        for (key, fold), path in zip(places, self.cache.ask(calls), strict=True):
+        for (key, fold), path in zip(places, self.cache.ask(choose_path, calls), strict=True):
             for parameter, columns in zip(asked[key], path.columns, strict=True):
                 self._columns[key, parameter, fold] = columns
             if fold is self.cuts.everything:
@@ -299,10 +299,9 @@ class Survey:
         alike = {(one.chosen_by, one.placement.parameter): one for one in choices if one.keep_joints is not None}
         places = [(key, fold) for key in alike for fold in folds]
         calls = [
-            rank_joints.call(self.inputs(True, key[0][2], fold), fold.train, self.columns(alike[key], fold))
-            for key, fold in places
+            (self.inputs(True, key[0][2], fold), fold.train, self.columns(alike[key], fold)) for key, fold in places
         ]
-        for (key, fold), order in zip(places, self.cache.ask(calls), strict=True):
+        for (key, fold), order in zip(places, self.cache.ask(rank_joints, calls), strict=True):
             self._joints[(*key, fold)] = order
 
     def columns(self, choice: Candidate, fold: Fold) -> Columns:
@@ -324,7 +323,7 @@ class Survey:
         """Return the tallies of every choice in every fold, trained to its `depth`."""
         places = [(choice, fold) for choice in choices for fold in folds]
         calls = [
-            fit_stages.call(
+            (
                 self.read(choice, fold),
                 fold,
                 self.columns(choice, fold),
@@ -334,7 +333,7 @@ class Survey:
             )
             for choice, fold in places
         ]
-        return dict(zip(places, self.cache.ask(calls), strict=True))
+        return dict(zip(places, self.cache.ask(fit_stages, calls), strict=True))
 
 
 @stored(1)

@@ -1,5 +1,6 @@
 from msgspec.structs import replace
 
+from thenar.compiler.frontier.cache import question
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.price import price
 from thenar.compiler.frontier.search import Search
@@ -27,7 +28,7 @@ def test_whatever_times_depend_on_is_part_of_the_question(grasp_set: GraspSet) -
     ]
     names, rows = tuple(NAMES), Samples.of(grasp_set)
     training = Search().training
-    asked = {price.call(rows, names, (0, 1, 2), (), training, each, False).question({}) for each in equipments}
+    asked = {question(price, (rows, names, (0, 1, 2), (), training, each, False), {}) for each in equipments}
     assert len(asked) == len(equipments)
 
 

@@ -18,7 +18,7 @@ from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.plots import pictures
-from thenar.compiler.frontier.points import Frontier, FrontierError, Point, frontier_from_bytes
+from thenar.compiler.frontier.points import Frontier, FrontierError, FrontierPoint, frontier_from_bytes
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
 from thenar.compiler.placement.methods.base import METHODS
@@ -94,7 +94,7 @@ def test_every_point_is_on_a_front_and_none_beats_those_of_its_own(first: tuple[
         assert not any(price(a) < price(b) and chosen_by(a) >= chosen_by(b) for a in front for b in front)
 
 
-def chosen_by(point: Point) -> float:
+def chosen_by(point: FrontierPoint) -> float:
     """Return the rate before its correction."""
     return point.rate.mean + point.luck
 
@@ -108,7 +108,7 @@ def test_subjects_are_left_out_where_there_are_several(first: tuple[Request, Fro
     assert {point.rate.over for point in found.points} == {2}
 
 
-def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) -> int:
+def rows_recognised(grasp_set: GraspSet, point: FrontierPoint, train: Rows, test: Rows) -> int:
     """Choose, train and cut integers from some rows alone, and let the runtime answer the others."""
     setting, joints = point.setting, point.setting.inputs != "switches"
     labels = np.unique(grasp_set.labels, return_inverse=True)[1]

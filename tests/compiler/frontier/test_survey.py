@@ -10,6 +10,7 @@ import pytest
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import EvaluationError
+from thenar.compiler.frontier.cache import question
 from thenar.compiler.frontier.search import SHAPES, Search
 from thenar.compiler.frontier.survey import Cuts, FoldHits, choose_path, fit_stages
 from thenar.compiler.placement.id3 import grow_id3
@@ -94,8 +95,8 @@ def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -
     several = (((0,) * 14, (1.0,)), ((0,) * 14, (2.0,)), (one, (1.0, 1.0)), (two, (1.0, 1.0)))
     costs = [None, *(PortCosts(*each) for each in several)]
     folds = [*cuts.screening, *cuts.others, cuts.everything]
-    asked = {choose_path.call(samples, folds[0].train, "id3", (0.0,), ports).question({}) for ports in costs}
-    asked |= {fit_stages.call(samples, fold, (0,), (1,), (), (), SEARCH.training).question({}) for fold in folds}
+    asked = {question(choose_path, (samples, folds[0].train, "id3", (0.0,), ports), {}) for ports in costs}
+    asked |= {question(fit_stages, (samples, fold, (0,), (1,), (), (), SEARCH.training), {}) for fold in folds}
     assert len(asked) == len(costs) + len(folds)
 
 
