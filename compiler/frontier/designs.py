@@ -49,7 +49,7 @@ class Design:
     @property
     def n_switches(self) -> int:
         """The number of switches that are read."""
-        return len(self.close.screened.columns)
+        return len(self.close.screened.elements)
 
     @property
     def scan(self) -> PointTime:
@@ -74,7 +74,7 @@ def designs(close: EvaluatedFinalist, read: PointTime = NO_TIME) -> Iterator[Des
     """Yield all designs of a finalist, whose joints take `read`."""
     for tables in close.priced:
         if tables.classified is not None:
-            wirings = tables.wired if close.screened.columns else (None, *tables.wired)
+            wirings = tables.wired if close.screened.elements else (None, *tables.wired)
             yield from (Design(close, tables, tables.classified, wired, read) for wired in wirings)
 
 
@@ -109,12 +109,12 @@ def lucks(
     closes = list(dict.fromkeys(design.close for design in several))
     chosen = {close.screened.choice for close in closes}
     picked_from = [
-        (judged, quickest[close, tabled.shape], len(close.screened.columns))
+        (judged, quickest[close, tabled.shape], len(close.screened.elements))
         for close in closes
         for tabled, judged in close.tables.items()
         if (close, tabled.shape) in quickest
     ]
-    picked_from += [(one.judged, one.frame_us, len(one.columns)) for one in screened if one.choice not in chosen]
+    picked_from += [(one.judged, one.frame_us, len(one.elements)) for one in screened if one.choice not in chosen]
     judged, *costs = zip(*picked_from, strict=True)
     most = max(each.repeats for each in judged)
     hits = np.array([each.hits * (most // each.repeats) for each in judged])

@@ -299,7 +299,7 @@ def _found(
     survey: Survey, replay: Replay, wanted: PointGoal, own: tuple[ReferencePoint, ...], lacking: tuple[str, ...]
 ) -> Frontier:
     search, n_switches, most = survey.search, survey.samples.n_switches, survey.levels[-1]
-    n_elements = len(survey.elements(most))
+    n_elements = survey.size(most)
     screened, curves = screen(survey)
     if not screened:
         raise FrontierError(
@@ -357,13 +357,13 @@ def _latencies(survey: Survey, replay: Replay, kept: Sequence[Design]) -> Latenc
         grouped.setdefault(design.close.screened.choice, []).append(design)
     calls = [
         (
-            survey.read(choice, fold),
+            survey.samples,
             fold.train,
-            survey.columns(choice, fold),
-            replay.reading(survey.elements(choice.levels, fold), survey.joints(choice, fold)),
+            survey.selection(choice, fold),
+            replay,
             tuple(Pace(design.tables.tabled, design.frame.us) for design in mine),
             survey.training(choice, fold),
-            movements and movements.reading(survey.elements(choice.levels, fold), survey.joints(choice, fold)),
+            movements,
         )
         for choice, mine in grouped.items()
     ]
@@ -384,7 +384,7 @@ def _tried(screened: Sequence[Screened], closes: Sequence[EvaluatedFinalist], se
         Tried(
             one.choice.placement,
             one.choice.inputs,
-            len(one.columns),
+            len(one.elements),
             rounds if searches[one.choice.trainer].staged else None,
             rate,
             one.frame_us,

@@ -49,7 +49,7 @@ def marks_of(
             us = priced.fastest_us(survey.transfer(screened.choice).us)
             if us is not None:
                 found.append(
-                    ReferencePoint(named[screened.choice], len(screened.columns), close.tables[tabled].rate, us)
+                    ReferencePoint(named[screened.choice], len(screened.elements), close.tables[tabled].rate, us)
                 )
     return tuple(found)
 

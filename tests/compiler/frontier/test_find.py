@@ -21,7 +21,9 @@ from thenar.compiler.frontier.plots import pictures
 from thenar.compiler.frontier.points import Frontier, FrontierError, FrontierPoint, frontier_from_bytes
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
+from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.methods.base import METHODS
+from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.tables.collapse import collapse
@@ -306,10 +308,11 @@ def test_settings_are_chosen_inside_the_training_rows(make_set: Make) -> None:
     samples = Samples.of(make_set(subjects=2))
     cuts, candidates = Cuts.of(samples, Search()), Search().alone("logit").candidates
     fold = cuts.screening[0]
-    found = choose_settings(samples, fold.train, (0, 1, 2), candidates, 1, True)
+    kept = InputSelection.of(tuple(map(Element, range(3))), (0, 1, 2))
+    found = choose_settings(samples, fold.train, kept, candidates, 1, True)
     shuffled = samples.labels.copy()
     shuffled[fold.test] = shuffled[fold.test][::-1]
-    assert choose_settings(replace_rows(samples, labels=shuffled), fold.train, (0, 1, 2), candidates, 1, True) == found
+    assert choose_settings(replace_rows(samples, labels=shuffled), fold.train, kept, candidates, 1, True) == found
 
 
 def with_sensors(grasp_set: GraspSet, sensors: int) -> GraspSet:

@@ -110,11 +110,9 @@ def test_levels_of_a_fold_come_from_its_training_rows_alone(pressed: GraspSet, t
         survey.choose([choice], [fold])
         alone = samples.rows(fold.train).with_joints(())
         elements = elements_of(alone, 3)
-        assert survey.elements(3, fold) == elements
         assert elements != elements_of(samples, 3)
         choose: Any = METHODS["elimination-cost"].chooser(bits_of(alone, elements), ports and ports_of(ports, elements))
-        assert survey.columns(choice, fold) == choose(5.0)
-        assert (survey.read(choice, fold).switches == bits_of(samples, elements).switches).all()
+        assert survey.elements(choice, fold) == tuple(elements[column] for column in choose(5.0))
 
 
 def test_a_composed_stream_presses_taxels_as_trials_do(pressed: GraspSet) -> None:
