@@ -90,20 +90,6 @@ class Labels:
                 return True
         return False
 
-    def _annotate(
-        self,
-        label: ChartLabel,
-        text: str,
-        anchors: Floats,
-        anchor: int,
-        centre: Floats,
-        radius: float,
-        style: dict[str, Any],
-    ) -> None:
-        led = {"arrowstyle": "-", "color": label.colour, "lw": 0.6, "shrinkA": 1, "shrinkB": 3}
-        arrow, offset = led if radius >= _LED_FROM else None, tuple(centre - anchors[anchor])
-        self.axes.annotate(text, label.at[anchor], offset, textcoords="offset points", arrowprops=arrow, **style)
-
     def _free(self, lows: Floats, highs: Floats) -> NDArray[np.bool_]:
         """Return which boxes (n,) lie within the frame and on no label and no marker."""
         inside = (lows >= self._frame[:2]).all(axis=1) & (highs <= self._frame[2:]).all(axis=1)
