@@ -12,7 +12,7 @@ from msgspec import Struct
 from thenar.drivers.extras import optional
 
 from ..frontier.plots import POINT_ID, RING_ID, pictures
-from ..frontier.points import Frontier, Point, Time
+from ..frontier.points import Frontier, FrontierPoint, PointTime
 from ..frontier.words import (
     LUCK,
     elements_of,
@@ -173,7 +173,7 @@ def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
     ElementTree.SubElement(marker, "circle", circle)
 
 
-def _detail(point: Point, frontier: Frontier, hand: HandShape | None) -> Detail:
+def _detail(point: FrontierPoint, frontier: Frontier, hand: HandShape | None) -> Detail:
     setting = point.setting
     what = (inputs_of(point), setting.placement.method, trainer_of(setting), f"{setting.width} bits")
     words = ", ".join(filter(None, (*what, _wiring(point))))
@@ -190,7 +190,7 @@ def _detail(point: Point, frontier: Frontier, hand: HandShape | None) -> Detail:
     )
 
 
-def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
+def _facts(point: FrontierPoint, frontier: Frontier) -> Iterable[tuple[str, str]]:
     setting = point.setting
     for what, rate in rates_of(frontier).items():
         yield f"Accuracy in %, {what}", interval(rate(point))
@@ -211,21 +211,21 @@ def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
     yield "To compile", f"{point.compile_s:.1f} s"
 
 
-def _placement(point: Point) -> str:
+def _placement(point: FrontierPoint) -> str:
     return way_of(point.setting) if point.switches else DASH
 
 
-def _wiring(point: Point) -> str:
+def _wiring(point: FrontierPoint) -> str:
     return wiring_of(point.setting) or point.setting.wiring
 
 
-def _latency(point: Point) -> tuple[str, str]:
+def _latency(point: FrontierPoint) -> tuple[str, str]:
     """Return mean and 99th percentile of the latency, µs; dashes where no grasp was decided on correctly."""
     latency = point.latency
     return (DASH, DASH) if latency.missed >= 1 else (microseconds(latency.mean_us), microseconds(latency.p99_us))
 
 
-def _time(time: Time) -> str:
+def _time(time: PointTime) -> str:
     return "unknown, not included" if time.how == "unknown" else f"{microseconds(time.us)} µs ({time.how})"
 
 

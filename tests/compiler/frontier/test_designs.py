@@ -9,7 +9,7 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.designs import Design, best_designs, designs, lucks, points_of
 from thenar.compiler.frontier.finalists import EvaluatedFinalist
 from thenar.compiler.frontier.latency import POLICIES
-from thenar.compiler.frontier.points import Latency, PlacementChoice, Time
+from thenar.compiler.frontier.points import Latency, PlacementChoice, PointTime
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Search, Shape
@@ -52,7 +52,7 @@ def close_of(
 
 
 def simulated(design: Design, us: float) -> Design:
-    return replace(design, measured=Time(us, "simulated"))
+    return replace(design, measured=PointTime(us, "simulated"))
 
 
 def test_joints_alone_have_one_design_and_wait_for_a_record() -> None:
@@ -112,7 +112,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     assert fronts[10, "single"] == ("switches",)
     assert (20, "dwell") in fronts
     assert (10, "dwell") not in fronts
-    assert points[0].classify == Time(20.0, "simulated")
+    assert points[0].classify == PointTime(20.0, "simulated")
 
 
 def test_a_points_rate_and_the_lower_end_of_its_interval_are_less_its_luck() -> None:

@@ -13,7 +13,7 @@ from thenar.compiler.frontier.designs import Design
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.finalists import EvaluatedFinalist
 from thenar.compiler.frontier.measure import measured, unmeasured
-from thenar.compiler.frontier.points import PlacementChoice, Time
+from thenar.compiler.frontier.points import PlacementChoice, PointTime
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Shape
@@ -35,7 +35,7 @@ def design_of(model: ClassifyModel) -> Design:
     screened = Screened(Candidate(PlacementChoice("id3", 6.0), "switches"), tuple(range(6)), judged, 1.0)
     close = EvaluatedFinalist(screened, {}, {}, {}, {}, (priced,), 1.0)
     assert priced.classified is not None
-    return Design(close, priced, priced.classified, wired, Time(0.0, "wire"))
+    return Design(close, priced, priced.classified, wired, PointTime(0.0, "wire"))
 
 
 @pytest.mark.slow

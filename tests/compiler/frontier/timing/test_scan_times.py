@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.targets import timed
-from thenar.compiler.frontier.points import Time
+from thenar.compiler.frontier.points import PointTime
 from thenar.compiler.frontier.timing.scan_times import (
     Overhead,
     ScanTimes,
@@ -12,7 +12,7 @@ from thenar.compiler.frontier.timing.scan_times import (
     records_of,
     scan_times,
 )
-from thenar.compiler.frontier.timing.wirings import BOARD, Wiring
+from thenar.compiler.frontier.timing.wirings import BOARD, WiringOption
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring
@@ -22,7 +22,7 @@ from thenar.runtime.scanning.timing import row_us, scan_us
 
 CALL = Overhead("a call", call_us=7.0)
 wired = st.builds(
-    Wiring, st.sampled_from(["mcp23017", "pca9555", "tca6424a", "pcf8575"]), st.sampled_from([100_000, 400_000])
+    WiringOption, st.sampled_from(["mcp23017", "pca9555", "tca6424a", "pcf8575"]), st.sampled_from([100_000, 400_000])
 )
 
 
@@ -31,7 +31,9 @@ def names_of(count: int) -> list[str]:
 
 
 @given(st.integers(1, 140), wired)
-def test_a_scan_takes_what_the_runtime_predicts_with_a_system_call_a_transaction(switches: int, wiring: Wiring) -> None:
+def test_a_scan_takes_what_the_runtime_predicts_with_a_system_call_a_transaction(
+    switches: int, wiring: WiringOption
+) -> None:
     names = names_of(switches)
     times = scan_times(names, wiring, CALL)
     harness = wiring.harness_of(names)
@@ -42,18 +44,18 @@ def test_a_scan_takes_what_the_runtime_predicts_with_a_system_call_a_transaction
 
 @pytest.mark.parametrize(("switches", "baud", "hz"), [(33, 115_200, 200), (33, 1_000_000, 200), (200, 115_200, 149)])
 def test_a_board_sends_two_hundred_rows_a_second_or_what_its_line_allows(switches: int, baud: int, hz: int) -> None:
-    times = scan_times(names_of(switches), Wiring(BOARD, baud))
+    times = scan_times(names_of(switches), WiringOption(BOARD, baud))
     assert times == ScanTimes(float(round(1e6 / hz)), 1, 0, "wire")
     assert times.us >= row_us(switches, 0, baud)
 
 
 def test_without_switches_there_is_nothing_to_read() -> None:
-    none = scan_times((), Wiring("mcp23017", 400_000))
+    none = scan_times((), WiringOption("mcp23017", 400_000))
     assert none == ScanTimes(0.0, 0, 0, "wire")
 
 
 def test_a_switch_without_a_place_is_an_error() -> None:
-    wiring = Wiring("as wired", 400_000, propose_harness(["s0"]))
+    wiring = WiringOption("as wired", 400_000, propose_harness(["s0"]))
     with pytest.raises(HarnessError, match="s1"):
         scan_times(names_of(2), wiring)
 
@@ -74,11 +76,11 @@ def test_eighteen_sensors_take_six_milliseconds_of_which_the_wire_has_less_than_
 
 
 def test_joints_of_ones_own_take_what_the_user_says_and_else_an_unknown_time() -> None:
-    assert records_of(["bend_1", "thumb_mpj"]).of(2) == Time(0.0, "unknown")
-    assert records_of(["bend_1", "bend_2"], 650.0).of(2) == Time(650.0, "given")
-    assert records_of(["bend_1", "bend_2"], 650.0).of(1) == Time(325.0, "given")
+    assert records_of(["bend_1", "thumb_mpj"]).of(2) == PointTime(0.0, "unknown")
+    assert records_of(["bend_1", "bend_2"], 650.0).of(2) == PointTime(650.0, "given")
+    assert records_of(["bend_1", "bend_2"], 650.0).of(1) == PointTime(325.0, "given")
     assert records_of(SENSORS_18, 650.0).of(18).us == pytest.approx(650.0)
-    assert records_of([]).of(0) == records_of([], 650.0).of(0) == records_of(SENSORS_18).of(0) == Time(0.0, "wire")
+    assert records_of([]).of(0) == records_of([], 650.0).of(0) == records_of(SENSORS_18).of(0) == PointTime(0.0, "wire")
 
 
 def test_a_cyberglove_may_be_wired_under_other_names() -> None:
