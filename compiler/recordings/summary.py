@@ -29,7 +29,7 @@ def contacts(grasp_set: GraspSet) -> NDArray[np.bool_]:
     return np.hstack([grasp_set.switches, pressed])
 
 
-class Finding(msgspec.Struct, frozen=True):
+class Oddity(msgspec.Struct, frozen=True):
     """One kind of oddity: its count, the first rows as the user counts them, the columns, and a sentence."""
 
     kind: str
@@ -39,7 +39,7 @@ class Finding(msgspec.Struct, frozen=True):
     columns: tuple[str, ...] = ()
 
 
-def find_oddities(grasp_set: GraspSet, rows: NDArray[np.int64]) -> tuple[Finding, ...]:
+def find_oddities(grasp_set: GraspSet, rows: NDArray[np.int64]) -> tuple[Oddity, ...]:
     """Return all oddities of `grasp_set`, whose rows have the numbers `rows` (n,) for the user.
 
     Rows in which nothing is held are naturally alike, and so not compared.
@@ -84,7 +84,7 @@ def disagreeing(frames: NDArray[np.intp], what: NDArray[np.generic]) -> NDArray[
     return np.bincount(pairs // max(len(found), 1), minlength=len(frames))[frames] > 1
 
 
-def _odd_columns(grasp_set: GraspSet) -> Iterator[Finding]:
+def _odd_columns(grasp_set: GraspSet) -> Iterator[Oddity]:
     for kind, columns, names in (
         ("switch", grasp_set.switches, grasp_set.switch_names),
         ("taxel", grasp_set.taxels, grasp_set.taxel_names),
@@ -93,16 +93,16 @@ def _odd_columns(grasp_set: GraspSet) -> Iterator[Finding]:
         plural = "switches" if kind == "switch" else f"{kind}s"
         if constant := constant_columns(columns, names):
             message = f"{len(constant)} {plural} never change: {list_names(constant)}"
-            yield Finding(f"constant {plural}", len(constant), message, columns=constant)
+            yield Oddity(f"constant {plural}", len(constant), message, columns=constant)
         if pairs := duplicate_columns(columns, names):
             shown = list_names([f"{name} = {original}" for name, original in pairs])
             repeated = tuple(name for name, _ in pairs)
-            yield Finding(
+            yield Oddity(
                 f"duplicate {plural}", len(pairs), f"{len(pairs)} {plural} repeat others: {shown}", (), repeated
             )
 
 
-def _odd_frames(grasp_set: GraspSet, rows: NDArray[np.int64]) -> Iterator[Finding]:
+def _odd_frames(grasp_set: GraspSet, rows: NDArray[np.int64]) -> Iterator[Oddity]:
     frames = frame_numbers(grasp_set.switches, np.hstack([grasp_set.taxels, grasp_set.codes]))
     for kind, what, sentence in (
         ("frames shared by subjects", grasp_set.subjects, "have a frame that another subject has as well"),
@@ -111,10 +111,10 @@ def _odd_frames(grasp_set: GraspSet, rows: NDArray[np.int64]) -> Iterator[Findin
         found = rows[disagreeing(frames, what)]
         if found.size:
             message = f"{found.size} rows {sentence}: {list_rows(found)}"
-            yield Finding(kind, int(found.size), message, tuple(found[:SHOWN].tolist()))
+            yield Oddity(kind, int(found.size), message, tuple(found[:SHOWN].tolist()))
 
 
-def _gaps(grasp_set: GraspSet) -> Iterator[Finding]:
+def _gaps(grasp_set: GraspSet) -> Iterator[Oddity]:
     subjects, subject = np.unique(grasp_set.subjects, return_inverse=True)
     present, grasp = np.unique(grasp_set.grasps, return_inverse=True)
     # Encoded as numbers: many more pairs can be absent than there are rows, so only those shown are listed.
@@ -123,7 +123,7 @@ def _gaps(grasp_set: GraspSet) -> Iterator[Finding]:
     if count:
         absent = np.setdiff1d(np.arange(min(len(pairs) + SHOWN, len(subjects) * len(present))), pairs)[:SHOWN]
         shown = [f"subject {subjects[pair // len(present)]} has no {present[pair % len(present)]}" for pair in absent]
-        yield Finding("grasp types that a subject lacks", count, list_names(shown, count))
+        yield Oddity("grasp types that a subject lacks", count, list_names(shown, count))
 
 
 # The most rows compared with each other, a sample of a larger set: the time is quadratic.
@@ -198,7 +198,7 @@ def _neighbour_rate(
     return float(np.mean(labels[rows][nearest] == labels[rows])), len(rows)
 
 
-class Count(msgspec.Struct, frozen=True):
+class FrameCount(msgspec.Struct, frozen=True):
     """The number of frames with `name`."""
 
     name: str
@@ -244,22 +244,22 @@ class Summary(msgspec.Struct, frozen=True):
     independent: bool
     fingerprint: str
     taxonomy: str
-    grasps: tuple[Count, ...]
+    grasps: tuple[FrameCount, ...]
     absent: tuple[str, ...]
     balance: float
-    subjects: tuple[Count, ...]
-    objects: tuple[Count, ...]
+    subjects: tuple[FrameCount, ...]
+    objects: tuple[FrameCount, ...]
     switches: tuple[SwitchUse, ...]
     taxels: tuple[JointRange, ...]
     joints: tuple[JointRange, ...]
     separability: tuple[Separability, ...]
-    warnings: tuple[Finding, ...]
+    warnings: tuple[Oddity, ...]
 
 
 def summarise(grasp_set: GraspSet) -> Summary:
     """Return the summary of `grasp_set`, with rows counted from 1. An empty set has no separability."""
     counts = np.bincount(grasp_set.labels[~grasp_set.is_none], minlength=len(grasp_set.taxonomy.types))
-    grasps = [Count(name, int(rows)) for name, rows in zip(grasp_set.taxonomy.types, counts, strict=True)]
+    grasps = [FrameCount(name, int(rows)) for name, rows in zip(grasp_set.taxonomy.types, counts, strict=True)]
     present = counts[counts > 0]
     return Summary(
         frames=len(grasp_set),
@@ -294,9 +294,9 @@ def _seconds(grasp_set: GraspSet) -> float | None:
     return float(steps[steps > 0].sum() / 1e6)
 
 
-def _counts(names: NDArray[np.str_]) -> tuple[Count, ...]:
+def _counts(names: NDArray[np.str_]) -> tuple[FrameCount, ...]:
     found, counts = np.unique(names, return_counts=True)
-    return tuple(map(Count, found.tolist(), counts.tolist()))
+    return tuple(map(FrameCount, found.tolist(), counts.tolist()))
 
 
 def _switches(grasp_set: GraspSet) -> tuple[SwitchUse, ...]:
