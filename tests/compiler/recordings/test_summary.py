@@ -54,23 +54,20 @@ def test_rows_in_which_nothing_is_held_count_apart_and_clash_with_none(small: Gr
     assert "contradictory frames" not in kinds
     assert kinds["frames shared by subjects"].rows == (1, 4)
     assert kinds["grasp types that a subject lacks"].message == "subject A has no Tip"
-    assert summary.separability == summarise(found.without_none()).separability
 
 
 def test_a_set_without_rows_has_a_summary(small: GraspSet) -> None:
     summary = summarise(small.rows([]))
-    assert (summary.frames, summary.grasps, summary.balance, summary.separability) == (0, (), 0.0, ())
+    assert (summary.frames, summary.grasps, summary.balance) == (0, (), 0.0)
     assert {(joint.least, joint.largest, joint.codes) for joint in summary.joints} == {(None, None, 0)}
 
 
-def test_taxels_have_ranges_and_a_separability_and_are_touched_above_their_noise(small: GraspSet) -> None:
+def test_taxels_have_ranges_and_are_touched_above_their_noise(small: GraspSet) -> None:
     pads = np.array([[0, 2], [900, 0], [12, 3], [1000, 1], [3, 0], [880, 2]], np.uint16)
     columns = tuple(Joint(name, "N", 0, 0.0, 1000, 1.0) for name in ("pad", "idle"))
     with_pads = replace(small, taxels=pads, taxel_columns=columns)
     summary = summarise(with_pads)
     assert summary.taxels == (JointRange("pad", "N", 0.0, 1.0, 6), JointRange("idle", "N", 0.0, 0.003, 4))
-    assert [each.inputs for each in summary.separability] == ["switches", "taxels", "joints", "all"]
-    assert summary.separability[1].distinct_frames == 6
     touched = contacts(with_pads)
     assert (touched[:, : len(small.switch_names)] == small.switches).all()
     assert touched[:, -2:].tolist() == [[False, False], [True, False]] * 3
