@@ -8,7 +8,7 @@ from textwrap import fill
 from ..text import cells
 from .circuit import BillLine
 from .layout import CONTACT_MM, counted_sensors
-from .spec import Expected, SpecSummary
+from .spec import ExpectedPerformance, SpecSummary
 
 Row = Sequence[object]
 _WIDTH = 100
@@ -78,7 +78,7 @@ def readme_of(summary: SpecSummary) -> str:
     return "\n".join(_laid_out(part, part in headings) for part in parts)
 
 
-def expectations(expected: Expected) -> Iterator[str]:
+def expectations(expected: ExpectedPerformance) -> Iterator[str]:
     """Yield sentences on times and accuracy."""
     if expected.transactions:
         full = "" if expected.full_us == expected.scan_us else f"; for all wired sensors, {expected.full_us:.1f} us"

@@ -19,11 +19,11 @@ from thenar.runtime.scanning.timing import glove_us, scan_us
 
 from ..hand import HandShape
 from ..sensors import SensorCount
-from .circuit import BillLine, bill_of, bill_of_joints, glove_circuit
+from .circuit import BillLine, Circuit, bill_of, bill_of_joints, glove_circuit
 from .layout import (
-    End,
+    GloveWire,
     PlacedSensor,
-    Wire,
+    WireEnd,
     as_soldered,
     counted_sensors,
     crowded,
@@ -32,7 +32,6 @@ from .layout import (
     place_sensors,
     wires_of,
 )
-from .parts import Circuit
 from .pattern import Pattern, pattern_of
 
 
@@ -40,7 +39,7 @@ class SpecError(ThenarError, ValueError):
     """There is no glove to describe, or it does not match the wiring."""
 
 
-class Expected(Struct, frozen=True):
+class ExpectedPerformance(Struct, frozen=True):
     """Times calculated from bus arithmetic, in microseconds, without the computer's overhead per transaction.
 
     scan_us      scan of all kept switches on expanders, in `transactions` transactions, mux selections included
@@ -63,11 +62,11 @@ class Expected(Struct, frozen=True):
     detection: tuple[Detected, ...] = ()
 
 
-def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected:
+def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> ExpectedPerformance:
     """Return the expected times and rates of a build's switches in a harness, with a complete scan by `scan`."""
     time = scan_us(scan, harness)
     glove = harness.cyberglove if manifest.joints else None
-    return Expected(
+    return ExpectedPerformance(
         transactions=len(scan.ports) + time.selects,
         scan_us=time.us,
         full_us=time.full_us,
@@ -106,9 +105,9 @@ class SpecSummary(Struct, frozen=True):
     print_on: str
     sensors: tuple[PlacedSensor, ...]
     readers: tuple[SwitchReader, ...]
-    wires: tuple[Wire, ...]
+    wires: tuple[GloveWire, ...]
     materials: tuple[BillLine, ...]
-    expected: Expected
+    expected: ExpectedPerformance
     remarks: tuple[str, ...]
 
 
@@ -211,8 +210,8 @@ def _of_boards(harness: Harness) -> Iterator[str]:
             )
 
 
-def _readers(ends: Sequence[End]) -> tuple[SwitchReader, ...]:
-    groups: dict[str, list[End]] = {}
+def _readers(ends: Sequence[WireEnd]) -> tuple[SwitchReader, ...]:
+    groups: dict[str, list[WireEnd]] = {}
     for end in ends:
         groups.setdefault(end.unit.ref, []).append(end)
     return tuple(

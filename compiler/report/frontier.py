@@ -64,7 +64,7 @@ class Chart:
     drawing: Markup
 
 
-class Detail(Struct, frozen=True):
+class PointDetail(Struct, frozen=True):
     """The details of a picked point: a sentence, names and values, its switches, their numbers on the drawn hand, and
     the command that builds it.
     """
@@ -83,8 +83,8 @@ class FrontierView:
 
     charts: tuple[Chart, ...]
     points: PlainTable
-    details: tuple[Detail, ...]
-    picked: Detail | None
+    details: tuple[PointDetail, ...]
+    picked: PointDetail | None
     hand: HandPicture | None
     tables: tuple[PlainTable, ...]
     warnings: tuple[str, ...]
@@ -120,14 +120,14 @@ def frontier_view(
     )
 
 
-def _charts(frontier: Frontier, details: Mapping[int, Detail], picked: Detail) -> Iterator[Chart]:
+def _charts(frontier: Frontier, details: Mapping[int, PointDetail], picked: PointDetail) -> Iterator[Chart]:
     drawn = pictures(msgspec.structs.replace(frontier, picked=picked.number), "svg", letters=True)
     for name, svg in drawn.items():
         ident = f"by-{name}"
         yield Chart(ident, _CAPTIONS[name], _embedded(svg, ident, details, picked.number))
 
 
-def _embedded(svg: bytes, ident: str, details: Mapping[int, Detail], picked: int) -> Markup:
+def _embedded(svg: bytes, ident: str, details: Mapping[int, PointDetail], picked: int) -> Markup:
     """Return an SVG file as a part of a page, in the page's colours; its points are clickable and have titles.
 
     Only ids that are referenced are kept, prefixed with `ident`.
@@ -173,11 +173,11 @@ def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
     ElementTree.SubElement(marker, "circle", circle)
 
 
-def _detail(point: FrontierPoint, frontier: Frontier, hand: HandShape | None) -> Detail:
+def _detail(point: FrontierPoint, frontier: Frontier, hand: HandShape | None) -> PointDetail:
     setting = point.setting
     what = (inputs_of(point), setting.placement.method, trainer_of(setting), f"{setting.width} bits")
     words = ", ".join(filter(None, (*what, _wiring(point))))
-    return Detail(
+    return PointDetail(
         number=point.number,
         said=f"Point {point.number}: {words}; {point.rate} in {_time(point.frame)}.",
         facts=tuple(_facts(point, frontier)),

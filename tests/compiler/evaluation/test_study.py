@@ -5,13 +5,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.compiler.evaluation.baselines import CLASSIFIERS
 from thenar.compiler.evaluation.folds import EvaluationError, Fold
-from thenar.compiler.evaluation.plan import REFERENCE, CellPlan, FoldFit, RowPlan, learners
+from thenar.compiler.evaluation.plan import CLASSIFIERS, REFERENCE, CellPlan, FoldFit, RowPlan, learners
 from thenar.compiler.evaluation.populations import Population, Scheme
 from thenar.compiler.evaluation.rates import Rate, RecipeWords
 from thenar.compiler.evaluation.study import TABLES, Study, StudyDesign, evaluate
-from thenar.compiler.evaluation.tables import RateTable, Reader, Row
+from thenar.compiler.evaluation.tables import RateReader, RateRow, RateTable
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import TRAINERS
@@ -30,7 +29,7 @@ ANSWERS = {
     SECOND[0]: np.array([2, 2, 2]),
     SECOND[1]: np.array([2, 2, 5]),
 }
-READER = Reader(LABELS, np.arange(6), (2, 5), ANSWERS, frozenset({SECOND[1]}), "within subject", None)
+READER = RateReader(LABELS, np.arange(6), (2, 5), ANSWERS, frozenset({SECOND[1]}), "within subject", None)
 CELL = CellPlan(PART, (FIRST, SECOND))
 
 
@@ -92,7 +91,7 @@ def table(study: Study, name: str, protocol: str = "nested") -> RateTable:
     return found
 
 
-def row(table: RateTable, name: str) -> Row:
+def row(table: RateTable, name: str) -> RateRow:
     (found,) = (candidate for candidate in table.rows if candidate.name == name)
     return found
 
