@@ -16,6 +16,7 @@ from thenar.compiler.frontier.search import Candidate, Search, Shape
 from thenar.compiler.frontier.survey import Cuts, TrialAccuracy
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes, records_of
+from thenar.compiler.placement.elements import Element
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS, Training
 from thenar.drivers.cyberglove_protocol import SENSORS_18
@@ -46,7 +47,10 @@ def close_of(
     tables = PricedTables(TABLED, b"", Classified(classify_us, "model", 900, 30), wired, 1.25)
     choice = PlacementChoice("id3", float(switches))
     screened = Screened(
-        Candidate(choice, "switches" if switches else "joints"), tuple(range(switches)), judged(rate), classify_us
+        Candidate(choice, "switches" if switches else "joints"),
+        tuple(map(Element, range(switches))),
+        judged(rate),
+        classify_us,
     )
     return EvaluatedFinalist(screened, {}, {TABLED: judged(rate)}, {}, {}, (tables,), 2.0)
 

@@ -8,6 +8,7 @@ from thenar.compiler.frontier.price import Tabled
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import NO_SWITCHES, Candidate, Search, Shape
 from thenar.compiler.frontier.survey import FoldHits, TrialAccuracy
+from thenar.compiler.placement.elements import Element
 from thenar.runtime.recipe import Inputs
 
 
@@ -17,7 +18,7 @@ def judged(rate: float) -> TrialAccuracy:
 
 def _screened(size: int, rate: float, frame_us: float, inputs: Inputs = "switches", method: str = "id3") -> Screened:
     choice = Candidate(PlacementChoice(method, float(size)), inputs)
-    return Screened(choice, tuple(range(size)), judged(rate), frame_us)
+    return Screened(choice, tuple(map(Element, range(size))), judged(rate), frame_us)
 
 
 def test_joints_are_read_unless_switches_stand_alone() -> None:

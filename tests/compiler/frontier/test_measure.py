@@ -21,6 +21,7 @@ from thenar.compiler.frontier.survey import TrialAccuracy
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
 from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, ScanTimes
+from thenar.compiler.placement.elements import Element
 from thenar.runtime.tables import tables_to_bytes
 
 PYTHON = PythonCost(5.0, 0.1, 0.5, 0.1, 0.01, 0.01, 10.0)
@@ -32,7 +33,7 @@ def design_of(model: ClassifyModel) -> Design:
     wired = Wired("mcp23017", 400_000, scan)
     priced = PricedTables(Tabled(1, Shape(16)), tables_to_bytes(tables), model.cost(tables), (wired,), 1.0)
     judged = TrialAccuracy(Rate.counted((9,), 10, of="pooled"), np.arange(10), 1)
-    screened = Screened(Candidate(PlacementChoice("id3", 6.0), "switches"), tuple(range(6)), judged, 1.0)
+    screened = Screened(Candidate(PlacementChoice("id3", 6.0), "switches"), tuple(map(Element, range(6))), judged, 1.0)
     close = EvaluatedFinalist(screened, {}, {}, {}, {}, (priced,), 1.0)
     assert priced.classified is not None
     return Design(close, priced, priced.classified, wired, PointTime(0.0, "wire"))
