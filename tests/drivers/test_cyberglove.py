@@ -285,38 +285,6 @@ def test_garbage_at_power_up_is_overcome(line: PtyLine) -> None:
             assert glove.counts.resyncs == 0
 
 
-@pytest.mark.parametrize(
-    "harm",
-    [
-        lambda message: message[1:],
-        lambda message: message[:-1],
-        lambda message: message[:5] + b"\x07" + message[5:],
-        lambda message: message[:5] + b"\0" + message[6:],
-        lambda message: b"\0" * 300,
-        lambda message: b"\x55" * 3000,
-    ],
-    ids=["cut", "end lost", "inserted", "flipped to nul", "nul flood", "endless"],
-)
-def test_a_bad_cable_gives_no_false_record_and_the_next_good_one_is_read(
-    line: PtyLine, harm: Callable[[bytes], bytes]
-) -> None:
-    harmed: list[bytes] = []
-
-    def damage(message: bytes) -> bytes:
-        if len(harmed) >= 3:
-            return message
-        harmed.append(message)
-        return harm(message)
-
-    with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link)) as glove:
-        emulated.set(VALUES[18])
-        read(glove, lambda record: record.sensors == VALUES[18])
-        line.damage = damage
-        for _ in range(20):
-            assert read(glove) == Record(VALUES[18], status=0x81)
-        assert len(harmed) == 3
-
-
 @pytest.mark.parametrize("lost", range(10))
 def test_any_answer_may_get_lost_while_it_is_set_up(line: PtyLine, lost: int) -> None:
     """All ten: ?G twice, ?N, ?M, ?R, ?i, T, D, U, ?F."""

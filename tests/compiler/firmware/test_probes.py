@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.probes import Probes, extreme_frames, joined, random_frames, turns
+from thenar.compiler.firmware.probes import Probes, extreme_frames, random_frames, turns
 from thenar.runtime.tables import IntegerTables
 
 ALL_OPEN, ALL_CLOSED = (False,) * 5, (True,) * 5
@@ -59,10 +59,3 @@ def test_random_frames_are_those_of_their_seed_and_meet_every_side_of_every_thre
     assert len(set(frames.codes[:, 0].tolist())) > 200
     assert {ALL_OPEN, ALL_CLOSED} <= set(map(tuple, frames.bits.tolist()))
     assert len(set(map(tuple, frames.bits.tolist()))) == 32
-
-
-def test_a_build_without_switches_or_without_joints_has_frames_too() -> None:
-    for held, shape in ((tables([3], switches=0), (0, 1)), (tables(), (5, 0))):
-        frames = joined(extreme_frames(held), random_frames(held, 10, 0))
-        assert (frames.bits.shape[1], frames.codes.shape[1]) == shape
-        assert len(frames) == len(extreme_frames(held)) + 10

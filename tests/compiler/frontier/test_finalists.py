@@ -6,7 +6,7 @@ from thenar.compiler.frontier.finalists import depth_of, finalists, papers_depth
 from thenar.compiler.frontier.points import PlacementChoice
 from thenar.compiler.frontier.price import Tabled
 from thenar.compiler.frontier.screen import Screened
-from thenar.compiler.frontier.search import NO_SWITCHES, Candidate, Search, Shape
+from thenar.compiler.frontier.search import Candidate, Search, Shape
 from thenar.compiler.frontier.survey import FoldHits, TrialAccuracy
 from thenar.runtime.recipe import Inputs
 
@@ -18,10 +18,6 @@ def judged(rate: float) -> TrialAccuracy:
 def _screened(size: int, rate: float, frame_us: float, inputs: Inputs = "switches", method: str = "id3") -> Screened:
     choice = Candidate(PlacementChoice(method, float(size)), inputs)
     return Screened(choice, tuple(range(size)), judged(rate), frame_us)
-
-
-def test_joints_are_read_unless_switches_stand_alone() -> None:
-    assert [Candidate(NO_SWITCHES, kind).joints for kind in ("both", "joints", "switches")] == [True, True, False]
 
 
 def test_the_best_and_the_smallest_that_is_level_come_first() -> None:

@@ -22,11 +22,6 @@ def test_it_says_how_many_switches_how_much_time_how_much_recognition_and_agains
     )
 
 
-def test_what_was_not_corrected_is_not_said_to_be(examples: Any) -> None:
-    points = tuple(msgspec.structs.replace(point, luck=0.0004) for point in examples.example_frontier().points)
-    assert "luck" not in summary(examples.example_frontier(points=points))
-
-
 def test_rates_are_named_by_what_they_are_of_and_their_unit(examples: Any) -> None:
     frontier = examples.example_frontier()
     assert list(rates_of(frontier)) == ["new subject", "pooled"]
@@ -35,13 +30,6 @@ def test_rates_are_named_by_what_they_are_of_and_their_unit(examples: Any) -> No
     assert list(several) == ["new subject", "new subject, frames", "pooled"]
     assert [rate(point) for rate in several.values()] == [point.rate, point.frames, point.other_rate]
     assert list(rates_of(examples.example_frontier(subjects=1, by="pooled"))) == ["pooled"]
-
-
-def test_joints_are_told_too(examples: Any) -> None:
-    assert summary(examples.example_frontier(picked=8)).startswith(
-        "Point 8: 8 of 160 switches and 16 of 16 joints, read"
-    )
-    assert summary(examples.example_frontier(picked=7)).startswith("Point 7: 16 of 16 joints, read")
 
 
 def test_without_marks_and_without_points_it_is_still_a_summary(examples: Any) -> None:
@@ -143,11 +131,3 @@ def test_names_come_back_as_they_are(examples: Any, name: str) -> None:
     (names,) = csv.reader(io.StringIO(text_of(row["switches"]), newline=""), delimiter=";")
     assert names == [name, "s2"]
     assert not row["switches"].startswith("=")
-
-
-def test_one_subject_has_no_rate_of_new_ones(examples: Any) -> None:
-    points = examples.example_frontier().points
-    (row,) = _rows(
-        examples.example_frontier(points=(msgspec.structs.replace(points[0], other_rate=None),), picked=None)
-    )
-    assert (row["other_rate_of"], row["other_rate"], row["other_rate_low"], row["other_rate_high"]) == ("",) * 4

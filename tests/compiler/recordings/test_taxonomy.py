@@ -10,19 +10,12 @@ from thenar.compiler.recordings.taxonomy import (
     FEIX_33,
     KAMAKURA_14,
     Taxonomy,
-    is_published,
     own,
     published,
     published_for,
 )
 
 PUBLISHED = [KAMAKURA_14, CUTKOSKY_16, FEIX_33]
-
-
-def test_the_published_taxonomies_have_as_many_types_as_their_names_say() -> None:
-    assert [len(taxonomy.types) for taxonomy in PUBLISHED] == [14, 16, 33]
-    assert [taxonomy.name for taxonomy in PUBLISHED] == ["kamakura14", "cutkosky16", "feix33"]
-    assert all(published(taxonomy.name) == taxonomy and is_published(taxonomy) for taxonomy in PUBLISHED)
 
 
 @pytest.mark.parametrize("taxonomy", PUBLISHED, ids=lambda taxonomy: taxonomy.name)

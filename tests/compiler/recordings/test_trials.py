@@ -4,16 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from thenar.compiler.recordings.trials import Frames, fill, groups, in_time, natural_key, numbered, otsu, restarts
+from thenar.compiler.recordings.trials import Frames, fill, groups, in_time, numbered, otsu, restarts
 
 IDS = hnp.arrays(np.intp, st.integers(1, 30), elements=st.integers(0, 4))
-
-
-@given(st.lists(st.integers(0, 10**6)))
-def test_numbers_in_texts_are_sorted_as_numbers(numbers: list[int]) -> None:
-    texts = [f"Trial {number} - Copy" for number in numbers]
-    assert sorted(texts, key=natural_key) == [f"Trial {number} - Copy" for number in sorted(numbers)]
-    assert sorted(["b1", "a10", "1" * 5000, "A2", ""], key=natural_key) == ["", "1" * 5000, "A2", "a10", "b1"]
 
 
 @given(IDS, st.data())
@@ -26,11 +19,6 @@ def test_rows_get_one_number_exactly_where_all_columns_are_equal(first: np.ndarr
     order = sorted(set(pairs))
     assert texts == [f"{a} {b}" for a, b in order]
     assert numbers.tolist() == [order.index(pair) + 1 for pair in pairs]
-
-
-def test_a_trial_begins_with_another_person_and_where_the_clock_starts_again() -> None:
-    ids, time = np.array([0, 0, 0, 1, 1, 1, 0]), np.array([5, 6, 6, 7, 8, 1, 2.0])
-    assert restarts(ids, time).tolist() == [1, 1, 1, 2, 2, 3, 4]
 
 
 @given(st.lists(st.integers(10, 40), min_size=4, max_size=8), st.integers(0, 2**32 - 1))

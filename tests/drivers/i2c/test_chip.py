@@ -42,10 +42,6 @@ def test_reading_all_pins_takes_what_the_data_sheets_say(kind: str) -> None:
     assert [(reading.wire_bytes, reading.scl_periods) for reading in whole] == [WHOLE_READS[kind]]
 
 
-def test_selecting_a_channel_takes_what_the_data_sheet_says() -> None:
-    assert tca9548a.SCL_PERIODS == 9 * 2 + 2
-
-
 @pytest.mark.parametrize("kind", CHIPS)
 def test_the_cheapest_readings_stand_first_and_have_names_of_their_own(kind: str) -> None:
     readings = CHIPS[kind].readings
@@ -67,11 +63,6 @@ def test_the_seventh_pins_of_a_microchip_expander_are_no_inputs_and_the_reason_i
     chip = CHIPS[kind]
     assert set(chip.not_inputs) == pins
     assert all("SDA" in reason for reason in chip.not_inputs.values())
-
-
-@pytest.mark.parametrize("kind", sorted(set(CHIPS) - {"mcp23017", "mcp23008"}))
-def test_all_pins_of_the_others_are_inputs(kind: str) -> None:
-    assert not CHIPS[kind].not_inputs
 
 
 @pytest.mark.parametrize("kind", CHIPS)
@@ -129,10 +120,6 @@ def test_the_straps_of_an_address_are_its_lowest_bits(package: Package, addresse
 def test_the_one_address_pin_of_an_ads1115_goes_to_ground_supply_sda_or_scl() -> None:
     package = CHIPS["ads1115"].package
     assert [package.selects(offset) for offset in range(4)] == [(("ADDR", to),) for to in ("low", "high", "SDA", "SCL")]
-
-
-def test_only_the_chip_without_pull_ups_is_said_to_have_none() -> None:
-    assert [kind for kind, chip in expanders().items() if not chip.pulls_up] == ["tca6424a"]
 
 
 @pytest.mark.parametrize(("kind", "start", "read", "us"), [("ads1115", 38, 48, 1317), ("ads7828", 0, 48, 0)])

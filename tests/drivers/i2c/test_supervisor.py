@@ -142,14 +142,6 @@ def test_what_is_nothing_known_is_called_so() -> None:
     assert identify_chip(WireNode("pcf8574", 0x21), 0x20) == "something unknown"
 
 
-def test_a_chip_left_in_bank_1_by_a_crash_is_brought_back_to_bank_0() -> None:
-    node = node_with("mcp23017", 0x20, 0x2A15)
-    node.station.device.poke(0x0A, 0xA0)  # BANK and SEQOP
-    node.station.device.poke(0x00, 0x00)
-    set_up(node, CHIPS["mcp23017"], 0x20, inputs("mcp23017"))
-    assert node.query(Query(0x20, b"\x12", 2)) == bytes((0x15, 0x2A))
-
-
 CONVERTERS = [kind for kind in CHIPS if kind not in expanders()]
 
 

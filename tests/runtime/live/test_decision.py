@@ -1,4 +1,4 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import pytest
@@ -6,9 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime.live.decision import Decision, Ranking
-from thenar.runtime.tables import IntegerTables
 
-MakeTables = Callable[..., IntegerTables]
 Frame = tuple[int, tuple[int, ...]]
 
 LEAD, DWELL, HOLD = 5, 40, 150
@@ -80,21 +78,6 @@ def test_a_frame_without_the_lead_begins_the_dwell_anew(between: tuple[int, ...]
     old, new = (110, 100, 100), (100, 110, 100)
     found = decide([(0, old), (10, new), (30, between), (20, new), (39, new), (1, new)])
     assert [decided for _, _, decided in found] == [0, 0, 0, 0, 0, 1]
-
-
-def test_the_same_frame_again_is_no_new_evidence() -> None:
-    found = decide([(0, (110, 100, 100)), (10, (100, 110, 100)), *[(0, (100, 110, 100))] * 50])
-    assert {decided for _, _, decided in found} == {0}
-
-
-def test_after_unknown_the_first_candidate_is_taken_at_once() -> None:
-    decision = Decision(LEAD, DWELL, HOLD)
-    assert decision.update(0, Ranking((9, 0, 0))) == 0
-    decision.update(1, Ranking((0, 9, 0)))
-    decision.forget()
-    assert decision.held is None
-    assert decision.update(2, Ranking((0, 0, 1))) == 2
-    assert decision.update(50, Ranking((0, 9, 0))) == 2
 
 
 A, B, C = (110, 100, 100), (100, 110, 100), (100, 100, 110)

@@ -1,15 +1,11 @@
 """The stated error rate, beside the rate that simulation finds; and what correlated frames do to it."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from thenar.runtime.live.decision import Ranking, SequentialTest
-from thenar.runtime.tables import IntegerTables
-
-MakeTables = Callable[..., IntegerTables]
 
 SCALE = 200.0
 FOREVER = 10**12
@@ -64,15 +60,6 @@ def test_frames_that_repeat_themselves_are_not_evidence_and_spacing_leaves_them_
     spaced = wrong_share(5, 0.02, 800, repeat=8, spacing_us=8 * FRAME_US)
     assert alike > 3 * 0.02
     assert spaced <= 0.02 + 3 * math.sqrt(0.02 * 0.98 / 800)
-
-
-def test_a_lower_error_rate_takes_more_frames() -> None:
-    def frames(error_rate: float) -> float:
-        random = np.random.default_rng(3)
-        rows = [scores(random, 0, 4, 0.7, 400) for _ in range(100)]
-        return float(np.mean([run(SequentialTest(4, SCALE, error_rate, FOREVER), row)[1] for row in rows]))
-
-    assert frames(0.2) < frames(0.02) < frames(0.002)
 
 
 def test_it_decides_at_the_threshold_and_not_one_step_below() -> None:

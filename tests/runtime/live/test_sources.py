@@ -13,7 +13,7 @@ from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.live import sources as module
 from thenar.runtime.live.recogniser import LiveRecognizer
-from thenar.runtime.live.sources import RETRY_S, DeviceThread, FrameBuffer
+from thenar.runtime.live.sources import DeviceThread, FrameBuffer
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import LiveGrasp
 
@@ -175,10 +175,6 @@ def test_the_gloves_record_is_a_measurement_until_it_expires(monkeypatch: pytest
         clock[0] = now
         taken = arrivals.take()
         assert (taken.glove, taken.measured) == (record, measured)
-
-
-def test_nothing_is_joined_before_the_first_frame(joined: Joined) -> None:
-    assert joined(5, [LOW, HIGH], [], 0) is None
 
 
 def test_a_part_alone_that_owns_everything_is_handed_on_as_it_is(joined: Joined) -> None:
@@ -347,7 +343,3 @@ def test_a_fault_after_each_opening_is_logged_once(kept: Kept, caplog: pytest.Lo
         assert kept.next_change() == (False, "ZeroDivisionError: oops")
     assert kept.keeper.state.faults == 3
     assert len([record for record in caplog.records if record.exc_info]) == 1
-
-
-def test_retries_leave_time_to_recover_within_a_second() -> None:
-    assert RETRY_S <= 0.25

@@ -74,38 +74,6 @@ def test_what_is_held_is_the_newest_preshape_that_was_called_for_without_a_break
         assert answer is (held_after(frames[: number + 1]) if told else None)
 
 
-@given(lives)
-def test_nothing_is_ever_told_on_unknown(frames: list[LiveGrasp]) -> None:
-    told = answers(frames, settle_ms=0)
-    assert all(answer is None for one, answer in zip(frames, told, strict=True) if one.grasp == UNKNOWN)
-    assert all(answer is None for one, answer in zip(frames, told, strict=True) if one.health == "unknown")
-
-
-@given(lives)
-def test_a_low_probability_never_changes_the_preshape(frames: list[LiveGrasp]) -> None:
-    selector = PreshapeSelector(TABLE, min_probability=0.8, settle_ms=0)
-    before: Preshape | None = None
-    for one in frames:
-        answer = selector.update(one)
-        if one.probability < 0.8:
-            assert answer in (None, before)
-        before = answer or before
-
-
-def test_grasp_types_that_share_a_preshape_settle_together() -> None:
-    assert answers([frame(0, "PoS"), frame(20, "PoI"), frame(30, "PoS")]) == [None, None, WRAP]
-
-
-def test_the_hand_stays_as_it_is_after_a_grasp_type_that_the_table_does_not_name() -> None:
-    frames = [frame(0, "PoS"), frame(30, "PoS"), frame(40, "Lat"), frame(50, "PoS", 0.3)]
-    assert answers(frames) == [None, WRAP, None, WRAP]
-
-
-def test_a_break_begins_the_settling_anew() -> None:
-    frames = [frame(0, "Tip"), frame(20, "Tip", 0.4), frame(30, "Tip"), frame(50, "Tip"), frame(60, "Tip")]
-    assert answers(frames) == [None, None, None, None, PINCH]
-
-
 @pytest.mark.parametrize("wrong", [{"min_probability": 1.5}, {"min_probability": float("nan")}, {"settle_ms": -1}])
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(PreshapeError):

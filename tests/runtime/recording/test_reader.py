@@ -20,7 +20,7 @@ from thenar.runtime.errors import McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.guide import read_journal
-from thenar.runtime.recording.layout import CHANNELS, LARGEST_RECORD, MAGIC
+from thenar.runtime.recording.layout import LARGEST_RECORD, MAGIC
 from thenar.runtime.recording.reader import OTHER_RECORDS, Reader
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
@@ -373,7 +373,3 @@ def test_a_file_may_grow_while_it_is_read(recording: Path, entries: list[Entry])
     with recording.open("ab") as file:
         file.write(b"more")
     assert [entry for entry in reader if not isinstance(entry, Session)] == entries
-
-
-def test_every_channel_is_named_as_ros_names_topics() -> None:
-    assert all(topic.startswith("/thenar/") and topic.islower() for topic, _ in CHANNELS.values())

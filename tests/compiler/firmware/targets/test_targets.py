@@ -27,11 +27,6 @@ def test_the_page_on_firmware_names_every_target() -> None:
     assert [name for name in TARGETS if f"`{name}`" not in page] == []
 
 
-def test_an_atmega328p_has_32_kib_of_flash_and_2_of_ram() -> None:
-    uno = TARGETS["avr328p"]
-    assert (uno.part, uno.flash, uno.ram, uno.clock_hz) == ("atmega328p", 32768, 2048, 16_000_000)
-
-
 def test_what_is_verified_and_what_is_timed_is_read_off_the_targets() -> None:
     assert kinds() == ("host", "avr", "micropython")
     assert timed() == ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "rv32imac", "host", "pi")

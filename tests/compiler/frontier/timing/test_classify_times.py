@@ -4,21 +4,13 @@ import pytest
 from thenar.compiler.firmware.choose import fit_for
 from thenar.compiler.firmware.targets import TARGETS, timed
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.frontier.timing.classify_times import Classified, ClassifyModel
+from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.python_times import YARDSTICK, PythonCost, classify_us, fit_here, random_tables
 from thenar.compiler.workers import in_workers
 from thenar.runtime.tables import tables_to_bytes
 
 PYTHON = PythonCost(1.0, 0.1, 0.2, 0.3, 0.01, 0.02, 10.0)
 TABLES = random_tables(33, 16, 14)
-
-
-@pytest.mark.parametrize("target", [target for target in timed() if target not in ("host", "pi")])
-def test_tables_cost_what_the_formula_of_the_target_says(target: str) -> None:
-    part, model = TARGETS[target], ClassifyModel(target)
-    found, fit = model.cost(TABLES), fit_for(part, TABLES)
-    assert fit.cost is not None
-    assert found == Classified(model.us(fit.cost.cycles), "model", fit.cost.flash, fit.cost.ram)
 
 
 def test_tables_that_do_not_fit_have_no_cost() -> None:

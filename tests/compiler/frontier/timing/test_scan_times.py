@@ -2,13 +2,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware.targets import timed
 from thenar.compiler.frontier.points import Time
 from thenar.compiler.frontier.timing.scan_times import (
     Overhead,
     ScanTimes,
-    measured_call_us,
-    overhead_of,
     records_of,
     scan_times,
 )
@@ -103,14 +100,3 @@ def test_a_glove_is_as_fast_as_its_line_and_no_faster_than_it_is_asked() -> None
 
 def test_a_firmware_that_sets_no_mask_waits_for_all_sensors() -> None:
     assert records_of(SENSORS_18[:4], masked=False).of(4) == records_of(SENSORS_18).of(18)
-
-
-@pytest.mark.parametrize("target", timed())
-def test_every_target_says_the_overhead_of_its_scans(target: str) -> None:
-    overhead = overhead_of(target)
-    assert len(overhead.what) > 20
-    assert (overhead.call_us > 0) == (not target.startswith(("avr", "cortex", "rv32")))
-
-
-def test_a_system_call_is_timed() -> None:
-    assert 0.05 < measured_call_us() < 1000.0
