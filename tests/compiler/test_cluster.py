@@ -61,7 +61,7 @@ def times_out(number: int) -> None:
     raise TimeoutError(f"piece {number}")
 
 
-def test_a_timeout_of_the_work_is_not_taken_for_one_of_the_cluster(scheduler: str) -> None:
+def test_a_timeout_in_the_work_is_not_the_clusters(scheduler: str) -> None:
     with pytest.raises(TimeoutError, match="piece 3"):
         list(in_cluster(times_out, [3], scheduler))
 
@@ -144,7 +144,7 @@ def killed(_number: int) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_work_that_kills_every_worker_it_meets_is_an_error_and_the_cluster_lives_on(scheduler: str) -> None:
+def test_work_that_kills_workers_fails_without_ending_the_cluster(scheduler: str) -> None:
     with pytest.raises(ClusterError, match="one task ended 4 workers"):
         list(in_cluster(killed, [0], scheduler))
     assert list(in_cluster(operator.neg, [1], scheduler)) == [-1]

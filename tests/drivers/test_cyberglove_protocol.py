@@ -133,7 +133,7 @@ def test_the_usual_rates_are_told_as_two_public_drivers_tell_them(
 
 
 @given(st.floats(0.001, 115_200.0))
-def test_the_told_period_is_the_nearest_but_for_the_rounding_of_two_words(rate_hz: float) -> None:
+def test_the_sent_period_is_the_nearest_two_words_allow(rate_hz: float) -> None:
     words = period_words(rate_hz)
     assert all(0 < word <= 0xFFFF for word in words)
     # Half a tick in the product of the words, and half a tick in each of its factors' multiples.
@@ -197,7 +197,7 @@ def test_a_lost_byte_costs_one_record(values: bytes, place: int) -> None:
 
 
 @pytest.mark.parametrize("ending", [b"es", b"eg"])
-def test_e_s_and_g_are_sensor_values_unless_there_are_two_bytes_too_many(ending: bytes) -> None:
+def test_fault_letters_are_values_unless_two_bytes_are_extra(ending: bytes) -> None:
     values = b"S" * (SENSORS - 2) + ending
     assert RecordDecoder().feed(encode(Record(values))) == [Record(values)]
     (record,) = RecordDecoder().feed(b"S" + values + ending + b"\0")
@@ -233,7 +233,7 @@ def test_a_status_byte_comes_behind_the_sensors_and_before_a_fault(record: Recor
 
 
 @given(VALUES, st.integers(128, 255))
-def test_whoever_expects_a_status_byte_takes_no_record_without_one_nor_the_other_way(values: bytes, on: int) -> None:
+def test_records_need_a_status_byte_exactly_where_expected(values: bytes, on: int) -> None:
     without, with_it = Record(values), Record(values, status=on)
     expecting, plain = RecordDecoder(status=True), RecordDecoder()
     assert expecting.feed(encode(without)) == plain.feed(encode(with_it)) == []

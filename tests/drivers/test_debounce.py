@@ -54,16 +54,14 @@ def scan_times(rate_hz: int, seed: int, until: int) -> list[int]:
 
 @pytest.mark.parametrize("rate_hz", RATES_HZ)
 @pytest.mark.parametrize("seed", range(10))
-def test_bounce_within_the_data_sheet_gives_one_press_and_one_release_a_tap(rate_hz: int, seed: int) -> None:
+def test_bounce_within_specification_gives_one_press_and_one_release(rate_hz: int, seed: int) -> None:
     changes = contact(seed, taps=3)
     seen = reported(scan_times(rate_hz, seed, changes[-1][0] + 60_000), changes)
     assert [state for _, state in seen] == [1, 0] * 3
 
 
 @given(st.integers(0, 10_000), st.sampled_from(RATES_HZ))
-def test_a_press_waits_for_nothing_and_a_release_for_the_first_scan_after_its_time_at_most(
-    seed: int, rate_hz: int
-) -> None:
+def test_presses_are_immediate_and_releases_wait_one_scan_at_most(seed: int, rate_hz: int) -> None:
     """Measured from the first reading of the press, and from the first reading after the last bounce.
 
     Of slow scans it never takes two.
@@ -85,7 +83,7 @@ def test_at_100_scans_a_second_both_edges_are_reported_at_once() -> None:
     assert [debouncer.update(n * 10_000, level, 1) for n, level in enumerate(levels)] == levels
 
 
-def test_at_1000_scans_a_second_a_release_is_deferred_and_a_gap_in_it_starts_again() -> None:
+def test_at_1000_scans_a_second_a_release_is_deferred_without_gaps() -> None:
     debouncer = Debouncer()
     levels = [1] * 20 + [0] * 5 + [1] + [0] * 15
     states = [debouncer.update(n * 1000, level, 1) for n, level in enumerate(levels)]
@@ -167,7 +165,7 @@ def test_it_does_what_the_rules_say_one_switch_at_a_time(
     assert [debouncer.update(*reading) for reading in readings] == model(readings, press, release)
 
 
-def test_a_switch_that_is_not_read_for_a_while_keeps_its_state_and_its_opening_goes_on() -> None:
+def test_unread_switches_keep_their_state_and_their_opening() -> None:
     debouncer = Debouncer()
     for time in range(0, 20_000, 1000):
         debouncer.update(time, 1, 1)

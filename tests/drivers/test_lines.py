@@ -140,7 +140,7 @@ def test_nothing_that_comes_raises(line: bytes, columns: int) -> None:
     parsed(line, columns)
 
 
-def test_ten_megabytes_without_a_line_feed_fill_no_memory_and_the_next_row_counts() -> None:
+def test_ten_megabytes_without_line_feed_fill_no_memory() -> None:
     splitter = Splitter()
     for _ in range(160):
         assert splitter.feed(b"7" * 65_536) == []

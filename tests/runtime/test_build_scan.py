@@ -25,7 +25,7 @@ def add(folder: Path, scan: ScanMap) -> Path:
     return path
 
 
-def test_a_build_for_no_harness_has_no_map_and_its_manifest_says_nothing_of_one(folder: Path) -> None:
+def test_a_build_without_harness_has_no_map(folder: Path) -> None:
     assert Build.load(folder).scan is None
     assert b"scan" not in (folder / MANIFEST_NAME).read_bytes()
 

@@ -41,7 +41,7 @@ def test_a_recognition_says_what_the_scores_say(loaded: Build, seed: int) -> Non
     assert not found.degraded
 
 
-def test_a_lost_input_is_replaced_by_its_mean_and_the_frame_is_degraded(loaded: Build) -> None:
+def test_a_lost_input_takes_its_mean_and_degrades_the_frame(loaded: Build) -> None:
     frame, lost = _frame(1), np.arange(9) == 4
     found = loaded.recognise(*frame, lost_switches=lost)
     lanes = loaded.scorer.lanes_without(*frame, lost, np.zeros(3, bool))

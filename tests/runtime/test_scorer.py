@@ -130,7 +130,7 @@ def test_the_highest_code_there_is_is_a_code(make_tables: MakeTables) -> None:
         scorer.lanes(bits, [65535, 65536, 0])
 
 
-def test_every_code_of_a_joint_has_the_row_of_its_bin_the_first_time_and_again(make_tables: MakeTables) -> None:
+def test_every_code_has_its_bins_row_also_when_cached(make_tables: MakeTables) -> None:
     tables = make_tables(3, switches=0, joints=2)
     scorer, codes = Scorer(tables), np.arange(0, 65536, 7)
     bins = np.searchsorted(tables.thresholds[0], codes)

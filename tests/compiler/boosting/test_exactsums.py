@@ -53,7 +53,7 @@ def test_scaling_by_a_power_of_two_changes_no_integer(values: np.ndarray, power:
 
 
 @given(ROWS)
-def test_the_two_grids_together_hold_every_number_to_2_to_the_minus_90_of_the_sum(values: np.ndarray) -> None:
+def test_two_grids_together_keep_90_bits_of_the_sum(values: np.ndarray) -> None:
     coarse, fine = on_grids(values)
     for row in range(len(values)):
         total = sum(Fraction(abs(float(v))) for v in values[row])

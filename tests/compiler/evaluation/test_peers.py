@@ -36,7 +36,7 @@ def majorities(predicted: list[str], grasp_set: GraspSet) -> int:
     return sum(min(vote, key=lambda grasp: (-vote[grasp], grasp)) == trial[1] for trial, vote in votes.items())
 
 
-def test_each_subject_left_out_is_what_scikit_learn_predicts_with_a_selector_in_its_pipeline(make_grasps: Make) -> None:
+def test_leaving_subjects_out_matches_a_scikit_learn_pipeline(make_grasps: Make) -> None:
     grasp_set = framed(make_grasps)
     study = evaluate(grasp_set, scheme="subject", **NESTED)
     selected = make_pipeline(ID3Selector(), LogitBoostClassifier(rounds=10))

@@ -86,7 +86,7 @@ def predicted_rows(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @given(predicted_rows())
-def test_a_trial_is_what_most_of_its_frames_are_and_the_lowest_label_of_several(
+def test_a_trial_is_the_majority_of_frames_ties_lowest_label(
     case: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> None:
     predicted, labels, trials = case
@@ -122,7 +122,7 @@ def test_the_order_of_rows_and_the_names_of_trials_say_nothing(
     )
 
 
-def test_a_new_subjects_rate_is_over_subjects_and_one_subjects_alone_over_trials() -> None:
+def test_new_subject_rates_are_over_subjects_single_ones_over_trials() -> None:
     # Seven people, 172 trials each, of whom 31 to 98 % are recognised: no sample of people says much of the next.
     shares = [0.31, 0.98, 0.72, 0.55, 0.90, 0.84, 0.76]
     hits = np.concatenate([np.arange(172) < round(172 * share) for share in shares])

@@ -25,7 +25,7 @@ def test_any_other_name_is_refused(text: str) -> None:
 
 
 @given(ANY_TEXT)
-def test_a_comment_is_one_line_of_ascii_that_neither_ends_nor_opens_one(text: str) -> None:
+def test_a_comment_is_one_ascii_line_that_cannot_break_out(text: str) -> None:
     said = comment(text)
     assert said.isascii()
     assert said.isprintable()
@@ -33,7 +33,7 @@ def test_a_comment_is_one_line_of_ascii_that_neither_ends_nor_opens_one(text: st
 
 
 @given(ANY_TEXT)
-def test_a_text_in_markdown_is_one_line_in_which_every_mark_is_escaped(text: str) -> None:
+def test_markdown_text_is_one_line_with_every_mark_escaped(text: str) -> None:
     said = markdown(text)
     assert said.isascii()
     assert said.isprintable()

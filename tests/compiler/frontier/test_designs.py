@@ -115,7 +115,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     assert points[0].classify == Time(20.0, "simulated")
 
 
-def test_a_points_rate_and_the_lower_end_of_its_interval_are_less_its_luck() -> None:
+def test_luck_lowers_a_points_rate_and_its_intervals_lower_end() -> None:
     design = next(designs(close_of(20, 0.9)))
     waits = dict.fromkeys(((design, kind) for kind in POLICIES), WAIT)
     (point, *_) = points_of([design], waits, {design.judged: 0.25}, names, trained)

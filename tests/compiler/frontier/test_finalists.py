@@ -66,13 +66,13 @@ def rates_of(shape: Shape, *rates: tuple[int, float]) -> dict[Tabled, TrialAccur
     return {Tabled(rounds, shape): judged(rate) for rounds, rate in rates}
 
 
-def test_of_every_shape_the_fewest_rounds_that_do_as_well_are_worth_a_price() -> None:
+def test_every_shape_is_priced_at_its_fewest_equivalent_rounds() -> None:
     wide, narrow = Shape(16), Shape(4)
     rates = rates_of(wide, (10, 0.8), (30, 0.9), (100, 0.9002)) | rates_of(narrow, (10, 0.7), (30, 0.6))
     assert worthwhile(rates) == (Tabled(30, wide), Tabled(10, narrow))
 
 
-def test_the_papers_tables_have_a_hundred_rounds_or_as_many_as_there_are() -> None:
+def test_the_papers_tables_have_at_most_a_hundred_rounds() -> None:
     rounds = [papers_tables(Search(methods=("id3",), baselines=(), rounds=most)).rounds for most in (300, 100, 50)]
     assert rounds == [100, 100, 50]
     for most in (300, 100, 50, 1):
@@ -85,9 +85,7 @@ def right(count: int) -> bytes:
 
 
 @pytest.mark.parametrize(("late", "rounds"), [(0, 100), (2, 100), (3, 300)])
-def test_rounds_beyond_the_papers_are_followed_where_they_win_more_than_a_fifth_of_a_percent(
-    late: int, rounds: int
-) -> None:
+def test_further_rounds_are_followed_if_they_win_a_fifth_percent(late: int, rounds: int) -> None:
     search = Search(methods=("id3",), baselines=())
     correct = [450 + (late if stage > 100 else 0) for stage in search.stages]
     fits = [FoldHits(tuple(map(right, counts)), (), ()) for counts in (correct, [450] * len(correct))]

@@ -12,7 +12,7 @@ from thenar.compiler.frontier.words import COLUMNS, csv_bytes, featured, rates_o
 from thenar.compiler.text import text_of
 
 
-def test_it_says_how_many_switches_how_much_time_how_much_recognition_and_against_what(examples: Any) -> None:
+def test_the_summary_gives_switches_time_accuracy_and_reference_points(examples: Any) -> None:
     marks = examples.example_frontier().marks
     assert summary(examples.example_frontier(marks=(marks[0], marks[2]))) == (
         "Point 5: 33 of 160 switches, read and classified in 440 us on ATmega328P at 16 MHz, reach 92.9 [92.1, 93.7] % "
@@ -38,7 +38,7 @@ def test_without_marks_and_without_points_it_is_still_a_summary(examples: Any) -
     assert summary(none) == "Of 184,320 combinations none is a point of the frontier."
 
 
-def test_where_nothing_is_picked_the_fastest_point_level_with_all_switches_is_spoken_of(examples: Any) -> None:
+def test_without_a_pick_the_fastest_equivalent_point_is_featured(examples: Any) -> None:
     frontier = examples.example_frontier(picked=None)
     point = featured(frontier)
     assert point is not None

@@ -129,7 +129,7 @@ def test_nothing_is_drawn_off_the_page(manifest_of: Manifests, hand: HandShape, 
             assert 4.9 < float(shape.attrib["y"]) < page[1] - 4.0
 
 
-def test_a_hand_that_is_no_a4_sheet_tells_what_to_print_it_on(manifest_of: Manifests, hand: HandShape) -> None:
+def test_a_hand_larger_than_a4_names_the_sheet_to_use(manifest_of: Manifests, hand: HandShape) -> None:
     readme = spec_files(manifest_of(hand.names), hand=hand)["README.txt"].decode()
     assert "A3 (297 x 420 mm), or 4 A4 sheets, 2 across and 2 down" in " ".join(readme.split())
 

@@ -80,9 +80,7 @@ def test_of_exact_ties_the_lowest_is_taken_where_floating_point_sees_none() -> N
 @given(
     seed=st.integers(0, 2**32 - 1), rest=st.integers(0, 60), noise=st.floats(3.0, 12.0), pressed=st.integers(900, 3000)
 )
-def test_no_level_lies_in_the_noise_of_rest_on_whichever_side_that_is(
-    seed: int, rest: int, noise: float, pressed: int
-) -> None:
+def test_no_level_lies_in_the_noise_of_rest(seed: int, rest: int, noise: float, pressed: int) -> None:
     """Type 0 rests, type 1 presses in a third of its rows, type 2 in all; noise is cut off at 0."""
     random = np.random.default_rng(seed)
     labels = np.repeat(np.arange(3), 60)

@@ -67,7 +67,7 @@ def test_gains_of_one_value_and_other_terms_go_to_the_lowest_number(
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_inputs_of_the_same_cells_are_told_apart_by_the_rows_of_their_values(order: tuple[int, int]) -> None:
+def test_rows_per_value_distinguish_inputs_of_equal_cells(order: tuple[int, int]) -> None:
     # Classes of 2 b + 1 and 2 d + 1 rows, parted (b + 1, b) by both inputs and (d + 1, d) or (d, d + 1): values of
     # b + d + 2 and b + d rows, or of b + d + 1 both, which says more, by less than a double can tell.
     b, d = 10**9, 7 * 10**8

@@ -80,7 +80,7 @@ def test_a_name_with_a_control_character_is_wrong_wherever_it_stands() -> None:
     assert names(cells).missing.tolist() == [False, False, False, False, True, True]
 
 
-def test_a_number_is_a_name_unless_it_is_none_and_zero_has_one_name() -> None:
+def test_finite_numbers_are_names_and_zero_has_one_name() -> None:
     parsed = names(np.array([3.0, -0.0, 0.0, np.inf, -np.inf, np.nan, 0.5]))
     assert parsed.values[[0, 1, 2, 6]].tolist() == ["3", "0", "0", "0.5"]
     assert parsed.wrong.tolist() == [False, False, False, True, True, False, False]

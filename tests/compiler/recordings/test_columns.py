@@ -147,9 +147,7 @@ def test_columns_that_do_not_fit_the_table_are_refused(columns: Columns, reason:
         (("s" * 400_000,), 2, "more than 600 characters"),
     ],
 )
-def test_globs_that_would_take_long_are_refused_at_once_and_in_few_words(
-    globs: tuple[str, ...], count: int, reason: str
-) -> None:
+def test_slow_globs_are_refused_at_once_and_briefly(globs: tuple[str, ...], count: int, reason: str) -> None:
     names = ["g", *(f"s{number:05}" for number in range(count - 1))]
     with pytest.raises(ColumnsError, match=reason) as refused:
         select(Columns("g", switches=globs), names)
@@ -166,7 +164,7 @@ def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
     assert read_columns(tmp_path / "columns.toml") == Columns("a")
 
 
-def test_a_column_with_brackets_in_its_name_is_answered_with_the_glob_that_finds_it() -> None:
+def test_a_missed_column_with_brackets_is_answered_with_its_glob() -> None:
     with pytest.raises(ColumnsError, match=r"for the column of that name write 'force\[\[\]N\]'"):
         select(Columns("g", switches=("force[N]",)), ["g", "force[N]"])
     assert select(Columns("g", switches=("force[[]N]",)), ["g", "force[N]"]).switches == ("force[N]",)

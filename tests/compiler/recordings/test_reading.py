@@ -53,7 +53,7 @@ def test_missing_cells_are_an_error_unless_their_rows_may_be_dropped() -> None:
         read(ALL, j=["", "2", "3"], who=["x", "y", "?"])
 
 
-def test_a_wrong_cell_is_an_error_even_in_a_row_that_would_be_dropped() -> None:
+def test_a_wrong_cell_is_an_error_even_in_dropped_rows() -> None:
     with pytest.raises(TableError, match="not 0 or 1"):
         read(DROP, s=["2", "1", "1"], j=["", "2", "3"])
 
@@ -68,7 +68,7 @@ def test_a_row_that_misses_a_label_is_found_among_numbers_too() -> None:
         read(Columns("g", switches=("s",)), g=np.array([1.0, np.nan, 2.0]))
 
 
-def test_of_many_wrong_cells_the_first_rows_are_named_and_the_rest_counted() -> None:
+def test_the_first_wrong_cells_are_named_and_the_rest_counted() -> None:
     columns = [f"s{number}" for number in range(10)]
     table = Table("t.csv", {"g": ["a"] * 9} | {name: ["7"] * 9 for name in columns}, np.arange(1, 10))
     wanted = Columns("g", switches=("s*",))

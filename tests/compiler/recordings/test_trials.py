@@ -44,9 +44,7 @@ def test_frames_are_ordered_within_the_places_of_their_trial(ids: np.ndarray, da
 
 
 @given(IDS, st.data())
-def test_a_gap_is_filled_from_the_nearest_frame_of_its_trial_else_with_the_median(
-    ids: np.ndarray, data: st.DataObject
-) -> None:
+def test_gaps_are_filled_from_the_trial_else_with_the_median(ids: np.ndarray, data: st.DataObject) -> None:
     values = data.draw(hnp.arrays(np.int64, len(ids), elements=st.integers(0, 9)))
     missing = data.draw(hnp.arrays(np.bool_, len(ids)).filter(lambda mask: not mask.all()))
     expected, strange = values.copy(), 0

@@ -162,7 +162,7 @@ def test_all_rows_have_pythons_scores_and_answers(trier: Trier, make_set: Make, 
     assert trier.log("browser") == []
 
 
-def test_a_build_with_a_class_of_none_and_one_that_refuses_say_none_as_python_does(
+def test_the_page_predicts_none_as_python_does(
     trier: Trier, make_set: Make, with_none_too: GraspSet, tmp_path: Path
 ) -> None:
     for name, grasp_set in (("class", with_none_too), ("refusing", make_set())):
@@ -388,7 +388,7 @@ def test_a_taxel_goes_from_level_to_level_and_recorded_values_are_levels(
 
 
 @pytest.mark.parametrize("width", [1400, 400])
-def test_it_fits_the_screen_in_light_and_dark_with_letters_that_can_be_read(opened: Trier, width: int) -> None:
+def test_the_page_fits_light_and_dark_screens_with_readable_letters(opened: Trier, width: int) -> None:
     metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
     opened.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     try:

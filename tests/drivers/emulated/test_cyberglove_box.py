@@ -104,7 +104,7 @@ def test_the_doubtful_can_be_had_either_way() -> None:
     assert other.feed(b"?Z\x03?i") == [b"e?\0", b"\x03\0", b"?iCyberGlove\r\n\0\0"]
 
 
-def test_it_is_ready_when_it_has_said_often_enough_that_it_is_not() -> None:
+def test_the_box_is_ready_after_its_given_refusals() -> None:
     one = box(not_ready=2)
     assert one.feed(b"?G?G?G") == [b"?G\x01\0", b"?G\x01\0", b"?G\x03\0"]
     one.state.plugged = False
@@ -153,7 +153,7 @@ def test_a_mask_takes_sensors_out_of_the_records() -> None:
 
 
 @given(st.binary(min_size=18, max_size=18), st.booleans())
-def test_only_bytes_that_a_sensor_can_have_are_taken_and_the_driver_reads_them(values: bytes, status: bool) -> None:
+def test_only_possible_sensor_bytes_are_accepted_and_read(values: bytes, status: bool) -> None:
     one = box()
     one.feed(setting("U", bytes([status])).request)
     if 0 in values:

@@ -27,9 +27,7 @@ def drained(outgoing: Outgoing, now: float) -> bytes:
 
 
 @given(GAPS, st.integers(1, 50))
-def test_a_byte_arrives_when_the_line_has_had_the_time_for_it_and_no_wake_up_shifts_the_schedule(
-    messages: list[tuple[int, int]], every: int
-) -> None:
+def test_bytes_arrive_on_the_lines_schedule_whatever_wakes_up(messages: list[tuple[int, int]], every: int) -> None:
     """Times in milliseconds, a byte taking one; whoever looks, how often, makes no difference."""
     outgoing, queued, free, ends = Outgoing(BYTE_S, 10_000), 0, 0, []
     for gap, length in messages:

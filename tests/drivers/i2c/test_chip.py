@@ -50,16 +50,14 @@ def test_the_cheapest_readings_stand_first_and_have_names_of_their_own(kind: str
 
 
 @pytest.mark.parametrize("kind", CHIPS)
-def test_pins_have_names_of_their_own_and_every_pin_is_in_some_reading(kind: str) -> None:
+def test_pin_names_are_unique_and_every_pin_is_read(kind: str) -> None:
     chip = CHIPS[kind]
     assert len(set(chip.pins)) == len(chip.pins)
     assert {pin for reading in chip.readings for pin in reading.pins} - {-1} == set(range(len(chip.pins)))
 
 
 @pytest.mark.parametrize(("kind", "pins"), [("mcp23017", {"GPA7", "GPB7"}), ("mcp23008", {"GP7"})])
-def test_the_seventh_pins_of_a_microchip_expander_are_no_inputs_and_the_reason_is_given(
-    kind: str, pins: set[str]
-) -> None:
+def test_a_microchip_expanders_seventh_pins_are_no_inputs(kind: str, pins: set[str]) -> None:
     chip = CHIPS[kind]
     assert set(chip.not_inputs) == pins
     assert all("SDA" in reason for reason in chip.not_inputs.values())
@@ -95,7 +93,7 @@ def test_the_mux_has_the_pins_of_its_data_sheet() -> None:
 
 
 @pytest.mark.parametrize("kind", list(CHIPS))
-def test_every_chip_has_each_pin_of_its_driver_once_and_can_be_powered_and_reached(kind: str) -> None:
+def test_every_chips_package_has_its_drivers_pins_supply_and_bus(kind: str) -> None:
     pins = CHIPS[kind].package.pins
     assert all(pins.count(name) == 1 for name in (*CHIPS[kind].pins, "SDA", "SCL"))
     assert set(pins) & set(SUPPLY)
@@ -117,7 +115,7 @@ def test_the_straps_of_an_address_are_its_lowest_bits(package: Package, addresse
     assert len(addresses) == 1 << len(package.selects(0))
 
 
-def test_the_one_address_pin_of_an_ads1115_goes_to_ground_supply_sda_or_scl() -> None:
+def test_an_ads1115s_address_pin_goes_to_ground_supply_sda_or_scl() -> None:
     package = CHIPS["ads1115"].package
     assert [package.selects(offset) for offset in range(4)] == [(("ADDR", to),) for to in ("low", "high", "SDA", "SCL")]
 

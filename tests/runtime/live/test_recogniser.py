@@ -182,7 +182,7 @@ def test_a_segment_has_the_probability_of_its_type_in_this_frame(make_build: Mak
 @pytest.mark.parametrize(
     ("period_us", "grace_us", "until_us"), [(10_000, None, 60_000), (30_000, None, 120_000), (10_000, 25_000, 25_000)]
 )
-def test_a_late_record_serves_degraded_with_its_age_until_the_grace_is_over(
+def test_a_late_record_serves_degraded_until_the_grace_ends(
     make_build: MakeBuild, period_us: int, grace_us: int | None, until_us: int
 ) -> None:
     """Joints hold all the weight, so without them the answer is unknown. A late record displaces no answer."""

@@ -116,18 +116,18 @@ def follow(frames: list[tuple[int, tuple[int, int], bool]]) -> list[int | None]:
     return [test.update(time_us, Ranking(scores), whole=whole) for time_us, scores, whole in frames]
 
 
-def test_frames_with_lost_inputs_end_no_test_while_an_answer_of_whole_frames_holds() -> None:
+def test_degraded_frames_end_no_test_during_a_whole_answer() -> None:
     whole = [(0, FOR_0, True), (10, FOR_0, True)]
     lost = [(time_us, FOR_1, False) for time_us in (20, 110, 111, 112)]
     assert follow(whole + lost) == [None, 0, 0, 0, None, 1]
 
 
-def test_frames_with_lost_inputs_are_left_aside_while_a_test_of_whole_frames_is_under_way() -> None:
+def test_degraded_frames_are_ignored_during_tests_of_whole_frames() -> None:
     frames = [(0, FOR_0, True), (10, FOR_1, False), (20, FOR_1, False), (30, FOR_0, True)]
     assert follow(frames) == [None, None, None, 0]
 
 
-def test_a_test_of_whole_frames_that_takes_too_long_makes_room_for_frames_with_lost_inputs() -> None:
+def test_an_expired_test_of_whole_frames_admits_degraded_ones() -> None:
     frames = [(0, FOR_0, True), (100, FOR_1, False), (101, FOR_1, False), (102, FOR_1, False)]
     assert follow(frames) == [None, None, None, 1]
 

@@ -295,7 +295,7 @@ def test_the_last_trial_is_undone_and_comes_again_at_once(guide: Guide, recorder
     assert read_journal(recorder.path).accepted == (1, 2)
 
 
-def test_a_trial_is_skipped_whatever_it_is_doing_and_is_left_for_another_time(guide: Guide, recorder: Recorder) -> None:
+def test_a_trial_is_skipped_at_any_stage(guide: Guide, recorder: Recorder) -> None:
     guide.press(0, Key.SKIP)
     assert stage(guide) is Stage.READY
     guide.press(0, Key.ACCEPT)

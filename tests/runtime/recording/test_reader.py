@@ -44,9 +44,7 @@ def ends_of_records(data: bytes) -> list[int]:
     return ends
 
 
-def test_a_file_that_is_cut_at_any_byte_gives_what_is_whole_and_says_what_is_cut(
-    recording: Path, tmp_path: Path, entries: list[Entry]
-) -> None:
+def test_a_file_cut_at_any_byte_gives_its_whole_entries(recording: Path, tmp_path: Path, entries: list[Entry]) -> None:
     data = recording.read_bytes()
     ends = ends_of_records(data)
     # Those of the messages on channels that are entries of their own, in order.
@@ -73,9 +71,7 @@ def test_a_file_that_is_cut_at_any_byte_gives_what_is_whole_and_says_what_is_cut
         assert not reader.altered
 
 
-def test_the_rest_of_a_file_that_a_power_cut_filled_with_zeros_is_left_out(
-    recording: Path, entries: list[Entry]
-) -> None:
+def test_zeros_after_a_power_cut_are_left_out(recording: Path, entries: list[Entry]) -> None:
     data = recording.read_bytes()
     end = data.rindex(DATA_END)
     recording.write_bytes(data[:end] + bytes(4096))
@@ -263,7 +259,7 @@ def test_what_other_programs_made_of_a_recording_is_read(
     assert not list(reader.faults())
 
 
-def test_a_chunk_of_another_program_that_does_not_match_its_checksum_is_told(recording: Path, tmp_path: Path) -> None:
+def test_a_foreign_chunk_with_a_wrong_checksum_is_reported(recording: Path, tmp_path: Path) -> None:
     path = tmp_path / "copy.mcap"
     copied(recording, path, compression=CompressionType.NONE, chunk_size=1 << 20)
     data = path.read_bytes()

@@ -112,7 +112,7 @@ def test_a_types_hash_is_that_of_its_description(ros: ModuleType, name: str) -> 
         ("diagnostic_msgs/msg/DiagnosticArray", "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"),
     ],
 )
-def test_the_way_hashes_are_worked_out_here_is_that_of_ross_own_packages(name: str, known: str) -> None:
+def test_hashes_computed_here_are_those_of_ross_packages(name: str, known: str) -> None:
     assert rihs01(name) == f"RIHS01_{known}"
 
 

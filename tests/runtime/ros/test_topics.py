@@ -235,9 +235,7 @@ def test_a_node_that_comes_late_has_the_newest_at_once(
     assert len(heard["preshape"]) == 1
 
 
-def test_a_node_that_comes_late_has_the_step_of_the_task_as_it_is_now(
-    sink: Sink, listen: Listen, make_grasp: MakeGrasp
-) -> None:
+def test_a_late_node_gets_the_tasks_current_step(sink: Sink, listen: Listen, make_grasp: MakeGrasp) -> None:
     sink.publish(replace(make_grasp(), unix_us=1_700_000_000_123_456), None, None)
     sink.task(Progress(0, 3, expected=("cup",)))
     sink.task(Progress(2, 3, "pen", ("rod", "cup"), "skipped", "skipped: cup"))

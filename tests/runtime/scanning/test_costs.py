@@ -25,7 +25,7 @@ def costs_of(*places: tuple[int, int] | None) -> tuple[Costs, Harness]:
     return Costs(whole_scan(harness, harness.switches).ports, harness), harness
 
 
-def test_of_two_muxes_each_stays_together_and_its_first_port_pays_for_leaving_the_other() -> None:
+def test_a_muxs_first_port_pays_for_leaving_the_other_mux() -> None:
     costs, _ = costs_of((0x70, 1), (0x71, 1), (0x70, 2))
     assert costs.units == (((0,), (2,)), ((1,),))
     assert costs.after(0, 0) == READ + 2 * WRITE

@@ -210,7 +210,7 @@ def test_a_grasp_is_published_when_it_changes_and_fifty_times_a_second(
     assert sink.report().sent == 52
 
 
-def test_preshape_task_and_health_come_and_who_comes_later_has_what_is_kept_within_a_second(
+def test_late_readers_get_preshape_and_task_within_a_second(
     sink: Any, listen: Callable[..., Client], make_grasp: MakeGrasp, preshape: Preshape, health: HealthReport
 ) -> None:
     topics, progress = ["/thenar/preshape", "/thenar/task", "/thenar/health"], Progress(1, 3, "hook", ("cup",))

@@ -301,7 +301,7 @@ def test_closing_ends_every_reader_and_may_be_done_twice(
 
 
 @pytest.mark.parametrize("detail", [False, True])
-def test_details_follow_their_grasps_for_those_who_asked_and_a_hundred_times_a_second(
+def test_requested_details_follow_grasps_100_times_a_second(
     make_build: Callable[..., Build], make_grasp: MakeGrasp, tmp_path: Path, detail: bool
 ) -> None:
     build = make_build()

@@ -137,7 +137,7 @@ def first_line(simavr: str, elf: Path, part: str) -> str:
     [{"switches": 12, "joints": 6}, {"switches": 2, "joints": 7}, {"switches": 40, "joints": 17, "bins": 3}],
     ids=["switches", "joints", "both"],
 )
-def test_an_example_for_more_inputs_than_the_board_has_reads_them_by_other_parts(
+def test_inputs_beyond_the_boards_pins_are_read_by_other_parts(
     make_tables: MakeTables, library: Library, sketch: Sketch, inputs: dict[str, int]
 ) -> None:
     sketch(library(Layout(make_tables(**inputs))), "uno")

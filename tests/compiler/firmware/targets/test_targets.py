@@ -12,7 +12,7 @@ from thenar.runtime.tables import IntegerTables
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_every_target_says_what_it_is_and_what_to_do_with_its_folder(name: str) -> None:
+def test_every_target_describes_itself_and_its_folder(name: str) -> None:
     target = TARGETS[name]
     assert (target.name, bool(target.help), bool(target.part)) == (name, True, True)
     assert "{folder}" in target.next_step

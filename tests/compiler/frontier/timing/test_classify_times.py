@@ -28,14 +28,14 @@ def test_instructions_take_a_cycle_each_at_a_clock_that_is_said(target: str) -> 
     assert "lower bound" in slow.note
 
 
-def test_on_a_computer_there_is_the_runtime_alone_and_a_line_through_what_it_took() -> None:
+def test_host_times_are_a_line_fitted_to_the_runtime() -> None:
     found, size = ClassifyModel("host", python=PYTHON).cost(TABLES), len(tables_to_bytes(TABLES))
     assert found is not None
     assert (found.flash, found.ram) == (size, size)
     assert found.us == pytest.approx(1 + 3.3 + 3.2 + 4.2 + 0.01 * 33 * 14 + 0.02 * 16 * 14)
 
 
-def test_a_raspberry_pi_elsewhere_is_so_many_times_as_slow_and_that_is_said_to_be_a_guess() -> None:
+def test_a_raspberry_pis_time_is_a_scaled_and_declared_guess() -> None:
     here, there = ClassifyModel("host", python=PYTHON), ClassifyModel("pi", python=PYTHON, factor=3.0)
     assert _us(there) == pytest.approx(3 * _us(here))
     assert "guess" in there.note

@@ -57,7 +57,7 @@ def test_every_switch_that_varies_is_in_the_order_once() -> None:
     assert sorted(order) == [column for column in range(22) if column not in (3, 9)]
 
 
-def test_of_two_equal_switches_one_goes_before_any_that_is_needed_and_it_is_the_lower_number() -> None:
+def test_one_of_two_equal_switches_goes_first() -> None:
     labels = np.arange(120) % 4
     low, high = (labels & 1).astype(bool), (labels >> 1).astype(bool)
     assert elimination_order(learning_of(np.stack([low, low, high, high], axis=1), labels))[:2] in ((1, 3), (3, 1))
@@ -131,9 +131,7 @@ def plainly(learning: Samples) -> Columns:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "joints", "switches"), [(0, 0, 9), (1, 0, 9), (2, 2, 9), (3, 1, 25)])
-def test_what_goes_is_what_raises_the_loss_least_when_its_mean_takes_its_place(
-    seed: int, joints: int, switches: int
-) -> None:
+def test_elimination_removes_the_switch_whose_mean_raises_loss_least(seed: int, joints: int, switches: int) -> None:
     learning = noisy(seed, joints, switches)
     assert boosted_elimination_order(learning) == plainly(learning)
 
@@ -181,7 +179,7 @@ def loss(scores: Floats, labels: npt.NDArray[np.intp]) -> float:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 30), st.integers(1, 5), st.integers(1, 4))
-def test_a_rise_is_that_of_the_loss_with_the_mean_row_in_place(seed: int, n: int, s: int, classes: int) -> None:
+def test_a_removals_rise_is_the_loss_with_the_mean_row(seed: int, n: int, s: int, classes: int) -> None:
     random = np.random.default_rng(seed)
     bits, rows = random.random((s, n)) < 0.5, random.normal(0, 2, (s, classes))
     labels, scores = random.integers(0, classes, n), random.normal(0, 3, (n, classes))
