@@ -34,12 +34,6 @@ def test_an_older_frame_does_not_replace_a_newer_one() -> None:
     assert newest.fresh(60) == SwitchFrame(50, 3)
 
 
-def test_a_switch_read_after_a_pause_is_reported_once() -> None:
-    pauses = Pauses(100)
-    readings = [(0, 0b11), (10, 0b01), (50, 0b01), (111, 0b11), (112, 0b11), (120, 0b01), (220, 0b11)]
-    assert [pauses.over(time, known) for time, known in readings] == [0, 0, 0, 0b10, 0, 0, 0]
-
-
 @given(st.lists(st.tuples(st.integers(0, 200), MASKS), max_size=40), st.integers(0, 300))
 def test_it_is_so_for_every_switch_by_itself(steps: list[tuple[int, int]], pause_us: int) -> None:
     pauses, now = Pauses(pause_us), 0

@@ -69,14 +69,6 @@ def test_sessions_left_out_are_those_of_scikit_learn_too(make_grasps: Make) -> N
     assert row.rate.over == 6
 
 
-def test_random_folds_part_no_trial(make_grasps: Make) -> None:
-    study = evaluate(framed(make_grasps), scheme="trial", repeats=2, **NESTED)
-    (row,) = (row for row in study.tables[0].rows if row.name == "I")
-    assert (row.rate.total, len(row.rate.correct), row.rate.of) == (72, 2, "within subject")
-    assert study.trials == 72
-    assert np.array(row.cells[0].confusion).sum() == 2 * 24
-
-
 def test_frames_that_count_as_trials_are_refused(make_grasps: Make) -> None:
     one = make_grasps(per_type=4, noise=0.3)
     frames = one.rows(np.repeat(np.arange(len(one)), 5))

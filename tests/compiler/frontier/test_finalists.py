@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.frontier.finalists import depth_of, finalists, papers_depth, papers_tables, worthwhile
+from thenar.compiler.frontier.finalists import depth_of, finalists, papers_tables, worthwhile
 from thenar.compiler.frontier.points import PlacementChoice
 from thenar.compiler.frontier.price import Tabled
 from thenar.compiler.frontier.screen import Screened
@@ -25,11 +25,6 @@ def test_the_best_and_the_smallest_that_is_level_come_first() -> None:
     assert finalists([between, level, best], [], 2) == (level, best)
 
 
-def test_then_comes_what_is_least_like_those() -> None:
-    best, near, far = _screened(40, 0.99, 300), _screened(20, 0.97, 200), _screened(4, 0.8, 100)
-    assert finalists([far, near, best], [], 2) == (far, best)
-
-
 def test_kinds_of_inputs_share_evenly() -> None:
     switches = [_screened(size, rate, size) for size, rate in ((40, 0.9), (20, 0.85), (10, 0.8))]
     both = [_screened(size, rate, 1000 + size, "both") for size, rate in ((40, 0.99), (20, 0.98), (10, 0.95))]
@@ -42,11 +37,6 @@ def test_what_others_beat_is_no_finalist() -> None:
     assert finalists([best, beaten], [], 5) == (best,)
 
 
-def test_what_recognises_far_less_is_of_no_use() -> None:
-    best, useless = _screened(8, 0.9, 100), _screened(1, 0.6, 50)
-    assert finalists([useless, best], [], 5) == (best,)
-
-
 def test_what_is_wanted_is_among_them_however_bad() -> None:
     best, bad = _screened(8, 0.9, 100), _screened(9, 0.1, 300)
     assert finalists([best, bad], [bad.choice], 1) == (best, bad)
@@ -55,11 +45,6 @@ def test_what_is_wanted_is_among_them_however_bad() -> None:
 def test_equal_placements_count_once() -> None:
     one, same = _screened(8, 0.9, 100), _screened(8, 0.9, 100, method="id3-ccp")
     assert finalists([one, same], [], 2) == (one,)
-
-
-def test_a_placement_that_is_slow_but_small_is_a_finalist() -> None:
-    quick, small = _screened(20, 0.9, 100), _screened(4, 0.89, 500)
-    assert set(finalists([quick, small], [], 2)) == {quick, small}
 
 
 def rates_of(shape: Shape, *rates: tuple[int, float]) -> dict[Tabled, TrialAccuracy]:
@@ -90,14 +75,3 @@ def test_further_rounds_are_followed_if_they_win_a_fifth_percent(late: int, roun
     correct = [450 + (late if stage > 100 else 0) for stage in search.stages]
     fits = [FoldHits(tuple(map(right, counts)), (), ()) for counts in (correct, [450] * len(correct))]
     assert depth_of(search, fits, 1000).rounds == rounds
-
-
-def test_a_search_of_few_rounds_is_followed_to_its_end() -> None:
-    search = Search(methods=("id3",), baselines=(), rounds=50)
-    assert depth_of(search, [FoldHits(tuple(map(right, range(len(search.stages)))), (), ())], 10) == search
-
-
-def test_what_is_followed_less_far_is_the_beginning_of_what_is() -> None:
-    few, all_rounds = papers_depth(Search()), Search()
-    assert all_rounds.stages[: len(few.stages)] == few.stages
-    assert all_rounds.tabled[: len(few.tabled)] == few.tabled

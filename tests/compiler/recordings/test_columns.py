@@ -98,22 +98,11 @@ def test_a_wrong_key_is_named(text: str, reason: str, tmp_path: Path) -> None:
     assert len(str(refused.value)) < 500
 
 
-def test_a_file_that_is_not_utf8_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "columns.toml").write_bytes(b'label = "\xff"')
-    with pytest.raises(ColumnsError, match=r"columns\.toml"):
-        read_columns(tmp_path / "columns.toml")
-
-
 def test_globs_pick_columns_in_their_own_order_then_the_tables() -> None:
     columns = Columns("grasp", switches=("s1*", "s2"), joints=(JointColumns(("j2",)), JointColumns(("j1",))))
     selection = select(columns, NAMES)
     assert selection.switches == ("s1", "s10", "s2")
     assert selection.joints == (("j2", columns.joints[0]), ("j1", columns.joints[1]))
-
-
-def test_globs_heed_case() -> None:
-    with pytest.raises(ColumnsError, match="switches: 'S\\*' matches no column"):
-        select(Columns("grasp", switches=("S*",)), NAMES)
 
 
 @pytest.mark.parametrize(
@@ -157,11 +146,6 @@ def test_slow_globs_are_refused_at_once_and_briefly(globs: tuple[str, ...], coun
 def test_columns_by_their_names_may_be_as_many_as_there_are() -> None:
     names = [f"s{number}" for number in range(50_000)]
     assert select(Columns("g", switches=tuple(names)), ["g", *names]).switches == tuple(names)
-
-
-def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
-    (tmp_path / "columns.toml").write_bytes(b"\xef\xbb\xbflabel = 'a'")
-    assert read_columns(tmp_path / "columns.toml") == Columns("a")
 
 
 def test_a_missed_column_with_brackets_is_answered_with_its_glob() -> None:

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from thenar.compiler.recordings.trials import Frames, fill, groups, in_time, numbered, otsu, restarts
+from thenar.compiler.recordings.trials import fill, groups, numbered, otsu, restarts
 
 IDS = hnp.arrays(np.intp, st.integers(1, 30), elements=st.integers(0, 4))
 
@@ -33,17 +33,6 @@ def test_a_clock_that_repeats_or_jitters_starts_no_trial(sizes: list[int], seed:
 
 
 @given(IDS, st.data())
-def test_frames_are_ordered_within_the_places_of_their_trial(ids: np.ndarray, data: st.DataObject) -> None:
-    time = data.draw(hnp.arrays(np.float64, len(ids), elements=st.integers(0, 5)))
-    order = in_time(ids, time)
-    assert sorted(order) == list(range(len(ids)))
-    assert (ids[order] == ids).all()
-    for trial in set(ids.tolist()):
-        rows = order[ids == trial].tolist()
-        assert rows == sorted(rows, key=lambda row: (time[row], row))
-
-
-@given(IDS, st.data())
 def test_gaps_are_filled_from_the_trial_else_with_the_median(ids: np.ndarray, data: st.DataObject) -> None:
     values = data.draw(hnp.arrays(np.int64, len(ids), elements=st.integers(0, 9)))
     missing = data.draw(hnp.arrays(np.bool_, len(ids)).filter(lambda mask: not mask.all()))
@@ -57,17 +46,6 @@ def test_gaps_are_filled_from_the_trial_else_with_the_median(ids: np.ndarray, da
         expected[row] = present[(len(present) - 1) // 2] if near is None else values[near]
     assert fill(values, missing, ids) == strange
     assert values.tolist() == expected.tolist()
-
-
-@given(IDS, st.data())
-def test_frames_are_reduced_as_one_by_one(ids: np.ndarray, data: st.DataObject) -> None:
-    values = data.draw(hnp.arrays(np.int64, len(ids), elements=st.integers(0, 9)))
-    rows = [np.flatnonzero(ids == trial) for trial in set(ids.tolist())]
-    rows.sort(key=lambda frames: int(frames[(len(frames) - 1) // 2]))
-    frames = Frames(ids)
-    assert frames.middle.tolist() == [each[(len(each) - 1) // 2] for each in rows]
-    assert frames.median(values).tolist() == [sorted(values[each])[(len(each) - 1) // 2] for each in rows]
-    assert frames.any(values > 5).tolist() == [bool((values[each] > 5).any()) for each in rows]
 
 
 @given(hnp.arrays(np.float64, st.integers(2, 40), elements=st.integers(-50, 50)))

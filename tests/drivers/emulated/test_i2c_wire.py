@@ -131,13 +131,6 @@ def test_nobody_at_an_address_costs_the_address() -> None:
     assert wire.traffic == {(0x20, None, None, None): 1}
 
 
-@pytest.mark.parametrize(("clock_hz", "us"), [(100_000, 480 + 4.7), (400_000, 120 + 1.3), (1_000_000, 48 + 0.5)])
-def test_a_read_of_an_mcp23017_takes_as_long_as_the_table_says(clock_hz: int, us: float) -> None:
-    wire = Wire([mcp()], clock_hz)
-    wire.transfer([write(0x20, 0x12), read(0x20, 2)])
-    assert wire.duration_s(wire.scl_periods, wire.transfers) * 1e6 == pytest.approx(us)
-
-
 PAIR = [write(0x20, 0x12), read(0x20, 1)]
 OTHER = [write(0x21, 0x12), read(0x21, 1)]
 

@@ -1,5 +1,4 @@
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ from thenar.drivers.i2c.supervisor import PlacedChip, Route
 
 MakeRig = Callable[..., Any]
 NEVER_CHECKED = 3600.0
-RECOVERY_S = 3.0  # a second until the next try, and what a loaded machine adds
 
 EVERY_KIND = [
     ("mcp23017", 0x20),
@@ -219,15 +217,3 @@ def test_no_group_asks_more_than_its_way_allows(way: BatchMode, ports: list[Port
         assert sum(port.query.messages for _, port in group.ports) <= MOST_MESSAGES
         assert len(members) == 1 or way is BatchMode.CHANNEL
         assert len(group.ports) == 1 or way in (BatchMode.CHANNEL, BatchMode.CHIP)
-
-
-@given(ports=ports)
-def test_neighbours_are_parted_only_where_they_must_be(ports: list[Port]) -> None:
-    groups = list(cut(ports, BatchMode.CHANNEL))
-    for one, other in pairwise(groups):
-        messages = sum(port.query.messages for _, port in one.ports) + other.ports[0][1].query.messages
-        assert one.route != other.route or messages > MOST_MESSAGES
-
-
-def test_each_way_has_a_lower_one_but_the_last() -> None:
-    assert [way.lower() for way in BatchMode] == [BatchMode.CHIP, BatchMode.PORT, BatchMode.SMBUS, BatchMode.SMBUS]

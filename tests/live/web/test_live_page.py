@@ -19,7 +19,6 @@ pytestmark = pytest.mark.slow
 _BARS = """return Object.fromEntries([...document.querySelectorAll('#types li')].map((row) =>
     [row.querySelector('.name').textContent, row.querySelector('.share').textContent]))"""
 _CLOSED = "return document.querySelectorAll('#hand .spot.closed').length"
-_LOST = "return document.querySelectorAll('#hand .spot.lost').length"
 
 
 def shown(browser: Any, scene: Any, row: int) -> str:
@@ -55,22 +54,6 @@ def test_the_page_shows_what_is_published(run: Callable[[], Any], browser: Any) 
     browser.wait(lambda: browser.texts("#wrong li") == ["nothing"])
 
 
-def test_a_stopped_run_is_old_for_later_pages_too(run: Callable[[], Any], browser: Any) -> None:
-    running = run()
-    browser.open(running.page.server.url)
-    answer = shown(browser, running.scene, 0)
-    running.end()
-    browser.wait(lambda: browser.text("age").startswith("this is "))
-    assert browser.text("grasp") == answer
-    age = float(browser.text("age").split()[2])
-    browser.open(running.page.server.url)
-    browser.wait(lambda: browser.text("grasp") == answer and browser.text("age").startswith("this is "))
-    assert float(browser.text("age").split()[2]) >= age
-    assert browser.text("glove-state").startswith("glove: silent since ")
-    assert browser.text("link").startswith("page: connected since ")
-    assert browser.text("build-state") == f"build: both {running.glove.system.build.manifest.checksum[:8]}"
-
-
 def bars_are(browser: Any, scene: Any) -> bool:
     """Return whether the bars show the probabilities of the row that is on the devices now, by the build itself."""
     truth, row = scene.truth, scene.shown[-1].row
@@ -89,27 +72,6 @@ def test_the_posed_hand_follows_the_joints(run: Callable[[], Any], browser: Any)
     assert len(before) == 5
     shown(browser, running.scene, 5)
     browser.wait(lambda: sum(one != other for one, other in zip(before, browser.script(bones), strict=True)) >= 3)
-
-
-def test_what_is_lost_is_named_and_crossed_out(run: Callable[[], Any], browser: Any) -> None:
-    running = run()
-    names = running.scene.truth.switch_names
-    browser.open(running.page.server.url)
-    shown(browser, running.scene, 0)
-    browser.wait(lambda: browser.script(_LOST) == 0)
-    board = running.bench.lines[1]
-    board.unplug()
-    browser.wait(lambda: browser.text("health") == "degraded")
-    browser.wait(lambda: browser.texts("#wrong li") == [f"{name}: lost" for name in names])
-    browser.wait(lambda: browser.script(_LOST) == len(names))
-    browser.wait(lambda: browser.text("hand-says") == f"0 of 0 readable switches closed; {len(names)} lost")
-    browser.wait(lambda: " lost since " in browser.text("glove-state"))
-    browser.wait(lambda: any("there is no such port" in text for text in browser.texts("#devices td:nth-child(2)")))
-    board.replug()
-    browser.wait(lambda: browser.text("health") == "ok" and browser.script(_LOST) == 0)
-    browser.wait(
-        lambda: browser.texts("#wrong li") == ["nothing"] and browser.text("glove-state") == "glove: connected"
-    )
 
 
 def test_record_mark_and_stop_write_what_the_command_writes(run: Callable[[], Any], browser: Any) -> None:
@@ -225,27 +187,6 @@ def test_a_screen_reader_is_told_what_stands_and_not_flooded(run: Callable[[], A
         "return [...document.querySelectorAll('[aria-live], [role=status], [role=log]')].map((e) => e.id)"
     )
     assert live == ["spoken"]
-
-
-def test_a_page_that_comes_late_sees_what_was(run: Callable[[], Any], browser: Any) -> None:
-    running = run()
-    for row in (0, 5, 11):
-        running.scene.show(row)
-        running.scene.settled(row)
-    browser.open(running.page.server.url)
-    types = [running.scene.truth.answer(row) for row in (0, 5, 11)]
-    browser.wait(lambda: all(name in browser.script(_PAST_LABEL) for name in types[-1:]))
-    browser.wait(lambda: len(browser.texts("#segments li")) >= 1)
-    drawn = browser.script(_INKED)
-    assert drawn > 1000
-
-
-_PAST_LABEL = "return document.getElementById('past').getAttribute('aria-label')"
-_INKED = """const canvas = document.getElementById('past');
-    const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
-    const colours = new Set(); let inked = 0;
-    for (let at = 0; at < data.length; at += 4) if (data[at + 3]) inked++;
-    return inked"""
 
 
 SCRIPT = "<script>alert(1)</script>"

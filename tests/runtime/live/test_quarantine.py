@@ -311,11 +311,3 @@ def test_a_resting_first_minute_causes_no_drift_later(make_build: MakeBuild) -> 
         now_us, at = second * 1_000_000, 30 if second < 60 else 120
         live.step(now_us, 0, None, GloveFrame(now_us, bytes([at + second % 2] * 3)))
     assert live.quarantine.found == ()
-
-
-def test_the_same_frames_and_times_find_the_same(make_build: MakeBuild) -> None:
-    shares = closing()
-    first, again = (Hand(exact(make_build, shares)) for _ in range(2))
-    for closed in drawn(shares, 60, 9):
-        assert first.grasp(closed, stuck=4) == again.grasp(closed, stuck=4)
-    assert first.found == again.found != ()

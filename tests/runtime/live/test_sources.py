@@ -178,12 +178,6 @@ def test_a_part_alone_that_owns_everything_is_handed_on_as_it_is(joined: Joined)
     assert joined(2, [LOW], [(6, 0, frame, LONGEST_US)], 6) is frame
 
 
-def test_parts_are_joined_at_the_time_of_the_newest(joined: Joined) -> None:
-    first, second = SwitchFrame(100, 0b0001), SwitchFrame(90, 0b1000, lost=0b0100)
-    both = joined(5, [LOW, HIGH], [(100, 0, first, LONGEST_US), (100, 1, second, LONGEST_US)], 200)
-    assert both == SwitchFrame(100, 0b1001, lost=0b0100 | NOBODYS)
-
-
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.tuples(times, times), st.tuples(limits, limits), times)
 def test_a_parts_inputs_are_lost_when_its_frame_expires(

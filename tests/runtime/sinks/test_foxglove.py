@@ -271,16 +271,6 @@ def test_the_end_closes_connections_and_frees_the_port(sink: Any, listen: Callab
     again.close()
 
 
-def test_who_leaves_is_no_reader_any_more_and_costs_nothing(
-    sink: Any, listen: Callable[..., Client], make_grasp: MakeGrasp
-) -> None:
-    client = listen()
-    client.socket.close()
-    eventually(lambda: not sink.report().readers)
-    sink.publish(make_grasp(), None, None)
-    assert sink.report().sent == 0
-
-
 @pytest.mark.parametrize(
     ("where", "said"),
     [

@@ -5,7 +5,7 @@ from thenar.compiler.firmware.choose import fit_for
 from thenar.compiler.firmware.targets import TARGETS, timed
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
-from thenar.compiler.frontier.timing.python_times import YARDSTICK, PythonCost, classify_us, fit_here, random_tables
+from thenar.compiler.frontier.timing.python_times import PythonCost, classify_us, fit_here, random_tables
 from thenar.compiler.workers import in_workers
 from thenar.runtime.tables import tables_to_bytes
 
@@ -61,14 +61,6 @@ def _us(model: ClassifyModel) -> float:
 def test_there_is_no_other_target() -> None:
     with pytest.raises(FrontierError, match="no target 'arduino'"):
         ClassifyModel("arduino")
-
-
-@pytest.mark.parametrize("pace", [1.0, 40.0])
-def test_times_are_those_of_the_pace_that_the_yardstick_says(pace: float) -> None:
-    """Half as long and twice as long are within it: who else is on the machine is not known."""
-    same, larger = classify_us([random_tables(*YARDSTICK), random_tables(160, 22, 33)], pace)
-    assert 0.5 < same / pace < 2.0
-    assert larger > same
 
 
 def test_what_is_fitted_here_foretells_other_shapes() -> None:

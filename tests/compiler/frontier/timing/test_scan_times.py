@@ -64,12 +64,6 @@ def test_a_record_is_the_vendors_formula_of_the_sensors_that_are_read(joints: tu
     assert found.how == "formula"
 
 
-def test_of_six_milliseconds_for_18_sensors_the_wire_takes_two() -> None:
-    assert round(records_of(SENSORS_18).of(18).us) == 6323
-    wire = records_of(SENSORS_18, wire_only=True).of(18)
-    assert (round(wire.us), wire.how) == (1823, "wire")
-
-
 def test_custom_joints_take_the_given_time_or_an_unknown_one() -> None:
     assert records_of(["bend_1", "thumb_mpj"]).of(2) == Time(0.0, "unknown")
     assert records_of(["bend_1", "bend_2"], 650.0).of(2) == Time(650.0, "given")
