@@ -5,7 +5,9 @@ import pkgutil
 import msgspec
 import pytest
 
+from thenar.simulator.contact.models import models
 from thenar.stability import cases
+from thenar.stability.contact.halving import kept, shipped
 from thenar.stability.report import NAMES, CaseReport, load, run_case
 
 
@@ -37,3 +39,8 @@ def test_a_case_holds_quickly(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_case_holds_in_full(name: str) -> None:
     _holds(run_case(name, full=True))
+
+
+def test_most_shipped_grasps_settle_so_that_halved_steps_are_compared() -> None:
+    loads = list(shipped(1))
+    assert kept(loads, models()["quasistatic"]().solve(loads)).mean() > 0.9

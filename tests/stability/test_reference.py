@@ -5,6 +5,7 @@ import math
 from fractions import Fraction
 from itertools import combinations, pairwise, product
 from pathlib import Path
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -31,6 +32,7 @@ from thenar.stability.reference.information import (
     sign_of_log_sum,
 )
 from thenar.stability.reference.intervals import normal_quantile, student, student_quantile, wilson
+from thenar.stability.reference.logit import Column, largest_derivative
 from thenar.stability.reference.numbers import DIGITS, cos, precisely, sin, turn
 from thenar.stability.reference.standing_in import Kind, stand_ins, whole
 from thenar.stability.reference.tables import steps
@@ -276,3 +278,30 @@ def test_a_turn_keeps_its_axis_and_all_lengths(axis: list[float], angle: float) 
         assert near(rows[0][0] + rows[1][1] + rows[2][2], 1 + 2 * mpmath.cos(angle))
     quarter = turn((0, 0, 2), float(mpmath.pi / 2))
     assert [round(float(x)) for row in quarter for x in row] == [0, -1, 0, 1, 0, 0, 0, 0, 1]
+
+
+@precisely()
+def test_the_derivative_is_that_of_the_loss() -> None:
+    rng = np.random.default_rng(1)
+    rows, labels, weights = rng.normal(size=(4, 3)), [0, 1, 2, 1, 0, 2], [1.0, 2.0, 1.0, 3.0, 1.0, 1.0]
+    added, pulls, smoothness = [0, 1, -1, 2, 3, 3], [0.5, 1.0, 2.0, 0.1], [(0, 1, 3.0), (0, 3, 0.5), (2, 3, 1.5)]
+
+    def loss(entries: Any) -> Any:
+        scores = [[mpf(0)] * 3 if row < 0 else list(entries[row]) for row in added]
+        total = mean_loss(scores, labels, weights) * sum(weights)
+        total += sum(pull * sum(each**2 for each in row) for pull, row in zip(pulls, entries, strict=True)) / 2
+        pairs = [(s, entries[one], entries[other]) for one, other, s in smoothness]
+        return total + sum(s * sum((b - a) ** 2 for a, b in zip(one, two, strict=True)) for s, one, two in pairs) / 2
+
+    def slope(row: int, k: int) -> Any:
+        def moved(by: Any) -> Any:
+            entries = [[mpf(each) for each in own] for own in rows.tolist()]
+            entries[row][k] += by
+            return loss(entries)
+
+        step = mpf(10) ** -20
+        return (moved(step) - moved(-step)) / (2 * step)
+
+    true = max(abs(slope(row, k)) for row in range(4) for k in range(3))
+    found = largest_derivative([Column(added, rows.tolist(), pulls, smoothness)], labels, weights)
+    assert abs(found - true) < mpf(10) ** -30

@@ -50,7 +50,7 @@ def test_another_scope_of_question_is_another_question(tmp_path: Path) -> None:
     assert kept(tmp_path / "store", 1) == [0]
 
 
-def test_an_answer_that_no_longer_reads_as_asked_is_to_be_found_again(tmp_path: Path) -> None:
+def test_a_stored_answer_of_another_type_is_computed_again(tmp_path: Path) -> None:
     filled(tmp_path / "store", 1)
     with Store(tmp_path / "store", "set") as store:
         assert store.get(key(0), int) is None
@@ -173,7 +173,7 @@ def found_of(numbers: list[int] | range) -> list[Found]:
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_every_answer_is_found_once_and_comes_in_the_order_of_the_calls(tmp_path: Path, jobs: int) -> None:
+def test_answers_are_computed_once_and_come_in_call_order(tmp_path: Path, jobs: int) -> None:
     assert asked(tmp_path / "store", calls_in(tmp_path, [3, 1, 3, 2]), jobs) == found_of([3, 1, 3, 2])
     assert done_in(tmp_path) == [1, 2, 3]
 
@@ -190,7 +190,7 @@ def test_work_for_a_cluster_is_not_done_here(tmp_path: Path) -> None:
         asked(tmp_path / "store", calls_in(tmp_path, [1]), cluster="")
 
 
-def test_what_is_stored_is_not_done_again_and_reads_as_what_was_found(tmp_path: Path) -> None:
+def test_stored_answers_are_reused_and_read_back_equal(tmp_path: Path) -> None:
     first = asked(tmp_path / "store", calls_in(tmp_path, range(5)))
     again = asked(tmp_path / "store", calls_in(tmp_path, range(7)))
     assert done_in(tmp_path) == list(range(7))

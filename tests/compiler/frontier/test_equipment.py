@@ -38,7 +38,7 @@ def test_whatever_times_depend_on_is_part_of_the_question(grasp_set: GraspSet) -
     assert len(asked) == len(equipments)
 
 
-def test_without_switches_no_wiring_is_wanted_and_one_without_a_place_does_not_fit() -> None:
+def test_switches_need_a_wiring_with_a_place_for_each() -> None:
     equipment = Equipment(MODEL, wirings(propose_harness(NAMES[:2])), WIRE_ONLY)
     assert equipment.fitting(()) == ()
     assert "as wired" in [wiring.name for wiring in equipment.fitting(NAMES[:2])]

@@ -86,7 +86,7 @@ def test_rows_in_which_nothing_is_held_change_no_rate(
     assert [(one.placement, one.rate) for one in found.tried] == [(one.placement, one.rate) for one in first[1].tried]
 
 
-def test_every_point_is_on_a_front_and_none_beats_those_of_its_own(first: tuple[Request, Frontier]) -> None:
+def test_every_point_lies_on_a_front_without_dominating_others(first: tuple[Request, Frontier]) -> None:
     points = first[1].points
     assert points
     assert all(point.fronts for point in points)
@@ -273,9 +273,7 @@ def test_an_unknown_baseline_is_told(tmp_path: Path, make_set: Make) -> None:
         found_of(asked(tmp_path, make_set(), baselines=("nonsense",)))
 
 
-def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_what_the_point_says(
-    tmp_path: Path, make_set: Make
-) -> None:
+def test_compile_makes_what_a_point_of_each_trainer_says(tmp_path: Path, make_set: Make) -> None:
     request = asked(tmp_path, make_set(subjects=2), methods=("id3",), baselines=(), trainer="auto", settings={})
     found = found_of(request)
     assert set(found.trainers) == {name for name, trainer in TRAINERS.items() if trainer.tried}
@@ -325,9 +323,7 @@ def with_sensors(grasp_set: GraspSet, sensors: int) -> GraspSet:
     return replace_rows(grasp_set, codes=codes, joints=joints)
 
 
-def test_points_may_read_some_of_the_joints_and_what_is_built_of_them_reads_these(
-    tmp_path: Path, make_set: Make
-) -> None:
+def test_builds_of_points_with_some_joints_read_these_joints(tmp_path: Path, make_set: Make) -> None:
     grasp_set = with_sensors(make_set(switches=3, subjects=2), 5)
     found = found_of(asked(tmp_path, grasp_set, finalists=6, baselines=(), methods=("elimination",)))
     fewer = [point for point in found.points if point.joints]

@@ -67,7 +67,7 @@ def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:
         assert any(text.startswith(NASTY) for text in _texts(_drawn(frontier, name)))
 
 
-def test_a_cost_of_nothing_has_a_place_and_no_name_breaks_the_file(examples: Any) -> None:
+def test_zero_costs_and_strange_names_are_drawn(examples: Any) -> None:
     found, replace = examples.example_frontier(), msgspec.structs.replace
     first = replace(found.points[0], frame=replace(found.points[0].frame, us=0.0))
     mark = replace(found.marks[0], name="bell \x07 and no character \ufffe", frame_us=0.0)
@@ -108,7 +108,7 @@ def test_every_point_that_is_shown_has_a_marker_with_its_number(examples: Any) -
         assert {one for one in ids if one.startswith(POINT_ID)} == shown
 
 
-def test_a_frontier_whose_joints_take_an_unknown_time_says_so_on_the_axis(examples: Any) -> None:
+def test_the_axis_mentions_an_unknown_time_of_joints(examples: Any) -> None:
     found, replace = examples.example_frontier(), msgspec.structs.replace
     assert "left out" not in _drawn(found, "frontier").axes[0].get_xlabel()
     points = tuple(replace(point, transfer=PointTime(0.0, "unknown")) for point in found.points)

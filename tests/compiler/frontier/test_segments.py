@@ -48,7 +48,7 @@ def held_by(grasp_set: GraspSet, *subjects: str) -> np.ndarray:
     return np.flatnonzero(np.isin(held.subjects, subjects))
 
 
-def test_a_subject_who_is_left_out_has_no_part_in_what_is_learnt(make_set: Make) -> None:
+def test_a_left_out_subject_takes_no_part_in_learning(make_set: Make) -> None:
     grasp_set = movements(make_set)
     new = grasp_set.subjects == "S1"
     random = np.random.default_rng(1)
@@ -84,14 +84,12 @@ def test_no_stream_goes_over_a_movement_that_is_left_out(make_set: Make) -> None
 
 
 @pytest.mark.parametrize("change", [{"independent": True}, {"none": False}])
-def test_what_has_no_streams_or_never_says_that_nothing_is_held_teaches_nothing(
-    make_set: Make, change: dict[str, Any]
-) -> None:
+def test_sets_without_streams_or_none_teach_no_segments(make_set: Make, change: dict[str, Any]) -> None:
     grasp_set = make_set(rows=12) if "none" in change else replace(movements(make_set), **change)
     assert MovementSamples.of(grasp_set, np.arange(6), seed=1) is None
 
 
-def test_segments_alone_are_decided_at_learnt_costs_and_with_a_class_of_nothing_held(make_set: Make) -> None:
+def test_only_segments_use_learnt_costs_and_the_class_none(make_set: Make) -> None:
     grasp_set = movements(make_set)
     held, training = Samples.of(grasp_set.without_none()), Training.of(Recipe(rounds=5))
     train, new = held_by(grasp_set, "S0"), np.flatnonzero(grasp_set.subjects == "S1")

@@ -117,7 +117,7 @@ def frames_of(grasp_set: GraspSet, each: int) -> GraspSet:
     return grasp_set.rows(rows)
 
 
-def test_nobody_left_out_is_trained_on_and_a_tenth_at_most_is_tested_of_many(make_set: Callable[..., GraspSet]) -> None:
+def test_left_out_subjects_are_untrained_and_grouped_into_ten_folds(make_set: Callable[..., GraspSet]) -> None:
     for subjects, folds in ((3, 3), (10, 10), (24, 10)):
         grasp_set = make_set(rows=480, subjects=subjects)
         cuts = cuts_of(grasp_set)

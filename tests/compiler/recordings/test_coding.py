@@ -29,7 +29,7 @@ def test_no_value_moves_by_more_than_half_the_grid(angles: list[float], grid: fl
 
 
 @given(ANGLES)
-def test_the_grid_starts_on_a_multiple_of_itself_at_or_below_the_least_value(angles: list[float]) -> None:
+def test_the_grid_starts_at_a_multiple_below_the_least_value(angles: list[float]) -> None:
     values = np.array(angles)
     codes, joint, _ = code_joint("j", JointColumns(("j",), grid=0.5), values, rows(values))
     assert joint.value_a <= values.min() < joint.value_a + 0.5

@@ -98,22 +98,11 @@ def test_a_wrong_key_is_named(text: str, reason: str, tmp_path: Path) -> None:
     assert len(str(refused.value)) < 500
 
 
-def test_a_file_that_is_not_utf8_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "columns.toml").write_bytes(b'label = "\xff"')
-    with pytest.raises(ColumnsError, match=r"columns\.toml"):
-        read_columns(tmp_path / "columns.toml")
-
-
 def test_globs_pick_columns_in_their_own_order_then_the_tables() -> None:
     columns = ColumnRoles("grasp", switches=("s1*", "s2"), joints=(JointColumns(("j2",)), JointColumns(("j1",))))
     selection = select(columns, NAMES)
     assert selection.switches == ("s1", "s10", "s2")
     assert selection.joints == (("j2", columns.joints[0]), ("j1", columns.joints[1]))
-
-
-def test_globs_heed_case() -> None:
-    with pytest.raises(ColumnsError, match="switches: 'S\\*' matches no column"):
-        select(ColumnRoles("grasp", switches=("S*",)), NAMES)
 
 
 @pytest.mark.parametrize(
@@ -147,9 +136,7 @@ def test_columns_that_do_not_fit_the_table_are_refused(columns: ColumnRoles, rea
         (("s" * 400_000,), 2, "more than 600 characters"),
     ],
 )
-def test_globs_that_would_take_long_are_refused_at_once_and_in_few_words(
-    globs: tuple[str, ...], count: int, reason: str
-) -> None:
+def test_slow_globs_are_refused_at_once_and_briefly(globs: tuple[str, ...], count: int, reason: str) -> None:
     names = ["g", *(f"s{number:05}" for number in range(count - 1))]
     with pytest.raises(ColumnsError, match=reason) as refused:
         select(ColumnRoles("g", switches=globs), names)
@@ -161,12 +148,7 @@ def test_columns_by_their_names_may_be_as_many_as_there_are() -> None:
     assert select(ColumnRoles("g", switches=tuple(names)), ["g", *names]).switches == tuple(names)
 
 
-def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
-    (tmp_path / "columns.toml").write_bytes(b"\xef\xbb\xbflabel = 'a'")
-    assert read_columns(tmp_path / "columns.toml") == ColumnRoles("a")
-
-
-def test_a_column_with_brackets_in_its_name_is_answered_with_the_glob_that_finds_it() -> None:
+def test_a_missed_column_with_brackets_is_answered_with_its_glob() -> None:
     with pytest.raises(ColumnsError, match=r"for the column of that name write 'force\[\[\]N\]'"):
         select(ColumnRoles("g", switches=("force[N]",)), ["g", "force[N]"])
     assert select(ColumnRoles("g", switches=("force[[]N]",)), ["g", "force[N]"]).switches == ("force[N]",)

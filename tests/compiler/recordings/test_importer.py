@@ -41,7 +41,7 @@ def test_labels_of_a_published_taxonomy_may_be_names_abbreviations_and_numbers()
     assert import_table(table(*labels), columns)[0].grasps.tolist() == ["PoS", "PoH", "Lat", "PoS"]
 
 
-def test_all_unknown_labels_are_named_at_once_and_the_first_answered_with_the_nearest() -> None:
+def test_all_unknown_labels_are_named_at_once_with_suggestions() -> None:
     columns = ColumnRoles("g", joints=JOINTS, taxonomy="kamakura14", frames="independent")
     with pytest.raises(TableError) as refused:
         import_table(table("PoS", "PoX", "PoX", "PoH", "mug"), columns)
@@ -127,7 +127,7 @@ def test_missing_cells_are_kept_filled_from_their_trial_and_it_is_said() -> None
     )
 
 
-def test_a_row_without_a_label_or_trial_is_not_kept_and_the_loss_is_counted() -> None:
+def test_rows_without_label_or_trial_are_dropped_and_counted() -> None:
     grasp_set, report = frames(missing="keep", g=["a", "a", "a", "b", "", "a"], rep=["1", "1", "1", "", "1", "2"])
     assert grasp_set.codes[:, 0].tolist() == [3, 1, 2, 9]
     assert report.warnings[0].message == (
@@ -168,7 +168,7 @@ def test_a_label_and_a_trial_may_be_spread_over_columns() -> None:
     assert grasp_set.trials.tolist() == [1, 2, 3]
 
 
-def test_radians_on_a_grid_of_half_a_degree_are_a_warning_with_a_grid_that_keeps_them() -> None:
+def test_a_coarse_grid_of_radians_warns_with_a_better_one() -> None:
     values = np.random.default_rng(1).permutation(np.linspace(0, 1.4, 60))
     rows: dict[str, Column] = {"g": ["a", "b"] * 30, "j": values}
     columns = ColumnRoles("g", joints=(JointColumns(("j",), "rad"),), frames="independent")

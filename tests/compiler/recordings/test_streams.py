@@ -233,7 +233,7 @@ def test_a_taxonomy_that_lists_none_takes_it_for_a_type() -> None:
         ("time", 0, None),
     ],
 )
-def test_the_unit_of_a_time_is_told_by_its_name_or_its_steps(name: str, step: float, unit: str | None) -> None:
+def test_a_times_unit_follows_from_its_name_or_steps(name: str, step: float, unit: str | None) -> None:
     assert unit_of_time(name, np.tile(step * np.arange(20.0), 2)) == unit
 
 
