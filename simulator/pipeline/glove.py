@@ -93,7 +93,7 @@ TAXEL_ADC = "taxel.adc"
 
 @dataclass(frozen=True, slots=True)
 class TaxelConverter:
-    """The converter of taxels (`TAXEL_ADC`): counts of `bits` bits in even steps up to the full scale, `full_n` newtons.
+    """The converter of taxels (`TAXEL_ADC`): counts of `bits` bits in even steps up to the full scale of `full_n`.
 
     By default a count is a thousandth of a newton.
     """
