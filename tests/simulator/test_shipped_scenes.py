@@ -1,6 +1,5 @@
 """What each shipped scene promises."""
 
-import msgspec
 import pytest
 from msgspec.structs import replace
 
@@ -30,7 +29,7 @@ ADDED["initial-contact"] = ONSET
 ADDED |= {"continuous-def": IN_TIME, "continuous-rest": IN_TIME}
 
 
-def effects(scene: Scene) -> dict[str, msgspec.Struct]:
+def effects(scene: Scene) -> dict[str, tuple]:
     return dict(scene.effects)
 
 

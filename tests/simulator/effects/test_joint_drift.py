@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thenar.simulator.body.condition import Condition
-from thenar.simulator.effects.joint_drift import MEMBER, Parameters, prepare
+from thenar.simulator.effects.joint_drift import MEMBER, prepare
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
@@ -27,9 +27,7 @@ def drift(
         batch = make_batch(range(len(trials)), make_condition(subject))
         batch.trials = np.array(trials)
         batch.sensors_deg = np.zeros((len(trials), 2, 18))
-        prepare(Parameters(deg_per_session=deg_per_session), make_setting(session_trials=100))(
-            batch, make_draw(MEMBER.name, batch)
-        )
+        prepare(make_setting(session_trials=100), deg_per_session=deg_per_session)(batch, make_draw(MEMBER.name, batch))
         return batch.sensors_deg
 
     return run

@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS, SceneSetting
+from thenar.simulator.pipeline.glove import TaxelConverter
 from thenar.simulator.streams import Draw
 
 FRAMES, PADS = 5, 40
@@ -44,7 +45,7 @@ def acted(
         frames = {"timed": True, "first_us": 0, "hold_us": 10_000 * (newtons.shape[1] - 1), "release_us": 0}
         setting = make_setting(taxels=tuple(range(newtons.shape[2])), **frames)
         given: Any = parameters
-        effect.prepare(effect.parameters(**given), setting)(batch, make_draw(name, batch))
+        effect.prepare(setting, **given)(batch, make_draw(name, batch))
         return batch.taxels if batch.taxels is not None else batch.taxels_n
 
     return run
@@ -122,9 +123,7 @@ def test_noise_is_as_large_as_is_asked_in_a_repetition_and_in_a_frame(acted: Act
 def test_counts_are_the_nearest_and_end_where_the_converter_does(acted: Acted, newtons: np.ndarray, bits: int) -> None:
     codes = acted("taxel.adc", newtons, bits=bits, full_n=10.0)
     count_n = 10.0 / 2**bits
-    given: Any = {"bits": bits, "full_n": 10.0}
-    converter: Any = EFFECTS["taxel.adc"].parameters(**given)
-    values = converter.column("pad").value(codes)
+    values = TaxelConverter(bits, 10.0).column("pad").value(codes)
     inside = (newtons >= 0.0) & (newtons <= 10.0 - count_n)
     assert (np.abs(values - newtons)[inside] <= count_n / 2 * (1 + 1e-9)).all()
     assert (codes[newtons < 0.0] == 0).all()

@@ -30,7 +30,7 @@ def take(make_draw: DrawMaker) -> Callable[..., None]:
         draw = make_draw(name, batch)
         effect = steps[name]
         assert effect.prepare is not None
-        effect.prepare(effect.parameters(), setting)(batch, draw)
+        effect.prepare(setting)(batch, draw)
         assert not draw.draws.counts
 
     return run

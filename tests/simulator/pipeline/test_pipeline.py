@@ -37,7 +37,7 @@ SUBSETS = st.sets(st.sampled_from(OTHERS)).map(lambda others: ["contact.quasista
 
 
 def listed_with(name: str, **parameters: Any) -> tuple:
-    return name, EFFECTS[name].parameters(**parameters)
+    return name, parameters
 
 
 def light() -> list[tuple]:

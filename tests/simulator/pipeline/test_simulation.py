@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from thenar.simulator import load_scene, simulate
-from thenar.simulator.effects import wire_lost_bytes
-from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.report import SimulationReport
 from thenar.simulator.pipeline.simulation import Simulation, sessions
@@ -25,7 +23,7 @@ def scene_of(name: str, repetitions: int, types: tuple[str, ...] = (), **changes
 
 def hasty(scene: Scene, most_steps: int) -> Scene:
     """Return a scene whose contact model gives up early."""
-    listed = ListedEffect("contact.quasistatic", Parameters(most_steps=most_steps))
+    listed = ListedEffect("contact.quasistatic", (("most_steps", most_steps),))
     return msgspec.structs.replace(scene, effects=(*scene.effects, listed))
 
 
@@ -207,7 +205,7 @@ def test_a_scene_in_which_nothing_settles_is_an_error() -> None:
 
 
 def test_a_scene_of_which_no_byte_arrives_says_so_and_blames_no_hand() -> None:
-    lossy = ListedEffect("wire.lost_bytes", wire_lost_bytes.Parameters(rate=0.999))
+    lossy = ListedEffect("wire.lost_bytes", (("rate", 0.999),))
     scene = msgspec.structs.replace(QUICK, effects=(*QUICK.effects, lossy))
     with pytest.raises(SceneError, match="of the first, no frame arrived whole"):
         simulate(scene, jobs=1)

@@ -125,7 +125,7 @@ def test_counts_go_over_the_boards_line_and_come_through_where_nothing_happens(
 
 
 def test_counts_that_are_lost_leave_those_of_the_frame_before(make_scene: Any, make_batch: Any) -> None:
-    effects = ["contact.ramp", ("wire.lost_bytes", EFFECTS["wire.lost_bytes"].parameters(**LOSES))]
+    effects = ["contact.ramp", ("wire.lost_bytes", LOSES)]
     recording = Recording(rows="all", rate_hz=20.0, hold_ms=500.0)
     found = []
     for listed in (effects[:1], effects):

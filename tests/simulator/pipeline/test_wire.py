@@ -23,7 +23,7 @@ FRAMES, ROW_BYTES, RECORD_BYTES = 5, 5 + 6 + 11 + 40 + 3 + 2, 20
 
 def prepared(effect: Effect, setting: SceneSetting) -> Step:
     assert effect.prepare is not None
-    return effect.prepare(effect.parameters(), setting)
+    return effect.prepare(setting)
 
 
 @pytest.fixture(scope="module")
