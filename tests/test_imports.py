@@ -89,6 +89,7 @@ ALLOWED = {
     "compiler.glove": (
         "runtime",
         "drivers",
+        "compiler.facts",
         "compiler.hand",
         "compiler.publication",
         "compiler.recordings.graspset",

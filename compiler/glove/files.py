@@ -259,7 +259,7 @@ def files_of(spec: GloveSpec) -> Mapping[str, bytes]:
     """Return name -> content of a spec's files; without a cutting pattern if the switch positions are unknown."""
     summary = spec.summary
     files = {
-        "README.txt": readme_of(summary).encode(),
+        "README.txt": readme_of(spec).encode(),
         "bom.csv": materials_csv(summary.materials),
         "glove.net": netlist_of(spec.circuit, summary.glove),
         "glove.toml": harness_to_toml(spec.harness).encode(),

@@ -17,6 +17,7 @@ from thenar.runtime.scanning.propose import own_joints, propose_cyberglove, prop
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us
 
+from ..facts import Fact, facts
 from ..hand import HandShape
 from ..sensors import SensorCount
 from .circuit import BillLine, Circuit, bill_of, bill_of_joints, glove_circuit
@@ -113,13 +114,16 @@ class SpecSummary(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GloveSpec:
-    """A reduced glove: its summary, drawing, circuit and firmware. pattern is None if the positions are unknown."""
+    """A reduced glove: its summary, drawing, circuit and firmware, and the facts of the build as it is wired. pattern
+    is None if the positions are unknown.
+    """
 
     summary: SpecSummary
     harness: Harness
     scan: ScanMap
     circuit: Circuit
     pattern: Pattern | None
+    facts: tuple[Fact, ...]
 
 
 def glove_spec(
@@ -165,7 +169,7 @@ def glove_spec(
         expected=expected_of(manifest, read, wired),
         remarks=(*_remarks(manifest, wired, switches, known), *_of_boards(wired)),
     )
-    return GloveSpec(summary, wired, read, circuit, pattern)
+    return GloveSpec(summary, wired, read, circuit, pattern, facts(manifest, read, wired))
 
 
 def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) -> Harness:

@@ -106,6 +106,6 @@ def test_a_setting_names_the_trainer_that_takes_it_and_of_another_it_is_refused(
         *given, "--smoothing", "2", "--rounds", "5", code=2
     )
     assert not (tmp_path / "build").exists()
-    assert "trained by naive-bayes, smoothing 2, joint-bins 8" in installed.thenar(*given, "--smoothing", "2")
+    assert "trainer: naive-bayes, smoothing 2, joint-bins 8" in installed.thenar(*given, "--smoothing", "2")
     # It takes part where the trainer is chosen.
-    assert "\n  naive-bayes, smoothing 1, joint-bins 8: " in installed.thenar(*given)
+    assert "\ncompared: naive-bayes, smoothing 1, joint-bins 8: " in installed.thenar(*given)

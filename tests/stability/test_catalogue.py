@@ -5,9 +5,9 @@ import pkgutil
 import msgspec
 import pytest
 
-from thenar.simulator.contact.models import models
 from thenar.stability import cases
 from thenar.stability.contact.halving import kept, shipped
+from thenar.stability.contact.rest import models
 from thenar.stability.report import NAMES, CaseReport, load, run_case
 
 

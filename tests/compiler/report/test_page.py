@@ -70,7 +70,7 @@ def test_every_section_is_there_and_has_something_to_say(page: Page) -> None:
     for said in (
         "recognises 4 grasp types",
         "In the worst case over all possible frames",
-        "A whole scan is",
+        "A whole scan",
         "nested protocol",
     ):
         assert said in page.text
@@ -115,7 +115,7 @@ def test_every_table_of_rates_names_its_recipe(whole: ReportContent) -> None:
 
 
 def test_a_build_that_never_saw_an_empty_hand_says_so(whole: ReportContent) -> None:
-    assert "No row of the recordings shows an empty hand" in Page(report_html(whole)).text
+    assert "no row shows an empty hand" in Page(report_html(whole)).text
 
 
 def test_the_page_names_no_other_file(whole: ReportContent) -> None:
