@@ -5,9 +5,9 @@ import pkgutil
 import msgspec
 import pytest
 
+from thenar.simulator.effects.contact_quasistatic import Quasistatic
 from thenar.stability import cases
 from thenar.stability.contact.halving import kept, shipped
-from thenar.stability.contact.rest import models
 from thenar.stability.report import NAMES, CaseReport, load, run_case
 
 
@@ -43,4 +43,4 @@ def test_a_case_holds_in_full(name: str) -> None:
 
 def test_most_shipped_grasps_settle_so_that_halved_steps_are_compared() -> None:
     loads = list(shipped(1))
-    assert kept(loads, models()["quasistatic"]().solve(loads)).mean() > 0.9
+    assert kept(loads, Quasistatic().solve(loads)).mean() > 0.9
