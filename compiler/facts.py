@@ -12,9 +12,9 @@ from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us
 
 from .sensors import SensorCount
-from .text import INDEPENDENT, counted, microseconds, percent
+from .text import INDEPENDENT, counted, listed, microseconds, percent
 
-Topic = Literal["kept", "inputs", "fit", "compared", "accuracy", "caution", "integers", "faults", "scan"]
+Topic = Literal["kept", "inputs", "fit", "compared", "accuracy", "caution", "integers", "faults", "scan", "wiring"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ def _accuracy(manifest: Manifest) -> Iterator[Fact]:
         yield Fact(
             "accuracy",
             "nothing held",
-            "refused by score, closed switches and joints, with at most "
+            f"refused by {listed(_judged_by(manifest))}, with at most "
             f"{100 * manifest.rejection.share:g} % of the grasps of inner folds; no row shows an empty hand, so how "
             "many of those are refused is not known",
         )
@@ -120,6 +120,13 @@ def _accuracy(manifest: Manifest) -> Iterator[Fact]:
             yield Fact("accuracy", f"nothing held, {title}", str(each).removeprefix(f"{title}: "))
 
 
+def _judged_by(manifest: Manifest) -> list[str]:
+    """Return what the rejection rule looks at, in words."""
+    levels = [switch.threshold is not None for switch in manifest.switches]
+    kinds = {"closed switches": not all(levels), "pressed pads": any(levels), "joints": bool(manifest.joints)}
+    return ["score", *(kind for kind, read in kinds.items() if read)]
+
+
 def _cautions(manifest: Manifest, harness: Harness | None) -> Iterator[Fact]:
     """Yield what limits the worth of a build."""
     if manifest.zero_gain_nodes:
@@ -133,8 +140,9 @@ def _cautions(manifest: Manifest, harness: Harness | None) -> Iterator[Fact]:
         yield Fact("caution", "trials", INDEPENDENT)
     if manifest.source.simulated:
         yield Fact("caution", "simulated", manifest.source.simulated)
-    if harness is None and (joints := own_joints([joint.name for joint in manifest.joints])):
-        yield Fact("caution", "wiring", joints)
+    wired = harness is not None and harness.joint_device is not None
+    if not wired and (joints := own_joints([joint.name for joint in manifest.joints])):
+        yield Fact("wiring", "wiring", joints)
 
 
 def _integers(manifest: Manifest) -> Fact:
@@ -159,7 +167,7 @@ def _scan(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) -> 
                 "a whole scan",
                 f"{counted(len(scan.ports) + time.selects, 'transaction')}{muxes}, {time.us:.1f} us on the wire, "
                 f"{percent(time.share)} of the {time.full_us:.1f} us for all {harness.on_chips} wired "
-                f"{'switches and taxels' if harness.taxel_names else 'switches'}",
+                f"{'sensors' if harness.taxel_names else 'switches'}",
             )
         for stream, read in zip(harness.streams, scan.streams, strict=True):
             switches = counted(len(read.switches), "kept switch", "kept switches")

@@ -257,5 +257,5 @@ def _remarks(
         closed = list_names([level.closed for level in levels])
         yield f"{refs[taxel]} is the pad {taxel}, whose counts thenar compares: {closed}"
     joints = own_joints([joint.name for joint in manifest.joints])
-    if joints and harness.cyberglove is None:
+    if joints and harness.joint_device is None:
         yield joints
