@@ -15,7 +15,7 @@ Thenar = Callable[..., subprocess.CompletedProcess[str]]
 FEW = ("--rounds", 3, "--folds", 0)
 
 
-def test_a_proposed_harness_is_loaded_and_reads_every_kept_switch_in_one_go(
+def test_a_proposed_harness_loads_and_reads_every_kept_switch_at_once(
     thenar: Thenar, set_file: Path, tmp_path: Path
 ) -> None:
     build, glove = tmp_path / "build", tmp_path / "glove.toml"
@@ -40,7 +40,7 @@ def test_a_proposed_harness_is_loaded_and_reads_every_kept_switch_in_one_go(
     assert thenar("verify", build, set_file).returncode == 0
 
 
-def test_the_map_is_printed_chip_by_chip_with_its_share_of_all_that_is_wired(
+def test_the_map_is_printed_by_chip_with_its_share_of_the_wiring(
     thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
 ) -> None:
     names = [*small_set.switch_names, *(f"more {number}" for number in range(50))]
@@ -135,7 +135,7 @@ def test_a_preset_sets_options_and_explicit_ones_win(thenar: Thenar, set_file: P
         assert (options.placement, options.keep, options.rounds, options.table_bits) == expected
 
 
-def test_a_glove_that_lacks_a_joint_is_refused_by_compile_as_by_run(
+def test_compile_and_run_refuse_a_glove_that_lacks_a_joint(
     thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
 ) -> None:
     names = list(small_set.switch_names)
@@ -163,7 +163,7 @@ def test_a_glove_that_measures_no_joints_is_a_warning(thenar: Thenar, set_file: 
     assert "warning: nothing in 'glove' reads the build's joints, and every grasp is degraded" in done.stderr
 
 
-def test_verify_run_and_segment_say_the_same_of_inputs_that_a_set_lacks(
+def test_verify_run_and_segment_report_missing_inputs_alike(
     thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
 ) -> None:
     build, other = tmp_path / "build", tmp_path / "other.grasps"

@@ -96,7 +96,7 @@ def test_a_clock_or_counter_is_no_sensor_whatever_its_name(
     assert "clocks" not in warnings
 
 
-def test_a_second_clock_is_left_out_and_the_one_with_a_unit_is_the_time(cases: Path, import_cells: Import) -> None:
+def test_of_two_clocks_the_one_with_a_unit_is_the_time(cases: Path, import_cells: Import) -> None:
     grasp_set, said, _ = import_cells(cases / "second_clock_is_joint" / "two_clocks.csv")
     assert inputs(grasp_set) == ("thumb_flex", "index_flex")
     assert grasp_set.times_us[:2].tolist() == [0, 16667]

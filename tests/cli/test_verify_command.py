@@ -137,9 +137,7 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
     assert "compile the build again" not in verdict(found)
 
 
-def test_faults_are_put_to_every_row_and_the_worst_are_in_build_json_report_and_spec(
-    thenar: Thenar, set_file: Path, tmp_path: Path
-) -> None:
+def test_the_worst_faults_are_in_build_json_report_and_spec(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "build"
     done = thenar("compile", set_file, "-o", folder, "--rounds", "5", "--folds", "0")
     assert done.returncode == 0, done.stderr

@@ -16,7 +16,7 @@ def test_every_case_in_the_folder_is_in_the_catalogue_once() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_case_says_what_it_is_and_what_could_go_wrong_in_a_sentence_each(name: str) -> None:
+def test_a_case_describes_itself_and_its_risk_in_sentences(name: str) -> None:
     about = load(name).CASE
     assert about.title
     assert about.danger

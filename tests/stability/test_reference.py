@@ -87,7 +87,7 @@ def test_gains_compare_as_products_of_whole_numbers_do(one: list[list[int]], oth
     assert compare_gains(one, other) == (first > second) - (first < second)
 
 
-def test_one_row_in_a_billion_decides_and_equal_gains_of_other_terms_tie() -> None:
+def test_one_row_in_a_billion_decides_and_equal_gains_tie() -> None:
     m = 10**9
     nothing, least = [[m, m], [m, m]], [[m + 1, m - 1], [m, m]]
     assert compare_gains(least, nothing) == 1
@@ -206,7 +206,7 @@ def test_whole_steps_are_half_to_even(pairs: list[tuple[float, float]]) -> None:
 
 
 @pytest.mark.parametrize("counts", [(30, 10), (5, 12, 40), (1, 1, 1, 97)])
-def test_where_the_others_say_nothing_what_stands_in_says_how_frequent_each_class_is(counts: tuple[int, ...]) -> None:
+def test_uninformative_inputs_are_substituted_by_class_frequencies(counts: tuple[int, ...]) -> None:
     labels = [label for label, count in enumerate(counts) for _ in range(count)]
     rows = [[0] * len(counts)] * len(labels)
     ends = ((-9000,) * len(counts), (9000,) * len(counts))
@@ -216,7 +216,7 @@ def test_where_the_others_say_nothing_what_stands_in_says_how_frequent_each_clas
             assert found[one] - found[other] == pytest.approx(1000 * math.log(counts[one] / counts[other]), abs=2)
 
 
-def test_the_sum_of_a_kind_makes_up_for_what_its_inputs_say_twice() -> None:
+def test_the_sum_of_a_kind_compensates_redundant_inputs() -> None:
     # Each of two equal inputs is said by the other already, so nothing stands in for one alone; both are lost at once.
     labels = [0] * 30 + [1] * 10
     known, nothing = [[549, -549]] * 40, [[0, 0]] * 40

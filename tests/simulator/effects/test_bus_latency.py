@@ -34,7 +34,7 @@ def test_one_port_follows_the_other_and_nothing_is_drawn(delay: Callable) -> Non
     assert drawn == 0
 
 
-def test_switches_of_a_port_are_read_together_and_no_port_before_its_turn(delay: Callable) -> None:
+def test_ports_are_read_in_turn_with_all_their_switches(delay: Callable) -> None:
     us, drawn = delay({"us_per_port": 100, "jitter_us": 30.0})
     frames = us.shape[1]
     assert us.shape == (3, frames, 160)

@@ -122,7 +122,7 @@ def test_what_does_not_come_to_rest_is_marked(
 @pytest.mark.parametrize("press_n_per_mm", [5e-324, 1000.0])
 @pytest.mark.parametrize("soft_mm", [5e-324, 5.0])
 @pytest.mark.parametrize("drag_n_per_mm", [5e-324, 1000.0])
-def test_skins_at_the_ends_of_what_may_be_asked_for_come_to_numbers(
+def test_skins_at_the_limits_give_finite_results(
     conditions: list[Condition],
     press_n_per_mm: float,
     soft_mm: float,

@@ -140,6 +140,6 @@ def test_what_is_closed_from_the_first_level_on_closes_at_once() -> None:
     assert (on.tolist(), off.tolist()) == ([[0]], [[1500]])
 
 
-def test_a_grip_that_is_not_full_when_the_row_is_read_is_refused(make_setting: Callable) -> None:
+def test_a_row_read_before_the_full_grip_is_refused(make_setting: Callable) -> None:
     with pytest.raises(SceneError, match=r"contact\.ramp: .* rise_ms = 300 is longer than recording\.hold_ms = 250"):
         prepare(make_setting(hold_us=250_000), Press(lambda grip: grip), rise_ms=300.0)

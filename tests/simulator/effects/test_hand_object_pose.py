@@ -19,9 +19,7 @@ DIRECTIONS = arrays(np.float64, (3, 3), elements=st.floats(-1.0, 1.0))
 
 
 @given(vectors=VECTORS, directions=DIRECTIONS, size=st.floats(0.0, 0.05))
-def test_a_small_turn_is_the_rotation_about_the_hands_axes_up_to_its_square(
-    vectors: np.ndarray, directions: np.ndarray, size: float
-) -> None:
+def test_a_small_turn_is_linear_in_the_hands_axes(vectors: np.ndarray, directions: np.ndarray, size: float) -> None:
     turns = size * directions
     got = Rotation.from_rotvec(turned(vectors, turns))
     truth = Rotation.from_rotvec(turns) * Rotation.from_rotvec(vectors)

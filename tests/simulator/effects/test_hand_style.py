@@ -45,13 +45,13 @@ def test_a_style_is_the_same_in_every_repetition_and_with_every_object(style: St
     assert np.abs(posture).min() > 0.0
 
 
-def test_a_type_is_held_in_a_way_of_its_own_and_gripped_as_all_others(style: Styler) -> None:
+def test_each_type_has_its_own_habit_but_common_grip(style: Styler) -> None:
     (one, grip), (other, same) = style("A", "PoS"), style("A", "Lat")
     assert (one != other).all()
     assert grip.tolist() == same.tolist()
 
 
-def test_without_habits_all_types_are_off_alike_and_without_the_rest_only_habits_are_left(style: Styler) -> None:
+def test_habits_are_per_type_and_the_rest_common(style: Styler) -> None:
     for_all = {"habit_sd_deg": 0.0}
     np.testing.assert_array_equal(style("A", "PoS", "bar", for_all)[0], style("A", "Lat", "bar", for_all)[0])
     habits = {"sd_deg": 0.0, "log_sd": 0.0}

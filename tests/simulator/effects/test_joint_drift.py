@@ -41,7 +41,7 @@ def test_it_begins_at_nought_and_goes_on_in_a_straight_line(drift: Drift) -> Non
     np.testing.assert_array_equal(added[:, 0], added[:, 1])
 
 
-def test_every_sensor_of_every_subject_drifts_its_own_way_as_far_as_is_asked(drift: Drift) -> None:
+def test_every_subjects_sensors_drift_independently_by_the_requested_amount(drift: Drift) -> None:
     ends = np.stack([drift(f"subject {number}", [100], deg_per_session=8.0)[0, 0] for number in range(200)])
     # 3600 drifts: four standard errors of mean and sd.
     assert abs(ends.mean()) < 4 * 8.0 / 3600**0.5

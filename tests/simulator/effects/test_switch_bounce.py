@@ -81,7 +81,7 @@ def test_the_limits_are_those_of_the_scene(bounced: Callable) -> None:
     assert np.array_equal(rest, bits)
 
 
-def test_a_switch_that_opens_while_it_still_chatters_is_open_from_then_on(bounced: Callable) -> None:
+def test_a_switch_opening_during_chatter_stays_open(bounced: Callable) -> None:
     """The first switch opens 80 ms after it closed, in the midst of bursts of up to a second."""
     rest, bits = bounced(finely(ON_US, OFF_US + 50_000), {"on_ms": 1000.0, "off_ms": 0.0})
     opened = (OFF_US - ON_US) // 10

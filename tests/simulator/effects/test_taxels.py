@@ -51,7 +51,7 @@ def acted(
     return run
 
 
-def test_every_pad_of_the_glove_has_a_gain_of_its_own_whoever_wears_it(acted: Acted) -> None:
+def test_every_pad_has_its_own_gain_for_all_wearers(acted: Acted) -> None:
     found = acted("taxel.gain", np.full((2, 1, 1600), 2.0), log_sd=0.06)
     logs = np.log(found[0, 0] / 2.0)
     assert abs(logs.mean()) < 4 * 0.06 / 40
@@ -67,9 +67,7 @@ def test_a_pad_reads_nothing_below_what_actuates_it_and_its_force_above(acted: A
 
 
 @given(newtons=FORCES, share=st.floats(0.0, 1.0))
-def test_hysteresis_lies_between_the_force_and_a_share_more_and_is_the_force_while_it_rises(
-    acted: Acted, newtons: np.ndarray, share: float
-) -> None:
+def test_hysteresis_exceeds_only_falling_forces_by_a_share(acted: Acted, newtons: np.ndarray, share: float) -> None:
     found = acted("taxel.hysteresis", newtons, share=share)
     assert (found >= newtons).all()
     assert (found <= (1.0 + share) * newtons).all()
@@ -109,7 +107,7 @@ def test_crosstalk_is_what_kirchhoff_says_of_a_driven_row(acted: Acted, newtons:
         np.testing.assert_allclose(found[:, :, row : row + 16], shared * 10_000.0, rtol=1e-9, atol=1e-12)
 
 
-def test_noise_is_as_large_as_is_asked_in_a_repetition_and_in_a_frame(acted: Acted) -> None:
+def test_noise_has_the_requested_size_per_repetition_and_frame(acted: Acted) -> None:
     newtons = np.full((200, FRAMES, PADS), 2.0)
     gains = np.log(acted("taxel.noise", newtons, trial_log_sd=0.02, sd_n=0.0) / 2.0)
     assert (gains == gains[:, :1]).all()

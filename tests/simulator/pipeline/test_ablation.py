@@ -70,7 +70,7 @@ def test_a_change_is_what_the_rate_of_the_same_inputs_gained(ablation: Ablation)
         assert one.change.mean == pytest.approx(one.rate.mean - before.rate.mean)
 
 
-def test_a_scene_of_every_frame_is_judged_by_the_frames_that_are_read_out() -> None:
+def test_ablation_judges_only_the_frames_read_out() -> None:
     scene = scene_of(4)
     every = msgspec.structs.replace(scene, recording=msgspec.structs.replace(scene.recording, rows="all"))
     found = ablate(msgspec.structs.replace(every, effects=()), jobs=1)

@@ -62,7 +62,7 @@ def test_the_hand_goes_to_its_rest_as_it_came_and_stays(
     np.testing.assert_array_equal(after[:, 2:], np.tile(open_deg, (3, 6, 1)))
 
 
-def test_rests_vary_as_postures_do_and_that_after_a_trial_is_that_before_the_next(
+def test_rests_vary_and_join_consecutive_trials(
     make_scene: SceneMaker, make_batch: BatchMaker, make_condition: Callable[..., Any]
 ) -> None:
     scene = make_scene([*VARIED, "hand.transition"], recording=MOVING)
@@ -110,7 +110,7 @@ def test_a_rest_changes_no_draw_of_any_other_frame(name: str) -> None:
     assert (np.diff(rested.times_us[rested.subjects == "A"]) >= 0).all()
 
 
-def test_the_whole_of_a_movement_is_one_movement_and_none_outside_the_hold() -> None:
+def test_a_movement_is_one_and_none_outside_the_hold() -> None:
     made = whole("continuous-rest")
     frames = np.arange(len(made)) % 181
     assert made.is_none[(frames < 30) | (frames > 101)].all()
