@@ -121,7 +121,7 @@ def _accuracy(manifest: Manifest) -> Iterator[Fact]:
 
 
 def _judged_by(manifest: Manifest) -> list[str]:
-    """Return what the rejection rule looks at, in words."""
+    """Return the inputs of the rejection rule, in words."""
     levels = [switch.threshold is not None for switch in manifest.switches]
     kinds = {"closed switches": not all(levels), "pressed pads": any(levels), "joints": bool(manifest.joints)}
     return ["score", *(kind for kind, read in kinds.items() if read)]
