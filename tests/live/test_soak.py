@@ -77,3 +77,9 @@ def test_no_frame_does_more_than_the_ones_before(samples: Sequence[Sample], reco
     share = growth(later, lambda sample: sample.calls) / usual
     print(f"{usual:.1f} calls a frame, {share:+.1%} from the first of {len(later)} windows to the last")
     assert share <= MOST_SHARE
+
+
+def test_a_recording_ends_where_its_file_may_not_grow_and_says_so(samples: Sequence[Sample]) -> None:
+    assert samples[0].recording
+    assert not samples[-1].recording
+    assert "File too large" in samples[-1].failure

@@ -121,6 +121,20 @@ def test_the_guarantee_is_the_same_in_coarser_steps(make_stumps: MakeStumps, mak
     assert Rounding(tables, integers).worst_of_all().loss <= found.safe_margin + 2 * found.slack
 
 
+@pytest.mark.parametrize(("apart", "together"), [(1, 2), (4, 2), (5, 1), (50, 1)])
+def test_switches_count_together_only_within_five(apart: int, together: int) -> None:
+    rows = np.zeros((60, 2))
+    rows[[5, 5 + apart]] = [5.0, -5.0]
+    assert span(ScoreTables(np.zeros(2), rows, (), ()), 3.0) == 15 * together
+
+
+def test_a_joint_spans_from_its_least_row_to_its_greatest_and_zero() -> None:
+    rows = np.array([[-2.0, 1.0], [1.0, 2.0], [0.0, 6.5]])
+    tables = ScoreTables(np.array([9.0, -9.0]), np.zeros((0, 2)), (np.array([3, 9], np.uint16),), (rows,))
+    assert span(tables, 1.0) == 6
+    assert span(tables, 2.0) == 13
+
+
 def test_tables_of_zeros_and_of_no_joint_stay_so(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
     integers = quantise(collapse(make_stumps(rounds=0), 6), *make_rows(), entry_bits=8)
     assert (integers.scale, integers.bound) == (1.0, 0)
@@ -174,6 +188,17 @@ def test_the_order_of_the_rows_changes_no_byte(make_stumps: MakeStumps, make_row
     order = np.random.default_rng(seed).permutation(len(bits))
     shuffled = quantise(tables, bits[order], codes[order])
     assert tables_to_bytes(shuffled) == tables_to_bytes(quantise(tables, bits, codes))
+
+
+@pytest.mark.parametrize("width", [16, 8])
+def test_no_frame_at_all_overflows(make_stumps: MakeStumps, make_rows: MakeRows, width: int) -> None:
+    integers = quantise(collapse(make_stumps(3, switches=4, joints=2), 4), *make_rows(switches=4, joints=2), width)
+    limit, partial = 2 ** (width - 1) - 1, {tuple(integers.bias.tolist())}
+    terms = [[row, 0 * row] for row in integers.switch_rows.astype(int)]
+    terms += [list(rows.astype(int)) for rows in integers.joint_rows]
+    for choices in terms:
+        partial = {tuple(np.add(sum_, choice).tolist()) for sum_ in partial for choice in choices}
+        assert max(abs(lane) for sum_ in partial for lane in sum_) <= limit
 
 
 @given(seed=st.integers(0, 1000), shrinkage=st.sampled_from([1e-5, 1e-8, 1e-10, 1e-12, 1e-200]))

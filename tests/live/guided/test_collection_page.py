@@ -170,6 +170,34 @@ def test_a_signal_ends_it_and_the_page_says_so(
     assert len(GraspSet.load(tmp_path / "set.grasps")) == 1
 
 
+def test_the_countdown_waits_for_devices_that_are_lost(
+    record: Callable[..., Command], wearer: Wearer, browser: Browser
+) -> None:
+    going = record("--no-none")
+    page = browser.see(going.url)
+    page.until("ready")
+    page.wait(lambda: page.text("stage") == "Enter starts the countdown" and page.offered()[0].startswith("start"))
+    wearer.board_line.unplug()
+    page.wait(lambda: page.text("stage").startswith("the countdown waits: ") and "start" not in page.offered()[0])
+    lost = page.texts("#devices [data-is=bad]")
+    assert len(lost) == 1
+    name = lost[0].removeprefix("✗ ").partition(": ")[0]
+    assert page.text("stage") == f"the countdown waits: {name} not connected"
+    page.wait(lambda: f"{name} lost since " in page.text("glove-state"))
+    wearer.glove_line.unplug()
+    switches = len(wearer.performance.switch_names)
+    page.wait(lambda: page.text("sees").startswith(f"0 of 0 readable switches closed; {switches} lost ("))
+    page.wait(lambda: "0 of 0 readable joints measured; 18 lost (" in page.text("sees"))
+    page.wait(lambda: page.script("return document.documentElement.classList.contains('old')"))
+    assert page.text("link").startswith("page: connected since ")
+    assert page.axe() == []
+    page.picture("collect-lost-1400-light")
+    wearer.board_line.replug()
+    wearer.glove_line.replug()
+    page.wait(lambda: page.text("stage") == "Enter starts the countdown" and page.offered()[0].startswith("start"))
+    captured(page)
+
+
 def test_without_devices_there_is_neither_a_page_nor_a_file(
     record: Callable[..., Command], wearer: Wearer, tmp_path: Path
 ) -> None:

@@ -1,8 +1,10 @@
 """How runs end, and what survives of them."""
 
+import json
 import os
 import resource
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -20,6 +22,7 @@ MakeRun = Callable[..., Any]
 pytestmark = pytest.mark.slow
 
 FRANK = Policy(lead=0.0, dwell_us=0)
+SETTLE_US = 150_000
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
@@ -123,6 +126,46 @@ def full_at(running: Any, path: Path, client: Any, reason: str) -> None:
     assert pairs
     assert all(then == now for then, now in pairs)
     assert scene.check() > 0
+
+
+def test_a_reader_that_hangs_loses_lines_and_holds_nobody_up(run: MakeRun, tmp_path: Path) -> None:
+    running = run("both", "glove", "board")
+    scene, path = running.scene, tmp_path / "grasps"
+    client = running.start("--sink", f"unix:{path}")
+    scene.settled(0)
+    with socket.socket(socket.AF_UNIX) as hanging, socket.socket(socket.AF_UNIX) as reading:
+        for each in (hanging, reading):
+            each.connect(str(path))
+        begun_us = running.now_us()
+        reading.settimeout(10.0)
+        lines = reading.makefile("rb")
+        numbers = [
+            line["number"] for line in map(json.loads, (lines.readline() for _ in range(800))) if "number" in line
+        ]
+        lines.close()
+        scene.show(8)
+        scene.settled(8)
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    since = scene.grasps.since(begun_us)
+    assert [grasp.number for grasp in since] == list(range(since[0].number, since[0].number + len(since)))
+    assert sum(grasp.health == "ok" for grasp in since) > 0.9 * len(since)
+    assert client.end() == 0
+    assert "lost" in client.said
+    assert not path.exists()
+
+
+def test_a_stdout_that_nobody_reads_holds_nothing_up(run: MakeRun, tmp_path: Path) -> None:
+    running, path = run("both", "glove", "board"), tmp_path / "run.mcap"
+    glove = tmp_path / "glove.toml"
+    command = [sys.executable, "-m", "thenar.cli", "run", str(running.build), "--glove", str(glove)]
+    command += ["--record", str(path), "--frames", "1500"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as client:
+        assert client.wait(60.0) == 0
+        assert client.stderr is not None
+        said = client.stderr.read().decode()
+    assert "1500 frames" in said
+    assert "lost" in said
+    assert len(list(replayed(running.scene.truth.build, path, FRANK))) == 1500
 
 
 def test_a_killed_emulator_is_missed_and_its_successor_found(run: MakeRun, stage: Any, tmp_path: Path) -> None:

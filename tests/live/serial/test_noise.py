@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 MakeRun = Callable[..., Any]
+Cable = Callable[[bytes], bytes]
 
 pytestmark = pytest.mark.slow
 
@@ -80,6 +81,18 @@ def test_damaged_bytes_give_no_wrong_answer_and_cease_with_repair(
         assert scene.check() > 0
     assert all(device.opened == 1 for device in running.sources.devices())
     assert running.damaged(line) > 0 or damage in (drop, flood)
+
+
+@pytest.mark.parametrize("line", [GLOVE, BOARD], ids=["glove", "board"])
+def test_a_flood_of_zeros_between_messages_holds_nothing_up(run: MakeRun, line: int) -> None:
+    running = run("both", "glove", "board")
+    scene, cable = running.scene, running.bench.lines[line]
+    for row in range(1, 4):
+        for _ in range(20):
+            cable.send(bytes(50))
+        scene.show(row)
+        scene.settled(row)
+    assert scene.check() > 0
 
 
 def test_a_run_opens_its_devices_through_noise(run: MakeRun) -> None:

@@ -1,6 +1,7 @@
 """The live page in a real browser: what it shows is what was published, and what is pressed happens."""
 
 from collections.abc import Callable
+from threading import Event, Thread
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from thenar.runtime.live.replay import replayed
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Mark
+from thenar.runtime.web.monitor import StreamMonitor
 from thenar.runtime.web.server import Server, message
 
 pytestmark = pytest.mark.slow
@@ -19,6 +21,7 @@ pytestmark = pytest.mark.slow
 _BARS = """return Object.fromEntries([...document.querySelectorAll('#types li')].map((row) =>
     [row.querySelector('.name').textContent, row.querySelector('.share').textContent]))"""
 _CLOSED = "return document.querySelectorAll('#hand .spot.closed').length"
+_LOST = "return document.querySelectorAll('#hand .spot.lost').length"
 
 
 def shown(browser: Any, scene: Any, row: int) -> str:
@@ -54,6 +57,22 @@ def test_the_page_shows_what_is_published(run: Callable[[], Any], browser: Any) 
     browser.wait(lambda: browser.texts("#wrong li") == ["nothing"])
 
 
+def test_a_stopped_run_is_old_for_later_pages_too(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    browser.open(running.page.server.url)
+    answer = shown(browser, running.scene, 0)
+    running.end()
+    browser.wait(lambda: browser.text("age").startswith("this is "))
+    assert browser.text("grasp") == answer
+    age = float(browser.text("age").split()[2])
+    browser.open(running.page.server.url)
+    browser.wait(lambda: browser.text("grasp") == answer and browser.text("age").startswith("this is "))
+    assert float(browser.text("age").split()[2]) >= age
+    assert browser.text("glove-state").startswith("glove: silent since ")
+    assert browser.text("link").startswith("page: connected since ")
+    assert browser.text("build-state") == f"build: both {running.glove.system.build.manifest.checksum[:8]}"
+
+
 def bars_are(browser: Any, scene: Any) -> bool:
     """Return whether the bars show the probabilities of the row that is on the devices now, by the build itself."""
     truth, row = scene.truth, scene.shown[-1].row
@@ -61,6 +80,34 @@ def bars_are(browser: Any, scene: Any) -> bool:
     share: str = browser.script(_BARS)[found.grasp]
     # While too little is read, there is none.
     return share.endswith(" %") and abs(float(share.removesuffix(" %")) - 100 * found.probability) < 0.11
+
+
+def test_the_page_of_a_run_elsewhere_shows_the_same(run: Callable[[], Any], browser: Any) -> None:
+    running, stop = run(), Event()
+    scene, truth = running.scene, running.scene.truth
+    with StreamMonitor(running.stream, "127.0.0.1:0", token=None, build=running.build) as monitor:
+        thread = Thread(target=monitor.run, args=(stop,))
+        thread.start()
+        try:
+            browser.open(monitor.server.url)
+            for row in range(0, len(truth.performance), 7):
+                shown(browser, scene, row)
+                browser.wait(lambda: bars_are(browser, scene))
+            browser.wait(lambda: len(browser.texts("#devices tr")) == 2)
+            assert not browser.driver.find_element("id", "record-panel").is_displayed()
+            assert not browser.driver.find_element("id", "types-say").is_displayed()
+            assert browser.texts("#types .name") == list(truth.build.manifest.classes)
+            # A page that is opened after the last moment knows how old it is.
+            running.end()
+            browser.wait(lambda: browser.text("age").startswith("this is "))
+            age = float(browser.text("age").split()[2])
+            browser.open(monitor.server.url)
+            browser.wait(lambda: browser.text("age").startswith("this is "))
+            assert float(browser.text("age").split()[2]) >= age
+            browser.driver.get("about:blank")
+        finally:
+            stop.set()
+            thread.join()
 
 
 def test_the_posed_hand_follows_the_joints(run: Callable[[], Any], browser: Any) -> None:
@@ -72,6 +119,27 @@ def test_the_posed_hand_follows_the_joints(run: Callable[[], Any], browser: Any)
     assert len(before) == 5
     shown(browser, running.scene, 5)
     browser.wait(lambda: sum(one != other for one, other in zip(before, browser.script(bones), strict=True)) >= 3)
+
+
+def test_what_is_lost_is_named_and_crossed_out(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    names = running.scene.truth.switch_names
+    browser.open(running.page.server.url)
+    shown(browser, running.scene, 0)
+    browser.wait(lambda: browser.script(_LOST) == 0)
+    board = running.bench.lines[1]
+    board.unplug()
+    browser.wait(lambda: browser.text("health") == "degraded")
+    browser.wait(lambda: browser.texts("#wrong li") == [f"{name}: lost" for name in names])
+    browser.wait(lambda: browser.script(_LOST) == len(names))
+    browser.wait(lambda: browser.text("hand-says") == f"0 of 0 readable switches closed; {len(names)} lost")
+    browser.wait(lambda: " lost since " in browser.text("glove-state"))
+    browser.wait(lambda: any("there is no such port" in text for text in browser.texts("#devices td:nth-child(2)")))
+    board.replug()
+    browser.wait(lambda: browser.text("health") == "ok" and browser.script(_LOST) == 0)
+    browser.wait(
+        lambda: browser.texts("#wrong li") == ["nothing"] and browser.text("glove-state") == "glove: connected"
+    )
 
 
 def test_record_mark_and_stop_write_what_the_command_writes(run: Callable[[], Any], browser: Any) -> None:
@@ -187,6 +255,39 @@ def test_a_screen_reader_is_told_what_stands_and_not_flooded(run: Callable[[], A
         "return [...document.querySelectorAll('[aria-live], [role=status], [role=log]')].map((e) => e.id)"
     )
     assert live == ["spoken"]
+
+
+def test_a_page_that_comes_late_sees_what_was(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    for row in (0, 5, 11):
+        running.scene.show(row)
+        running.scene.settled(row)
+    browser.open(running.page.server.url)
+    types = [running.scene.truth.answer(row) for row in (0, 5, 11)]
+    browser.wait(lambda: all(name in browser.script(_PAST_LABEL) for name in types[-1:]))
+    browser.wait(lambda: len(browser.texts("#segments li")) >= 1)
+    drawn = browser.script(_INKED)
+    assert drawn > 1000
+
+
+_PAST_LABEL = "return document.getElementById('past').getAttribute('aria-label')"
+_INKED = """const canvas = document.getElementById('past');
+    const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+    const colours = new Set(); let inked = 0;
+    for (let at = 0; at < data.length; at += 4) if (data[at + 3]) inked++;
+    return inked"""
+
+
+def test_closing_all_pages_changes_nothing(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    browser.open(running.page.server.url)
+    shown(browser, running.scene, 0)
+    browser.driver.get("about:blank")
+    browser.wait(lambda: running.page.server.pages == 0)
+    for row in (5, 11, 17):
+        running.scene.show(row)
+        running.scene.settled(row)
+    assert running.scene.check() > 0
 
 
 SCRIPT = "<script>alert(1)</script>"
