@@ -13,15 +13,14 @@ from dataclasses import replace
 import numpy as np
 from onset import READINGS, Reading, onset
 
-from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import trial_folds
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.placement.elements import Element, bits_of, elements_of
 from thenar.compiler.placement.placement import choose
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
-from thenar.compiler.tables.collapse import model_scores
 from thenar.compiler.trainers.base import Training
+from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Recipe
 from thenar.simulator import load_scene, simulate
 
@@ -60,7 +59,7 @@ def rates(pads: GraspSet) -> Iterator[tuple[Reading, Rate, Rate]]:
                 first = 0 if joints else learning.codes.shape[1] - len(pads.joints)
                 columns = tuple(range(learning.codes.shape[1])) if joints else tuple(range(first))
                 model = training.train(learning.with_joints(columns))
-                found[row, fold.test] = winners(model_scores(model, test.switches, test.with_joints(columns).codes))
+                found[row, fold.test] = winners(model.scores(test.switches, test.with_joints(columns).codes))
         alone, both = (Rate.predicted(one, samples.labels, samples.trials, of="pooled") for one in found)
         yield reading, alone, both
 

@@ -32,7 +32,7 @@ from synthetic import grasp_like
 
 from thenar.compiler.additive.logit import fit_logit
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import winners
+from thenar.runtime.model.tables import winners
 
 WEKA_JAR = Path("/usr/share/java/weka.jar")
 CLASSES, ROUNDS = 14, 100

@@ -27,9 +27,9 @@ from thenar.compiler import TRAINERS
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.choose import fit_for
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.tables.collapse import Model, collapse
-from thenar.compiler.tables.quantise import integer_scores, quantise
-from thenar.runtime.tables import IntegerTables
+from thenar.compiler.model.collapse import Model, collapse
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.quantise import quantise
 
 AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
 SLOW_ROWS = 20  # rows for a peer on the larger part
@@ -62,7 +62,7 @@ class Ours:
     def predictor(self, fold: Fold) -> Predictor:
         """Return the predictor of rows that matches the firmware of a fold."""
         tables = self.integers(fold)
-        return lambda rows: integer_scores(tables, *split(rows, joints=self.joints)).argmax(axis=1)
+        return lambda rows: tables.scores(*split(rows, joints=self.joints)).argmax(axis=1)
 
 
 BINS = ("max_bins", 8)
@@ -104,7 +104,7 @@ def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Line:
     fold = cuts[CUTS[0]][0]
     tables, frames = what.integers(fold), split(fold.asked, joints=what.joints)
     layout = fit_for(AVR, tables).layout
-    cost = of_ours(layout, AVR, layout.frame_bytes(*frames), integer_scores(tables, *frames))
+    cost = of_ours(layout, AVR, layout.frame_bytes(*frames), tables.scores(*frames))
     return Line(what.name, rates(cuts, what.predictor), cost)
 
 

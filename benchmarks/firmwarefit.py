@@ -29,7 +29,8 @@ from thenar.compiler.firmware.measuring import sizes
 from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.firmware.words import numbered
-from thenar.runtime.tables import COARSE, IntegerTables, Slope
+from thenar.runtime.model.integers import COARSE, IntegerTables
+from thenar.runtime.model.terms.line import Slope
 
 FITTED = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "rv32imac")
 FRAMES = 200
@@ -79,7 +80,7 @@ def drawn(seed: int) -> IntegerTables:
         Slope(joint, 3, 3 + span, gain, (random.integers(-9, 10, classes) * last).astype(np.int8))
         for joint in range(joints - lines, joints)
     )
-    return IntegerTables(
+    return IntegerTables.of(
         bias=rows(classes),
         switch_rows=rows(switches, classes),
         thresholds=thresholds,
@@ -87,7 +88,7 @@ def drawn(seed: int) -> IntegerTables:
         switch_means=rows(switches, classes),
         joint_means=rows(joints, classes),
         scale=100.0,
-        slopes=slopes,
+        further=slopes,
         grid=unit,
     )
 

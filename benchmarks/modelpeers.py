@@ -20,10 +20,10 @@ from modelsets import Cut
 from numpy.typing import NDArray
 
 from thenar.compiler.evaluation.choosing import choose_training
+from thenar.compiler.model.collapse import collapse
 from thenar.compiler.samples import Samples, decided
-from thenar.compiler.tables.collapse import collapse, model_scores
-from thenar.compiler.tables.quantise import integer_scores, quantise
 from thenar.compiler.trainers.base import Training
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.recipe import AUTO, Recipe
 
 WEKA_JAR = Path("/usr/share/java/weka.jar")
@@ -90,8 +90,8 @@ def _trained(name: str) -> Predicting:
             training = Training.chosen(choose_training(train, Training.candidates(options), groups=groups, of=cut.of))
         model = training.train(train)
         integers = quantise(collapse(model, train.n_switches), train.switches, train.codes)
-        floats = model_scores(model, test.switches, test.codes)
-        return floats.argmax(axis=1), integer_scores(integers, test.switches, test.codes).argmax(axis=1)
+        floats = model.scores(test.switches, test.codes)
+        return floats.argmax(axis=1), integers.scores(test.switches, test.codes).argmax(axis=1)
 
     return predict
 

@@ -16,17 +16,16 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import EvaluationError, Fold, trial_folds
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.pictures import on_paper, painting, rendered
 from thenar.compiler.placement.elements import Element, Elements, bits_of, elements_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
-from thenar.compiler.tables.collapse import model_scores
 from thenar.compiler.trainers.base import Training
 from thenar.compiler.workers import in_workers
 from thenar.runtime.files import write_atomically
+from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Recipe
 
 if TYPE_CHECKING:
@@ -160,7 +159,7 @@ def _predicted(task: _Task) -> tuple[tuple[Reading, bool], Fold, NDArray[np.intp
         learning, test = bits_of(learning, elements), bits_of(samples.rows(fold.test), elements)
     else:
         learning, test = _coded(learning, reading), _coded(samples.rows(fold.test), reading)
-    return kind, fold, winners(model_scores(training.train(learning), test.switches, test.codes))
+    return kind, fold, winners(training.train(learning).scores(test.switches, test.codes))
 
 
 def _coded(samples: Samples, reading: Reading) -> Samples:

@@ -10,6 +10,12 @@ from thenar.drivers.extras import optional
 
 if TYPE_CHECKING:
     from thenar.drivers.errors import ThenarError
+    from thenar.runtime.model.tables import ScoreTables
+    from thenar.runtime.model.terms.base import Term
+    from thenar.runtime.model.terms.bins import Bins
+    from thenar.runtime.model.terms.bit import Bit
+    from thenar.runtime.model.terms.grid import Grid
+    from thenar.runtime.model.terms.line import Line
     from thenar.runtime.recipe import Recipe
 
     from .additive.classifier import AdditiveLogitClassifier
@@ -37,11 +43,16 @@ if TYPE_CHECKING:
     from .recordings.graspset import GraspSet, Joint
     from .recordings.merging import merge, split
     from .samples import Samples
-    from .tables.collapse import Line, ScoreTables
     from .trainers.base import TRAINERS, Setting, Trainer
 
 _HOMES = {
     "thenar.drivers.errors": ("ThenarError",),
+    "thenar.runtime.model.tables": ("ScoreTables",),
+    "thenar.runtime.model.terms.base": ("Term",),
+    "thenar.runtime.model.terms.bins": ("Bins",),
+    "thenar.runtime.model.terms.bit": ("Bit",),
+    "thenar.runtime.model.terms.grid": ("Grid",),
+    "thenar.runtime.model.terms.line": ("Line",),
     "thenar.runtime.recipe": ("Recipe",),
     ".additive.classifier": ("AdditiveLogitClassifier",),
     ".artifact.compile": ("compile_build",),
@@ -68,7 +79,6 @@ _HOMES = {
     ".recordings.graspset": ("GraspSet", "Joint"),
     ".recordings.merging": ("merge", "split"),
     ".samples": ("Samples",),
-    ".tables.collapse": ("Line", "ScoreTables"),
     ".trainers.base": ("TRAINERS", "Setting", "Trainer"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
@@ -78,6 +88,8 @@ __all__ = [
     "TARGETS",
     "TRAINERS",
     "AdditiveLogitClassifier",
+    "Bins",
+    "Bit",
     "BoostingError",
     "Build",
     "BuildReport",
@@ -88,6 +100,7 @@ __all__ = [
     "FaultCheck",
     "Frontier",
     "GraspSet",
+    "Grid",
     "ID3Selector",
     "Joint",
     "Line",
@@ -101,6 +114,7 @@ __all__ = [
     "Study",
     "StudyDesign",
     "SwitchSelector",
+    "Term",
     "ThenarError",
     "Trainer",
     "Verification",

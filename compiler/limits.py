@@ -3,7 +3,7 @@
 import os
 
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.tables import MAX_BYTES, MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES, payload_bytes
+from thenar.runtime.model.integers import MAX_BYTES, MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES, payload_bytes
 
 # Numbers of (types, rows) arrays in a round of boosting, and of a training's columns with two values and with more.
 _BYTES_A_TYPE_AND_ROW, _BYTES_A_SWITCH_AND_ROW, _BYTES_A_JOINT_AND_ROW = 120, 10, 60

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Fitting, Rejection
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.rejection import refused
-from thenar.runtime.tables import IntegerTables
 
 from .artifact import CompileError
 from .artifact.ensemble import model_fault
@@ -20,14 +21,13 @@ from .boosting.stumps import Stumps
 from .evaluation.choosing import choose_training
 from .evaluation.populations import OF
 from .limits import check_inputs
+from .model.collapse import Model, collapse
+from .model.substitutes import fit_lost
 from .placement.constraints import Limits
 from .placement.elements import Elements
 from .placement.placement import InputSelection, select
 from .placement.ports import PortCosts
 from .samples import Samples
-from .tables.collapse import Model, collapse
-from .tables.quantise import integer_scores, quantise
-from .tables.standing_in import fit_lost
 from .trainers.base import Report, Training
 
 Classes = NDArray[np.intp]
@@ -186,7 +186,7 @@ class Recogniser:
         If frames can be rejected, column K is +infinity for rejected ones and -infinity for the others.
         """
         read = self.read(samples)
-        scores = integer_scores(self.integers, read.switches, read.codes)
+        scores = self.integers.scores(read.switches, read.codes)
         if self.rejection is None:
             return scores / self.integers.scale
         beyond = np.where(refused(self.rejection, scores, read.switches, read.codes), np.inf, -np.inf)
@@ -218,7 +218,7 @@ def predicted_classes(
     tables: IntegerTables, rejection: Rejection | None, bits: NDArray[np.bool_], codes: NDArray[np.uint16]
 ) -> Classes:
     """Return the predicted classes (n,) of rows of kept switches (n, s) and codes (n, j); K: rejected."""
-    scores = integer_scores(tables, bits, codes)
+    scores = tables.scores(bits, codes)
     found: Classes = scores.argmax(axis=1)
     if rejection is not None:
         found[refused(rejection, scores, bits, codes)] = tables.n_classes

@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import manifest_file
-from . import tables as tables_file
 from .errors import BuildError
 from .files import read_file
 from .frames import Mask
 from .manifest import Manifest
 from .manifest_file import manifest_from_bytes
+from .model import integers as tables_file
+from .model.integers import IntegerTables, tables_from_bytes
 from .published import NONE
 from .rejection import Rejector, none_leads
 from .scanning import scanmap as scan_file
 from .scanning.scanmap import ScanMap, check_switches, scanmap_from_bytes
 from .scores import LANE_OFFSET, Scorer, softmax
 from .softmax import Softmax
-from .tables import IntegerTables, tables_from_bytes
 
 MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME = "build.json", "tables.bin", "ensemble.bin", "scan.json"
 

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import FrameError
 from .frames import Mask
-from .tables import HIGHEST_CODE, IntegerTables
+from .model.integers import IntegerTables
+from .model.terms.base import HIGHEST_CODE
 
 LANE_OFFSET = 1 << 15
 # Switches are looked up eight at a time: a byte of a mask indexes its sum of rows.
@@ -49,19 +50,19 @@ class Scorer:
         self.switch_means = _packed(tables.switch_means, offsets)
         self.joint_means = _packed(tables.joint_means, offsets)
         binned = [tables.binned(joint) for joint in range(tables.n_joints)]
-        self.joint_rows = [_packed(rows, offsets) for _, rows in binned]
-        self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds, _ in binned]
+        self.joint_rows = [_packed(bins.rows, offsets) for bins in binned]
+        self.thresholds: list[list[int]] = [bins.thresholds.tolist() for bins in binned]
         self._by_code = [*map(_RowsByCode, self.thresholds, self.joint_rows)]
-        self._pairs = [
+        self._grids = [
             (
-                *pair.joints,
-                *(steps.tolist() for steps in pair.thresholds),
-                [_packed(rows, offsets) for rows in pair.rows],
+                *grid.joints,
+                *(steps.tolist() for steps in grid.thresholds),
+                [_packed(rows, offsets) for rows in grid.rows],
             )
-            for pair in tables.pairs
+            for grid in tables.grids
         ]
         # Of all joints lost.
-        self.joints_lost = sum(self.joint_means) + self._pair_sum((0,) * tables.n_joints)
+        self.joints_lost = sum(self.joint_means) + self._grid_sum((0,) * tables.n_joints)
 
     @cached_property
     def row_sums(self) -> list[list[int]]:
@@ -85,13 +86,13 @@ class Scorer:
             there = [not lost >> joint & 1 for joint in range(len(codes))]
             rows = map(getitem, self._by_code, codes)
             known = sum(compress(rows, there), sum(compress(self.joint_means, map(not_, there))))
-            return known + self._pair_sum([code * own for code, own in zip(codes, there, strict=True)])
+            return known + self._grid_sum([code * own for code, own in zip(codes, there, strict=True)])
         known = sum(map(getitem, self._by_code, codes))
-        return known + self._pair_sum(codes) if self._pairs else known
+        return known + self._grid_sum(codes) if self._grids else known
 
-    def _pair_sum(self, codes: Sequence[int]) -> int:
+    def _grid_sum(self, codes: Sequence[int]) -> int:
         total = 0
-        for one, other, steps, more, rows in self._pairs:
+        for one, other, steps, more, rows in self._grids:
             total += rows[bisect_left(steps, codes[one])][bisect_left(more, codes[other])]
         return total
 

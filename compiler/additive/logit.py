@@ -22,14 +22,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import HIGHEST_CODE
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.base import HIGHEST_CODE, Floats
+from thenar.runtime.model.terms.line import Line
 
 from ..boosting.binning import bin_columns
 from ..boosting.boost import BoostingError, check_rows
 from ..boosting.exactsums import dot, exact_sum, on_one_grid
 from ..elementary import add_up, softmax_and_loss
 from ..limits import check_memory
-from ..tables.collapse import Floats, Line, ScoreTables
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -104,7 +105,7 @@ class ColumnTables:
             # The smallest code of each bin.
             joint_rows.append(rows[np.searchsorted(edges, np.append(0.0, steps + 1))])
         lines = (Line(column - n_switches, int(low), int(high), row) for column, (low, high, row) in self.lines.items())
-        return ScoreTables(bias, switch_rows, tuple(thresholds), tuple(joint_rows), tuple(lines))
+        return ScoreTables.of(bias, switch_rows, thresholds, joint_rows, [*lines])
 
 
 def fit_logit(

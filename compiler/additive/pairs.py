@@ -14,12 +14,13 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import Pair
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.base import Floats
+from thenar.runtime.model.terms.grid import Grid
 
 from ..boosting.boost import BoostingError, check_rows
 from ..boosting.exactsums import exact_sum, on_one_grid
 from ..limits import check_memory
-from ..tables.collapse import Floats, ScoreTables
 from .logit import TOLERANCE, Column, Fit, column_edges, columns_of, count_of, sparse, spread_out, tables_of
 
 PAIRS, PAIR_BINS, PAIR_SMOOTHNESS = 4, 8, 0.5
@@ -68,11 +69,11 @@ def fit_pairs(
     own = 1 + sum(column.n_rows for column in (*columns, *count))
     tables = tables_of(columns, spread_out(columns, rows[:own], count), np.ones(len(X))).score_tables(s)
     blocks = np.split(rows[own:], np.cumsum([column.n_rows for column in made])[:-1]) if found else []
-    made_pairs = []
+    grids = []
     for (a, b), block in sorted(zip(found, blocks, strict=True), key=lambda each: each[0]):
         one, other = (np.floor(edges[joint]).astype(np.uint16) for joint in (a, b))
-        made_pairs.append(Pair((a, b), (one, other), block.reshape(len(one) + 1, len(other) + 1, n_classes)))
-    return ScoreTables(tables.bias, tables.switch_rows, tables.thresholds, tables.joint_rows, (), tuple(made_pairs))
+        grids.append(Grid((a, b), (one, other), block.reshape(len(one) + 1, len(other) + 1, n_classes)))
+    return ScoreTables(tables.bias, (*tables.terms, *grids))
 
 
 def _bins(edges: Sequence[Floats], codes: NDArray[np.uint16], joint: int) -> NDArray[np.intp]:

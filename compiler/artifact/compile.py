@@ -18,14 +18,16 @@ from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.system import unread_joints
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch, Threshold
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Recipe, TableBits, changed
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.scanmap import scanmap_to_bytes
-from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
 from ..hand import HandShape
+from ..model.compare import Comparison, compare
+from ..model.faults import count_faults, groups_of, worst_faults
 from ..placement.constraints import Limits
 from ..placement.elements import Element, names_of
 from ..placement.methods.base import METHODS
@@ -35,8 +37,6 @@ from ..recogniser import Recogniser, predicted_classes
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet, Joint
 from ..samples import Samples
-from ..tables.compare import Comparison, compare
-from ..tables.faults import count_faults, groups_of, worst_faults
 from ..trainers.base import SHARED, TRAINERS, Training
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, TRY_NAME, BuildReport, Documents, Progress

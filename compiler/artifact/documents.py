@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.recipe import Recipe, changed
 from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.folds import EvaluationError
 from ..facts import Fact, facts
 from ..hand import HandShape
+from ..model.compare import Comparison, worst_case
+from ..model.faults import FaultCounts
 from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
-from ..tables.compare import Comparison, worst_case
-from ..tables.faults import FaultCounts
 from ..workers import little
 from .training import USUAL_ROUNDS
 

@@ -1,6 +1,6 @@
 """`ensemble.bin`: the model that a build was collapsed from, kept for verification.
 
-A sealed npz (recordings/arrays.py) in one of four formats.
+A sealed npz (recordings/arrays.py) in one of five formats.
 
 Format 1, LogitBoost: columns (M, K) int32, thresholds (M, K) float64 and values (M, K, 3) float64, with a JSON header
 {"n_inputs", "shrinkage"}.
@@ -8,27 +8,34 @@ Format 2, every other trainer: bias (K,), switch_rows (s, K), bins (j,) int64, t
 joint_rows (sum of bins, K); float64 unless stated; the header is {}.
 Format 3, models with lines: format 2 plus lines (n, 3) int64, the joint and its lowest and highest code, and
 line_rows (n, K).
-Format 4, models with pairs of joints: format 2 plus pairs (n, 4) int64, both joints and the number of thresholds of
-each, pair_thresholds uint16, pair after pair, and pair_rows (sum of cells, K).
+Format 4, models with grids of two joints: format 2 plus pairs (n, 4) int64, both joints and the number of thresholds of
+each, pair_thresholds uint16, grid after grid, and pair_rows (sum of cells, K).
+Format 5, models with terms of other kinds: format 2 plus term_N_FIELD, the fields of further term N (`Term.arrays`),
+and the header {"kinds"}, the kinds of the further terms.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated
 
 import msgspec
 import numpy as np
 from msgspec import Meta
 
+from thenar.drivers.members import MemberError
 from thenar.runtime.errors import BuildError
+from thenar.runtime.model.integers import MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.base import HIGHEST_CODE, TERMS, CoreTerm, Term
+from thenar.runtime.model.terms.grid import Grid
+from thenar.runtime.model.terms.line import Line
 from thenar.runtime.sealed import seal, unseal
-from thenar.runtime.tables import HIGHEST_CODE, MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES, Pair
 
 from ..boosting.stumps import Stumps
+from ..model.collapse import Model, collapse
 from ..recordings.arrays import AnyArray, pack, unpack
-from ..tables.collapse import Line, Model, ScoreTables
 
 KIND = b"THNRENSM"
-STUMPS, TABLES, LINES, PAIRS = 1, 2, 3, 4  # formats
+STUMPS, TABLES, LINES, PAIRS, OTHERS = 1, 2, 3, 4, 5  # formats
 MAX_BYTES = 1 << 30
 
 # This many times a column, a threshold and three values are just below a gigabyte.
@@ -54,6 +61,13 @@ class _NoHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     pass
 
 
+class _OthersHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    kinds: tuple[str, ...]
+
+
+_HEADERS = {STUMPS: _StumpsHeader, OTHERS: _OthersHeader}
+
+
 def ensemble_to_bytes(model: Model) -> bytes:
     """Return the content of `ensemble.bin`; the same model gives the same bytes."""
     arrays: dict[str, AnyArray]
@@ -69,16 +83,21 @@ def ensemble_to_bytes(model: Model) -> bytes:
             "thresholds": np.concatenate([np.zeros(0), *model.thresholds]),
             "joint_rows": np.concatenate([np.zeros((0, model.n_classes)), *model.joint_rows]),
         }
-        if model.lines:
+        if any(not isinstance(term, CoreTerm) for term in model.terms):
+            version, header = OTHERS, msgspec.json.encode(_OthersHeader(tuple(term.name for term in model.further)))
+            for number, term in enumerate(model.further):
+                arrays |= {f"term_{number}_{name}": array for name, array in term.arrays().items()}
+        elif model.lines:
             version = LINES
             arrays["lines"] = np.array([(line.joint, line.low, line.high) for line in model.lines])
             arrays["line_rows"] = np.stack([line.row for line in model.lines])
-        if model.pairs:
+        elif model.grids:
             version = PAIRS
-            arrays["pairs"] = np.array([(*pair.joints, *map(len, pair.thresholds)) for pair in model.pairs])
-            arrays["pair_thresholds"] = np.concatenate([each for pair in model.pairs for each in pair.thresholds])
-            arrays["pair_rows"] = np.concatenate([pair.rows.reshape(-1, model.n_classes) for pair in model.pairs])
-    written = {name: array.astype(_DTYPES[version][name]) for name, array in arrays.items()}
+            arrays["pairs"] = np.array([(*grid.joints, *map(len, grid.thresholds)) for grid in model.grids])
+            arrays["pair_thresholds"] = np.concatenate([each for grid in model.grids for each in grid.thresholds])
+            arrays["pair_rows"] = np.concatenate([grid.cells for grid in model.grids])
+    dtypes = _DTYPES.get(version, _DTYPES[TABLES])
+    written = {name: array.astype(dtypes.get(name, array.dtype)) for name, array in arrays.items()}
     return seal(KIND, version, pack(header, written))
 
 
@@ -87,16 +106,19 @@ def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
 
     Raises SealError for a file that is foreign, truncated, altered or newer, and BuildError for an inconsistent one.
     """
-    version, payload = unseal(data, KIND, PAIRS, what)
+    version, payload = unseal(data, KIND, OTHERS, what)
     header_bytes, arrays = unpack(payload, what)
-    dtypes = _DTYPES.get(version, {})
-    if {name: array.dtype for name, array in arrays.items()} != {n: np.dtype(d) for n, d in dtypes.items()}:
+    dtypes = _DTYPES.get(TABLES if version == OTHERS else version, {})
+    found = {name: array.dtype for name, array in arrays.items() if version != OTHERS or not name.startswith("term_")}
+    if found != {name: np.dtype(dtype) for name, dtype in dtypes.items()}:
         raise BuildError(f"{what} is damaged: its arrays are not {', '.join(dtypes)}")
     try:
-        header = msgspec.json.decode(header_bytes, type=_StumpsHeader if version == STUMPS else _NoHeader)
+        header = msgspec.json.decode(header_bytes, type=_HEADERS.get(version, _NoHeader))
     except (ValueError, RecursionError) as wrong:
         raise BuildError(f"{what} is damaged: {wrong}") from None
-    return _stumps(header, arrays, what) if isinstance(header, _StumpsHeader) else _tables(arrays, what)
+    if isinstance(header, _StumpsHeader):
+        return _stumps(header, arrays, what)
+    return _tables(arrays, header.kinds if isinstance(header, _OthersHeader) else (), what)
 
 
 def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) -> str:
@@ -106,50 +128,56 @@ def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) ->
         return (
             "" if sizes == wanted else f"has {sizes[0]} inputs and {sizes[1]} classes, not {wanted[0]} and {wanted[1]}"
         )
-    shapes = [model.bias.shape, model.switch_rows.shape, *(rows.shape for rows in model.joint_rows)]
-    bins = [(len(thresholds) + 1, n_classes) for thresholds in model.thresholds]
+    try:
+        tables = collapse(model, n_switches)
+    except (ValueError, TypeError, IndexError) as wrong:
+        return f"has a term that makes no sense: {wrong}"
+    shapes = [tables.bias.shape, tables.switch_rows.shape, *(rows.shape for rows in tables.joint_rows)]
+    bins = [(len(thresholds) + 1, n_classes) for thresholds in tables.thresholds]
     if len(bins) != n_joints or shapes != [(n_classes,), (n_switches, n_classes), *bins]:
         return f"has tables whose shapes do not fit {n_switches} switches, {n_joints} joints and {n_classes} classes"
-    if any(
-        thresholds.dtype != np.uint16 or (np.diff(thresholds.astype(int)) < 1).any() for thresholds in model.thresholds
-    ):
+    if any(map(_disordered, tables.thresholds)):
         return "has thresholds that are not codes, or not increasing"
-    if fault := _lines_fault(model) or _pairs_fault(model):
+    if fault := _lines_fault(tables) or _grids_fault(tables):
         return fault
     # Written so that NaN fails as well.
-    more = [line.row for line in model.lines] + [pair.rows for pair in model.pairs]
-    numbers = (model.bias, model.switch_rows, *model.joint_rows, *more)
-    if not all((np.abs(rows) <= _LARGEST_VALUE).all() for rows in numbers):
+    if not all(term.largest <= _LARGEST_VALUE for term in tables.terms if isinstance(term, CoreTerm)) or not (
+        (np.abs(tables.bias) <= _LARGEST_VALUE).all()
+    ):
         return "holds numbers beyond a million, or NaN"
     return ""
 
 
-def _lines_fault(model: ScoreTables) -> str:
-    joints = [line.joint for line in model.lines]
-    if joints != sorted(set(joints)) or any(not 0 <= joint < len(model.joint_rows) for joint in joints):
+def _disordered(thresholds: AnyArray) -> bool:
+    return thresholds.dtype != np.uint16 or bool((np.diff(thresholds.astype(int)) < 1).any())
+
+
+def _lines_fault(tables: ScoreTables) -> str:
+    joints = [line.joint for line in tables.lines]
+    if joints != sorted(set(joints)) or any(not 0 <= joint < tables.n_joints for joint in joints):
         return "has lines of unknown joints, or not in the order of the joints"
-    if any(not 0 <= line.low < line.high <= HIGHEST_CODE for line in model.lines):
+    if any(not 0 <= line.low < line.high <= HIGHEST_CODE for line in tables.lines):
         return "has lines whose ends are not codes, or not increasing"
-    if any(line.row.shape != model.bias.shape for line in model.lines):
-        return f"has lines whose rows do not have {model.n_classes} classes"
+    if any(line.row.shape != tables.bias.shape for line in tables.lines):
+        return f"has lines whose rows do not have {tables.n_classes} classes"
     return ""
 
 
-def _pairs_fault(model: ScoreTables) -> str:
-    joints = [joint for pair in model.pairs for joint in pair.joints]
+def _grids_fault(tables: ScoreTables) -> str:
+    joints = [joint for grid in tables.grids for joint in grid.joints]
     if not joints:
         return ""
-    if model.lines:
-        return "has both lines and pairs of joints: only one is allowed"
-    if any(not 0 <= a < b < len(model.joint_rows) for a, b in (pair.joints for pair in model.pairs)):
-        return "has pairs of unknown joints"
+    if tables.lines:
+        return "has both lines and grids of joints: only one is allowed"
+    if any(not 0 <= a < b < tables.n_joints for a, b in (grid.joints for grid in tables.grids)):
+        return "has grids of unknown joints"
     if len(set(joints)) < len(joints) or joints[::2] != sorted(joints[::2]):
-        return "has pairs that share a joint, or are not in the order of their joints"
-    for pair in model.pairs:
-        if any(each.dtype != np.uint16 or (np.diff(each.astype(int)) < 1).any() for each in pair.thresholds):
-            return "has pairs whose thresholds are not codes, or not increasing"
-        if pair.rows.shape != (*(len(each) + 1 for each in pair.thresholds), model.n_classes):
-            return "has pairs whose rows do not fit their thresholds"
+        return "has grids that share a joint, or are not in the order of their joints"
+    for grid in tables.grids:
+        if any(map(_disordered, grid.thresholds)):
+            return "has grids whose thresholds are not codes, or not increasing"
+        if grid.rows.shape != (*(len(each) + 1 for each in grid.thresholds), tables.n_classes):
+            return "has grids whose rows do not fit their thresholds"
     return ""
 
 
@@ -167,7 +195,7 @@ def _stumps(header: _StumpsHeader, arrays: Mapping[str, AnyArray], what: str) ->
     return Stumps(header.n_inputs, columns, thresholds, values, header.shrinkage)
 
 
-def _tables(arrays: Mapping[str, AnyArray], what: str) -> ScoreTables:
+def _tables(arrays: Mapping[str, AnyArray], kinds: Sequence[str], what: str) -> ScoreTables:
     bias, switch_rows, joint_rows = (arrays[name].astype(np.float64) for name in ("bias", "switch_rows", "joint_rows"))
     bins, thresholds = arrays["bins"].astype(np.int64), arrays["thresholds"].astype(np.uint16)
     dimensions = (bias.ndim, switch_rows.ndim, bins.ndim, thresholds.ndim, joint_rows.ndim)
@@ -178,7 +206,8 @@ def _tables(arrays: Mapping[str, AnyArray], what: str) -> ScoreTables:
     ends = np.cumsum(bins)[:-1]
     steps = np.split(thresholds, ends - np.arange(1, len(bins))) if len(bins) else []
     rows = np.split(joint_rows, ends) if len(bins) else []
-    tables = ScoreTables(bias, switch_rows, tuple(steps), tuple(rows), _lines(arrays, what), _pairs(arrays, what))
+    further = (*_lines(arrays, what), *_grids(arrays, what), *_others(arrays, kinds, what))
+    tables = ScoreTables.of(bias, switch_rows, steps, rows, further)
     if fault := model_fault(tables, len(switch_rows), len(bins), len(bias)):
         raise BuildError(f"{what} is damaged: it {fault}")
     return tables
@@ -193,23 +222,36 @@ def _lines(arrays: Mapping[str, AnyArray], what: str) -> tuple[Line, ...]:
     return tuple(Line(joint, low, high, row) for (joint, low, high), row in zip(lines.tolist(), rows, strict=True))
 
 
-def _pairs(arrays: Mapping[str, AnyArray], what: str) -> tuple[Pair, ...]:
+def _grids(arrays: Mapping[str, AnyArray], what: str) -> tuple[Grid, ...]:
     if "pairs" not in arrays:
         return ()
     pairs, steps = arrays["pairs"].astype(np.int64), arrays["pair_thresholds"].astype(np.uint16)
     rows = arrays["pair_rows"].astype(np.float64)
     if (pairs.ndim, steps.ndim, rows.ndim) != (2, 1, 2) or not pairs.size or pairs.shape[1] != 4:
-        raise BuildError(f"{what} is damaged: its pairs do not form a table")
+        raise BuildError(f"{what} is damaged: its grids do not form a table")
     counts = pairs[:, 2:]
     if (counts < 0).any() or counts.max() > HIGHEST_CODE:
-        raise BuildError(f"{what} is damaged: its pairs have thresholds that are not codes")
+        raise BuildError(f"{what} is damaged: its grids have thresholds that are not codes")
     cells = (counts + 1).prod(axis=1)
     if counts.sum() != len(steps) or cells.sum() != len(rows):
-        raise BuildError(f"{what} is damaged: its pairs belong to different tables")
+        raise BuildError(f"{what} is damaged: its grids belong to different tables")
     own = iter(np.split(steps, np.cumsum(counts.ravel())[:-1]))
     blocks = np.split(rows, np.cumsum(cells)[:-1])
     found = (
         (a, b, (next(own), next(own)), block.reshape(one + 1, other + 1, -1))
         for (a, b, one, other), block in zip(pairs.tolist(), blocks, strict=True)
     )
-    return tuple(Pair((a, b), thresholds, block) for a, b, thresholds, block in found)
+    return tuple(Grid((a, b), thresholds, block) for a, b, thresholds, block in found)
+
+
+def _others(arrays: Mapping[str, AnyArray], kinds: Sequence[str], what: str) -> Iterator[Term]:
+    """Yield the further terms of these kinds. Raises MemberError for a kind that no installed package defines."""
+    for number, kind in enumerate(kinds):
+        prefix = f"term_{number}_"
+        fields = {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+        try:
+            yield TERMS.named(kind).from_arrays(fields)
+        except (KeyError, TypeError, ValueError, IndexError) as wrong:
+            if isinstance(wrong, MemberError):
+                raise
+            raise BuildError(f"{what} is damaged: term {number}, {kind!r}, makes no sense: {wrong}") from None

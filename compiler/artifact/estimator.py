@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from thenar.drivers.extras import optional
 from thenar.runtime.build import Build as LoadedBuild
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.published import NONE
 from thenar.runtime.recipe import By, Inputs, Recipe, TableBits
-from thenar.runtime.tables import HIGHEST_CODE
 
 from ..additive.classifier import AdditiveLogitClassifier
 from ..additive.logit import ColumnTables
@@ -22,6 +23,7 @@ from ..boosting.stumps import Stumps
 from ..evaluation.folds import Fold
 from ..firmware.classifier import LIBRARY_NAME
 from ..firmware.generate import Firmware, write_folder
+from ..model.collapse import Model
 from ..placement.elements import elements_of
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import Chosen, InputSelection, information_alone
@@ -30,7 +32,6 @@ from ..recogniser import Recogniser, Scores
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
-from ..tables.collapse import Model, ScoreTables
 from . import CompileError
 from .compile import BuildAssembly, Wired, check_target
 from .documents import BuildReport, Documents, Progress

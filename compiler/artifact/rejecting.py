@@ -11,15 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Rejection
+from thenar.runtime.model.integers import LIMIT, IntegerTables
+from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.published import NONE
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.tables import HIGHEST_CODE, LIMIT, IntegerTables
 
 from ..evaluation.choosing import inner_folds
 from ..evaluation.folds import leave_groups_out
+from ..model.collapse import collapse
 from ..samples import Samples
-from ..tables.collapse import collapse
-from ..tables.quantise import integer_scores, quantise
 from ..trainers.base import Training
 
 Floats = NDArray[np.float64]
@@ -85,7 +86,7 @@ class _Limits:
             self.ranges[label] = np.stack([codes[tail], codes[-1 - tail]], axis=1)
 
     def _scores(self, samples: Samples) -> Floats:
-        scores: Floats = integer_scores(self._tables, samples.switches, samples.codes) / self._tables.scale
+        scores: Floats = self._tables.scores(samples.switches, samples.codes) / self._tables.scale
         return scores
 
     def deviations(self, samples: Samples) -> Floats:

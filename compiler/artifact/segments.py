@@ -16,7 +16,6 @@ from ..movements.learning import live_states
 from ..movements.streams import MovementError, newest, streams_of
 from ..movements.timeline import Timeline, probabilities
 from ..recordings.graspset import GraspSet
-from ..tables.quantise import integer_scores
 from .documents import Progress
 from .verify_firmware import select_inputs
 
@@ -90,7 +89,7 @@ def _of_movements(
     found = []
     for done, stream in enumerate(streams, 1):
         own = bits[stream.rows], codes[stream.rows]
-        scores, rejection = integer_scores(build.tables, *own), build.manifest.rejection
+        scores, rejection = build.tables.scores(*own), build.manifest.rejection
         no = None if rejection is None else refused(rejection, scores, *own)
         states, likely = _decoded(build, scores, no, lag_us)
         found.append(

@@ -33,7 +33,6 @@ from ..movements.streams import TICK_US, MovementError, movements_of, streams_of
 from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
 from ..samples import FRAMES, Samples
-from ..tables.quantise import integer_scores
 from ..trainers.base import SHARED
 from ..workers import in_workers
 from .documents import Progress
@@ -203,7 +202,7 @@ def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Recipe]) -> tuple[
     for stream in streams_of(grasp_set):
         if stream.subject == subject:
             part = read.rows(stream.rows)
-            lanes = integer_scores(tables, part.switches, part.codes)
+            lanes = tables.scores(part.switches, part.codes)
             decoders = _StreamScores(lanes, model, counts, tables.scale)
             for name, (states, announced) in decoders.every().items():
                 parts[name].append((stream.continued, part.labels, states, announced))

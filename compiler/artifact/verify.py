@@ -14,11 +14,11 @@ from thenar.runtime.manifest import Faults, Unit
 
 from ..boosting.stumps import Stumps
 from ..evaluation.rates import rated
+from ..model.collapse import Model
+from ..model.compare import Comparison, WorstCase, compare, worst_case
+from ..model.faults import count_faults, groups_of, worst_faults
 from ..recogniser import predicted_classes
 from ..recordings.graspset import GraspSet
-from ..tables.collapse import Model
-from ..tables.compare import Comparison, WorstCase, compare, worst_case
-from ..tables.faults import count_faults, groups_of, worst_faults
 from . import CompileError
 from .documents import Progress
 from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault

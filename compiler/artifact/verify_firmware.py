@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from thenar.runtime.build import Build
 from thenar.runtime.files import read_file
 from thenar.runtime.manifest import Calibration, Manifest, Switch
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.names import list_names, nearest
 from thenar.runtime.scores import LANE_OFFSET
-from thenar.runtime.tables import IntegerTables
 
 from ..firmware import FirmwareError
 from ..firmware.choose import Fit, features, fit_for, smallest_fit

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thenar.drivers.extras import optional
+from thenar.runtime.model.tables import TIE, winners
 
 from ..elementary import softmax
 from .boost import BoostingError, boost, check_weights
-from .stumps import TIE, winners
 
 with optional():
     from sklearn.base import BaseEstimator, ClassifierMixin

@@ -10,10 +10,6 @@ from ..elementary import add_exactly, add_up
 
 Floats = NDArray[np.float64]
 
-# Scores closer than this are tied. Equal scores that are reached by different sums differ by some 1e-14; different
-# settings of Weka differ by 1e-10 without a reason in the data.
-TIE = 1e-9
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stumps:
@@ -57,8 +53,14 @@ class Stumps:
             scores, carry = add_exactly(scores, carry, centred(outputs, self.shrinkage))
             yield (scores + carry).T
 
-    def scores(self, X: NDArray[np.generic]) -> Floats:
-        """Return the scores F (n, K) of inputs (n, n_inputs)."""
+    @property
+    def magnitude(self) -> float:
+        """The sum of the magnitudes that are added up."""
+        return float(2 * self.shrinkage * np.abs(self.values[:, :, :2]).max(axis=(1, 2)).sum())
+
+    def scores(self, *columns: NDArray[np.generic]) -> Floats:
+        """Return the scores F (n, K) of inputs (n, n_inputs), or of switches (n, s) and codes (n, j)."""
+        X = np.hstack(columns)
         scores = np.zeros((len(X), self.n_classes))
         for stage in self.staged_scores(X):
             scores = stage
@@ -84,9 +86,3 @@ def spread(outputs: Floats, n_classes: int, shrinkage: float) -> tuple[Floats, F
     g = outputs * shrinkage
     mean = g / n_classes
     return (g - mean) * (n_classes - 1) / n_classes, (0.0 - mean) * (n_classes - 1) / n_classes
-
-
-def winners(scores: Floats) -> NDArray[np.intp]:
-    """Return the class (n,) with the largest score of each row of (n, K); ties go to the lowest number."""
-    best: NDArray[np.intp] = (scores >= scores.max(axis=1, keepdims=True) - TIE).argmax(axis=1)
-    return best

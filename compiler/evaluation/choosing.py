@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Compared, Fitting, Of
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.base import CoreTerm
 
 from ..elementary import softmax_and_loss
+from ..model.collapse import Model, collapse
 from ..samples import Samples, decided
-from ..tables.collapse import Model, ScoreTables, collapse, model_scores
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
 from .folds import Fold, leave_groups_out, trial_folds
@@ -150,7 +152,7 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
     weights, held = 1.0 / np.bincount(trial)[trial], ~test.is_none[first]
     found = []
     for model in _models(trainings, learning):
-        scores = model_scores(model, test.switches, test.codes)
+        scores = model.scores(test.switches, test.codes)
         predicted = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
         loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
         found.append(
@@ -174,10 +176,8 @@ def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
 
 
 def _table_rows(tables: ScoreTables) -> int:
-    """Return the number of rows of scores for the inputs in use: one per switch, bin of a joint or pair, and line."""
-    in_use = [len(rows) for rows in tables.joint_rows if rows.any()]
-    in_use += [pair.rows.size // tables.n_classes for pair in tables.pairs]
-    return int(tables.switch_rows.any(axis=1).sum()) + sum(in_use) + sum(bool(line.row.any()) for line in tables.lines)
+    """Return the number of rows of scores for the inputs in use: of each switch, bin, cell of a grid, and line."""
+    return sum(term.n_rows for term in tables.terms if isinstance(term, CoreTerm) and term.largest > 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

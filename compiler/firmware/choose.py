@@ -4,7 +4,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from textwrap import wrap
 
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 from . import FirmwareError
 from .costs import Cost

@@ -8,8 +8,8 @@ from textwrap import wrap
 
 from thenar.firmware_templates.rendering import file_text, render
 from thenar.runtime.manifest import Rejection
+from thenar.runtime.model.terms.line import Slope
 from thenar.runtime.softmax import Softmax
-from thenar.runtime.tables import Slope
 
 from .layout import Bins, Layout, Rows
 from .segments import SEGMENT_FILES, segment_files

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from thenar.runtime.files import read_file
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 from ..publication import check_folder, entries, publish_folder
 from . import FirmwareError

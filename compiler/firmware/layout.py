@@ -15,7 +15,8 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.terms.base import HIGHEST_CODE
 
 from . import FirmwareError
 
@@ -88,14 +89,14 @@ class Layout:
     @property
     def n_rows(self) -> int:
         """The number of rows of the table."""
-        cells = sum((len(one) + 1) * (len(other) + 1) for one, other in (pair.thresholds for pair in self.tables.pairs))
+        cells = sum(grid.n_rows for grid in self.tables.grids)
         bins = sum(len(self.tables.thresholds[joint]) + 1 for joint in self.binned)
         return 1 + sum((1 << len(group)) - 1 for group in self.groups) + bins + cells
 
     @property
     def found(self) -> int:
         """The most rows that a frame adds, the start included."""
-        return 1 + len(self.groups) + len(self.binned) + len(self.tables.pairs)
+        return 1 + len(self.groups) + len(self.binned) + len(self.tables.grids)
 
     @cached_property
     def start(self) -> Rows:
@@ -112,9 +113,7 @@ class Layout:
         rows = tables.switch_rows
         switches = [("switches", group, _sums(rows[group[0] : group[-1] + 1])) for group in self.groups]
         bins = [("joints", (joint,), tables.joint_rows[joint].astype(np.int64)) for joint in self.binned]
-        grids = [
-            ("joints", pair.joints, pair.rows.astype(np.int64).reshape(-1, tables.n_classes)) for pair in tables.pairs
-        ]
+        grids = [("joints", grid.joints, grid.cells.astype(np.int64)) for grid in tables.grids]
         return (*switches, *bins, *grids)
 
     @cached_property
@@ -126,11 +125,11 @@ class Layout:
         for joint in self.binned:
             found.append(Bins(joint, at, tuple(tables.thresholds[joint].tolist()), row * self.row_pairs))
             row, at = row + len(tables.thresholds[joint]) + 1, at + len(found[-1].filled)
-        for pair in tables.pairs:
-            for joint, steps in zip(pair.joints, pair.thresholds, strict=True):
+        for grid in tables.grids:
+            for joint, steps in zip(grid.joints, grid.thresholds, strict=True):
                 found.append(Bins(joint, at, tuple(steps.tolist()), row * self.row_pairs))
                 at += len(found[-1].filled)
-            row += int(np.prod([len(steps) + 1 for steps in pair.thresholds]))
+            row += grid.n_rows
         return tuple(found)
 
     @property
@@ -174,7 +173,7 @@ class Layout:
         tables = self.tables
         bins, lines = len(self.binned), len(tables.slopes)
         slopes = lines * self.row_pairs * (2 if avr else 4)
-        terms = 8 * (bins + lines) + 18 * len(tables.pairs)
+        terms = 8 * (bins + lines) + 18 * len(tables.grids)
         numbers = len(self.thresholds) + (tables.n_switches + tables.n_joints) * tables.n_classes
         return 4 * self.row_pairs * self.n_rows + slopes + terms + 2 * numbers
 

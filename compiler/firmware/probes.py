@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.firmware_templates.rendering import render
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.tables import IntegerTables
 
-from ..tables.quantise import integer_scores
 from . import FirmwareError
 from .costs import Unit
 from .layout import Layout
@@ -225,9 +224,9 @@ def turns(tables: IntegerTables, joint: int) -> NDArray[np.uint16]:
     """Return, in order, 0, each threshold of a joint, the code after it, and the highest code; for a joint with a
     slope, also codes near its ends and some between.
     """
-    thresholds, slope = tables.steps_of(joint), tables.slope_of(joint)
+    thresholds = tables.steps_of(joint)
     codes = np.concatenate([[0, _top(tables)], thresholds, thresholds + 1])
-    if slope is not None:
+    for slope in (slope for slope in tables.slopes if slope.joint == joint):
         between = np.linspace(slope.low, slope.high, _BETWEEN).astype(np.int64)
         codes = np.concatenate([codes, between, [abs(slope.low - 1), slope.low + 1, slope.high - 1, slope.high + 1]])
     codes = np.unique(codes)
@@ -248,7 +247,7 @@ def check_header(name: str, layout: Layout, grasps: Sequence[str]) -> str:
     """Return thenar_NAME_check.h: frames, the expected predictions, the types' names, and a function that compares."""
     frames = self_test_frames(layout)
     what = ("every switch open, lowest codes", "every switch closed, highest codes", *DRAWN * ("drawn",))
-    predictions = integer_scores(layout.tables, frames.bits, frames.codes)
+    predictions = layout.tables.scores(frames.bits, frames.codes)
     rows = zip(what, np.packbits(frames.bits, axis=1, bitorder="little"), frames.codes, predictions, strict=True)
     checks = [_check(*row) for row in rows]
     values = {"name": name, "upper": name.upper(), "classes": layout.tables.n_classes, "count": len(checks)}

@@ -10,9 +10,9 @@ from importlib.metadata import version
 from typing import Protocol
 
 from thenar.runtime.manifest import Calibration, Rejection, Switch
+from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.published import NONE
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from . import FirmwareError
 

@@ -14,16 +14,15 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from thenar.runtime.live.decision import Decision, Ranking, SequentialTest
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.policy import Policy
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.segmenting.live import LiveSegments
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.folds import Rows
 from ..placement.placement import InputSelection
 from ..samples import Samples
-from ..tables.quantise import integer_scores
 from ..trainers.base import Training
 from .cache import stored
 from .points import DecisionKind, FrontierError, Latency
@@ -223,7 +222,7 @@ def decided_on(
 ) -> Decisions:
     """Return the decisions under `policy` on a replay with a frame every step_us, the first at its start."""
     rows, codes = replay.stream.rows, replay.codes[:, : None if tables.n_joints else 0]
-    scores = integer_scores(tables, replay.bits[rows][:, list(columns)], codes[rows])
+    scores = tables.scores(replay.bits[rows][:, list(columns)], codes[rows])
     return decisions(tables, stretches(scores, _bounds_us(replay), step_us), policy)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from thenar.runtime.tables import tables_from_bytes
+from thenar.runtime.model.integers import tables_from_bytes
 
 from ..firmware.choose import Fit
 from ..firmware.classifier import LIBRARY_NAME, Library

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from msgspec import Struct
 
+from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ..evaluation.folds import Rows
 from ..placement.placement import InputSelection

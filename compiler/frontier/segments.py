@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.folds import leave_groups_out, trial_folds
 from ..movements.learning import learnt
@@ -16,7 +16,6 @@ from ..movements.streams import TICK_US, MovementError, Stream, streams_of
 from ..placement.placement import InputSelection
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
-from ..tables.quantise import integer_scores
 from ..trainers.base import Training
 from .price import Tabled, tables_of
 
@@ -70,7 +69,7 @@ class MovementSamples:
         for fold in folds:
             test = selection.read(samples.rows(fold.test))
             for tabled, made, _ in tables_of(samples, fold.train, selection, tuple(tables), training):
-                scores[tabled][fold.test] = integer_scores(made, test.switches, test.codes) / made.scale
+                scores[tabled][fold.test] = made.scores(test.switches, test.codes) / made.scale
         return {
             tabled: (made, learnt(self.streams, samples.labels, scores[tabled], samples.n_types, made.scale, TICK_US))
             for tabled, made, _ in tables_of(

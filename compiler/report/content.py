@@ -8,17 +8,17 @@ from numpy.typing import NDArray
 from thenar.runtime.errors import ThenarError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.study import Study
 from ..facts import Fact
 from ..frontier.points import Frontier
 from ..hand import HandShape
+from ..model.compare import Comparison, WorstCase
+from ..model.faults import FaultCounts
 from ..movements.transitions import Transitions
 from ..placement.tree import Tree
-from ..tables.compare import Comparison, WorstCase
-from ..tables.faults import FaultCounts
 
 
 class ReportError(ThenarError, ValueError):

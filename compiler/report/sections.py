@@ -11,9 +11,9 @@ from thenar.runtime.scanning.timing import port_us, reading_of
 
 from ..evaluation.rates import RecipeWords, placement_words
 from ..facts import recognises
+from ..model.faults import FaultCounts
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
-from ..tables.faults import FaultCounts
 from ..text import NBSP, counted, microseconds, percent
 from ..trainers.base import TRAINERS
 from .content import PlainTable, ReportContent

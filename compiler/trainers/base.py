@@ -11,8 +11,8 @@ from thenar.runtime.manifest import Fitting
 from thenar.runtime.recipe import AUTO, Recipe
 
 if TYPE_CHECKING:
+    from ..model.collapse import Model
     from ..samples import Samples
-    from ..tables.collapse import Model
 
 Report = Callable[[int, int], None]
 Number = float | int | str | None

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 from .base import Report, Setting, Trainer
 
 if TYPE_CHECKING:
+    from thenar.runtime.model.tables import ScoreTables
+
     from ..samples import Samples
-    from ..tables.collapse import ScoreTables
 
 
 class Logit(Trainer):

@@ -8,8 +8,9 @@ from .logit import MEMBER as LOGIT
 from .logit import of_none
 
 if TYPE_CHECKING:
+    from thenar.runtime.model.tables import ScoreTables
+
     from ..samples import Samples
-    from ..tables.collapse import ScoreTables
 
 
 class Pairs(Trainer):

@@ -37,7 +37,7 @@ class NaiveBayes(Trainer):
             thresholds.append(steps)
             joint_rows.append(shares(bins == np.arange(len(steps) + 1)[:, None]))
         rows_of_switches = np.array(switch_rows).reshape(len(switch_rows), samples.n_classes)
-        return ScoreTables(bias, rows_of_switches, tuple(thresholds), tuple(joint_rows))
+        return ScoreTables.of(bias, rows_of_switches, tuple(thresholds), tuple(joint_rows))
 
 
 MEMBER = NaiveBayes()

@@ -9,12 +9,12 @@ import numpy as np
 from ..build import Build
 from ..calibration import Joints, Meaning
 from ..frames import PERIODS, GloveFrame, Mask, Newest, SwitchFrame
+from ..model.integers import IntegerTables
 from ..policy import Policy
 from ..preshape.selector import Preshape
 from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
 from ..scores import LiveScores
 from ..segmenting.live import LiveSegments, Segment
-from ..tables import IntegerTables
 from .decision import Decision, Ranking, SequentialTest
 from .quarantine import Quarantine
 
@@ -233,5 +233,5 @@ class MissingInputs:
 def weights(tables: IntegerTables) -> list[int]:
     """Return the weight of each switch, and of each joint after them, in steps."""
     switches: list[int] = np.abs(tables.switch_rows.astype(np.int64)).sum(axis=1).tolist()
-    terms = (tables.choices(joint)[1].sum(axis=0) for joint in range(tables.n_joints))
-    return [*switches, *(int(np.ptp(rows, axis=0).sum()) for rows in terms)]
+    added = (tables.choices(joint)[1] for joint in range(tables.n_joints))
+    return [*switches, *(int(np.ptp(rows, axis=0).sum()) for rows in added)]

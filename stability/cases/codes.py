@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from thenar.compiler.boosting.binning import midpoints
 from thenar.compiler.boosting.boost import boost
+from thenar.compiler.model.collapse import collapse
 from thenar.compiler.recordings.columns import ColumnRoles, JointColumns
 from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
 from thenar.compiler.recordings.table import read_table
-from thenar.compiler.tables.collapse import collapse
-from thenar.runtime.tables import HIGHEST_CODE
+from thenar.runtime.model.terms.base import HIGHEST_CODE
 
 from ..finding import Case, Finding, Worst
 

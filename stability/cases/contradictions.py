@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import winners
+from thenar.runtime.model.tables import winners
 
 from ..checks.class_rounds import see_round
 from ..checks.rounds import entropy_left, idle_loss, loss_rounding, moments, resting_error, rise_rounding

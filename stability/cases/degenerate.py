@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import Stumps, winners
+from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import softmax
 from thenar.compiler.evaluation.study import evaluate
 from thenar.compiler.placement.placement import place
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import Build
+from thenar.runtime.model.tables import winners
 
 from ..finding import Case, Finding, Worst
 from ..inputs.small_sets import make_set, one_hot

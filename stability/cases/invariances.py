@@ -15,14 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import TIE, Stumps
+from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import Floats
+from thenar.compiler.model.collapse import collapse
+from thenar.compiler.model.substitutes import fit_lost
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
-from thenar.compiler.tables.collapse import ScoreTables, collapse
-from thenar.compiler.tables.quantise import quantise
-from thenar.compiler.tables.standing_in import fit_lost
-from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.tables import TIE, ScoreTables
+from thenar.runtime.model.terms.base import HIGHEST_CODE
 
 from ..checks.class_rounds import ClassRound, Step, branches, class_rounds, grown, step_of
 from ..checks.rounds import counted

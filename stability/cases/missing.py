@@ -8,10 +8,11 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.compiler.tables.furthest import furthest
 from thenar.runtime.build import Build
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.proof import furthest
+from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.scores import LANE_OFFSET
-from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
 
 from ..checks.integer_sums import first_best
 from ..finding import Case, Finding, Worst

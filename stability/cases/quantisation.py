@@ -8,14 +8,20 @@ from itertools import permutations, product
 import numpy as np
 from mpmath import mpf
 
-from thenar.compiler.tables.collapse import ScoreTables
-from thenar.compiler.tables.compare import float_slack
-from thenar.compiler.tables.furthest import furthest
-from thenar.compiler.tables.quantise import balance
-from thenar.compiler.tables.worstcase import Rounding
+from thenar.compiler.model.compare import float_slack
 from thenar.runtime.errors import BuildError
+from thenar.runtime.model.integers import (
+    LIMIT,
+    MAX_CLASSES,
+    MAX_SWITCHES,
+    IntegerTables,
+    tables_from_bytes,
+    tables_to_bytes,
+)
+from thenar.runtime.model.proof import Rounding, furthest
+from thenar.runtime.model.quantise import balance
+from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.scores import LANE_OFFSET, Scorer
-from thenar.runtime.tables import LIMIT, MAX_CLASSES, MAX_SWITCHES, IntegerTables, tables_from_bytes, tables_to_bytes
 
 from ..checks.integer_sums import first_best, furthest_sums, largest, largest_sum, ties
 from ..finding import Case, Finding, Worst
@@ -83,7 +89,7 @@ def edge_tables(classes: int, sign: int, last: str) -> IntegerTables:
     towards[1] = sign
     arrays["bias"][0] = towards * (LIMIT - 1)
     arrays[last][0] += towards.astype(np.int16)
-    return IntegerTables(
+    return IntegerTables.of(
         bias=arrays["bias"][0],
         switch_rows=arrays["switch_rows"],
         thresholds=(np.array([100], np.uint16),),

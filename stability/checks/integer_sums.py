@@ -6,12 +6,9 @@ from itertools import product
 
 import numpy as np
 
-from thenar.compiler.tables.furthest import furthest
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch
-from thenar.runtime.recipe import Recipe
-from thenar.runtime.scores import LANE_OFFSET, Scorer
-from thenar.runtime.tables import (
+from thenar.runtime.model.integers import (
     LIMIT,
     MAX_CLASSES,
     MAX_JOINTS,
@@ -20,6 +17,9 @@ from thenar.runtime.tables import (
     tables_from_bytes,
     tables_to_bytes,
 )
+from thenar.runtime.model.proof import furthest
+from thenar.runtime.recipe import Recipe
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 
 from ..finding import Finding, Worst
 from ..inputs.hard_tables import every_frame, whole_numbers

@@ -2,7 +2,6 @@ import hashlib
 import json
 import subprocess
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,7 @@ from msgspec.structs import replace as replace_fields
 from thenar.cli.verify_command import print_firmware, verdict
 from thenar.compiler.artifact.verify_firmware import BundledFirmware, Difference, FirmwareVerification, TargetCheck
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
-from thenar.runtime.tables import tables_from_bytes, tables_to_bytes
+from thenar.runtime.model.integers import tables_from_bytes, tables_to_bytes
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -20,7 +19,7 @@ Thenar = Callable[..., subprocess.CompletedProcess[str]]
 def _silence_joints(folder: Path) -> None:
     tables = tables_from_bytes((folder / "tables.bin").read_bytes())
     rows = tuple(0 * rows for rows in tables.joint_rows)
-    silent = replace(tables, joint_rows=rows, joint_means=0 * tables.joint_means)
+    silent = tables.changed(joint_rows=rows, joint_means=0 * tables.joint_means)
     data = tables_to_bytes(silent)
     manifest = manifest_from_bytes((folder / "build.json").read_bytes())
     (folder / "tables.bin").write_bytes(data)

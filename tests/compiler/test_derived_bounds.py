@@ -14,12 +14,14 @@ from hypothesis import strategies as st
 
 from thenar.compiler.boosting.stumpfit import Targets, _tie_bound
 from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.model.collapse import collapse
+from thenar.compiler.model.compare import COLLAPSE_TOLERANCE, compare, float_slack
 from thenar.compiler.placement.cooccurrence import Cooccurrence
 from thenar.compiler.placement.exact import _log_sum, error_bound
 from thenar.compiler.placement.gain import NodeCounts, _score_bound
-from thenar.compiler.tables.collapse import Line, ScoreTables, collapse
-from thenar.compiler.tables.compare import COLLAPSE_TOLERANCE, compare, float_slack
-from thenar.compiler.tables.quantise import quantise, rounding_error
+from thenar.runtime.model.quantise import quantise, rounding_error
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.line import Line
 
 UNIT = 2.0**-53
 
@@ -70,7 +72,7 @@ def test_a_sum_of_logarithms_counts_two_errors_a_term_and_four(terms: dict[int, 
 def test_rounding_error_is_half_a_step_for_bias_and_inputs() -> None:
     def of(switches: int, *lines: Line) -> ScoreTables:
         no, row = np.array([], np.uint16), np.zeros((1, 2))
-        return ScoreTables(row[0], np.zeros((switches, 2)), (no,) * len(lines), (row,) * len(lines), lines)
+        return ScoreTables.of(row[0], np.zeros((switches, 2)), (no,) * len(lines), (row,) * len(lines), lines)
 
     assert [rounding_error(of(n), 9.0) for n in (0, 1, 48)] == [0.5, 1.0, 24.5]
     assert rounding_error(of(3), 9.0, 256) == 0.5 + 3 * 128
@@ -83,7 +85,7 @@ def test_rounding_error_is_half_a_step_for_bias_and_inputs() -> None:
 def test_the_float_slack_counts_a_unit_per_input_and_eight() -> None:
     rows = (np.array([[1.0, -3.0], [2.0, 0.5]]), np.array([[0.25, 0.0]]))
     none = np.array([], np.uint16)
-    tables = ScoreTables(np.array([-5.0, 4.0]), np.array([[-7.0, 6.0]]), (np.array([3], np.uint16), none), rows)
+    tables = ScoreTables.of(np.array([-5.0, 4.0]), np.array([[-7.0, 6.0]]), (np.array([3], np.uint16), none), rows)
     assert float_slack(tables, 64.0) == (3 + 2 + 8) * UNIT * (5 + 7 + 3 + 0.25) * 64
 
 

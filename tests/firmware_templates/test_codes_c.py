@@ -20,8 +20,8 @@ from thenar.runtime.code_line import FARTHEST, CodeLine, Point
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Calibration, Switch, Threshold
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.sources.rows import _Grid, steps_of
-from thenar.runtime.tables import IntegerTables
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine, count_limit
 
 SharedLibrary = Callable[..., ctypes.CDLL]
@@ -91,14 +91,14 @@ def tables_of(names: Numbered, highest: int) -> IntegerTables:
         return random.integers(-20, 21, shape).astype(np.int16)
 
     steps = np.array([7, highest], np.uint16)
-    return IntegerTables(
+    return IntegerTables.of(
         rows(k), rows(s, k), (steps,) * j, tuple(rows(3, k) for _ in range(j)), rows(s, k), rows(j, k), 100.0
     )
 
 
 def names_of(joints: Sequence[Calibration], switches: Sequence[Switch] = ()) -> Numbered:
     zeros = [np.zeros(shape, np.int16) for shape in (3, (1, 3), (1, 3), (0, 3))]
-    tables = IntegerTables(zeros[0], zeros[1], (), (), zeros[2], zeros[3], 1.0)
+    tables = IntegerTables.of(zeros[0], zeros[1], (), (), zeros[2], zeros[3], 1.0)
     return replace(numbered(tables), joints=tuple(joints), switches=tuple(switches) or (Switch(0, "s0", 0.0),))
 
 

@@ -10,8 +10,8 @@ import pytest
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.words import numbered
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.softmax import Softmax
-from thenar.runtime.tables import IntegerTables
 
 SharedLibrary = Callable[..., ctypes.CDLL]
 
@@ -20,7 +20,7 @@ SharedLibrary = Callable[..., ctypes.CDLL]
 def test_probability_and_margin_are_pythons_in_c(shared_library: SharedLibrary, scale: float) -> None:
     classes, random = 14, np.random.default_rng(5)
     rows = random.integers(-9, 10, (3, classes)).astype(np.int16)
-    tables = IntegerTables(rows[0], rows[1:], (), (), rows[1:], np.zeros((0, classes), np.int16), 1.0)
+    tables = IntegerTables.of(rows[0], rows[1:], (), (), rows[1:], np.zeros((0, classes), np.int16), 1.0)
     tables = replace(tables, scale=scale)
     library = shared_library(Library("hand", numbered(tables), Layout(tables)).files)
     hand, memory = (ctypes.c_void_p * 64)(), (ctypes.c_int16 * 512)()

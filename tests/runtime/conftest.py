@@ -15,10 +15,11 @@ from msgspec.structs import replace
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME, Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
 from thenar.runtime.manifest_file import manifest_to_bytes
+from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
+from thenar.runtime.model.terms.line import Slope
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import Count, DeviceHealth, Drift, HealthReport, JointAngles, LiveGrasp
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.tables import IntegerTables, Slope, tables_to_bytes
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
@@ -35,7 +36,7 @@ def _make_tables(
         return random.integers(-90, 91, shape).astype(np.int16)
 
     thresholds = [np.sort(random.choice(256, bins - 1, replace=False)).astype(np.uint16) for _ in range(joints)]
-    return IntegerTables(
+    return IntegerTables.of(
         bias=rows(classes),
         switch_rows=rows(switches, classes),
         thresholds=tuple(thresholds),
@@ -43,7 +44,7 @@ def _make_tables(
         switch_means=rows(switches, classes),
         joint_means=rows(joints, classes),
         scale=100.0,
-        slopes=tuple(_slope(random, joint, classes) for joint in range(min(slopes, joints))),
+        further=tuple(_slope(random, joint, classes) for joint in range(min(slopes, joints))),
     )
 
 

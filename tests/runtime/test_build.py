@@ -12,7 +12,7 @@ from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME
 from thenar.runtime.errors import BuildError, ThenarError
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.manifest_file import manifest_to_bytes
-from thenar.runtime.tables import MAX_BYTES, IntegerTables, tables_to_bytes
+from thenar.runtime.model.integers import MAX_BYTES, IntegerTables, tables_to_bytes
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
@@ -30,7 +30,7 @@ def test_a_loaded_build_scores_and_classifies_as_the_one_written(build: Build, f
 
 def test_a_tie_goes_to_the_lowest_number(describe: Describe) -> None:
     none = np.zeros((0, 4), np.int16)
-    tables = IntegerTables(np.array([1, 5, 5, 2], np.int16), none, (), (), none, none, 1.0)
+    tables = IntegerTables.of(np.array([1, 5, 5, 2], np.int16), none, (), (), none, none, 1.0)
     assert Build(describe(tables), tables).classify([], []) == "grasp 1"
 
 

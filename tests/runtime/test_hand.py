@@ -23,7 +23,7 @@ from thenar.runtime.hand import (
     moved_by,
 )
 from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 PAD = Calibration(0, "pad", "N", 0, 0.0, 1000, 10.0)
 

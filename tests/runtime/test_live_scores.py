@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule, run_state_machine_as_test
 
 from thenar.runtime.errors import FrameError
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.scores import LiveScores, Scorer
-from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 
@@ -66,7 +66,7 @@ def test_changes_at_the_edge_of_int16_do_not_spill(sign: int) -> None:
     def rows(*values: int) -> np.ndarray:
         return np.array(values, np.int16).reshape(-1, 2) * np.int16(sign)
 
-    tables = IntegerTables(rows(0, 7)[0], rows(32767, -32760), (), (), rows(-1, 1), rows(), 1.0)
+    tables = IntegerTables.of(rows(0, 7)[0], rows(32767, -32760), (), (), rows(-1, 1), rows(), 1.0)
     live, whole = LiveScores(Scorer(tables)), Scorer(tables)
     for closed, lost in [(1, 0), (0, 1), (1, 1), (0, 0), (1, 0)]:
         assert live.lanes(closed, lost) == whole.lanes_without([closed], [], [lost], [])

@@ -9,10 +9,10 @@ from msgspec.structs import replace
 from thenar.runtime.errors import BuildError, ThenarError
 from thenar.runtime.manifest import Compared, Fitting, Manifest, Recognised
 from thenar.runtime.manifest_file import MAX_BYTES, manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.published import NONE
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from thenar.runtime import Build
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]

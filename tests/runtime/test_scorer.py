@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from thenar.runtime.errors import FrameError
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.scores import LANE_OFFSET, Scorer
-from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 Drawn = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -67,7 +67,7 @@ def test_a_code_equal_to_a_threshold_goes_left_of_it(make_tables: MakeTables) ->
 def test_lanes_at_the_edge_of_int16_do_not_spill(sign: int) -> None:
     bias = np.array([32767 * sign, -32767 * sign, 0], np.int16)
     none = np.zeros((0, 3), np.int16)
-    assert Scorer(IntegerTables(bias, none, (), (), none, none, 1.0)).lanes([], []) == tuple(
+    assert Scorer(IntegerTables.of(bias, none, (), (), none, none, 1.0)).lanes([], []) == tuple(
         bias.astype(int) + LANE_OFFSET
     )
 

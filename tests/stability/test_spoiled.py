@@ -21,12 +21,13 @@ from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
 from thenar.compiler.evaluation.folds import Fold, weka_folds
 from thenar.compiler.evaluation.rates import Rate
+from thenar.compiler.model import collapse
 from thenar.compiler.placement import gain
 from thenar.compiler.placement.cooccurrence import Cooccurrence
-from thenar.compiler.tables import collapse, quantise
 from thenar.runtime.build import Build, Recognition
+from thenar.runtime.model import quantise
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.scores import Scorer
-from thenar.runtime.tables import IntegerTables
 from thenar.simulator.contact.settle import Rest, close
 from thenar.stability.cases import (
     codes,
@@ -148,12 +149,12 @@ def spoil_scoretables(patch: Patch) -> None:
 
     def lost_bits(tables: collapse.ScoreTables) -> collapse.ScoreTables:
         single = tuple(rows.astype(np.float32).astype(np.float64) for rows in balance(tables).joint_rows)
-        return replace(balance(tables), joint_rows=single)
+        return balance(tables).changed(joint_rows=single)
 
     def off(of: stumps.Stumps, n_switches: int) -> collapse.ScoreTables:
         tables = collapsed(of, n_switches)
         later = tuple(np.minimum(codes, 65533) + np.uint16(1) for codes in tables.thresholds)
-        return replace(tables, bias=tables.bias * (1 + 2.0**-40), thresholds=later)
+        return tables.changed(bias=tables.bias * (1 + 2.0**-40), thresholds=later)
 
     patch.setattr(stumps, "centred", lambda answers, shrinkage: answers * shrinkage)
     patch.setattr(scoretables, "collapse", off)
@@ -199,7 +200,7 @@ def spoil_missing(patch: Patch) -> None:
     def without_replacements(*given: Any, **named: Any) -> Any:
         small = small_build(*given, **named)
         tables = small.build.tables
-        return small._replace(build=Build(small.build.manifest, replace(tables, switch_means=0 * tables.switch_means)))
+        return small._replace(build=Build(small.build.manifest, tables.changed(switch_means=0 * tables.switch_means)))
 
     def nosy(self: Build, *frame: np.ndarray) -> Recognition:
         return replace(right(self, *frame[:2]), degraded=False)

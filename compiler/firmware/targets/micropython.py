@@ -52,9 +52,9 @@ class MicroPython(Target):
         from ..words import none_of
 
         tables, names = library.layout.tables, library.names
-        steps = [*tables.thresholds, *(each for pair in tables.pairs for each in pair.thresholds)]
+        steps = [*tables.thresholds, *(each for grid in tables.grids for each in grid.thresholds)]
         rows = [tables.bias, tables.switch_rows, tables.switch_means, tables.joint_means, *tables.joint_rows]
-        rows += [pair.rows for pair in tables.pairs]
+        rows += [grid.rows for grid in tables.grids]
         values = {
             "opening": _opening(library),
             "classes": tables.n_classes,
@@ -67,7 +67,7 @@ class MicroPython(Target):
             "steps": _coded(steps),
             "places": _lines(accumulate(map(len, steps), initial=0)),
             "slopes": _lines((s.joint, s.low, s.high, s.gain, s.zero, tuple(s.row.tolist())) for s in tables.slopes),
-            "pairs": _lines((*pair.joints, tables.n_joints + 2 * n) for n, pair in enumerate(tables.pairs)),
+            "pairs": _lines((*grid.joints, tables.n_joints + 2 * n) for n, grid in enumerate(tables.grids)),
             "powers": _lines(POWERS),
             **_sensor_values(library),
             "segments": _segment_values(library),

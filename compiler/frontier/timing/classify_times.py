@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from thenar.runtime.tables import IntegerTables, tables_to_bytes
+from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 
 from ...firmware import FirmwareError
 from ...firmware.choose import Fit, fit_for

@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.scores import Scorer
-from thenar.runtime.tables import IntegerTables
 
 from ...firmware.probes import random_frames
 
@@ -105,7 +105,7 @@ def random_tables(switches: int, joints: int, classes: int) -> IntegerTables:
     def rows(*shape: int) -> NDArray[np.int16]:
         return random.integers(-_REACH, _REACH, (*shape, classes), np.int16, endpoint=True)
 
-    return IntegerTables(
+    return IntegerTables.of(
         bias=rows(),
         switch_rows=rows(switches),
         thresholds=tuple(

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from ...boosting.boost import boost
 from ...elementary import LN_2, add_up, exp, log, softmax
+from ...model.collapse import collapse
 from ...samples import Columns, Samples
-from ...tables.collapse import collapse
 from ..exact import Floats
 from ..logistic import Logistic
 from ..ports import PortCosts

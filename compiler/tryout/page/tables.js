@@ -3,7 +3,7 @@
 
 const HEADER = 56;
 
-/** Return the score tables in the bytes of tables.bin; runtime/tables.py describes them. */
+/** Return the score tables in the bytes of tables.bin; runtime/model/integers.py describes them. */
 export function parseTables(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const format = view.getUint16(8, true);

@@ -8,8 +8,8 @@ from sklearn.base import clone
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from thenar.compiler import AdditiveLogitClassifier, GraspSet, Recipe, Samples
-from thenar.compiler.tables.collapse import ScoreTables
 from thenar.compiler.trainers.base import Training
+from thenar.runtime.model.tables import ScoreTables
 
 
 @parametrize_with_checks([AdditiveLogitClassifier(tolerance=1e-12), AdditiveLogitClassifier(linear=True)])

@@ -1,6 +1,5 @@
 """Tables of pairs of joints: scikit-learn's answer on the same design, and what joints say only together."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,8 @@ from sklearn.linear_model import LogisticRegression
 from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, fit_logit
 from thenar.compiler.additive.pairs import fit_pairs
 from thenar.compiler.boosting.boost import BoostingError
-from thenar.compiler.tables.collapse import ScoreTables
 from thenar.compiler.trainers.base import TRAINERS
+from thenar.runtime.model.tables import ScoreTables
 
 SEEDS = st.integers(0, 2**32 - 1)
 FIXED: dict[str, Any] = {"penalty": 0.5, "smoothness": 2.0, "max_bins": 6}
@@ -29,7 +28,7 @@ def grasps(seed: int, n: int = 80) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def numbers(tables: ScoreTables) -> bytes:
-    pairs = (part for pair in tables.pairs for part in (*pair.thresholds, pair.rows))
+    pairs = (part for pair in tables.grids for part in (*pair.thresholds, pair.rows))
     parts = (tables.bias, tables.switch_rows, *tables.thresholds, *tables.joint_rows, *pairs)
     return b"".join(part.tobytes() for part in parts)
 
@@ -51,7 +50,7 @@ def test_it_is_scikit_learns_answer_on_the_expanded_design(seed: int) -> None:
         count = len(edges) + 1
         parts.append(np.searchsorted(edges, column)[:, np.newaxis] == np.arange(count))
         penalties.append(BIN_SHARE * pull * np.eye(count) + FIXED["smoothness"] * steps(count))
-    for pair in tables.pairs:
+    for pair in tables.grids:
         one, other = (np.searchsorted(t, codes[:, a]) for a, t in zip(pair.joints, pair.thresholds, strict=True))
         down, across = pair.rows.shape[:2]
         parts.append((one * across + other)[:, np.newaxis] == np.arange(down * across))
@@ -73,7 +72,7 @@ def test_neither_the_order_of_rows_nor_a_constant_joint_changes_a_bit(seed: int)
     again = fit_pairs(switches[order], more[order], labels[order], 3, **FIXED)
     assert not again.joint_rows[-1].any()
     thresholds, rows = again.thresholds[:-1], again.joint_rows[:-1]
-    assert numbers(replace(again, thresholds=thresholds, joint_rows=rows)) == numbers(tables)
+    assert numbers(again.changed(thresholds=thresholds, joint_rows=rows)) == numbers(tables)
 
 
 def test_joints_that_say_something_together_are_found_and_recognised() -> None:
@@ -82,7 +81,7 @@ def test_joints_that_say_something_together_are_found_and_recognised() -> None:
     settings = {setting.name: setting.default for setting in TRAINERS["pairs"].settings}
     del settings["max_bins"]
     tables = fit_pairs(switches, codes, labels, 3, max_bins=16, **{**settings, "pairs": 1})  # type: ignore[arg-type]
-    assert [pair.joints for pair in tables.pairs] == [(1, 2)]
+    assert [pair.joints for pair in tables.grids] == [(1, 2)]
     alone = fit_logit(np.hstack([switches, codes]), labels, 3, penalty=0.5, smoothness=2.0).score_tables(2)
     rate, without = (np.mean(each.scores(*fresh[:2]).argmax(axis=1) == fresh[2]) for each in (tables, alone))
     assert rate > 0.9 > without + 0.2
@@ -92,10 +91,10 @@ def test_pairs_share_no_joint_and_need_two_bins() -> None:
     switches, codes, labels = grasps(5, 300)
     codes = np.column_stack([codes, codes[:, 1], np.zeros_like(codes[:, 0])])
     tables = fit_pairs(switches, codes, labels, 3, **FIXED, pairs=9)
-    joints = [joint for pair in tables.pairs for joint in pair.joints]
+    joints = [joint for pair in tables.grids for joint in pair.joints]
     assert len(set(joints)) == len(joints) == 4
     assert 5 not in joints
-    assert not fit_pairs(switches, codes[:, :1], labels, 3, **FIXED).pairs
+    assert not fit_pairs(switches, codes[:, :1], labels, 3, **FIXED).grids
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,4 @@
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,10 +6,11 @@ import pytest
 from thenar.compiler.artifact.ensemble import KIND, LINES, PAIRS, TABLES, ensemble_from_bytes, ensemble_to_bytes
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.recordings.arrays import pack, unpack
-from thenar.compiler.tables.collapse import Line, ScoreTables
 from thenar.drivers.errors import ThenarError
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.grid import Grid
+from thenar.runtime.model.terms.line import Line
 from thenar.runtime.sealed import seal, unseal
-from thenar.runtime.tables import Pair
 
 HEADER = b'{"n_inputs":5,"shrinkage":0.5}'
 
@@ -28,7 +28,7 @@ def _tables() -> ScoreTables:
     random = np.random.default_rng(1)
     thresholds = (np.array([3, 70, 65535], np.uint16), np.array([], np.uint16))
     rows = tuple(random.normal(size=(len(steps) + 1, 3)) for steps in thresholds)
-    return ScoreTables(random.normal(size=3), random.normal(size=(2, 3)), thresholds, rows)
+    return ScoreTables.of(random.normal(size=3), random.normal(size=(2, 3)), thresholds, rows)
 
 
 def _stumps() -> Stumps:
@@ -37,17 +37,17 @@ def _stumps() -> Stumps:
 
 
 def _few_joints(joints: int) -> ScoreTables:
-    return replace(_tables(), thresholds=_tables().thresholds[:joints], joint_rows=_tables().joint_rows[:joints])
+    return _tables().changed(thresholds=_tables().thresholds[:joints], joint_rows=_tables().joint_rows[:joints])
 
 
 def _with_lines() -> ScoreTables:
     lines = (Line(0, 3, 200, np.array([0.5, -1.0, 0.0])), Line(1, 0, 65535, np.array([1e-5, 0.0, 2.0])))
-    return replace(_tables(), lines=lines)
+    return _tables().changed(further=lines)
 
 
 def _with_pairs() -> ScoreTables:
     steps = np.array([4], np.uint16), np.array([7, 9], np.uint16)
-    return replace(_tables(), pairs=(Pair((0, 1), steps, np.random.default_rng(2).normal(size=(2, 3, 3))),))
+    return _tables().changed(further=(Grid((0, 1), steps, np.random.default_rng(2).normal(size=(2, 3, 3))),))
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,6 @@ from thenar.compiler.recordings.merging import merge
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.samples import FRAMES as SAMPLED
 from thenar.compiler.samples import Samples
-from thenar.compiler.tables.quantise import integer_scores
 from thenar.runtime.manifest import Rejection
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.rejection import refused
@@ -126,7 +125,7 @@ def test_without_rows_of_none_the_requested_share_is_refused(moved: GraspSet, tm
     assert found.held.rate >= 0.95
     assert made.manifest.classes == (*TYPES, "none")
     bits, codes = select_inputs(moved, made.manifest)
-    scores = integer_scores(build.tables, bits, codes)
+    scores = build.tables.scores(bits, codes)
     gone = refused(made.manifest.rejection, scores, bits, codes)
     assert gone[~moved.is_none].mean() <= 0.02
     assert gone[moved.is_none].mean() >= 0.5

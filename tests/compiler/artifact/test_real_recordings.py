@@ -9,14 +9,14 @@ from thenar.compiler import compile_build
 from thenar.compiler.artifact.training import samples_of
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.artifact.verify_firmware import select_inputs
-from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import weka_folds
+from thenar.compiler.model.collapse import collapse
 from thenar.compiler.recogniser import Recogniser
 from thenar.compiler.recordings.importer import import_file
-from thenar.compiler.tables.collapse import collapse, model_scores
-from thenar.compiler.tables.quantise import quantise
 from thenar.runtime import Build
 from thenar.runtime.manifest import Of
+from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Inputs, Recipe
 
 COLUMNS = Path(__file__).parents[3] / "examples" / "columns"
@@ -68,7 +68,7 @@ def test_integers_and_ensemble_differ_by_less_than_a_fifth_point(
         scores = test.switches @ integers.switch_rows.astype(int) + integers.bias
         for codes, thresholds, rows in zip(test.codes.T, integers.thresholds, integers.joint_rows, strict=True):
             scores += rows[np.searchsorted(thresholds, codes)]
-        found = winners(model_scores(made.model, test.switches, test.codes))
+        found = winners(made.model.scores(test.switches, test.codes))
         by_ensemble += int(np.count_nonzero(found == test.labels))
         by_integers += int(np.count_nonzero(scores.argmax(axis=1) == test.labels))
     assert by_ensemble > len(grasp_set) / 2

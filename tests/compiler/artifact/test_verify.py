@@ -15,17 +15,17 @@ from thenar.compiler.artifact.compile import MEMBERS
 from thenar.compiler.artifact.documents import REPORT_NAME
 from thenar.compiler.artifact.ensemble import ensemble_from_bytes
 from thenar.compiler.artifact.verify import Verification, verify
-from thenar.compiler.tables.collapse import collapse
+from thenar.compiler.model.collapse import collapse
 from thenar.compiler.trainers.base import Training
 from thenar.runtime import Build, BuildError
 from thenar.runtime.build import SCAN_NAME
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.model.integers import IntegerTables, tables_from_bytes, tables_to_bytes
 from thenar.runtime.scanning.plan import check_harness
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.scanmap import scanmap_to_bytes
-from thenar.runtime.tables import IntegerTables, tables_from_bytes, tables_to_bytes
 
 Make = Callable[..., GraspSet]
 
@@ -56,7 +56,7 @@ def _silence(folder: Path, joints: int) -> None:
     rows = tuple(rows * (number >= joints) for number, rows in enumerate(tables.joint_rows))
     slopes = tuple(slope for slope in tables.slopes if slope.joint >= joints)
     whole = tuple(row.astype(np.int16) for row in rows)
-    silent = replace(tables, joint_rows=whole, joint_means=0 * tables.joint_means, slopes=slopes)
+    silent = tables.changed(joint_rows=whole, joint_means=0 * tables.joint_means, further=slopes)
     _seal(folder, silent)
 
 
@@ -105,7 +105,7 @@ def test_a_fault_that_no_recorded_row_shows_does_not_hold(folder: Path, grasp_se
     fault = np.array([-30 - 400 * bool(tables.slopes), 0, 0, 0], np.int16)
     rows = np.vstack([tables.joint_rows[0], tables.joint_rows[0][-1:] + fault])
     thresholds = (np.append(tables.thresholds[0], np.uint16(300)), *tables.thresholds[1:])
-    _seal(folder, replace(tables, thresholds=thresholds, joint_rows=(rows, *tables.joint_rows[1:])))
+    _seal(folder, tables.changed(thresholds=thresholds, joint_rows=(rows, *tables.joint_rows[1:])))
     found = verify(folder, grasp_set)
     assert found.integer_difference <= found.integer_bound
     assert found.worst.loss > found.worst.bound

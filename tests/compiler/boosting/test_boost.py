@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.boosting.boost import LARGEST_Z_MAX, SMALLEST_SHRINKAGE, BoostingError, boost
-from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.elementary import softmax, softmax_and_loss
+from thenar.runtime.model.tables import winners
 
 
 def grasps(seed: int, n: int = 60, bits: int = 6, joints: int = 2, classes: int = 3) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.boosting.stumps import TIE, Stumps, winners
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.runtime.model.tables import TIE, winners
 
 
 def test_scores_within_a_billionth_are_a_tie_that_the_lowest_number_wins() -> None:

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from thenar.compiler import TRAINERS, GraspSet, Recipe, Samples, ScoreTables, Setting, Trainer
 from thenar.compiler.evaluation import choosing as module
 from thenar.compiler.evaluation.choosing import choose_training, inner_folds
-from thenar.compiler.tables.collapse import model_scores
 from thenar.compiler.trainers.base import Training
 from thenar.runtime.manifest import fit_name
 from thenar.runtime.recipe import changed
@@ -38,7 +37,7 @@ class Pointer(Trainer):
         rows[settings["switch"], 1] = 2 * settings["faith"]
         if settings["idle"]:
             rows[-settings["idle"] :] += 1e-9
-        return ScoreTables(np.array([settings["faith"], 0.0]), rows, (), ())
+        return ScoreTables.of(np.array([settings["faith"], 0.0]), rows, (), ())
 
 
 def _pointing(monkeypatch: pytest.MonkeyPatch, *tried: Mapping[str, float]) -> tuple[Training, ...]:
@@ -93,7 +92,7 @@ def test_every_candidate_is_scored_as_if_it_were_trained_alone(
         hits, loss = 0, 0.0
         for fold in folds:
             learning, test = samples.rows(fold.train), samples.rows(fold.test)
-            scores = model_scores(candidate.train(learning), test.switches, test.codes)
+            scores = candidate.train(learning).scores(test.switches, test.codes)
             for trial in np.unique(test.trials):
                 own = scores[test.trials == trial]
                 label = test.labels[test.trials == trial][0]

@@ -14,10 +14,10 @@ from thenar.compiler.firmware import simavr
 from thenar.compiler.firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, random_frames
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
+from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.softmax import Softmax
-from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
@@ -41,7 +41,7 @@ def _make_tables(
     def thresholds() -> np.ndarray:
         return np.sort(np.append(random.choice(highest, bins - 2, replace=False), highest)).astype(np.uint16)
 
-    return IntegerTables(
+    return IntegerTables.of(
         bias=rows(classes),
         switch_rows=rows(switches, classes),
         thresholds=tuple(thresholds() for _ in range(joints)),

@@ -7,7 +7,7 @@ from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.choose import features, fit_for, largest_classifier, smallest_fit
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 SMALL = TARGETS["avr328p"]

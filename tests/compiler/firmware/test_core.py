@@ -18,7 +18,9 @@ from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.host import MEMBER as HOST
 from thenar.compiler.firmware.tools import STRICT, call, workshop
 from thenar.compiler.firmware.words import numbered
-from thenar.runtime.tables import COARSE, IntegerTables, Pair, Slope
+from thenar.runtime.model.integers import COARSE, IntegerTables
+from thenar.runtime.model.terms.grid import Grid
+from thenar.runtime.model.terms.line import Slope
 
 MakeTables = Callable[..., IntegerTables]
 Probed = Callable[[IntegerTables, int], Probes]
@@ -70,16 +72,17 @@ def made(
         each[: 0 if joint in constant or joint >= joints - lines + 1 else None]
         for joint, each in enumerate(tables.thresholds)
     ]
-    return replace(
-        tables,
+    return tables.changed(
         bias=rows(tables.bias),
         switch_rows=rows(tables.switch_rows),
         switch_means=rows(tables.switch_means),
         joint_means=rows(tables.joint_means),
         thresholds=tuple(thresholds),
         joint_rows=tuple(rows(each[: len(t) + 1]) for each, t in zip(tables.joint_rows, thresholds, strict=True)),
-        slopes=tuple(_line(random, joint, last, top, lines) for joint in range(joints - lines, joints)),
-        pairs=tuple(_pair(random, (2 * n, 2 * n + 1), classes, top) for n in range(pairs)),
+        further=[
+            *(_line(random, joint, last, top, lines) for joint in range(joints - lines, joints)),
+            *(_pair(random, (2 * n, 2 * n + 1), classes, top) for n in range(pairs)),
+        ],
         grid=unit,
     )
 
@@ -91,12 +94,12 @@ def _line(random: np.random.Generator, joint: int, last: np.ndarray, top: int, s
     return Slope(joint, low, low + span, gain, (random.integers(-128, 128, len(last)) // share * last).astype(np.int8))
 
 
-def _pair(random: np.random.Generator, joints: tuple[int, int], classes: int, top: int) -> Pair:
+def _pair(random: np.random.Generator, joints: tuple[int, int], classes: int, top: int) -> Grid:
     one, other = (
         np.sort(random.choice(top, count, replace=False)).astype(np.uint16) for count in (7 * joints[0] % 9, 4)
     )
     rows = random.integers(-20, 21, (len(one) + 1, len(other) + 1, classes)).astype(np.int16)
-    return Pair(joints, (one, other), rows)
+    return Grid(joints, (one, other), rows)
 
 
 def with_missing(tables: IntegerTables, frames: Probes) -> tuple[Probes, Lost]:
@@ -183,7 +186,7 @@ def test_tables_at_the_16_bit_limit_borrow_and_carry_correctly(tool: Tool, same_
     row = np.array([16383, -16383, -16383, 16383, 16383], np.int16)
     rows = np.stack([row, -row, row, -row])
     zero = np.zeros((0, 5), np.int16)
-    tables = IntegerTables(np.full(5, -1, np.int16), rows, (), (), 0 * rows, zero, 1.0)
+    tables = IntegerTables.of(np.full(5, -1, np.int16), rows, (), (), 0 * rows, zero, 1.0)
     bits = np.array([[b >> i & 1 for i in range(4)] for b in range(16)], bool)
     for group in GROUPS:
         is_exact(tables, HOST, Probes(bits, np.zeros((16, 0), np.uint16)), same_as_python, group)

@@ -14,8 +14,8 @@ from thenar.compiler.firmware.sensors import sensors_of
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Threshold
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]

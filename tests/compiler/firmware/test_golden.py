@@ -19,8 +19,8 @@ from thenar.firmware_templates.rendering import file_text
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.tables import IntegerTables
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "firmware"
 WHOLE = ("host", "rows")
@@ -51,7 +51,7 @@ CASES = ("host", "avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "rv32imac",
 
 
 def small_build() -> Build:
-    tables = IntegerTables(
+    tables = IntegerTables.of(
         bias=np.array([120, -40, 7], np.int16),
         switch_rows=np.array(
             [[310, 205, -80], [-45, 260, 33], [90, -12, -7], [150, -300, 41], [400, -390, -120], [77, -8, 260]],

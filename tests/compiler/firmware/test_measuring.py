@@ -7,7 +7,7 @@ from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.measuring import Measured, measure
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 # Compilers and simulators of whole programs: minutes, together.
 pytestmark = pytest.mark.slow

@@ -13,8 +13,8 @@ from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.manifest import Manifest
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.names import fault
-from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]

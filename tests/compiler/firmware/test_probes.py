@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.firmware.probes import Probes, extreme_frames, random_frames, turns
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 ALL_OPEN, ALL_CLOSED = (False,) * 5, (True,) * 5
 
@@ -10,7 +10,7 @@ ALL_OPEN, ALL_CLOSED = (False,) * 5, (True,) * 5
 def tables(*thresholds: list[int], switches: int = 5) -> IntegerTables:
     """Return tables of zeros for two grasp types."""
     joints = tuple(np.array(each, np.uint16) for each in thresholds)
-    return IntegerTables(
+    return IntegerTables.of(
         bias=np.zeros(2, np.int16),
         switch_rows=np.zeros((switches, 2), np.int16),
         thresholds=joints,

@@ -20,7 +20,7 @@ from thenar.compiler.firmware.simavr import harness as simavr_program
 from thenar.drivers.i2c.chips import CHIPS, Device
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 Tool = Callable[[str], str]
 Named = Callable[[Sequence[str], Sequence[str], Sequence[str]], Manifest]

@@ -15,7 +15,7 @@ from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.firmware_templates.rendering import file_text
 from thenar.runtime.build import Build
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 from thenar.simulator import load_scene, simulate
 
 Compare = Callable[[Predictions, IntegerTables, Probes], None]
@@ -70,7 +70,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Build, GraspSet]
 
 def one_switch() -> IntegerTables:
     one = np.ones((1, 2), np.int16)
-    return IntegerTables(
+    return IntegerTables.of(
         bias=0 * one[0],
         switch_rows=one,
         thresholds=(),

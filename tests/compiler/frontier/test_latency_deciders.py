@@ -6,16 +6,16 @@ from hypothesis import strategies as st
 
 from thenar.compiler.frontier.latency import NOTHING, Stretches, decisions, stretches
 from thenar.runtime.live.decision import Decision, Ranking, SequentialTest
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.policy import Policy
 from thenar.runtime.scores import LANE_OFFSET
-from thenar.runtime.tables import IntegerTables
 
 CLASSES, SCALE = 3, 4.0
 
 
 def bare_tables(classes: int = CLASSES) -> IntegerTables:
     nothing = np.zeros((0, classes), np.int16)
-    return IntegerTables(np.zeros(classes, np.int16), nothing, (), (), nothing, nothing, SCALE)
+    return IntegerTables.of(np.zeros(classes, np.int16), nothing, (), (), nothing, nothing, SCALE)
 
 
 def frame_by_frame(frames: Stretches, policy: Policy) -> list[int]:

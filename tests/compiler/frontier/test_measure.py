@@ -22,7 +22,7 @@ from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
 from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, ScanTimes
 from thenar.compiler.placement.elements import Element
-from thenar.runtime.tables import tables_to_bytes
+from thenar.runtime.model.integers import tables_to_bytes
 
 PYTHON = PythonCost(5.0, 0.1, 0.5, 0.1, 0.01, 0.01, 10.0)
 

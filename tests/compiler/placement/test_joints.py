@@ -6,7 +6,6 @@ import pytest
 from thenar.compiler.evaluation.folds import trial_folds
 from thenar.compiler.placement.joints import joint_order, kept_joints
 from thenar.compiler.samples import Samples
-from thenar.compiler.tables.collapse import model_scores
 from thenar.compiler.trainers.base import Training
 
 
@@ -53,7 +52,7 @@ def test_a_few_recognise_as_well_as_all(most: int) -> None:
             joints = kept_joints(learnt, most)
             learnt, test = learnt.with_joints(joints), test.with_joints(joints)
             model = training.train(learnt)
-            hits += (model_scores(model, test.switches, test.codes).argmax(axis=1) == test.labels).tolist()
+            hits += (model.scores(test.switches, test.codes).argmax(axis=1) == test.labels).tolist()
         return float(np.mean(hits))
 
     assert rate(most) >= rate(None) - 0.01

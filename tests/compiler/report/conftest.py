@@ -13,11 +13,11 @@ from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.evaluation.study import StudyDesign, evaluate
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.hand import HandShape
+from thenar.compiler.model.compare import worst_case
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.report.content import ReportContent
-from thenar.compiler.tables.compare import worst_case
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.recipe import Recipe

@@ -36,7 +36,7 @@ class Constant(Trainer):
 
     def train(self, samples: Samples, settings: Mapping[str, Any], report: Any = None) -> ScoreTables:
         k, s, j = samples.n_classes + settings["excess"], samples.n_switches, samples.codes.shape[1]
-        return ScoreTables(np.zeros(k), np.zeros((s, k)), (np.array([], np.uint16),) * j, (np.zeros((1, k)),) * j)
+        return ScoreTables.of(np.zeros(k), np.zeros((s, k)), (np.array([], np.uint16),) * j, (np.zeros((1, k)),) * j)
 
 
 @pytest.fixture

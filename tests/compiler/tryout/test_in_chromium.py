@@ -27,7 +27,7 @@ from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.tryout import writing
 from thenar.runtime import Build
 from thenar.runtime.manifest import Calibration
-from thenar.runtime.tables import PAIRED, PLAIN, SLOPED
+from thenar.runtime.model.integers import PAIRED, PLAIN, SLOPED
 from thenar.simulator.handmaps.handmap import hand_map
 
 Make = Callable[..., GraspSet]

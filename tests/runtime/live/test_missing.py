@@ -1,12 +1,11 @@
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from thenar.runtime import Build
 from thenar.runtime.live.recogniser import Missing, MissingInputs, weights
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 MakeBuild = Callable[..., Build]
 MakeTables = Callable[..., IntegerTables]
@@ -18,7 +17,7 @@ def weighted(build: Build) -> Build:
     rows[range(4), range(4)] = [1, -2, 3, 4]
     joints = (np.array([[0, 0, 0, 0], [3, -2, 0, 0]], np.int16), np.array([[0, 1, 0, 0], [0, 6, 0, 0]], np.int16))
     steps = (np.array([9], np.uint16),) * 2
-    return Build(build.manifest, replace(build.tables, switch_rows=rows, thresholds=steps, joint_rows=joints))
+    return Build(build.manifest, build.tables.changed(switch_rows=rows, thresholds=steps, joint_rows=joints))
 
 
 def test_an_input_weighs_how_far_its_rows_lie_apart(make_build: MakeBuild) -> None:
@@ -56,6 +55,6 @@ def test_when_nothing_can_be_read_that_is_too_much_whatever_the_limit(make_build
 
 def test_inputs_that_weigh_nothing_may_all_but_vanish(make_build: MakeBuild) -> None:
     build = make_build(switches=4, joints=0)
-    idle = Build(build.manifest, replace(build.tables, switch_rows=np.zeros((4, 4), np.int16)))
+    idle = Build(build.manifest, build.tables.changed(switch_rows=np.zeros((4, 4), np.int16)))
     assert not MissingInputs(idle, 0.0).of(7, 0).too_much
     assert MissingInputs(idle, 0.0).of(15, 0).too_much

@@ -45,9 +45,9 @@ def exact(make_build: MakeBuild, shares: np.ndarray, joints: int = 0) -> Build:
     rows = np.rint(100 * np.log(shares / (1 - shares))).astype(np.int16)
     bias = np.rint(100 * np.log(1 - shares).sum(axis=0)).astype(np.int16)
     means = np.rint(rows * shares.mean(axis=1, keepdims=True)).astype(np.int16)
-    tables = replace(build.tables, bias=bias, switch_rows=rows, switch_means=means, scale=100.0)
+    tables = build.tables.changed(bias=bias, switch_rows=rows, switch_means=means, scale=100.0)
     if joints:
-        tables = replace(tables, joint_rows=tuple(np.zeros_like(row) for row in tables.joint_rows))
+        tables = tables.changed(joint_rows=tuple(np.zeros_like(row) for row in tables.joint_rows))
     counts = np.rint(255 * shares).astype(np.uint8)
     switches = tuple(
         changed(switch, closed_least=count.tobytes().hex(), closed_most=count.tobytes().hex())

@@ -16,9 +16,9 @@ from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.hand import HAND_NAME, grid_hand, hand_to_bytes
 from thenar.runtime.manifest_file import manifest_to_bytes
+from thenar.runtime.model.integers import tables_to_bytes
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.tables import tables_to_bytes
 from thenar.runtime.web.replay import ReplayPage
 
 NAMES = tuple(f"s{number}" for number in range(6))

@@ -16,7 +16,7 @@ from thenar.compiler.firmware.tools import STRICT, call, find, workshop
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]

@@ -1,7 +1,6 @@
 """The core on emulated 32-bit cores: its instructions are counted exactly, and few."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,8 @@ from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
 from thenar.compiler.firmware.words import numbered
 from thenar.firmware_templates.rendering import file_text
-from thenar.runtime.tables import IntegerTables, Slope
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.terms.line import Slope
 
 # Compilers and simulators of whole programs: minutes, together.
 pytestmark = pytest.mark.slow
@@ -31,11 +31,10 @@ def test_a_frame_takes_few_instructions(make_tables: MakeTables, cores: Any, par
     tables = make_tables(classes=14, switches=33, joints=16, reach=200)
     if lines:
         rows = np.arange(-7, 7, dtype=np.int8)
-        tables = replace(
-            tables,
+        tables = tables.changed(
             thresholds=tuple(each[:0] for each in tables.thresholds),
             joint_rows=tuple(each[:1] for each in tables.joint_rows),
-            slopes=tuple(Slope(joint, 3, 240, 0, rows) for joint in range(16)),
+            further=tuple(Slope(joint, 3, 240, 0, rows) for joint in range(16)),
         )
     layout, frames = Layout(tables), joined(extreme_frames(tables), random_frames(tables, 1000, 1))
     sent = layout.frame_bytes(frames.bits, frames.codes)

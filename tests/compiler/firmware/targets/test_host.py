@@ -10,7 +10,7 @@ from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.targets.host import MEMBER as HOST
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]

@@ -17,14 +17,15 @@ from thenar.compiler.firmware.probes import Predictions, Probes, lost_inputs
 from thenar.compiler.firmware.segments import LAG_US
 from thenar.compiler.firmware.sensors import Sensor, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.tables.quantise import integer_scores
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Rejection, Threshold
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.terms.grid import Grid
+from thenar.runtime.model.terms.line import Slope
 from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.softmax import Softmax
-from thenar.runtime.tables import IntegerTables, Pair, Slope
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
@@ -69,14 +70,14 @@ def test_every_score_is_python_s_with_inputs_missing_too(
 
 def with_slopes(tables: IntegerTables) -> IntegerTables:
     row = np.arange(-3, tables.n_classes - 3, dtype=np.int8)
-    return replace(tables, slopes=(Slope(1, 20, 220, 0, row), Slope(2, 3, 50, 2, -row), Slope(3, 9, 250, -3, row)))
+    return tables.changed(further=(Slope(1, 20, 220, 0, row), Slope(2, 3, 50, 2, -row), Slope(3, 9, 250, -3, row)))
 
 
 def with_pairs(tables: IntegerTables) -> IntegerTables:
     steps = np.array([9, 40, 254], np.uint16), np.array([77], np.uint16)
     random = np.random.default_rng(3)
     rows = [random.integers(-20, 21, (4, 2, tables.n_classes)).astype(np.int16) for _ in range(2)]
-    return replace(tables, pairs=(Pair((0, 3), steps, rows[0]), Pair((1, 2), steps, rows[1])))
+    return tables.changed(further=(Grid((0, 3), steps, rows[0]), Grid((1, 2), steps, rows[1])))
 
 
 @pytest.mark.slow
@@ -130,7 +131,7 @@ def test_margin_probability_and_refusal_are_python_s(
     bits = np.arange(tables.n_switches)[np.newaxis] % 3 == 0
     codes = 40 * np.arange(tables.n_joints, dtype=np.uint16)[np.newaxis]
     layout = Layout(tables)
-    scores = integer_scores(tables, bits, codes)[0]
+    scores = tables.scores(bits, codes)[0]
     best = int(scores.argmax())
     k, j = tables.n_classes, tables.n_joints
     least = [32767 if each == best else -32768 for each in range(k)]  # refused for its score alone

@@ -11,7 +11,7 @@ from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.tools import call
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "firmware.md"
 

@@ -17,7 +17,7 @@ from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 # Compilers and simulators of whole programs: minutes, together.
 pytestmark = pytest.mark.slow

@@ -9,7 +9,7 @@ from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 UNITS = {
     "host": "",

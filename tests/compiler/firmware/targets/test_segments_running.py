@@ -13,10 +13,10 @@ from thenar.compiler.firmware.probes import STREAM_TICKS, Lost, Predictions, Pro
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest, Rejection
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.published import NONE
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]

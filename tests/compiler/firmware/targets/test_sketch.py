@@ -22,7 +22,7 @@ from thenar.compiler.firmware.words import numbered
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 VARIANTS = Path("/usr/share/arduino/hardware/arduino/avr/variants")
 

@@ -8,7 +8,7 @@ from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS, Target, kinds, timed
 from thenar.drivers.members import MemberError
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 
 @pytest.mark.parametrize("name", TARGETS)

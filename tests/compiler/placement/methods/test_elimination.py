@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.boosting.boost import boost
+from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.methods import elimination
 from thenar.compiler.placement.methods.elimination import (
     BINS,
@@ -18,7 +19,6 @@ from thenar.compiler.placement.methods.elimination import (
 )
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.samples import Columns, Samples
-from thenar.compiler.tables.collapse import collapse
 
 Bits = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float64]

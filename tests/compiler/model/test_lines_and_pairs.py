@@ -9,14 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.tables.collapse import Line, ScoreTables
-from thenar.compiler.tables.compare import compare, worst_case
-from thenar.compiler.tables.furthest import furthest
-from thenar.compiler.tables.quantise import as_deployed, balance, integer_scores, quantise
-from thenar.compiler.tables.worstcase import Rounding
+from thenar.compiler.model.compare import compare, worst_case
 from thenar.runtime.errors import BuildError
+from thenar.runtime.model.integers import LIMIT, IntegerTables, tables_from_bytes, tables_to_bytes
+from thenar.runtime.model.proof import Rounding, furthest
+from thenar.runtime.model.quantise import as_deployed, balance, quantise
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.grid import Grid
+from thenar.runtime.model.terms.line import Line
 from thenar.runtime.scores import LANE_OFFSET, LiveScores, Scorer
-from thenar.runtime.tables import LIMIT, IntegerTables, Pair, tables_from_bytes, tables_to_bytes
 
 Drawn = tuple[ScoreTables, np.ndarray, np.ndarray]
 Make = Callable[[int], Drawn]
@@ -36,13 +37,8 @@ def with_lines(seed: int, joints: int = 3, switches: int = 4, classes: int = 4, 
             low, span = int(random.integers(0, 300)), int(np.exp(random.uniform(0, np.log(widest))))
             row = size * random.normal(size=classes) * 10 ** random.uniform(-1, 1) / max(span, 1)
             lines.append(Line(joint, low, low + max(span, 1), row))
-    tables = ScoreTables(
-        size * random.normal(size=classes),
-        size * random.normal(size=(switches, classes)),
-        tuple(thresholds),
-        tuple(rows),
-        tuple(lines),
-    )
+    bias, of_switches = size * random.normal(size=classes), size * random.normal(size=(switches, classes))
+    tables = ScoreTables.of(bias, of_switches, thresholds, rows, lines)
     codes = random.integers(0, 700, (40, joints)).astype(np.uint16)
     codes[random.random(codes.shape) < 0.1] = 65535
     return tables, random.random((40, switches)) < 0.5, codes
@@ -60,12 +56,12 @@ def with_pairs(seed: int, joints: int = 5, switches: int = 3) -> Drawn:
     for a, b in sorted(sorted(order[at : at + 2]) for at in range(0, joints - joints % 2, 2)):
         one, other = _steps(random, 4), _steps(random, 4)
         rows = size * random.normal(size=(len(one) + 1, len(other) + 1, 4))
-        pairs.append(Pair((a, b), (one, other), rows))
+        pairs.append(Grid((a, b), (one, other), rows))
     thresholds = tuple(_steps(random, 4) for _ in range(joints))
     own = tuple(size * random.normal(size=(len(steps) + 1, 4)) for steps in thresholds)
     bias, rows = size * random.normal(size=4), size * random.normal(size=(switches, 4))
     codes = random.integers(0, 45, (40, joints)).astype(np.uint16)
-    return ScoreTables(bias, rows, thresholds, own, (), tuple(pairs)), random.random((40, switches)) < 0.5, codes
+    return ScoreTables.of(bias, rows, thresholds, own, pairs), random.random((40, switches)) < 0.5, codes
 
 
 def exact_scores(tables: ScoreTables, bits: np.ndarray, codes: np.ndarray) -> list[Fraction]:
@@ -73,7 +69,7 @@ def exact_scores(tables: ScoreTables, bits: np.ndarray, codes: np.ndarray) -> li
     added = [tables.bias, *(row for row, closed in zip(tables.switch_rows, bits, strict=True) if closed)]
     for steps, rows, code in zip(tables.thresholds, tables.joint_rows, codes.tolist(), strict=True):
         added.append(rows[int((steps < code).sum())])
-    for pair in tables.pairs:
+    for pair in tables.grids:
         a, b = (int((steps < codes[joint]).sum()) for joint, steps in zip(pair.joints, pair.thresholds, strict=True))
         added.append(pair.rows[a, b])
     sums = [sum(map(Fraction, column), Fraction(0)) for column in zip(*(row.tolist() for row in added), strict=True)]
@@ -97,7 +93,7 @@ def test_integers_keep_their_bounds_on_every_row_and_are_read_again(make: Make, 
     comparison = compare(tables, integers, bits, codes)
     assert comparison.holds
     assert integers.bound <= LIMIT
-    scores = integer_scores(integers, bits, codes)
+    scores = integers.scores(bits, codes)
     for row in range(5):
         exact = exact_scores(tables, bits[row], codes[row])
         exact = [x - exact[-1] for x in exact] if integers.grid > 1 else exact
@@ -109,7 +105,7 @@ def test_integers_keep_their_bounds_on_every_row_and_are_read_again(make: Make, 
     data = tables_to_bytes(integers)
     again = tables_from_bytes(data)
     assert tables_to_bytes(again) == data
-    assert (integer_scores(again, bits, codes) == scores).all()
+    assert (again.scores(bits, codes) == scores).all()
 
 
 SMALL = {
@@ -128,10 +124,10 @@ def test_of_all_codes_none_loses_more_and_the_witness_as_much(kind: str, seed: i
     rounding, scale = Rounding(tables, integers), Fraction(integers.scale)
 
     def errors(frame: np.ndarray, at: np.ndarray) -> list[Fraction]:
-        steps = integer_scores(integers, frame[np.newaxis], at[np.newaxis])[0].tolist()
+        steps = integers.scores(frame[np.newaxis], at[np.newaxis])[0].tolist()
         return [scale * x - n for x, n in zip(exact_scores(tables, frame, at), steps, strict=True)]
 
-    of_a_joint = range(43) if tables.pairs else range(1100)
+    of_a_joint = range(43) if tables.grids else range(1100)
     every = [
         errors(np.array(frame, bool), np.array(at, np.uint16))
         for frame in product((False, True), repeat=bits.shape[1])
@@ -149,7 +145,7 @@ def test_of_all_codes_none_loses_more_and_the_witness_as_much(kind: str, seed: i
 def test_the_runtime_sums_as_arrays_do_without_lost_inputs(seed: int) -> None:
     tables, bits, codes = with_lines(seed)
     integers = quantise(tables, bits, codes)
-    scorer, scores = Scorer(integers), integer_scores(integers, bits, codes)
+    scorer, scores = Scorer(integers), integers.scores(bits, codes)
     lost = np.arange(integers.n_joints) % 2 == seed % 2
     for row in range(len(bits)):
         assert (np.array(scorer.lanes(bits[row], codes[row])) - LANE_OFFSET == scores[row]).all()
@@ -158,8 +154,8 @@ def test_the_runtime_sums_as_arrays_do_without_lost_inputs(seed: int) -> None:
             mine = integers.joint_rows[joint][np.searchsorted(integers.thresholds[joint], codes[row, joint])].astype(
                 int
             )
-            slope = integers.slope_of(joint)
-            mine = mine + (0 if slope is None else slope.of(codes[row : row + 1, joint])[0])
+            slopes = (slope for slope in integers.slopes if slope.joint == joint)
+            mine = mine + sum(slope.of(codes[row : row + 1, joint])[0] for slope in slopes)
             left += mine - integers.joint_means[joint]
         assert (left == scores[row]).all()
 
@@ -178,8 +174,8 @@ def test_no_partial_sum_of_any_code_leaves_the_bound(seed: int, entry_bits: int)
         for joint, mean in enumerate(integers.joint_means.astype(int)):
             each = np.maximum(sign * integers.joint_rows[joint].astype(int), 0)
             each = each[np.searchsorted(integers.thresholds[joint], codes)]
-            if slope := integers.slope_of(joint):
-                each = each + np.maximum(sign * slope.of(codes), 0)
+            for slope in integers.slopes:
+                each = each + np.maximum(sign * slope.of(codes), 0) * (slope.joint == joint)
             reached += np.maximum(each.max(axis=0), sign * mean)
         assert reached.max() <= integers.bound
 
@@ -212,12 +208,12 @@ def test_the_bias_compensates_the_mean_rounding_of_upper_halves(seed: int) -> No
 def test_a_line_of_few_codes_and_much_weight_takes_a_gain() -> None:
     row = np.array([1.0, -1.0])
     no = np.array([], np.uint16)
-    tables = ScoreTables(np.zeros(2), np.zeros((0, 2)), (no,), (np.zeros((1, 2)),), (Line(0, 10, 14, row),))
+    tables = ScoreTables.of(np.zeros(2), np.zeros((0, 2)), (no,), (np.zeros((1, 2)),), (Line(0, 10, 14, row),))
     bits, codes = np.zeros((5, 0), bool), np.arange(10, 15, dtype=np.uint16)[:, np.newaxis]
     integers = quantise(tables, bits, codes)
     (slope,) = integers.slopes
     assert slope.most == 4 << slope.gain > 127
-    scores = integer_scores(integers, bits, codes)
+    scores = integers.scores(bits, codes)
     assert (np.diff(scores, axis=0) == np.diff(scores, axis=0)[0]).all()
     assert scores[:, 0].tolist() == (-scores[:, 1]).tolist()
 
@@ -230,12 +226,12 @@ JOINTS = 5
 def test_a_missing_joint_adds_its_mean_and_gives_pairs_code_0(seed: int) -> None:
     tables, bits, codes = with_pairs(seed)
     integers = quantise(tables, bits, codes)
-    scorer, scores = Scorer(integers), integer_scores(integers, bits, codes)
+    scorer, scores = Scorer(integers), integers.scores(bits, codes)
     lost = np.random.default_rng(seed).random(JOINTS) < 0.5
     for row in range(len(bits)):
         assert (np.array(scorer.lanes(bits[row], codes[row])) - LANE_OFFSET == scores[row]).all()
         asked = np.where(lost, 0, codes[row]).astype(np.uint16)[np.newaxis]
-        meant = integer_scores(integers, bits[row : row + 1], asked)[0]
+        meant = integers.scores(bits[row : row + 1], asked)[0]
         for joint in np.flatnonzero(lost).tolist():
             meant = meant + integers.joint_means[joint] - integers.joint_rows[joint][0]
         left = np.array(scorer.lanes_without(bits[row], codes[row], np.zeros(3, bool), lost)) - LANE_OFFSET
@@ -262,47 +258,46 @@ def test_the_bound_is_what_the_worst_of_all_frames_reaches(seed: int, entry_bits
             else integers.joint_rows[a][np.searchsorted(integers.thresholds[a], code)]
             for a, code in enumerate(frame)
         ]
-        asked = np.array([[code or 0 for code in frame]])
-        own += [pair.of(asked)[0] for pair in integers.pairs]
+        own += [pair.of(*(np.array([frame[joint] or 0]) for joint in pair.joints))[0] for pair in integers.grids]
         for switch in (0 * integers.bias, integers.switch_rows[0], integers.switch_means[0]):
             terms = np.stack([integers.bias, switch, *own]).astype(int)
             reached = max(reached, int(np.maximum(terms, 0).sum(0).max()), int(np.maximum(-terms, 0).sum(0).max()))
     assert integers.bound == reached
     found = furthest(integers, missing=False)
     whole = found.terms.astype(int).sum(axis=0)
-    assert (whole == integer_scores(integers, found.bits[np.newaxis], found.codes[np.newaxis])[0]).all()
+    assert (whole == integers.scores(found.bits[np.newaxis], found.codes[np.newaxis])[0]).all()
     assert found.terms[found.order][: found.n_terms].astype(int).sum(axis=0)[found.grasp] == found.total
 
 
-def _whole(*pairs: Pair) -> IntegerTables:
+def _whole(*pairs: Grid) -> IntegerTables:
     none, no = np.zeros((0, 2), np.int16), np.zeros(0, np.uint16)
     rows = (np.zeros((1, 2), np.int16),) * 4
-    return IntegerTables(np.zeros(2, np.int16), none, (no,) * 4, rows, none, np.zeros((4, 2), np.int16), 1.0, (), pairs)
+    return IntegerTables.of(np.zeros(2, np.int16), none, (no,) * 4, rows, none, np.zeros((4, 2), np.int16), 1.0, pairs)
 
 
-def _pair(a: int, b: int, steps: tuple[int, ...] = (3,), rows: int = 2) -> Pair:
-    return Pair((a, b), (np.array(steps, np.uint16), np.array([5], np.uint16)), np.zeros((rows, 2, 2), np.int16))
+def _pair(a: int, b: int, steps: tuple[int, ...] = (3,), rows: int = 2) -> Grid:
+    return Grid((a, b), (np.array(steps, np.uint16), np.array([5], np.uint16)), np.zeros((rows, 2, 2), np.int16))
 
 
 @pytest.mark.parametrize(
     ("pairs", "because"),
     [
-        ([_pair(0, 1), _pair(1, 2)], "in one pair at most"),
-        ([_pair(1, 0)], "in one pair at most"),
+        ([_pair(0, 1), _pair(1, 2)], "in one grid at most"),
+        ([_pair(1, 0)], "in one grid at most"),
         ([_pair(0, 4)], "below 4"),
         ([_pair(2, 3), _pair(0, 1)], "must rise"),
         ([_pair(0, 1, (3, 3), 3)], "strictly increasing"),
         ([_pair(0, 1, (3, 4))], "it must be int16"),
     ],
 )
-def test_pairs_that_make_no_sense_are_refused(pairs: list[Pair], because: str) -> None:
+def test_pairs_that_make_no_sense_are_refused(pairs: list[Grid], because: str) -> None:
     with pytest.raises(BuildError, match=because):
         _whole(*pairs)
 
 
 def test_the_bytes_of_a_pair_are_as_documented() -> None:
     rows = np.arange(4, dtype=np.int16).reshape(2, 1, 2)
-    pair = Pair((1, 3), (np.array([258], np.uint16), np.zeros(0, np.uint16)), rows)
+    pair = Grid((1, 3), (np.array([258], np.uint16), np.zeros(0, np.uint16)), rows)
     data, without = (tables_to_bytes(_whole(*pairs))[56:] for pairs in ([pair], []))
     assert data[6] == 1
     assert data[8 : len(without)] == without[8:]

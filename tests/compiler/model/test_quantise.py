@@ -7,10 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.boosting.stumps import Stumps, winners
-from thenar.compiler.tables.collapse import ScoreTables, collapse
-from thenar.compiler.tables.compare import compare
-from thenar.compiler.tables.quantise import (
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.model.collapse import collapse
+from thenar.compiler.model.compare import compare
+from thenar.runtime.model.integers import FINEST_SCALE, IntegerTables, tables_to_bytes
+from thenar.runtime.model.proof import Rounding
+from thenar.runtime.model.quantise import (
     GROUP_SIZE,
     TRIED,
     balance,
@@ -20,8 +22,7 @@ from thenar.compiler.tables.quantise import (
     reach,
     span,
 )
-from thenar.compiler.tables.worstcase import Rounding
-from thenar.runtime.tables import FINEST_SCALE, IntegerTables, tables_to_bytes
+from thenar.runtime.model.tables import ScoreTables, winners
 
 MakeStumps = Callable[..., Stumps]
 MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
@@ -35,12 +36,12 @@ def test_balancing_changes_no_score_and_never_coarsens(
     balanced = balance(tables)
     bits, codes = make_rows(seed, joints=joints)
     assert np.allclose(balanced.scores(bits, codes), tables.scores(bits, codes), rtol=0, atol=1e-11)
-    assert reach(balanced, 1.0, rounded=False) <= reach(tables, 1.0, rounded=False) * (1 + 1e-12)
+    assert reach(balanced, 1.0, whole=False) <= reach(tables, 1.0, whole=False) * (1 + 1e-12)
 
 
 def test_a_bias_that_the_joints_have_room_for_is_gone() -> None:
     rows = np.array([[-4.0, 1.0], [6.0, 5.0]])
-    tables = ScoreTables(np.array([3.0, -2.0]), np.zeros((0, 2)), (np.array([9], np.uint16),), (rows,))
+    tables = ScoreTables.of(np.array([3.0, -2.0]), np.zeros((0, 2)), (np.array([9], np.uint16),), (rows,))
     balanced = balance(tables)
     assert balanced.bias.tolist() == [0.0, 0.0]
     assert balanced.joint_rows[0].tolist() == [[-1.0, -1.0], [9.0, 3.0]]
@@ -125,12 +126,12 @@ def test_the_guarantee_is_the_same_in_coarser_steps(make_stumps: MakeStumps, mak
 def test_switches_count_together_only_within_five(apart: int, together: int) -> None:
     rows = np.zeros((60, 2))
     rows[[5, 5 + apart]] = [5.0, -5.0]
-    assert span(ScoreTables(np.zeros(2), rows, (), ()), 3.0) == 15 * together
+    assert span(ScoreTables.of(np.zeros(2), rows, (), ()), 3.0) == 15 * together
 
 
 def test_a_joint_spans_from_its_least_row_to_its_greatest_and_zero() -> None:
     rows = np.array([[-2.0, 1.0], [1.0, 2.0], [0.0, 6.5]])
-    tables = ScoreTables(np.array([9.0, -9.0]), np.zeros((0, 2)), (np.array([3, 9], np.uint16),), (rows,))
+    tables = ScoreTables.of(np.array([9.0, -9.0]), np.zeros((0, 2)), (np.array([3, 9], np.uint16),), (rows,))
     assert span(tables, 1.0) == 6
     assert span(tables, 2.0) == 13
 
@@ -138,9 +139,9 @@ def test_a_joint_spans_from_its_least_row_to_its_greatest_and_zero() -> None:
 def test_tables_of_zeros_and_of_no_joint_stay_so(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
     integers = quantise(collapse(make_stumps(rounds=0), 6), *make_rows(), entry_bits=8)
     assert (integers.scale, integers.bound) == (1.0, 0)
-    bias_alone = ScoreTables(np.array([3.0, -3.0]), np.zeros((6, 2)), (), ())
+    bias_alone = ScoreTables.of(np.array([3.0, -3.0]), np.zeros((6, 2)), (), ())
     assert quantise(bias_alone, *make_rows(joints=0), entry_bits=8).bias.tolist() == [32767, -32767]
-    assert span(ScoreTables(np.ones(2), np.zeros((0, 2)), (), ()), 1.0) == 0
+    assert span(ScoreTables.of(np.ones(2), np.zeros((0, 2)), (), ()), 1.0) == 0
 
 
 widths = st.sampled_from([4, 8, 12, 16])
@@ -167,7 +168,7 @@ def test_a_broken_table_does_not_hold(make_stumps: MakeStumps, make_rows: MakeRo
 
 
 def test_a_nearly_empty_ensemble_has_a_finite_scale(make_rows: MakeRows) -> None:
-    tables = ScoreTables(np.array([1e-300, -1e-300]), np.zeros((6, 2)), (), ())
+    tables = ScoreTables.of(np.array([1e-300, -1e-300]), np.zeros((6, 2)), (), ())
     assert quantise(tables, *make_rows(joints=0)).scale <= FINEST_SCALE
 
 
@@ -215,7 +216,7 @@ def test_scores_next_to_the_ensembles_ties_do_not_break_the_guarantee(
 def test_a_threshold_is_dropped_only_between_equal_rows(make_rows: MakeRows, rows: str, kept: list[int]) -> None:
     values = {"a": [-1.0, 1.0], "b": [1.0, -1.0], "c": [0.5, 0.25]}
     joint = np.array([values[row] for row in rows])
-    tables = ScoreTables(np.zeros(2), np.zeros((6, 2)), (np.array([3, 9], np.uint16),), (joint,))
+    tables = ScoreTables.of(np.zeros(2), np.zeros((6, 2)), (np.array([3, 9], np.uint16),), (joint,))
     assert quantise(tables, *make_rows(joints=1)).thresholds[0].tolist() == kept
 
 
@@ -227,7 +228,7 @@ def test_the_mean_of_equal_rows_is_exactly_that_row(sign: int) -> None:
         if math.fsum([row] * n) / n <= row:
             continue
         joint = np.array([[0.0, 0.0], [sign * row, -sign * row]])
-        tables = ScoreTables(np.zeros(2), np.zeros((0, 2)), (np.array([5], np.uint16),), (joint,))
+        tables = ScoreTables.of(np.zeros(2), np.zeros((0, 2)), (np.array([5], np.uint16),), (joint,))
         integers = quantise(tables, np.zeros((n, 0), bool), np.full((n, 1), 9, np.uint16))
         assert integers.joint_rows[0].tolist() == [[0, 0], [sign * 32767, -sign * 32767]]
         assert integers.joint_means.tolist() == integers.joint_rows[0][1:].tolist()

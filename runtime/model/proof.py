@@ -1,24 +1,24 @@
-"""The worst case of rounding to integers, over all possible frames rather than a sample of them.
+"""What integers can do at worst, over all possible frames rather than a sample of them: their rounding, their sums.
 
 Rounding takes from the lead of class k over class l a sum over bias and inputs,
 
     scale * (F_k - F_l) - (I_k - I_l) = sum over inputs a of (e_a[k] - e_a[l])    with e_a = scale * row_a - steps_a,
 
-and inputs are independent, except for the joints of a pair, which count as one input here. So the maximum is the sum of
+and inputs are independent, except for the joints of a grid, which count as one input here. So the maximum is the sum of
 the maxima of all inputs, and the bits and codes that reach them form the worst frame. All arithmetic is in integers:
 nothing is rounded here.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import HIGHEST_CODE, IntegerTables, Slope
-
-from .collapse import Floats, ScoreTables, first_codes
+from .integers import LOST, IntegerTables
+from .tables import ScoreTables
+from .terms.base import HIGHEST_CODE, CoreTerm, Floats
 
 Exact = NDArray[np.object_]  # of Python integers
 
@@ -48,7 +48,7 @@ class Rounding:
     def __init__(self, tables: ScoreTables, integers: IntegerTables) -> None:
         """Compare the two, bin by bin of both. They must have the same classes and inputs."""
         self._n_switches, self._units = integers.n_switches, integers.units
-        if (len(tables.switch_rows), len(tables.joint_rows)) != (integers.n_switches, integers.n_joints):
+        if (tables.n_switches, tables.n_joints) != (integers.n_switches, integers.n_joints):
             raise ValueError("the tables and the integers are of other inputs")
         choices = list(_choices(tables, integers))
         self._values = [choice.values for choice in choices[1:]]
@@ -61,9 +61,10 @@ class Rounding:
         # Ties go to the first: an open switch, the lowest code.
         picked = [choice.index(max(choice)) for choice in taken]
         values = [values[pick] for values, pick in zip(self._values, picked[1:], strict=True)]
-        bits, codes = values[: self._n_switches], np.zeros(sum(map(len, self._units)), np.uint16)
-        for unit, own in zip(self._units, values[self._n_switches :], strict=True):
-            codes[list(unit)] = own
+        bits = [state for (state,) in values[: self._n_switches]]
+        codes = np.zeros(sum(map(len, self._units)), np.uint16)
+        for unit, of_unit in zip(self._units, values[self._n_switches :], strict=True):
+            codes[list(unit)] = of_unit
         loss = Fraction(sum(map(max, taken)), self._step)
         return WorstFrame(leader, competitor, loss, np.array(bits, bool), codes)
 
@@ -164,92 +165,136 @@ class _Pairs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Choice:
-    """What an input can say: values (c,), of the joints of a pair (c, 2), its rows in units of score, which are added
-    up, (t, c, K), and in steps (c, K); and the row (K,) of its line, which is added `times` (c,).
+    """What a unit can say: values (c, inputs), the parts of its rows in units of score (`Term.parts`), which are added
+    up, and its rows in steps (c, K).
     """
 
     values: NDArray[np.int64]
-    rows: Floats
+    parts: tuple[tuple[Floats, NDArray[np.int64]], ...]
     steps: NDArray[np.integer]
-    line: Floats
-    times: NDArray[np.int64]
 
 
 def _choices(tables: ScoreTables, integers: IntegerTables) -> Iterator[_Choice]:
-    """Yield bias, switches and joints, those of a pair together."""
-    none, never = 0 * tables.bias, np.zeros(1, np.int64)
-    yield _Choice(np.zeros(1, np.int64), tables.bias[np.newaxis, np.newaxis], integers.bias[np.newaxis], none, never)
-    for row, steps in zip(tables.switch_rows, integers.switch_rows, strict=True):
-        rows = np.stack([0 * row, row])[np.newaxis]
-        yield _Choice(np.arange(2), rows, np.stack([0 * steps, steps]), none, never)
-    lines = {line.joint: line for line in tables.lines}
+    """Yield bias, switches and joints, those of a grid together."""
+    once = np.ones((1, 1), np.int64)
+    yield _Choice(np.zeros((1, 0), np.int64), ((tables.bias[np.newaxis], once),), integers.bias[np.newaxis])
+    for bit, whole in zip(tables.bits, integers.bits, strict=True):
+        states = np.arange(2)
+        yield _Choice(states[:, np.newaxis], (bit.parts(states),), whole.of(states))
     for unit in integers.units:
-        if len(unit) == 2:
-            yield _of_pair(tables, integers, unit)
-            continue
-        joint = unit[0]
-        one, other = tables.thresholds[joint], integers.thresholds[joint]
-        slope, line = integers.slope_of(joint), lines.get(joint)
-        codes = first_codes(one, other) if slope is None else _turning_codes(slope, one, other)
-        rows, steps = _own(tables, integers, joint, codes)
-        if slope is None or line is None:
-            yield _Choice(codes, rows[np.newaxis], steps, none, never)
-        else:
-            above = np.clip(codes, line.low, line.high) - line.low
-            yield _Choice(codes, rows[np.newaxis], steps + slope.of(codes), line.row, above)
+        ours, theirs = (
+            [term for term in (*of.bins, *of.further) if isinstance(term, CoreTerm) and set(term.inputs) <= set(unit)]
+            for of in (tables, integers)
+        )
+        codes = np.meshgrid(*(_turning_codes(joint, [*ours, *theirs]) for joint in unit), indexing="ij")
+        of_joint = dict(zip(unit, (each.ravel() for each in codes), strict=True))
+        parts = tuple(term.parts(*(of_joint[joint] for joint in term.inputs)) for term in ours)
+        steps = [term.of(*(of_joint[joint] for joint in term.inputs)) for term in theirs]
+        yield _Choice(np.stack([*of_joint.values()], axis=1), parts, np.sum(steps, axis=0, dtype=np.int64))
 
 
-def _own(
-    tables: ScoreTables, integers: IntegerTables, joint: int, codes: NDArray[np.int64]
-) -> tuple[Floats, NDArray[np.int64]]:
-    """Return the rows (c, K) of codes (c,) of a joint, in units of score and in steps."""
-    rows = tables.joint_rows[joint][np.searchsorted(tables.thresholds[joint], codes)]
-    return rows, integers.joint_rows[joint][np.searchsorted(integers.thresholds[joint], codes)].astype(np.int64)
-
-
-def _of_pair(tables: ScoreTables, integers: IntegerTables, unit: tuple[int, ...]) -> _Choice:
-    """Return the choices of a pair of joints: every bin of one combined with every bin of the other."""
-    pair, whole = (next(pair for pair in each.pairs if pair.joints == unit) for each in (tables, integers))
-    each = [
-        first_codes(tables.thresholds[joint], integers.thresholds[joint], steps)
-        for joint, steps in zip(unit, pair.thresholds, strict=True)
+def _turning_codes(joint: int, terms: Sequence[CoreTerm]) -> NDArray[np.int64]:
+    """Return codes of a joint among which, in every bin of `terms`, are those of the largest and of the least error."""
+    last = [
+        steps.astype(np.int64)
+        for term in terms
+        for number, steps in zip(term.inputs, term.steps, strict=True)
+        if number == joint and term.stepped
     ]
-    codes = np.stack(np.meshgrid(*each, indexing="ij"), axis=-1).reshape(-1, 2)
-    all_codes = np.zeros((len(codes), integers.n_joints), np.int64)
-    all_codes[:, list(unit)] = codes
-    (one, steps), (other, more) = (_own(tables, integers, joint, all_codes[:, joint]) for joint in unit)
-    rows = np.stack([one, other, pair.of(all_codes)])
-    return _Choice(codes, rows, steps + more + whole.of(all_codes), 0 * tables.bias, np.zeros(1, np.int64))
+    codes = np.concatenate([[0], *(steps + 1 for steps in last)])
+    ends = np.concatenate([[0, HIGHEST_CODE], *last, codes])
+    turning = [term.turning(ends) for term in terms if not term.stepped and term.inputs == (joint,)]
+    if turning:
+        return np.unique(np.clip(np.concatenate([ends, *turning]), 0, HIGHEST_CODE))
+    return np.unique(codes[codes <= HIGHEST_CODE])
 
 
-def _turning_codes(slope: Slope, *thresholds: NDArray[np.uint16]) -> NDArray[np.int64]:
-    """Return codes among which, in every bin, are those of the largest and of the least error.
-
-    Within a bin, errors at the first of the codes that become one distance lie on a straight line, and so do those at
-    the last ones: the ends of both lines are among the codes about each end of the bin.
-    """
-    cell = 1 << max(-slope.gain, 0)
-    last = np.concatenate([each.astype(np.int64) for each in thresholds])
-    ends = np.concatenate([[0, HIGHEST_CODE], last, last + 1])
-    firsts = slope.low + (np.clip(ends, slope.low, slope.high) - slope.low) // cell * cell
-    about = (firsts + near for near in (-1, 0, cell - 1, cell))
-    return np.unique(np.clip(np.concatenate([ends, [slope.low, slope.high], *about]), 0, HIGHEST_CODE))
-
-
-def _errors(choices: list[_Choice], scale: float) -> tuple[list[Exact], int]:
+def _errors(choices: Sequence[_Choice], scale: float) -> tuple[list[Exact], int]:
     """Return scale * rows - steps of every choice, (c, K), as whole numbers; and how many of them make a step."""
-    cut = [(np.frexp(choice.rows), np.frexp(choice.line)) for choice in choices]
+    cut = [[(np.frexp(rows), times) for rows, times in choice.parts] for choice in choices]
     # Doubles are whole numbers below 2^53 times a power of two: the least power is a grid for all.
-    lowest = min(0, *(int(powers.min()) - 53 for both in cut for _, powers in both))
+    lowest = min(0, *(int(powers.min()) - 53 for parts in cut for (_, powers), _ in parts))
     above, below = scale.as_integer_ratio()
     step = below << -lowest
     errors = []
-    for choice, (rows, line) in zip(choices, cut, strict=True):
-        whole = _whole(*rows, lowest).sum(axis=0) + choice.times.astype(object)[:, np.newaxis] * _whole(*line, lowest)
-        errors.append(whole * above - choice.steps.astype(object) * step)
+    for choice, parts in zip(choices, cut, strict=True):
+        exact = sum(_whole(*rows, lowest) * times.astype(object) for rows, times in parts)
+        errors.append(exact * above - choice.steps.astype(object) * step)
     return errors, step
 
 
 def _whole(mantissas: Floats, powers: NDArray[np.int32], lowest: int) -> Exact:
     whole: Exact = np.ldexp(mantissas, 53).astype(np.int64).astype(object) << (powers - 53 - lowest).astype(object)
     return whole
+
+
+OPEN, CLOSED = 0, 1
+_SIGNS = 1, -1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Furthest:
+    """A frame, perhaps with inputs missing, whose rows reach the largest partial sum when added in this `order`.
+
+    The first `n_terms` rows bring class `grasp` to the partial sum `total`; the others lead back. order (n,) numbers
+    the terms: 0 the bias, then switches, then joints, then slopes or grids, n in all. bits (s,) and codes (j,) come
+    with the masks of missing inputs that the runtime takes; `terms` (n, K) are the rows themselves, by number.
+    """
+
+    grasp: int
+    total: int
+    n_terms: int
+    order: NDArray[np.intp]
+    terms: NDArray[np.int16]
+    bits: NDArray[np.bool_]
+    codes: NDArray[np.uint16]
+    lost_switches: NDArray[np.bool_]
+    lost_joints: NDArray[np.bool_]
+
+
+def furthest(tables: IntegerTables, *, missing: bool = True) -> Furthest:
+    """Return the sum that reaches `tables.bound`; without `missing`, the largest over frames that are read completely.
+
+    A bin that no code can reach, above a threshold of 65535, counts for the bound but for no frame; `collapse` never
+    makes one.
+    """
+    choices = list(_states(tables, missing))
+    onwards = [[np.maximum(sign * terms, 0).sum(axis=0) for _, terms in choices] for sign in _SIGNS]
+    reached = np.stack([sum(onward.max(axis=0) for onward in each) for each in onwards])
+    way, grasp = map(int, np.unravel_index(reached.argmax(), reached.shape))
+    sign = _SIGNS[way]
+    picked = [int(np.argmax(onward[:, grasp])) for onward in onwards[way]]
+    chosen = [(values[pick], terms[:, pick]) for (values, terms), pick in zip(choices, picked, strict=True)]
+    first = 1 + tables.n_switches
+    switches, joints = np.array([value for value, _ in chosen[1:first]]), np.zeros(tables.n_joints, np.int64)
+    single, further = [term[0] for _, term in chosen[:first]], []
+    of_joints = np.zeros((tables.n_joints, tables.n_classes), np.int64)
+    for unit, (codes, term) in zip(tables.units, chosen[first:], strict=True):
+        joints[list(unit)], of_joints[list(unit)] = codes, term[: len(unit)]
+        further += list(term[len(unit) :])
+    terms = np.stack([*single, *of_joints, *further])
+    onward = sign * terms[:, grasp] > 0
+    order = np.concatenate([np.flatnonzero(onward), np.flatnonzero(~onward)])
+    return Furthest(
+        grasp=grasp,
+        total=int(terms[onward, grasp].sum()),
+        n_terms=int(np.count_nonzero(onward)),
+        order=order,
+        terms=terms.astype(np.int16),
+        bits=switches == CLOSED,
+        codes=np.maximum(joints, 0).astype(np.uint16),
+        lost_switches=switches == LOST,
+        lost_joints=joints == LOST,
+    )
+
+
+def _states(tables: IntegerTables, missing: bool) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Yield, for bias, switches and units of joints, the choices, (c,) or (c, joints), and their terms, (t, c, K)."""
+    last = slice(None if missing else -1)
+    yield np.zeros(1, np.int64), tables.bias[np.newaxis, np.newaxis].astype(np.int64)
+    for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True):
+        yield np.array([OPEN, CLOSED, LOST])[last], np.stack([0 * row, row, mean])[np.newaxis, last].astype(np.int64)
+    for unit in tables.units:
+        codes, terms = tables.states(unit)
+        there = (codes <= HIGHEST_CODE).all(axis=1) & (missing | (codes != LOST).all(axis=1))
+        yield codes[there], terms[:, there]

@@ -1,12 +1,10 @@
-from dataclasses import replace
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.tables.furthest import furthest
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.proof import furthest
 from thenar.runtime.scores import LANE_OFFSET, Scorer
-from thenar.runtime.tables import IntegerTables
 from thenar.stability.inputs.hard_tables import every_frame, whole_numbers
 
 tables = st.builds(
@@ -54,7 +52,7 @@ def test_without_gaps_it_is_the_furthest_of_all_whole_frames(tables: IntegerTabl
 def test_a_bin_that_no_code_falls_into_is_in_no_frame() -> None:
     silent = whole_numbers(0, 2, 0, (2,), 0)
     rows = np.array([[3, 0], [9, 0]], np.int16)
-    found = furthest(replace(silent, thresholds=(np.array([65535], np.uint16),), joint_rows=(rows,)))
+    found = furthest(silent.changed(thresholds=(np.array([65535], np.uint16),), joint_rows=(rows,)))
     assert (found.total, found.codes.tolist()) == (3, [0])
 
 
@@ -63,5 +61,5 @@ def test_a_bin_is_shown_by_its_lowest_existing_code() -> None:
     for bin_, code in enumerate((0, 10, 65535)):
         rows = np.zeros((3, 2), np.int16)
         rows[bin_] = 5, 0
-        found = furthest(replace(silent, thresholds=(np.array([9, 65534], np.uint16),), joint_rows=(rows,)))
+        found = furthest(silent.changed(thresholds=(np.array([9, 65534], np.uint16),), joint_rows=(rows,)))
         assert (found.total, found.codes.tolist()) == (5, [code])

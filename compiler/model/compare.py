@@ -7,14 +7,14 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from thenar.runtime.model.integers import LIMIT, IntegerTables
+from thenar.runtime.model.proof import Rounding, furthest
+from thenar.runtime.model.quantise import as_deployed, rounding_error
+from thenar.runtime.model.tables import TIE, ScoreTables, winners
+from thenar.runtime.model.terms.base import CoreTerm
 from thenar.runtime.scores import LANE_OFFSET, Scorer
-from thenar.runtime.tables import LIMIT, IntegerTables
 
-from ..boosting.stumps import TIE, Stumps, winners
-from .collapse import Floats, Model, ScoreTables, collapse, model_scores
-from .furthest import furthest
-from .quantise import as_deployed, rounding_error
-from .worstcase import Rounding
+from .collapse import Floats, Model, collapse
 
 COLLAPSE_TOLERANCE = 1e-12  # of the sum of the magnitudes that are added up
 
@@ -116,18 +116,12 @@ def float_slack(tables: ScoreTables, scale: float) -> float:
     the largest magnitudes of all rows, it is scale * u * S times j for the bias that `balance` sums up, 2 for its rows,
     each at most twice as large as before, 3 for scaling these and the bias, n for adding up the scores compared with
     and 1 for scaling them; and 2 for products of u. A line is two more rows, each at its maximum, and adds 4: a
-    product, a sum, and two by which its middle moves. A pair is one more row, and adds 1.
+    product, a sum, and two by which its middle moves. A grid is one more row, and adds 1.
     """
-    rows = [tables.bias, *tables.switch_rows, *tables.joint_rows]
-    rows += 2 * [line.row * (line.high - line.low) for line in tables.lines]
-    rows += [pair.rows for pair in tables.pairs]
-    largest = sum(float(np.abs(row).max()) for row in rows)
-    return (
-        (tables.n_inputs + len(tables.joint_rows) + 4 * len(tables.lines) + len(tables.pairs) + 8)
-        * 2.0**-53
-        * largest
-        * scale
-    )
+    terms = [term for term in (*tables.terms, *tables.lines) if isinstance(term, CoreTerm)]
+    largest = sum((term.largest for term in terms), float(np.abs(tables.bias).max()))
+    operations = len(tables.terms) + tables.n_joints + 3 * len(tables.lines) + 8
+    return operations * 2.0**-53 * largest * scale
 
 
 def compare(
@@ -139,7 +133,7 @@ def compare(
 ) -> Comparison:
     """Run kept switches (n, s) and codes (n, j) through all three; the integers frame by frame, as deployed."""
     tables = collapse(model, bits.shape[1])
-    by_model = model_scores(model, bits, codes)
+    by_model = model.scores(bits, codes)
     by_tables = tables.scores(bits, codes)
     by_integers = _deployed_scores(integers, bits, codes, report)
     deployed = as_deployed(tables, integers.grid)
@@ -149,7 +143,7 @@ def compare(
     error, slack = rounding_error(deployed, integers.scale, integers.grid), float_slack(deployed, integers.scale)
     return Comparison(
         collapse_difference=float(np.abs(by_model - by_tables).max()),
-        collapse_bound=COLLAPSE_TOLERANCE * _magnitudes(model),
+        collapse_bound=COLLAPSE_TOLERANCE * model.magnitude,
         integer_difference=float(np.abs(steps - by_integers).max()),
         integer_bound=error,
         slack=slack,
@@ -159,13 +153,6 @@ def compare(
         margins=margins,
         covered=margins > 2 * (error + slack),
     )
-
-
-def _magnitudes(model: Model) -> float:
-    """Return the sum of the magnitudes that an ensemble adds up; 0 for tables, where nothing is lost."""
-    if not isinstance(model, Stumps):
-        return 0.0
-    return float(2 * model.shrinkage * np.abs(model.values[:, :, :2]).max(axis=(1, 2)).sum())
 
 
 def _deployed_scores(

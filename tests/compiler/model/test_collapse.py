@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.boosting.stumps import Stumps, centred, spread
-from thenar.compiler.tables.collapse import _contributions, _joint, collapse
+from thenar.compiler.model.collapse import _contributions, _joint, collapse
 
 MakeStumps = Callable[..., Stumps]
 MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]

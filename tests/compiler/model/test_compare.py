@@ -5,10 +5,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from thenar.compiler.boosting.stumps import Stumps, winners
-from thenar.compiler.tables.collapse import ScoreTables, collapse
-from thenar.compiler.tables.compare import Comparison, compare, float_slack
-from thenar.compiler.tables.quantise import quantise, rounding_error
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.model.collapse import collapse
+from thenar.compiler.model.compare import Comparison, compare, float_slack
+from thenar.runtime.model.quantise import quantise, rounding_error
+from thenar.runtime.model.tables import ScoreTables, winners
 
 MakeStumps = Callable[..., Stumps]
 MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
@@ -54,7 +55,7 @@ def test_the_ensembles_ties_are_its_own(make_stumps: MakeStumps, make_rows: Make
 def test_the_slack_covers_what_doubles_lose_where_large_rows_cancel(make_rows: MakeRows, size: float) -> None:
     random = np.random.default_rng(5)
     rows = tuple(random.normal(0, 1e-3, (2, 3)) - size for _ in range(3))
-    tables = ScoreTables(np.full(3, 3 * size), np.zeros((6, 3)), (np.array([99], np.uint16),) * 3, rows)
+    tables = ScoreTables.of(np.full(3, 3 * size), np.zeros((6, 3)), (np.array([99], np.uint16),) * 3, rows)
     bits, codes = make_rows()
     integers = quantise(tables, bits, codes)
     slack, errors = float_slack(tables, integers.scale), []

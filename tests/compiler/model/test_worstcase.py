@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.boosting.stumps import Stumps
-from thenar.compiler.tables.collapse import ScoreTables, collapse
-from thenar.compiler.tables.compare import float_slack
-from thenar.compiler.tables.quantise import quantise, rounding_error
-from thenar.compiler.tables.worstcase import Rounding, _Pairs
-from thenar.runtime.tables import IntegerTables
+from thenar.compiler.model.collapse import collapse
+from thenar.compiler.model.compare import float_slack
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.proof import Rounding, _Pairs
+from thenar.runtime.model.quantise import quantise, rounding_error
+from thenar.runtime.model.tables import ScoreTables
 
 MakeStumps = Callable[..., Stumps]
 MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
@@ -94,9 +95,9 @@ def test_the_worst_is_within_what_counting_inputs_promises(
 def _switches(bias: list[float], rows: list[list[float]], steps: list[int], whole: list[list[int]]) -> Rounding:
     none = np.zeros((0, len(bias)), np.int16)
     switch_rows = np.array(whole, np.int16).reshape(-1, len(bias))
-    tables = ScoreTables(np.array(bias), np.array(rows).reshape(-1, len(bias)), (), ())
+    tables = ScoreTables.of(np.array(bias), np.array(rows).reshape(-1, len(bias)), (), ())
     return Rounding(
-        tables, IntegerTables(np.array(steps, np.int16), switch_rows, (), (), 0 * switch_rows, none, scale=2.0)
+        tables, IntegerTables.of(np.array(steps, np.int16), switch_rows, (), (), 0 * switch_rows, none, scale=2.0)
     )
 
 
@@ -112,10 +113,10 @@ def test_ties_go_to_the_lower_number_others_need_a_step(leader: int, safe: str) 
 
 def test_bins_that_rounding_has_merged_are_still_told_apart() -> None:
     rows = np.array([[0.0, 0.0], [0.25, 0.0], [3.0, 0.0]])
-    tables = ScoreTables(np.zeros(2), np.zeros((0, 2)), (np.array([10, 20], np.uint16),), (rows,))
+    tables = ScoreTables.of(np.zeros(2), np.zeros((0, 2)), (np.array([10, 20], np.uint16),), (rows,))
     none = np.zeros((0, 2), np.int16)
     whole = np.array([[0, 0], [3, 0]], np.int16)
-    integers = IntegerTables(none.sum(axis=0, dtype=np.int16), none, (np.array([20], np.uint16),), (whole,), none,
+    integers = IntegerTables.of(none.sum(axis=0, dtype=np.int16), none, (np.array([20], np.uint16),), (whole,), none,
                              np.zeros((1, 2), np.int16), 1.0)  # fmt: skip
     worst = Rounding(tables, integers).worst(0, 1)
     assert (worst.codes.tolist(), worst.loss) == ([11], Fraction(1, 4))
@@ -123,10 +124,10 @@ def test_bins_that_rounding_has_merged_are_still_told_apart() -> None:
 
 def test_a_bin_that_no_code_falls_into_is_no_frame() -> None:
     rows = np.array([[0.0, 0.0], [0.25, 0.0]])
-    tables = ScoreTables(np.zeros(2), np.zeros((0, 2)), (np.array([65535], np.uint16),), (rows,))
+    tables = ScoreTables.of(np.zeros(2), np.zeros((0, 2)), (np.array([65535], np.uint16),), (rows,))
     none = np.zeros((0, 2), np.int16)
     means = np.zeros((1, 2), np.int16)
-    integers = IntegerTables(np.zeros(2, np.int16), none, (np.array([], np.uint16),), (means,), none, means, 1.0)
+    integers = IntegerTables.of(np.zeros(2, np.int16), none, (np.array([], np.uint16),), (means,), none, means, 1.0)
     assert Rounding(tables, integers).worst_of_all().loss == 0
 
 
@@ -144,8 +145,8 @@ def test_the_first_and_last_code_may_have_single_bins(bin_: int, code: int) -> N
     rows[bin_, 0] = 0.25
     steps, none = (np.array([0, 65534], np.uint16),), np.zeros((0, 2), np.int16)
     whole = (np.zeros((3, 2), np.int16),)
-    integers = IntegerTables(np.zeros(2, np.int16), none, steps, whole, none, np.zeros((1, 2), np.int16), 1.0)
-    worst = Rounding(ScoreTables(np.zeros(2), np.zeros((0, 2)), steps, (rows,)), integers).worst(0, 1)
+    integers = IntegerTables.of(np.zeros(2, np.int16), none, steps, whole, none, np.zeros((1, 2), np.int16), 1.0)
+    worst = Rounding(ScoreTables.of(np.zeros(2), np.zeros((0, 2)), steps, (rows,)), integers).worst(0, 1)
     assert (worst.codes.tolist(), worst.loss) == ([code], Fraction(1, 4))
 
 
@@ -173,7 +174,7 @@ def test_the_worst_pair_is_found_exactly_and_first_on_ties(
 
 def test_a_thousand_classes_take_no_more_memory_than_their_pairs_need() -> None:
     random = np.random.default_rng(0)
-    tables = ScoreTables(np.zeros(1000), random.normal(0, 1, (20, 1000)), (), ())
+    tables = ScoreTables.of(np.zeros(1000), random.normal(0, 1, (20, 1000)), (), ())
     integers = quantise(tables, random.random((50, 20)) < 0.5, np.zeros((50, 0), np.uint16))
     tracemalloc.start()
     assert Rounding(tables, integers).worst_of_all().loss > 5

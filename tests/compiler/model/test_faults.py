@@ -8,11 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.tables import faults
-from thenar.compiler.tables.faults import count_faults, groups_of, worst_faults
+from thenar.compiler.model import faults
+from thenar.compiler.model.faults import count_faults, groups_of, worst_faults
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.terms.grid import Grid
+from thenar.runtime.model.terms.line import Slope
 from thenar.runtime.scanning.scanmap import Port, ScanMap, StreamRead
 from thenar.runtime.scores import Scorer
-from thenar.runtime.tables import IntegerTables, Pair, Slope
 
 
 def tables_of(
@@ -27,9 +29,9 @@ def tables_of(
 
     thresholds = tuple(steps() for _ in range(joints))
     both = steps(), steps()
-    joined = Pair((0, joints - 1), both, rows(len(both[0]) + 1, len(both[1]) + 1, classes))
+    joined = Grid((0, joints - 1), both, rows(len(both[0]) + 1, len(both[1]) + 1, classes))
     line = Slope(0, 5, 15, 0, rows(classes).astype(np.int8))
-    return IntegerTables(
+    return IntegerTables.of(
         bias=rows(classes),
         switch_rows=rows(switches, classes),
         thresholds=thresholds,
@@ -37,8 +39,7 @@ def tables_of(
         switch_means=rows(switches, classes),
         joint_means=rows(joints, classes),
         scale=1.0,
-        slopes=(line,) if slope and joints else (),
-        pairs=(joined,) if pair and not slope and joints > 1 else (),
+        further=(line,) if slope and joints else (joined,) if pair and joints > 1 else (),
     )
 
 

@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 from ..elementary import log, softmax
 
@@ -55,7 +55,7 @@ def fit_lost(
     switch_rows = tables.switch_rows.astype(np.int64)
     closed, joints = bits.astype(np.int64) @ switch_rows, tables.joint_sums(codes).astype(np.int64)
     whole = closed + joints
-    added = [tables.choices(joint)[1].sum(axis=0) for joint in range(tables.n_joints)]
+    added = [tables.choices(joint)[1] for joint in range(tables.n_joints)]
     ends = np.minimum(switch_rows, 0), np.maximum(switch_rows, 0)
     spans = tuple(np.array([end(rows, axis=0) for rows in added]).reshape(-1, len(wanted)) for end in (np.min, np.max))
     # For each varying input, and then for all of its kind if the other kind varies: the scores without it.
@@ -106,10 +106,10 @@ def _distinct(
 
 
 def _without(tables: IntegerTables, codes: NDArray[np.uint16], joints: Sequence[int]) -> Steps:
-    """Return bias plus joints without the given `joints`, (n, K): a lost joint of a pair reads as code 0."""
+    """Return bias plus joints without the given `joints`, (n, K): a lost joint of a grid reads as code 0."""
     left = codes.copy()
     left[:, list(joints)] = 0
-    own = [tables.binned(joint)[1][0].astype(np.int64) for joint in joints]
+    own = [tables.binned(joint).rows[0].astype(np.int64) for joint in joints]
     found: Steps = tables.joint_sums(left).astype(np.int64) - np.sum(own, axis=0)
     return found
 

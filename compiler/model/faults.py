@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Faults, Faulty
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.tables import IntegerTables, Pair
 
 Numbers = NDArray[np.intp]
 Steps = NDArray[np.int64]
@@ -61,7 +62,7 @@ def count_faults(
     correct. `groups` are indices of inputs that fail together, switches first, then joints.
     """
     terms = [*_switches(tables), *_joints(tables)]
-    joined = [_Joined.of(tables, pair) for pair in tables.pairs]
+    joined = [_Joined.of(tables, grid) for grid in tables.grids]
     bins = (np.searchsorted(_steps(tables, joint), codes[:, joint]) for joint in range(tables.n_joints))
     at = np.vstack([bits.T.astype(np.intp), *(column[np.newaxis] for column in bins)])
     order, trial = np.argsort(trials, kind="stable"), np.unique(np.sort(trials), return_inverse=True)[1]
@@ -96,22 +97,22 @@ class _Term:
 
 
 def _switches(tables: IntegerTables) -> Iterator[_Term]:
-    for row, mean in zip(tables.switch_rows.astype(np.int64), tables.switch_means.astype(np.int64), strict=True):
-        yield _Term(np.stack([np.zeros_like(row), row]), mean, ("open", "closed"))
+    for bit, mean in zip(tables.bits, tables.switch_means.astype(np.int64), strict=True):
+        yield _Term(bit.of(np.arange(2)).astype(np.int64), mean, ("open", "closed"))
 
 
 def _joints(tables: IntegerTables) -> Iterator[_Term]:
     for joint, mean in enumerate(tables.joint_means.astype(np.int64)):
-        (own, rows), steps = tables.binned(joint), _steps(tables, joint)
+        steps = _steps(tables, joint)
         ends = [-1, *steps.tolist()]
         words = [f"codes {low + 1} to {high}" for low, high in pairwise(ends)]
-        rows = rows[np.searchsorted(own, np.append(0, steps + 1))]
+        rows = tables.binned(joint).of(np.append(0, steps + 1))
         yield _Term(rows.astype(np.int64), mean, (*words, f"codes above {ends[-1]}" if len(ends) > 1 else "any code"))
 
 
 def _steps(tables: IntegerTables, joint: int) -> Steps:
     """Return the last code of each interval of a joint in which its contribution is constant."""
-    return np.union1d(tables.binned(joint)[0], tables.steps_of(joint)).astype(np.int64)
+    return np.union1d(tables.binned(joint).thresholds, tables.steps_of(joint)).astype(np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,11 +123,11 @@ class _Joined:
     rows: Steps
 
     @classmethod
-    def of(cls, tables: IntegerTables, pair: Pair) -> "_Joined":
-        codes = (np.concatenate([[0], _steps(tables, joint) + 1, [0]]) for joint in pair.joints)
-        bins = [np.searchsorted(steps, own) for steps, own in zip(pair.thresholds, codes, strict=True)]
-        one, other = pair.joints
-        return cls((tables.n_switches + one, tables.n_switches + other), pair.rows[np.ix_(*bins)].astype(np.int64))
+    def of(cls, tables: IntegerTables, grid: Grid) -> "_Joined":
+        codes = (np.concatenate([[0], _steps(tables, joint) + 1, [0]]) for joint in grid.joints)
+        one, other = np.meshgrid(*codes, indexing="ij")
+        rows = grid.of(one.ravel(), other.ravel()).reshape(*one.shape, -1)
+        return cls((tables.n_switches + grid.joints[0], tables.n_switches + grid.joints[1]), rows.astype(np.int64))
 
     def turned(self, first: int) -> tuple[int, Steps]:
         """Return the index of the other input than `first`, and the rows with the axis of `first` first."""

@@ -1,0 +1,268 @@
+"""Quantise score tables to integers: one scale for all rows, as fine as possible without overflow of any sum.
+
+Rounding every row to whole steps moves a score by at most (inputs + 1)/2 steps, half a step for the bias and for each
+input's row. Two scores can therefore approach each other by at most inputs + 1 steps, and a frame whose best score
+leads by more than that keeps its grasp type. This holds for every scale: a coarser one only makes a step worth more.
+
+Firmware adds the results of table lookups: the sum of the rows of a few switches, or a row of a joint. Where it stores
+these in entries of 8 bits, as the excess over the minimum for the lookup and class, no lookup may span more than 255
+steps. The scale is then about 4 steps per unit of score, compared with about 300 for 16 bits.
+
+The row of a line becomes whole steps per distance from the middle of its range (terms/line.py), a byte each. This
+moves a score by at most half a step times the largest distance, which is at most 127. Where tables have lines and
+entries of 8 bits, the entries are the upper halves of steps: rows of switches and bins are rounded to multiples of 256
+steps, and only lines and bias use the full resolution of 16-bit sums. The bias compensates the mean rounding error: x
+times the error of a switch's row becomes (x - mean) times the error, which is no larger for x = 0 or 1. Such scores are
+relative to the last class, so there is one class less to add up.
+"""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .integers import COARSE, FINEST_SCALE, IntegerTables
+from .tables import ScoreTables, winners
+from .terms.base import CoreTerm, Floats, rounded
+from .terms.line import LARGEST_SLOPE, WIDEST, Line
+
+# The most consecutive switches that firmware looks up together in tables of narrow entries. Every group of this many
+# consecutive switches keeps the span, so smaller groups do as well.
+GROUP_SIZE = 5
+
+# Scales that `least_disruptive_scale` tries, evenly spaced down to four fifths of the finest.
+TRIED, _TRIED_OF_ALL = 32, 160
+
+
+def balance(tables: ScoreTables) -> ScoreTables:
+    """Return tables of equal scores whose bias is spread over the joints' rows, as far as their ranges allow.
+
+    Moving a constant from the bias into all rows of a joint changes no score. A partial sum can reach |bias| plus the
+    range of every input; without bias it reaches no further than complete scores do, which is optimal. A line reaches
+    least where its zero is in the middle of its range: rows are evaluated there.
+    """
+    if not tables.n_joints:
+        return tables
+    middles = np.zeros((tables.n_joints, tables.n_classes))
+    for line in tables.lines:
+        middles[line.joint] = line.middle
+    middle_rows = [rows + middle for rows, middle in zip(tables.joint_rows, middles, strict=True)]
+    lowest = np.stack([rows.min(axis=0) for rows in middle_rows])
+    spans = np.stack([rows.max(axis=0) for rows in middle_rows]) - lowest
+    # Each joint gives up its lowest row and a common share of its span, chosen such that the bias becomes zero.
+    wanted, room = -tables.bias - lowest.sum(axis=0), spans.sum(axis=0)
+    share = np.divide(wanted, room, out=np.zeros_like(room), where=room > 0).clip(0, 1)
+    moved = lowest + share * spans
+    rows = [rows - shift for rows, shift in zip(tables.joint_rows, moved, strict=True)]
+    return tables.changed(bias=tables.bias + moved.sum(axis=0), joint_rows=rows)
+
+
+def as_deployed(tables: ScoreTables, grid: int) -> ScoreTables:
+    """Return the tables before rounding to a `grid`: scores relative to the last class if rows are on one."""
+    if grid == 1:
+        return tables
+    return ScoreTables(tables.bias - tables.bias[-1:], tuple(term.relative() for term in _core(tables)))
+
+
+def _core(tables: ScoreTables) -> list[CoreTerm]:
+    """Return the terms. Raises ValueError where one is of another kind: `collapse` returns tables without such."""
+    terms = [term for term in tables.terms if isinstance(term, CoreTerm)]
+    if len(terms) < len(tables.terms):
+        raise ValueError("the tables have terms of other kinds: collapse them first")
+    return terms
+
+
+def _centred(tables: ScoreTables, scale: float) -> ScoreTables:
+    """Return the tables with what lines add at the zeros of their slopes in the rows of bins."""
+    rows = list(tables.joint_rows)
+    for line in tables.lines:
+        rows[line.joint] = rows[line.joint] + line.row * line.slope(scale).offset
+    return tables.changed(joint_rows=rows) if tables.lines else tables
+
+
+def finest_scale(tables: ScoreTables, limit: float, widest: int, grid: int = 1) -> float:
+    """Return the largest scale at which no sum exceeds `limit` and no lookup spans more than `widest`.
+
+    It is a double below FINEST_SCALE; 1 for tables of zeros. Rounded terms never shrink as the scale grows, so neither
+    do sums and spans, and bisection over the doubles is exact. With lines, or rows on a `grid`, the result is only one
+    of the largest.
+    """
+    whole = reach(tables, 1.0, whole=False)
+    if whole == 0:
+        return 1.0
+    extremes = _Extremes(tables, grid)
+    most = limit + grid * (len(tables.terms) - len(tables.lines) + 2) + WIDEST * len(tables.lines)
+    fits, too_fine = 0.0, min(most / whole, FINEST_SCALE)
+    while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
+        if extremes.reach(middle) <= limit and (grid > 1 or extremes.span(middle) <= widest):
+            fits = middle
+        else:
+            too_fine = middle
+    return fits
+
+
+def least_disruptive_scale(
+    tables: ScoreTables, finest: float, bits: NDArray[np.bool_], codes: NDArray[np.uint16], grid: int = 1
+) -> float:
+    """Return, of `finest` and slightly coarser scales, the one at which the fewest rows change class.
+
+    The rows are bits (n, s) and codes (n, j); ties go to the finest scale. With coarse steps, whether a common frame
+    changes its class depends on luck rather than on the scale. The bounds on rounding hold at every scale.
+    """
+    scales = finest * (1 - np.arange(TRIED) / _TRIED_OF_ALL)
+    scores = tables.scores(bits, codes)
+    most = max(rounding_error(tables, scale, grid) for scale in scales[[0, -1]].tolist())
+    near = _leads(scores) * scales[-1] <= 2 * most + 1  # no scale can change the other rows: see above
+    right, means = winners(scores[near]), _mean(bits.astype(np.int64))
+    changed = []
+    for scale in scales.tolist():
+        whole = ScoreTables(_whole_bias(tables, scale, grid, means), tuple(_whole(tables, scale, grid)))
+        changed.append(np.count_nonzero(whole.scores(bits[near], codes[near]).argmax(axis=1) != right))
+    return float(scales[int(np.argmin(changed))])
+
+
+def rounding_error(tables: ScoreTables, scale: float, grid: int = 1) -> float:
+    """Return the most steps by which rounding can move a score: half a step for the bias, and that of each term."""
+    return sum((term.rounding_error(scale, grid) for term in _core(tables)), 0.5)
+
+
+def reach(tables: ScoreTables, scale: float, *, whole: bool = True, grid: int = 1) -> float:
+    """Return the largest absolute value of a partial sum of the scaled rows, in any order; infinity if an entry of a
+    slope's row does not fit its byte.
+    """
+    return _Extremes(tables, grid).reach(scale, whole=whole)
+
+
+def span(tables: ScoreTables, scale: float) -> float:
+    """Return the largest difference between results of one lookup for a class.
+
+    A lookup returns a joint's row or zero, scaled and rounded, or the sum of the rows of some of GROUP_SIZE consecutive
+    switches. Zero, which `balance` puts between a joint's rows anyway, is included so that no span shrinks as the scale
+    grows.
+    """
+    return _Extremes(tables, 1).span(scale)
+
+
+class _Extremes:
+    """The largest and smallest contributions of bias and terms, at any scale: rounding keeps them extreme."""
+
+    def __init__(self, tables: ScoreTables, grid: int) -> None:
+        fixed = [term for term in _core(tables) if not isinstance(term, Line)]
+        ends = [(tables.bias, tables.bias), *(term.ends for term in fixed)]
+        self._n_switches, self._lines = tables.n_switches, tables.lines
+        self._upper, self._lower = (np.stack(rows) for rows in zip(*ends, strict=True))
+        # Where the bins of each joint begin, and the grid of each row.
+        self._first = 1 + tables.n_switches
+        self._grids = np.array([1.0] + [2 * term.rounding_error(1.0, grid) for term in fixed])[:, np.newaxis]
+
+    def _at(self, scale: float, *, whole: bool) -> tuple[Floats, Floats]:
+        """Return the largest and smallest scaled rows, zero included, (1 + terms, K) each: bias, switches, joints at
+        the zeros of their lines, and grids.
+        """
+        upper, lower = self._upper, self._lower
+        if self._lines:
+            upper, lower = upper.copy(), lower.copy()
+            for line in self._lines:
+                offset = line.row * line.slope(scale).offset
+                upper[self._first + line.joint] += offset
+                lower[self._first + line.joint] += offset
+        upper, lower = upper * scale, lower * scale
+        if whole:
+            upper, lower = np.rint(upper / self._grids) * self._grids, np.rint(lower / self._grids) * self._grids
+        return np.maximum(upper, 0), np.minimum(lower, 0)
+
+    def reach(self, scale: float, *, whole: bool = True) -> float:
+        """Return the largest absolute value of a partial sum."""
+        upper, lower = self._at(scale, whole=whole)
+        slopes = [line.whole(scale, 1) if whole else line.slope(scale) for line in self._lines]
+        if whole and any(np.abs(slope.row).max() > LARGEST_SLOPE for slope in slopes):
+            return math.inf
+        for slope in slopes:
+            largest, smallest = slope.ends
+            upper, lower = np.vstack([upper, largest]), np.vstack([lower, smallest])
+        return float(max(upper.sum(axis=0).max(), -lower.sum(axis=0).min()))
+
+    def span(self, scale: float) -> float:
+        """Return the largest span of a lookup."""
+        upper, lower = self._at(scale, whole=True)
+        switches, others = np.split(upper[1:] - lower[1:], [self._n_switches])
+        # Sums of integers are exact, and so is the difference of two of them, GROUP_SIZE switches apart.
+        sums = np.cumsum(np.vstack([np.zeros((GROUP_SIZE, upper.shape[1])), switches]), axis=0)
+        groups = sums[GROUP_SIZE:] - sums[:-GROUP_SIZE]
+        return float(np.vstack([groups, others]).max(initial=0.0))
+
+
+def _leads(scores: Floats) -> Floats:
+    """Return the lead (n,) of the best over the second best score in each row of (n, K)."""
+    second, best = np.partition(scores, -2, axis=1)[:, -2:].T
+    leads: Floats = best - second
+    return leads
+
+
+def _whole(tables: ScoreTables, scale: float, grid: int) -> list[CoreTerm]:
+    """Return the terms in whole steps."""
+    return [term.whole(scale, grid) for term in _core(_centred(tables, scale))]
+
+
+def _whole_bias(tables: ScoreTables, scale: float, grid: int, means: Floats) -> Floats:
+    """Return the bias in whole steps, with compensation for the mean error of rounding switches' rows to a `grid`.
+
+    `means` (s,) are the shares of rows in which each switch is closed.
+    """
+    rows = tables.switch_rows * scale
+    lost = means[:, np.newaxis] * (rows - rounded(rows, grid)) if grid > 1 else 0 * rows
+    whole: Floats = np.rint(tables.bias * scale + [math.fsum(column) for column in lost.T])
+    return whole
+
+
+def quantise(
+    tables: ScoreTables,
+    bits: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+    width: int = 16,
+    entry_bits: int = 16,
+) -> IntegerTables:
+    """Return integer tables whose sums fit `width` bits (4 to 16), rounded half to even.
+
+    bits (n, s) and codes (n, j) are the training rows; their mean contributions replace missing inputs. No lookup (a
+    joint, or up to GROUP_SIZE consecutive switches) spans more than 2^entry_bits - 1 steps in any class. With 16 bits
+    this is no restriction, since sums of 16 bits span no more, and the scale is the finest; with fewer it is the
+    kindest. With lines, entries of fewer than 16 bits are multiples of 256 instead.
+    """
+    grid, means = COARSE if tables.lines and entry_bits < 16 else 1, _mean(bits.astype(np.int64))
+    balanced = balance(as_deployed(tables, grid))
+    limit, room = 2 ** (width - 1) - 1, 0.0
+    while True:
+        scale = finest_scale(balanced, limit - room, 2**entry_bits - 1, grid)
+        if entry_bits < 16:
+            scale = least_disruptive_scale(balanced, scale, bits, codes, grid)
+        bias = _whole_bias(balanced, scale, grid, means)
+        beyond = reach(ScoreTables(bias / scale, balanced.terms), scale, grid=grid) - limit
+        if grid == 1 or beyond <= 0:
+            break
+        room += beyond  # the compensation in the bias needs room, too
+    terms = tuple(term.integers() for term in _whole(balanced, scale, grid))
+    s, j, K = tables.n_switches, tables.n_joints, tables.n_classes
+    none = np.zeros((s + j, K), np.int16)
+    integers = IntegerTables(bias.astype(np.int16), terms, none[:s], none[s:], scale, grid)
+    rows = integers.switch_rows
+    switch_means = np.rint(balanced.switch_rows * means[:, np.newaxis] * scale)
+    joint_means = []
+    lines = {line.joint: line for line in balanced.lines}
+    for joint, (column, bins) in enumerate(zip(codes.T, balanced.bins, strict=True)):
+        added = bins.of(column) + (lines[joint].of(column) if joint in lines else 0.0)
+        # A mean computed in floating point may round to just outside the range of its values, and so of int16.
+        mean, added = np.rint(_mean(added) * scale), integers.choices(joint)[1]
+        joint_means.append(np.clip(mean, added.min(axis=0), added.max(axis=0)))
+    return replace(
+        integers,
+        switch_means=np.clip(switch_means, np.minimum(rows, 0), np.maximum(rows, 0)).astype(np.int16),
+        joint_means=np.array(joint_means, np.int16).reshape(j, K),
+    )
+
+
+def _mean(rows: NDArray[Any]) -> Floats:
+    """Return the mean (K,) of rows (n, K), summed exactly, so that its bits are the same on every machine."""
+    return np.array([math.fsum(column) / len(rows) for column in rows.T])

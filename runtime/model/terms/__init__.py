@@ -1,0 +1,1 @@
+"""The kinds of terms: a file each."""
