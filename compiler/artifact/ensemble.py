@@ -21,7 +21,6 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from thenar.drivers.members import MemberError
 from thenar.runtime.errors import BuildError
 from thenar.runtime.model.integers import MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
 from thenar.runtime.model.tables import ScoreTables
@@ -246,12 +245,11 @@ def _grids(arrays: Mapping[str, AnyArray], what: str) -> tuple[Grid, ...]:
 
 def _others(arrays: Mapping[str, AnyArray], kinds: Sequence[str], what: str) -> Iterator[Term]:
     """Yield the further terms of these kinds. Raises MemberError for a kind that no installed package defines."""
-    for number, kind in enumerate(kinds):
+    for number, name in enumerate(kinds):
         prefix = f"term_{number}_"
-        fields = {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+        fields = {key.removeprefix(prefix): array for key, array in arrays.items() if key.startswith(prefix)}
+        kind = TERMS.named(name)
         try:
-            yield TERMS.named(kind).from_arrays(fields)
+            yield kind.from_arrays(fields)
         except (KeyError, TypeError, ValueError, IndexError) as wrong:
-            if isinstance(wrong, MemberError):
-                raise
-            raise BuildError(f"{what} is damaged: term {number}, {kind!r}, makes no sense: {wrong}") from None
+            raise BuildError(f"{what} is damaged: term {number}, {name!r}, makes no sense: {wrong}") from None

@@ -4,8 +4,11 @@ import shlex
 from itertools import accumulate
 
 import msgspec
+import numpy as np
 
 from thenar.runtime.manifest import Manifest
+from thenar.runtime.model.terms.base import CoreTerm
+from thenar.runtime.model.terms.bit import Bit
 from thenar.runtime.recipe import AUTO
 from thenar.runtime.scanning.timing import port_us, reading_of
 
@@ -173,15 +176,29 @@ def _worst_first(found: FaultCounts) -> list[int]:
     return sorted(range(len(found.lost)), key=found.lost.__getitem__)
 
 
-def fault_bars(content: ReportContent) -> tuple[tuple[str, float, float], ...]:
-    """Return for each input, the worst first: its name, the accuracy without it, and with it."""
+def fault_bars(content: ReportContent) -> tuple[tuple[str, float], ...]:
+    """Return the name of each input and the accuracy without it, the worst first: as a text, and as a share."""
     found = content.faults
     if found is None:
         return ()
     names = (*content.switch_names, *(joint.name for joint in content.manifest.joints))
-    return tuple(
-        (names[one], found.lost[one] / found.total, found.correct / found.total) for one in _worst_first(found)
-    )
+    shares = ((names[one], found.lost[one] / found.total) for one in _worst_first(found))
+    return tuple((f"{name} {100 * share:.1f} %", share) for name, share in shares)
+
+
+def term_bars(content: ReportContent) -> tuple[tuple[str, float], ...]:
+    """Return each term of the model, the weightiest first: what it reads and by how much it can move a score, as a text
+    and as a share of the largest.
+    """
+    joints = [joint.name for joint in content.manifest.joints]
+    spans = [
+        (" and ".join((content.switch_names if isinstance(term, Bit) else joints)[one] for one in term.inputs), term)
+        for term in content.tables.terms
+        if isinstance(term, CoreTerm)
+    ]
+    rows = [(int(np.subtract(*term.ends, dtype=np.int64).max()), f"{name}, {term.name}") for name, term in spans]
+    rows = sorted(((span, text) for span, text in rows if span), key=lambda row: (-row[0], row[1]))
+    return tuple((f"{text} {span / content.tables.scale:.2f}", span / rows[0][0]) for span, text in rows)
 
 
 def _share(count: int, total: int) -> str:

@@ -254,8 +254,8 @@ def quantise(
     for joint, (column, bins) in enumerate(zip(codes.T, balanced.bins, strict=True)):
         added = bins.of(column) + (lines[joint].of(column) if joint in lines else 0.0)
         # A mean computed in floating point may round to just outside the range of its values, and so of int16.
-        mean, added = np.rint(_mean(added) * scale), integers.choices(joint)[1]
-        joint_means.append(np.clip(mean, added.min(axis=0), added.max(axis=0)))
+        mean, possible = np.rint(_mean(added) * scale), integers.choices(joint)[1]
+        joint_means.append(np.clip(mean, possible.min(axis=0), possible.max(axis=0)))
     return replace(
         integers,
         switch_means=np.clip(switch_means, np.minimum(rows, 0), np.maximum(rows, 0)).astype(np.int16),

@@ -71,6 +71,11 @@ class Additive(ABC):
         return len(self.bits)
 
     @property
+    def n_inputs(self) -> int:
+        """Number of kept switches and joints."""
+        return self.n_switches + self.n_joints
+
+    @property
     def n_joints(self) -> int:
         """Number of joints, j."""
         return len(self.bins)

@@ -3,9 +3,10 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -94,16 +95,22 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def install(tmp_path: Path) -> Install:
-    """Install a file of examples/extending as a distribution with one entry point: file, group, name of the point."""
+    """Install a file of examples/extending as a distribution with an entry point for its MEMBER (file, group, name of
+    the point), and for the objects of other groups.
+    """
 
-    def installed(file: str, group: str, name: str = "member") -> Installed:
+    def installed(
+        file: str, group: str, name: str = "member", others: Mapping[str, str] = MappingProxyType({})
+    ) -> Installed:
         folder = tmp_path / "site"
         metadata = folder / "somebody_else-1.0.dist-info"
         metadata.mkdir(parents=True)
         module = f"somebody_elses_{Path(file).stem}"
         (folder / f"{module}.py").write_bytes((EXAMPLES / file).read_bytes())
         (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: somebody-else\nVersion: 1.0\n")
-        (metadata / "entry_points.txt").write_text(f"[{group}]\n{name} = {module}:MEMBER\n")
+        points = [(group, name, "MEMBER"), *((group, name, what) for group, what in others.items())]
+        lines = (f"[{group}]\n{point} = {module}:{what}\n" for group, point, what in points)
+        (metadata / "entry_points.txt").write_text("".join(lines))
         return Installed(folder)
 
     return installed

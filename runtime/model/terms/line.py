@@ -134,6 +134,11 @@ class Slope(CoreTerm):
         return above << self.gain if self.gain > 0 else above >> -self.gain
 
     @property
+    def _wide(self) -> Rows:
+        """The row in a type that has room for products."""
+        return self.row.astype(np.int64) if self.row.dtype == np.int8 else self.row
+
+    @property
     def inputs(self) -> tuple[int, ...]:
         """The joint."""
         return (self.joint,)
@@ -168,7 +173,7 @@ class Slope(CoreTerm):
     @property
     def ends(self) -> Ends:
         """The largest and the smallest contribution, (K,) each."""
-        ends = np.stack([-self.zero * self.row, (self.most - self.zero) * self.row])
+        ends = np.stack([-self.zero * self._wide, (self.most - self.zero) * self._wide])
         return ends.max(axis=0), ends.min(axis=0)
 
     def distances(self, codes: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -179,8 +184,7 @@ class Slope(CoreTerm):
 
     def of(self, *values: NDArray[Any]) -> Rows:
         """Return the contribution (n, K) of codes (n,)."""
-        row = self.row.astype(np.int64) if self.row.dtype == np.int8 else self.row
-        contribution: Rows = self.distances(values[0])[:, np.newaxis] * row
+        contribution: Rows = self.distances(values[0])[:, np.newaxis] * self._wide
         return contribution
 
     def turning(self, ends: NDArray[np.int64]) -> NDArray[np.int64]:
