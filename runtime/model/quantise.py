@@ -116,10 +116,14 @@ def least_disruptive_scale(
     most = max(rounding_error(tables, scale, grid) for scale in scales[[0, -1]].tolist())
     near = _leads(scores) * scales[-1] <= 2 * most + 1  # no scale can change the other rows: see above
     right, means = winners(scores[near]), _mean(bits.astype(np.int64))
-    changed = []
+    closed, asked, changed = bits[near].astype(np.float64), codes[near], []
     for scale in scales.tolist():
         whole = ScoreTables(_whole_bias(tables, scale, grid, means), tuple(_whole(tables, scale, grid)))
-        changed.append(np.count_nonzero(whole.scores(bits[near], codes[near]).argmax(axis=1) != right))
+        # Sums of integers are exact in any order, so a matrix product may add them up.
+        added = closed @ whole.switch_rows
+        for term in (*whole.bins, *whole.further):
+            added += term.of(*whole.values(term, bits, asked))
+        changed.append(np.count_nonzero((whole.bias + added).argmax(axis=1) != right))
     return float(scales[int(np.argmin(changed))])
 
 

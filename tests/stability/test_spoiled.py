@@ -27,6 +27,7 @@ from thenar.compiler.placement.cooccurrence import Cooccurrence
 from thenar.runtime.build import Build, Recognition
 from thenar.runtime.model import quantise
 from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.scores import Scorer
 from thenar.simulator.contact.settle import Rest, close
 from thenar.stability.cases import (
@@ -147,11 +148,11 @@ def nearer_zero(integers: IntegerTables) -> IntegerTables:
 def spoil_scoretables(patch: Patch) -> None:
     balance, collapsed, quantised = quantise.balance, collapse.collapse, quantise.quantise
 
-    def lost_bits(tables: collapse.ScoreTables) -> collapse.ScoreTables:
+    def lost_bits(tables: ScoreTables) -> ScoreTables:
         single = tuple(rows.astype(np.float32).astype(np.float64) for rows in balance(tables).joint_rows)
         return balance(tables).changed(joint_rows=single)
 
-    def off(of: stumps.Stumps, n_switches: int) -> collapse.ScoreTables:
+    def off(of: stumps.Stumps, n_switches: int) -> ScoreTables:
         tables = collapsed(of, n_switches)
         later = tuple(np.minimum(codes, 65533) + np.uint16(1) for codes in tables.thresholds)
         return tables.changed(bias=tables.bias * (1 + 2.0**-40), thresholds=later)
@@ -160,7 +161,7 @@ def spoil_scoretables(patch: Patch) -> None:
     patch.setattr(scoretables, "collapse", off)
     patch.setattr(scoretables, "balance", lost_bits)
     patch.setattr(scoretables, "quantise", lambda *given: nearer_zero(quantised(*given)))
-    patch.setattr(collapse.ScoreTables, "scores", lambda self, bits, codes: np.tile(self.bias, (len(bits), 1)))
+    patch.setattr(ScoreTables, "scores", lambda self, bits, codes: np.tile(self.bias, (len(bits), 1)))
 
 
 def spoil_logits(patch: Patch) -> None:
