@@ -76,7 +76,7 @@ FAULTS = (
     ),
     Fault(
         "of tied classes the ensemble takes the last",
-        "compiler/boosting/stumps.py",
+        "runtime/model/tables.py",
         "(scores >= scores.max(axis=1, keepdims=True) - TIE).argmax(axis=1)",
         "scores.shape[1] - 1 - (scores >= scores.max(axis=1, keepdims=True) - TIE)[:, ::-1].argmax(axis=1)",
         "tests/compiler/boosting/test_stumps.py",
@@ -104,9 +104,9 @@ FAULTS = (
     ),
     Fault(
         "a code at a threshold goes right, in the float tables",
-        "compiler/model/collapse.py",
-        "rows[np.searchsorted(thresholds, column)]",
-        'rows[np.searchsorted(thresholds, column, side="right")]',
+        "runtime/model/terms/bins.py",
+        "self.rows[np.searchsorted(self.thresholds, values[0])]",
+        'self.rows[np.searchsorted(self.thresholds, values[0], side="right")]',
         "tests/compiler/model/test_collapse.py",
     ),
     Fault(
@@ -118,7 +118,7 @@ FAULTS = (
     ),
     Fault(
         "halves are rounded up, not to even",
-        "runtime/model/quantise.py",
+        "runtime/model/terms/base.py",
         "np.rint(rows / grid) * grid",
         "np.floor(rows / grid + 0.5) * grid",
         "tests/compiler/model/test_quantise.py",

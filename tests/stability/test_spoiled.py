@@ -142,7 +142,7 @@ def spoil_stumpfits(patch: Patch) -> None:
 def nearer_zero(integers: IntegerTables) -> IntegerTables:
     """Return tables with every entry a step nearer to zero: no sum leaves its range."""
     names = ("bias", "switch_rows", "switch_means", "joint_means")
-    return replace(integers, **{name: getattr(integers, name) - np.sign(getattr(integers, name)) for name in names})
+    return integers.changed(**{name: getattr(integers, name) - np.sign(getattr(integers, name)) for name in names})
 
 
 def spoil_scoretables(patch: Patch) -> None:
