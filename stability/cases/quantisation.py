@@ -109,10 +109,12 @@ def _is_right(tables: IntegerTables, sign: int) -> bool:
 
 
 def _is_refused(tables: IntegerTables, last: str, sign: int) -> bool:
-    row = tables.joint_rows[0] if last == "joint_rows" else getattr(tables, last)
-    if last == "bias" and sign > 0:
-        row = tables.switch_rows  # 32768 does not fit int16: the extra step comes from another row
+    if last == "switch_rows" or (last == "bias" and sign > 0):
+        row = tables.bits[0].row  # 32768 does not fit int16: the extra step comes from another row than the bias
+    else:
+        row = tables.joint_rows[0] if last == "joint_rows" else getattr(tables, last)
     row[..., 1].flat[0] += sign
+    vars(tables).pop("switch_rows")  # which was kept
     altered = tables_to_bytes(tables)
     return _refuses(lambda: replace(tables)) and _refuses(lambda: tables_from_bytes(altered))
 
