@@ -239,8 +239,9 @@ class Detected(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     none: Recognised | None = None
 
     def __str__(self) -> str:
-        """Return "new subject: 98.1 % [...] of grasps are held, 97.0 % [...] of nothing held are none"."""
-        parts = [(self.held, "said to be held")] + ([] if self.none is None else [(self.none, "of nothing held, none")])
+        """Return "new subject: 98.1 % of grasps detected as one (...); 97.0 % of nothing held as none (...)"."""
+        parts = [(self.held, "of grasps detected as one")]
+        parts += [] if self.none is None else [(self.none, "of nothing held as none")]
         shares = (f"{100 * rate.rate:.1f} % {words} ({rate.basis})" for rate, words in parts)
         return f"{self.held.title}: {'; '.join(shares)}"
 
