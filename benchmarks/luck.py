@@ -97,7 +97,7 @@ def played(asked: tuple[int, GraspSet | None, Equipment]) -> Case:
     fresh = recorded(seed, more=MORE) if others is None else others
     best = [design for design in fronts[0] if design.frame.us <= BUDGET_US or design is fronts[0][0]][-1]
     tables = tables_from_bytes(best.tables.content)
-    columns = list(best.close.screened.columns)
+    columns = [element.column for element in best.close.screened.elements]
     predicted = integer_scores(tables, fresh.switches[:, columns], fresh.codes[:, : tables.n_joints]).argmax(axis=1)
     truth = np.array([samples.grasps.index(grasp) for grasp in fresh.grasps.tolist()])
     lucky = luck[best.judged]

@@ -20,7 +20,7 @@ import msgspec
 import numpy as np
 
 from thenar.simulator.contact.model import Contact
-from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
+from thenar.simulator.effects.contact_quasistatic import Quasistatic
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import sessions, simulate
@@ -49,7 +49,7 @@ def poses(scene: Scene, repetitions: int) -> Iterator[Batch]:
 def solved(batches: Sequence[Batch]) -> tuple[list[Contact], float]:
     """Return the contacts of batches, solved together, and the processor time of a grasp in milliseconds."""
     start = time.process_time()
-    contacts = Quasistatic(Parameters()).solve([batch.load() for batch in batches])
+    contacts = Quasistatic().solve([batch.load() for batch in batches])
     return contacts, 1e3 * (time.process_time() - start) / sum(map(len, batches))
 
 

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from thenar.compiler.text import INDEPENDENT, duration
-from thenar.runtime.published import NONE
 from thenar.runtime.recipe import AUTO, choices
 
 from .common import (
@@ -46,7 +44,6 @@ if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
     from thenar.runtime.harness.wiring import Harness
     from thenar.runtime.manifest import Manifest
-    from thenar.runtime.scanning.scanmap import ScanMap
     from thenar.runtime.scanning.timing import ScanTime
 
 _BOARD = "board"
@@ -232,13 +229,8 @@ def _warn(made: "BuildReport", chosen: "Picked | None", given: "Harness | None",
     """Warn of a build that always predicts the same, whose joints the glove does not measure, or that is not wired as
     `glove`, the file of `given`.
     """
-    if made.only_answer is not None:
-        warning(
-            f"the build predicts {made.only_answer} for every row: no single input distinguishes grasp types, and the "
-            "model looks at one input at a time"
-        )
-    if made.unread:
-        warning(made.unread)
+    for sentence in made.warnings:
+        warning(sentence)
     if chosen is not None and given is not None and made.harness != given:
         warning(
             f"the scan map uses the wiring that point {chosen.point.number} was found with, not {glove}: to run on "
@@ -305,81 +297,19 @@ def _propose(manifest: "Manifest", path: Path | None, chip: str | None) -> None:
 
 
 def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
-    from thenar.compiler.sensors import SensorCount
-    from thenar.runtime.scanning.propose import own_joints
+    from thenar.runtime.scanning.timing import scan_us
 
-    manifest, proof = made.manifest, made.manifest.proof
     console = out()
-    console.print(
-        f"{folder}: {len(manifest.grasps) - (manifest.grasps[-1] == NONE)} grasp types from "
-        f"{SensorCount.of_build(manifest)}; tables of {made.tables_bytes} bytes"
-    )
-    _print_training(manifest)
-    for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
-        console.print(f"accuracy, {rate}")
-    for sentence in manifest.nothing_held:
-        console.print(sentence, soft_wrap=True)
-    if manifest.source.independent:
-        console.print(INDEPENDENT)
-    console.print(
-        f"integers: {proof.scale:.1f} steps a unit, no sum above {proof.bound} of 32767, no score off by more than "
-        f"{proof.error:g} steps; {proof.covered} of {manifest.source.rows} rows are safe, {proof.changed} change class"
-    )
-    console.print(made.firmware, soft_wrap=True)
-    if manifest.faults is not None and manifest.faults.lost is not None:
-        console.print(f"worst loss of a single input, on training rows: {manifest.faults.sentences[0]}", soft_wrap=True)
-    if made.harness is not None and made.scan is not None:
-        _print_scan(made.scan, made.harness)
+    for fact in made.facts:
+        console.print(f"{folder}: {fact.text}" if fact.label == "build" else str(fact), soft_wrap=True)
+    if made.scan is not None and made.harness is not None:
+        time = scan_us(made.scan, made.harness)
+        if time.chips:
+            _print_chips(time)
     if propose is not None:
         console.print(
             f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
         )
-        if joints := own_joints([joint.name for joint in manifest.joints]):
-            console.print(joints)
-
-
-def _print_training(manifest: "Manifest") -> None:
-    from thenar.drivers.cyberglove_protocol import sensors_with, shortest_us
-
-    console = out()
-    if manifest.switches:
-        levels = any(switch.threshold is not None for switch in manifest.switches)
-        kept = ", ".join(switch.name for switch in manifest.switches)
-        console.print(f"{'switches and levels of pads' if levels else 'switches'}: {kept}", soft_wrap=True)
-    for switch in manifest.switches:
-        if switch.threshold is not None:
-            console.print(f"{switch.name}: {switch.closed}, learnt")
-    if manifest.options.keep_joints is not None:
-        names = [joint.name for joint in manifest.joints]
-        us = shortest_us(len(names), 115_200, status=True)
-        record = f"; a CyberGlove's record of them takes {duration(us)}" if sensors_with(names) else ""
-        console.print(f"joints: {', '.join(names)}{record}", soft_wrap=True)
-    console.print(f"trained by {manifest.fit}{': ' if manifest.fit.why else ''}{manifest.fit.why}", soft_wrap=True)
-    for each in manifest.fit.compared:
-        console.print(f"  {each}", soft_wrap=True)
-    if manifest.stopped_after:
-        console.print(
-            f"stopped after {manifest.stopped_after} of {manifest.fit.settings['rounds']:g} rounds: the last changed "
-            f"the mean loss by less than {manifest.options.tolerance:g}"
-        )
-    if manifest.zero_gain_nodes:
-        console.print(
-            f"at {manifest.zero_gain_nodes} of the placement's decisions no switch alone gains anything: "
-            "the lowest-numbered one that varies was taken"
-        )
-
-
-def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
-    """Print the map chip by chip, in reading order, with the time on the wire."""
-    from thenar.runtime.scanning.timing import scan_us
-
-    time = scan_us(scan, harness)
-    if time.chips:
-        _print_chips(time)
-        out().print(_in_all(scan, harness, time))
-    for stream, read in zip(harness.streams, scan.streams, strict=True):
-        count = len(read.switches) + len(read.levels)
-        out().print(f"stream {stream.port}: {count} kept switches and levels, a row every {stream.period_us} us")
 
 
 def _print_chips(time: "ScanTime") -> None:
@@ -389,11 +319,3 @@ def _print_chips(time: "ScanTime") -> None:
     if time.selects:
         chips.add_row(f"{time.selects} writes to muxes", "", "", "", f"{time.select_us:.1f}")
     out().print(chips)
-
-
-def _in_all(scan: "ScanMap", harness: "Harness", time: "ScanTime") -> str:
-    count, what = len(scan.ports) + time.selects, "switches and taxels" if harness.taxel_names else "switches"
-    return (
-        f"a whole scan: {count} transaction{'s' if count > 1 else ''}, {time.us:.1f} us on the wire, "
-        f"{time.share:.1%} of the {time.full_us:.1f} us for all {harness.on_chips} wired {what}"
-    )

@@ -32,7 +32,7 @@ from .options import Training, asked_settings, method_list, trainer_option
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from thenar.compiler.frontier.points import Frontier, Point
+    from thenar.compiler.frontier.points import Frontier, FrontierPoint
     from thenar.compiler.frontier.search import Search
 
 
@@ -217,7 +217,7 @@ def _title(frontier: "Frontier") -> str:
     return f"The best of {frontier.combinations:,} combinations, {frontier.source} on {frontier.machine}{wanted}"
 
 
-def _cells(point: "Point", rated: Sequence[str]) -> tuple[Text, ...]:
+def _cells(point: "FrontierPoint", rated: Sequence[str]) -> tuple[Text, ...]:
     from thenar.compiler.frontier.words import is_usual, training_of, way_of, wiring_of
 
     setting = point.setting

@@ -28,7 +28,7 @@ from .lines import echo
 if TYPE_CHECKING:
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.compiler.recordings.importer import ImportReport
-    from thenar.compiler.recordings.propose import Proposal
+    from thenar.compiler.recordings.propose import ColumnProposal
 
 
 class _Table(click.Path):
@@ -139,7 +139,7 @@ def _write(text: str, path: Path, asked: bool) -> Path:
     return path
 
 
-def _print_proposal(proposal: "Proposal") -> None:
+def _print_proposal(proposal: "ColumnProposal") -> None:
     from thenar.compiler.recordings.inputs import listed
 
     for remark in proposal.remarks:

@@ -24,12 +24,9 @@ if TYPE_CHECKING:
 @overwrite_flag
 @json_flag
 def command(grasps: Path, plot: Path | None) -> None:
-    """Summarise GRASPS, a .grasps file: counts, balance, odd columns and rows, and how separable it is.
+    """Summarise GRASPS, a .grasps file: counts, balance, and odd columns and rows.
 
-    A trial is one recorded grasp or rest, a frame one reading. Rests count in no accuracy. The ceiling is the accuracy
-    of a perfect memory: no classifier that sees only these inputs is more accurate on these frames. The
-    nearest-neighbour accuracy classifies each frame by the nearest frame of another trial, with joints in standard
-    deviations.
+    A trial is one recorded grasp or rest, a frame one reading. Rests count in no accuracy.
 
     \b
     Example:
@@ -72,7 +69,6 @@ def _print(summary: "Summary", path: Path) -> None:
     _print_counts(summary)
     for kind, ranges in (("taxel", summary.taxels), ("joint", summary.joints)):
         _print_ranges(kind, ranges)
-    _print_separability(summary)
     for warning in summary.warnings:
         echo(f"warning: {warning.message}")
 
@@ -97,13 +93,4 @@ def _print_ranges(kind: str, ranges: "Sequence[JointRange]") -> None:
     for each in ranges:
         ends = ("-" if end is None else f"{end:g}" for end in (each.least, each.largest))
         lines.add_row(each.name, each.unit, *ends, str(each.codes))
-    out().print(lines)
-
-
-def _print_separability(summary: "Summary") -> None:
-    numbers = ("distinct frames", "ceiling", "nearest neighbour", "over rows")
-    lines = table(("inputs", *numbers), numbers, "Separability")
-    for line in summary.separability:
-        rate = "-" if line.neighbour_rate is None else f"{line.neighbour_rate:.1%}"
-        lines.add_row(line.inputs, str(line.distinct_frames), f"{line.ceiling:.1%}", rate, str(line.neighbour_rows))
     out().print(lines)

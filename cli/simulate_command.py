@@ -29,7 +29,7 @@ from .lines import echo
 from .options import scene_name
 
 if TYPE_CHECKING:
-    from thenar.compiler.evaluation.ablation import Ablation, Change, Variant
+    from thenar.compiler.evaluation.ablation import Ablation, AccuracyChange, Variant
     from thenar.simulator.pipeline.explain import Explanation
     from thenar.simulator.pipeline.report import SimulationReport, StepReport
     from thenar.simulator.pipeline.scene_file import Shipped
@@ -305,7 +305,7 @@ def _print_ablation(ablation: "Ablation") -> None:
     )
 
 
-def _change(change: "Change | None") -> str:
+def _change(change: "AccuracyChange | None") -> str:
     return "" if change is None else f"{100 * change.mean:+z.1f} [{100 * change.low:+z.1f}, {100 * change.high:+z.1f}]"
 
 

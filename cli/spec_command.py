@@ -9,6 +9,8 @@ from .common import Number, OutputFolder, existing_file, existing_folder, json_f
 from .options import fitted_hand, layout_option
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from thenar.compiler.glove.spec import SpecSummary
     from thenar.runtime.build import Build
     from thenar.runtime.harness.wiring import Harness
@@ -45,6 +47,7 @@ def command(
         thenar spec build/ --layout layout.toml -o spec/
     """
     from thenar.compiler.glove.files import check_output, files_of, write_spec
+    from thenar.compiler.glove.lists import expectations
     from thenar.compiler.glove.spec import glove_spec
     from thenar.runtime.build import Build
 
@@ -58,7 +61,7 @@ def command(
         files = files_of(spec)
         write_spec(files, output)
         written = f"{output}: {', '.join(sorted(files))}"
-    show(spec.summary, _print, written)
+    show(spec.summary, lambda summary: _print(summary, expectations(spec), written))
 
 
 def _harness(folder: Path, loaded: "Build", glove: Path | None) -> "Harness | None":
@@ -71,10 +74,8 @@ def _harness(folder: Path, loaded: "Build", glove: Path | None) -> "Harness | No
     return load_harness(own) if loaded.scan is not None and own.is_file() else None
 
 
-def _print(spec: "SpecSummary", written: str) -> None:
+def _print(spec: "SpecSummary", expected: "Iterable[str]", written: str) -> None:
     """Print the content of `spec.json` for people, and the names of the written files."""
-    from thenar.compiler.glove.lists import expectations
-
     console = out()
     hand = "" if spec.hand_length_mm is None else f", for a right hand of {spec.hand_length_mm:g} mm"
     wired = "a proposed wiring" if spec.proposed else f"wired as {spec.glove}"
@@ -84,7 +85,7 @@ def _print(spec: "SpecSummary", written: str) -> None:
     _print_materials(spec)
     if spec.print_on:
         console.print(f"the pattern is for {spec.print_on}")
-    for sentence in (*expectations(spec.expected), *spec.remarks):
+    for sentence in (*expected, *spec.remarks):
         console.print(sentence)
     if written:
         console.print(written, soft_wrap=True)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .placement.methods.base import METHODS
     from .placement.placement import Placement, place
     from .placement.selectors import ID3Selector, SwitchSelector
-    from .recordings.columns import Columns
+    from .recordings.columns import ColumnRoles
     from .recordings.dataframes import from_dataframe
     from .recordings.export import to_dataframe
     from .recordings.graspset import GraspSet, Joint
@@ -62,7 +62,7 @@ _HOMES = {
     ".placement.methods.base": ("METHODS",),
     ".placement.placement": ("Placement", "place"),
     ".placement.selectors": ("ID3Selector", "SwitchSelector"),
-    ".recordings.columns": ("Columns",),
+    ".recordings.columns": ("ColumnRoles",),
     ".recordings.dataframes": ("from_dataframe",),
     ".recordings.export": ("to_dataframe",),
     ".recordings.graspset": ("GraspSet", "Joint"),
@@ -81,7 +81,7 @@ __all__ = [
     "BoostingError",
     "Build",
     "BuildReport",
-    "Columns",
+    "ColumnRoles",
     "CompileError",
     "Documents",
     "EvaluationError",

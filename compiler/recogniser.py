@@ -1,5 +1,6 @@
 """The recogniser: what a recipe makes of samples, for everything that compiles, evaluates or places."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -123,9 +124,28 @@ class Recogniser:
         fitting = choose_training(kept, candidates, seed=recipe.seed, groups=by, of=of, jobs=jobs, report=report)
         training = Training.chosen(fitting, masked=recipe.robust)
         model = training.train(kept, report if len(candidates) == 1 else None)
-        if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
-            raise CompileError(f"trainer {fitting.trainer!r} returned an invalid model that {fault}: fix the trainer")
+        _check_model(model, kept, training)
         return cls(recipe, samples, selection, model, fitting, training, groups)
+
+    @classmethod
+    def stages(
+        cls,
+        samples: Samples,
+        recipe: Recipe,
+        rows: NDArray[np.intp],
+        selection: InputSelection,
+        training: Training,
+        rounds: Sequence[int],
+    ) -> tuple[Self, ...]:
+        """Train once with inputs and a fit that were chosen before from the same rows, as `fit` chooses them; return
+        the recogniser after each of these numbers of rounds. Several recipes share the work of choosing so.
+        """
+        samples = samples.rows(rows)
+        kept = selection.read(samples.rows(samples.balanced()))
+        models = training.stages(kept, rounds)
+        for model in models:
+            _check_model(model, kept, training)
+        return tuple(cls(recipe, samples, selection, model, training=training) for model in models)
 
     @property
     def elements(self) -> Elements:
@@ -187,6 +207,11 @@ class Recogniser:
         """The number of tree nodes at which no single switch gained anything."""
         tree = self.selection.chosen.tree
         return 0 if tree is None else tree.n_zero_gain
+
+
+def _check_model(model: Model, kept: Samples, training: Training) -> None:
+    if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
+        raise CompileError(f"trainer {training.trainer!r} returned an invalid model that {fault}: fix the trainer")
 
 
 def predicted_classes(

@@ -373,21 +373,6 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
         return next((rate for rate in self.rates if rate.protocol != "training"), None)
 
     @property
-    def nothing_held(self) -> tuple[str, ...]:
-        """How hands that hold nothing are predicted, and how well, in words."""
-        if self.grasps[-1] == NONE:
-            first = "nothing held: a class of the tables"
-        elif self.rejection is not None:
-            first = (
-                "nothing held: refused by score, closed switches and joints, with at most "
-                f"{100 * self.rejection.share:g} % of the grasps of inner folds; no row shows an empty hand, so how "
-                "many of those are refused is not known"
-            )
-        else:
-            first = "nothing held: never said, every frame is one of the grasp types"
-        return (first, *(f"nothing held, {each}" for each in self.detection if each.held.protocol != "training"))
-
-    @property
     def detected(self) -> Detected | None:
         """How well it detects on new grasps whether something is held; None if that was not measured."""
         return next((each for each in self.detection if each.held.protocol != "training"), None)

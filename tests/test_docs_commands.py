@@ -183,7 +183,7 @@ def every_line() -> Iterator[str]:
             yield from step.text.splitlines()
 
 
-def test_only_the_readme_has_slow_commands_and_every_exception_is_on_a_page() -> None:
+def test_slow_commands_stand_in_the_readme_and_exceptions_on_pages() -> None:
     assert not any(is_slow(step) for path in TUTORIALS for step in steps_of(path.read_text(encoding="utf-8")))
     assert {*NOT_RUN, *SLOW} <= {*every_line()}
 

@@ -92,7 +92,7 @@ def test_every_effect_is_documented_and_none_that_is_not_there() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_an_effect_has_the_parameters_defaults_and_limits_of_the_page(name: str) -> None:
-    kind = EFFECTS[name].parameters
+    kind = EFFECTS[name].parameters()
     documented = keyed([row for effect, row in effect_rows() if effect == name], "parameter")
     assert documented.keys() == {*kind.__struct_fields__} - {"after"}
     for key, row in documented.items():
@@ -109,7 +109,7 @@ TABLES: dict[str, type[msgspec.Struct]] = {
 
 
 @pytest.mark.parametrize("heading", TABLES)
-def test_a_table_of_a_scene_has_the_keys_defaults_and_limits_of_the_page(heading: str) -> None:
+def test_scene_tables_have_the_pages_keys_defaults_and_limits(heading: str) -> None:
     kind, documented = TABLES[heading], keyed(table(heading), heading)
     assert documented.keys() == {*kind.__struct_fields__}
     for key, row in documented.items():

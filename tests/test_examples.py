@@ -162,7 +162,7 @@ def test_jupytext_makes_a_valid_notebook_of_it(tmp_path: Path) -> None:
 
 
 @slow
-def test_the_home_made_glove_goes_from_its_table_to_firmware_in_at_most_ten_commands(tmp_path: Path) -> None:
+def test_the_home_made_glove_takes_ten_commands_to_firmware(tmp_path: Path) -> None:
     script = (EXAMPLES / "home_glove.sh").read_text()
     commands = [line for line in script.splitlines() if line.startswith("thenar ")]
     assert len(commands) <= 10
@@ -211,7 +211,7 @@ def test_the_sample_table_imports_as_it_is(home_glove: GraspSet) -> None:
     assert np.bincount(home_glove.trial_ids).tolist() == [8] * (6 * 16 * 3)
 
 
-def test_folds_that_part_the_frames_of_a_trial_flatter_on_the_sample_table(home_glove: GraspSet) -> None:
+def test_folds_that_split_trials_flatter_on_the_sample_table(home_glove: GraspSet) -> None:
     X = StandardScaler().fit_transform(home_glove.codes)
     frames, trials, people = (
         cross_val_score(KNeighborsClassifier(1), X, home_glove.labels, cv=folds, groups=groups).mean()

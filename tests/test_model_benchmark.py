@@ -26,7 +26,7 @@ def grasps(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_no_fold_outer_or_inner_parts_a_trial_or_a_subject_that_is_left_out(grasps: Path) -> None:
+def test_no_fold_splits_a_trial_or_a_left_out_subject(grasps: Path) -> None:
     from modelsets import cuts, load
 
     found = list(cuts(load(str(grasps), Path())))

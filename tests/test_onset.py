@@ -86,7 +86,7 @@ def test_joints_are_read_alone_and_with_each(onset: Callable[..., Any]) -> None:
     assert titles[3:] == ["joints", "switches and joints", "levels and joints", "codes and joints"]
 
 
-def test_a_force_that_no_trial_reads_has_no_rate_and_none_at_all_is_refused(onset: Callable[..., Any]) -> None:
+def test_a_force_without_trials_has_no_rate(onset: Callable[..., Any]) -> None:
     found = onset(pressed(), (1.0, 1.2, 1.4), jobs=1, options=FAST)
     assert [rate is None for rate in found.curves[0].rates] == [False, False, True]
     with pytest.raises(EvaluationError, match="no trial has a frame"):

@@ -21,7 +21,7 @@ LINKS = ROOT / "src" / "thenar"
 ROOMS = sorted(path.name for path in LINKS.iterdir() if path.is_dir() and path.name != "__pycache__")
 
 
-def test_every_room_stands_at_the_top_and_is_linked_under_its_import_name() -> None:
+def test_every_room_is_linked_under_its_import_name() -> None:
     assert sorted(path.parent.name for path in ROOT.glob("*/__init__.py")) == ROOMS
     assert all((LINKS / room).is_symlink() and (LINKS / room).resolve() == ROOT / room for room in ROOMS)
 
@@ -156,7 +156,7 @@ def test_the_wheel_holds_every_module_and_no_other(board: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_wheel_holds_what_the_modules_read_beside_them_such_as_every_template(board: Path) -> None:
+def test_the_wheel_holds_every_template_and_data_file(board: Path) -> None:
     listed = on_board(
         board,
         "import thenar.runtime, pathlib; r = pathlib.Path(thenar.runtime.__file__).parents[1]; "

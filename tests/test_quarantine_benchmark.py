@@ -67,7 +67,7 @@ def test_a_switch_that_sticks_is_found_and_none_without_a_fault(faults: ModuleTy
 
 
 @pytest.mark.slow
-def test_of_every_switch_that_sticks_closed_and_of_healthy_gloves_of_other_men(
+def test_stuck_switches_and_healthy_gloves_of_other_men_are_counted(
     faults: ModuleType, scene: Callable[..., GraspSet], tmp_path: Path
 ) -> None:
     """39 switches of three men, on three other men: at most a point more than the switch costs as lost, and eight in

@@ -15,6 +15,7 @@ from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.folds import EvaluationError
+from ..facts import Fact, facts
 from ..hand import HandShape
 from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
@@ -52,7 +53,7 @@ class BuildReport:
         The grasp type predicted for every row, if there is only one: then the inputs carry no information that a sum
         over them can use.
     firmware : str
-        A sentence: what the firmware is laid out for, or why there is none.
+        What the firmware is laid out for, or why there is none, in words.
     scan, harness : ScanMap, Harness or None
         How to read the switches, and the wiring to read them from; None if it was compiled without a harness.
     unread : str
@@ -82,6 +83,20 @@ class BuildReport:
     faults: FaultCounts
     has_page: bool
     confusion: NDArray[np.intp] | None
+
+    @property
+    def facts(self) -> tuple[Fact, ...]:
+        """Its facts in words, as the command line and the report print them."""
+        return facts(self.manifest, self.scan, self.harness, tables_bytes=self.tables_bytes, firmware=self.firmware)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on a build that always predicts the same, and on joints that nothing in the harness reads."""
+        always = (
+            f"the build predicts {self.only_answer} for every row: no single input distinguishes grasp types, and the "
+            "model looks at one input at a time"
+        )
+        return tuple(filter(None, ("" if self.only_answer is None else always, self.unread)))
 
     def __repr__(self) -> str:
         """Return the folder, and the numbers of grasp types, switches and joints."""
@@ -129,10 +144,8 @@ class Documents:
             ReportContent(
                 manifest=made.manifest,
                 tables=made.tables,
-                tables_bytes=made.tables_bytes,
-                rounds=made.recogniser.rounds,
-                firmware=made.firmware,
-                only_answer=made.only_answer,
+                facts=made.facts,
+                warnings=made.warnings,
                 tree=made.recogniser.selection.chosen.tree,
                 confusion=made.confusion,
                 study=study,

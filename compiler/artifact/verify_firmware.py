@@ -97,13 +97,13 @@ class BundledFirmware(Struct, frozen=True):
 
 
 def made_firmware(manifest: Manifest, tables: IntegerTables) -> tuple[dict[str, str], str]:
-    """Return path in the build -> text of its firmware, and a sentence on its target, or on why there is none."""
+    """Return path in the build -> text of its firmware, and its target or why there is none, in words."""
     try:
         fit = smallest_fit(tables)
         made = Library(LIBRARY_NAME, manifest, fit.layout, fit.notes()).whole
     except FirmwareError as reason:
-        return {}, f"no firmware: {reason}"
-    return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, f"firmware {fit.words}"
+        return {}, f"none: {reason}"
+    return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, fit.words
 
 
 def bundled_firmware(folder: Path, build: Build) -> BundledFirmware:

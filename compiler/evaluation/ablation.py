@@ -27,7 +27,7 @@ _KINDS = {"switches": COMPOSITIONS[4], "joints": COMPOSITIONS[3], "both": COMPOS
 _Z = 1.959963984540054  # of the normal distribution, for 95 %
 
 
-class Change(msgspec.Struct, frozen=True):
+class AccuracyChange(msgspec.Struct, frozen=True):
     """A difference of two accuracies on the same grasps, and its 95 % interval."""
 
     mean: float
@@ -35,7 +35,7 @@ class Change(msgspec.Struct, frozen=True):
     high: float
 
 
-class Recognised(msgspec.Struct, frozen=True):
+class InputAccuracy(msgspec.Struct, frozen=True):
     """The accuracy with some inputs, by trials and by frames (None if each row is a trial), and the change in accuracy
     by trials when the effect is removed; None for the whole scene.
     """
@@ -43,7 +43,7 @@ class Recognised(msgspec.Struct, frozen=True):
     inputs: str
     rate: Rate
     frames: Rate | None
-    change: Change | None
+    change: AccuracyChange | None
 
 
 class Variant(msgspec.Struct, frozen=True):
@@ -53,7 +53,7 @@ class Variant(msgspec.Struct, frozen=True):
     rows: int
     unsettled: int
     us_a_grasp: float
-    rates: tuple[Recognised, ...]
+    rates: tuple[InputAccuracy, ...]
 
 
 class Ablation(msgspec.Struct, frozen=True):
@@ -122,15 +122,15 @@ def _predicted(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dic
 
 def _recognised(
     name: str, grasp_set: GraspSet, predicted: dict[str, Labels], whole: tuple[GraspSet, dict[str, Labels]] | None
-) -> Recognised:
+) -> InputAccuracy:
     rates = rated(predicted[name], grasp_set.labels, grasp_set.trial_ids, of="within subject")
     if whole is None:
-        return Recognised(name, *rates, None)
+        return InputAccuracy(name, *rates, None)
     now, before = _hits(grasp_set, predicted[name]), _hits(whole[0], whole[1][name])
     # A grasp may have settled in only one of the two.
     same = [key for key in now if key in before]
     change = change_of(np.array([now[key] for key in same]), np.array([before[key] for key in same]))
-    return Recognised(name, *rates, change)
+    return InputAccuracy(name, *rates, change)
 
 
 def _hits(grasp_set: GraspSet, predicted: Labels) -> dict[tuple[str, int], bool]:
@@ -142,7 +142,7 @@ def _hits(grasp_set: GraspSet, predicted: Labels) -> dict[tuple[str, int], bool]
     return dict(zip(keys, hits.tolist(), strict=True))
 
 
-def change_of(now: Bits, before: Bits) -> Change:
+def change_of(now: Bits, before: Bits) -> AccuracyChange:
     """Return the change in accuracy on the same m > 0 grasps, recognised `now` and `before`, with its 95 % interval.
 
     The interval is for a difference of paired proportions, with half a grasp added to each cell of the 2 x 2 table
@@ -154,4 +154,4 @@ def change_of(now: Bits, before: Bits) -> Change:
     middle = (gained - lost) / m
     reach = _Z * ((gained + lost + 1.0) / m - middle * middle) ** 0.5 / m**0.5
     mean = (gained - lost) / len(now)
-    return Change(mean, max(-1.0, min(mean, middle - reach)), min(1.0, max(mean, middle + reach)))
+    return AccuracyChange(mean, max(-1.0, min(mean, middle - reach)), min(1.0, max(mean, middle + reach)))

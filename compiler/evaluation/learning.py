@@ -20,7 +20,7 @@ from .luck import Draws
 from .plan import CellPlan, Data, Planner, learners
 from .populations import NESTED, Population, Scheme
 from .rates import Rate, RecipeWords
-from .tables import Reader
+from .tables import RateReader
 
 Floats = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ _EXPONENTS = np.arange(1, 61) / 30  # of n, from 1/30 to 2
 
 
 @dataclass(frozen=True, slots=True)
-class Expected:
+class ExpectedAccuracy:
     """The accuracy expected after `repetitions` repetitions, from a fitted law, with its 95 % interval."""
 
     repetitions: int
@@ -44,7 +44,7 @@ class LearningCurve:
 
     learner: str
     rates: tuple[Rate, ...]
-    expected: tuple[Expected, ...]
+    expected: tuple[ExpectedAccuracy, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ class LearningPlan:
         """All cells."""
         return (cell for cells in self.cells.values() for cell in cells)
 
-    def read(self, reader: Reader, groups: NDArray[np.str_] | None, seed: int, recipe: RecipeWords) -> Learning:
+    def read(self, reader: RateReader, groups: NDArray[np.str_] | None, seed: int, recipe: RecipeWords) -> Learning:
         """Return the curves; groups (n,) are the subjects, if those are left out."""
         enough, curves = len(self.repetitions) >= LEAST, []
         for learner, cells in self.cells.items():
@@ -165,7 +165,7 @@ def _ranks(data: Data, subjects: Rows, rows: Rows, place: Rows) -> tuple[Rows, f
 
 def expected(
     repetitions: Sequence[int], rates: Sequence[Rate], hits: NDArray[np.bool_], units: Rows, seed: int
-) -> tuple[Expected, ...]:
+) -> tuple[ExpectedAccuracy, ...]:
     """Return the expected accuracies up to FURTHER times the last number of repetitions.
 
     The interval covers 95 % of the laws fitted to bootstrap draws of units (m,), trials or subjects, and of repeats, by
@@ -186,7 +186,7 @@ def expected(
     last, found = rates[-1], []
     for times, mean, low, high in zip(FURTHER, means.tolist(), lows.tolist(), highs.tolist(), strict=True):
         ends = (low, mean - last.mean + last.low, last.mean), (high, mean - last.mean + last.high, last.mean)
-        found.append(Expected(times * repetitions[-1], mean, max(0.0, min(ends[0])), min(1.0, max(ends[1]))))
+        found.append(ExpectedAccuracy(times * repetitions[-1], mean, max(0.0, min(ends[0])), min(1.0, max(ends[1]))))
     return tuple(found)
 
 

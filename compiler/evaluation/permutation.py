@@ -15,7 +15,7 @@ from ..workers import in_workers
 from .plan import ANGLE, ANGLE_SELECTED, SELECTED, Composition, Data, Planner, Progress, Ways, predictions
 from .populations import NESTED, OF, Population, Scheme, groups_of, populations
 from .rates import RecipeWords
-from .tables import Reader
+from .tables import RateReader
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ def _counted(task: tuple[Permutations, GraspSet, Composition, int]) -> tuple[int
     grasps = tuple(np.unique(made.labels).tolist())
     scheme = how.scheme
     groups = groups_of(made, scheme)
-    reader = Reader(made.labels, made.trial_ids, grasps, found, frozenset(), OF[scheme], groups)
+    reader = RateReader(made.labels, made.trial_ids, grasps, found, frozenset(), OF[scheme], groups)
     rate, _ = reader.rates(cells)
     return rate.correct[0], rate.total
 

@@ -8,9 +8,9 @@ import numpy as np
 from thenar.runtime.files import write_atomically
 
 from ..pictures import on_paper, painting, rendered
-from .learning import Expected, Learning
+from .learning import ExpectedAccuracy, Learning
 from .study import Study
-from .tables import RateTable, Row
+from .tables import RateRow, RateTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +42,7 @@ def draw(study: Study, folder: Path) -> list[Path]:
         ]
 
 
-def _draw(grasps: tuple[str, ...], table: RateTable, row: Row, path: Path) -> Path:
+def _draw(grasps: tuple[str, ...], table: RateTable, row: RateRow, path: Path) -> Path:
     from matplotlib.figure import Figure
 
     side = 1.6 + 0.42 * len(grasps)
@@ -74,7 +74,7 @@ def _draw_learning(learning: Learning, path: Path) -> Path:
         axes.plot([], [], color=colour, marker="os^Dv"[number % 5], ms=4, label=curve.learner)
         if curve.expected:
             ahead = [last, *(each.repetitions for each in curve.expected)]
-            shown: list[Rate | Expected] = [curve.rates[-1], *curve.expected]
+            shown: list[Rate | ExpectedAccuracy] = [curve.rates[-1], *curve.expected]
             lows, highs = [100 * each.low for each in shown], [100 * each.high for each in shown]
             axes.plot(ahead, [100 * each.mean for each in shown], color=colour, lw=1.5, ls=(0, (2, 2)))
             axes.fill_between(ahead, lows, highs, color=colour, alpha=0.08, lw=0)

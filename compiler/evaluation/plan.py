@@ -21,7 +21,6 @@ from ..samples import Columns, Samples
 from ..tables.collapse import model_scores
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
-from .baselines import CLASSIFIERS
 from .choosing import choose_training
 from .folds import Fold, Rows
 from .populations import Population, Protocol, Scheme, groups_of
@@ -30,6 +29,8 @@ Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
 # For each trainer, the candidates among which each fit chooses.
 Ways = Mapping[str, tuple[Training, ...]]
+# Classifiers of scikit-learn with its own settings, neighbours weighted by distance: to compare the trainers with.
+CLASSIFIERS = ("logistic-regression", "5-nearest-neighbours")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,12 +88,28 @@ def predictions(data: Data, fit: FoldFit, training: Training, ways: Ways | None 
     learning = replace(read.rows(rows), labels=trained, grasps=tuple(map(str, fit.grasps)))
     test = read.rows(fit.fold.test)
     if fit.learner in CLASSIFIERS:
-        return grasps[CLASSIFIERS[fit.learner].predict(learning, test.inputs)]
+        return grasps[_classified(fit.learner, learning, test.inputs)]
     if fit.learner:
         groups = None if data.groups is None else data.groups[rows]
         fitting = choose_training(learning, (ways or {})[fit.learner], groups=groups)
         training = Training.chosen(fitting, masked=training.masked)
     return grasps[winners(model_scores(training.train(learning), test.switches, test.codes))]
+
+
+def _classified(name: str, learning: Samples, X: NDArray[np.generic]) -> Labels:
+    """Return the class numbers that one of CLASSIFIERS, on standardised inputs, predicts for rows X (n, d)."""
+    from sklearn.linear_model import LogisticRegression
+    from sklearn.neighbors import KNeighborsClassifier
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    # scikit-learn's classifiers cannot be fitted to a single class.
+    if (learning.labels == learning.labels[0]).all():
+        return np.full(len(X), learning.labels[0])
+    logistic = name == "logistic-regression"
+    classifier = LogisticRegression(max_iter=10_000) if logistic else KNeighborsClassifier(5, weights="distance")
+    made = make_pipeline(StandardScaler(), classifier).fit(learning.inputs.astype(np.float64), learning.labels)
+    return np.asarray(made.predict(X.astype(np.float64)), dtype=np.intp)
 
 
 def is_blind(data: Data, fit: FoldFit) -> bool:

@@ -37,7 +37,7 @@ from .plan import (
 )
 from .populations import NESTED, OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, populations
 from .rates import RecipeWords, placement_words
-from .tables import RateTable, Reader
+from .tables import RateReader, RateTable
 
 TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines", "trainers")
 _NESTED: tuple[TableName, ...] = ("trainers", "joints")
@@ -247,7 +247,7 @@ class _Planned:
         grasps = tuple(np.unique(grasp_set.labels).tolist())
         blind = frozenset(fit for fit in predictions if is_blind(data, fit))
         of = OF[design.scheme]
-        reader = Reader(grasp_set.labels, data.trials, grasps, predictions, blind, of, data.groups)
+        reader = RateReader(grasp_set.labels, data.trials, grasps, predictions, blind, of, data.groups)
         return Study(
             fingerprint=fingerprint,
             rows=len(grasp_set),

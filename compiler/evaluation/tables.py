@@ -79,7 +79,7 @@ def both(rate: Rate, frames: Rate | None, mark: str = "") -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class RateRow:
     """A row of a table: its short name, its description, its switches, its cells, and the rate over all trials.
 
     frames is the rate over all frames, None if each row is a trial; paired compares the trials with those of the
@@ -103,7 +103,7 @@ class RateTable:
     protocol: ProtocolName
     recipe: RecipeWords
     columns: tuple[str, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[RateRow, ...]
 
     @property
     def title(self) -> str:
@@ -118,7 +118,7 @@ class RateTable:
 
 
 @dataclass(frozen=True, slots=True)
-class Reader:
+class RateReader:
     """Computes rates from predictions.
 
     labels, trials  (n,) of each row       grasps  labels that occur
@@ -157,12 +157,12 @@ class Reader:
         confusion = self._confusion(plan) if confusing else None
         return Cell(rate, frames, Spread.of(counts), blind, _draws(rate, len(plan.part.repeats)), confusion)
 
-    def _row(self, plan: RowPlan, *, confusing: bool) -> Row:
+    def _row(self, plan: RowPlan, *, confusing: bool) -> RateRow:
         cells = tuple(self.cell(cell, confusing=confusing) for cell in plan.cells)
         spreads = [cell.switches for cell in cells]
         switches = Spread(min(s.least for s in spreads), fmean(s.mean for s in spreads), max(s.most for s in spreads))
         rate, frames = (cells[0].rate, cells[0].frames) if len(cells) == 1 else self.rates(plan.cells)
-        return Row(plan.name, plan.what, switches, cells, rate, frames)
+        return RateRow(plan.name, plan.what, switches, cells, rate, frames)
 
     def rates(self, plans: Sequence[CellPlan]) -> tuple[Rate, Rate | None]:
         """Return the rates by trials and by frames of some cells together; their runs correspond."""

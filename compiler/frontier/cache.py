@@ -4,14 +4,12 @@ import fcntl
 import os
 import platform
 import sqlite3
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import update_wrapper
 from hashlib import blake2b
 from inspect import signature
 from pathlib import Path
-from typing import Any, Generic, Literal, ParamSpec, TypeVar, get_type_hints
+from typing import Any, Literal, TypeVar, get_type_hints
 
 import msgspec
 import numpy as np
@@ -32,7 +30,7 @@ Place = Literal["cluster", "machine", "process"]
 Report = Callable[[int, int], None]
 # Steps of the progress of one round.
 ROUND = 100
-P = ParamSpec("P")
+F = TypeVar("F", bound=Callable[..., Any])
 R = TypeVar("R")
 
 
@@ -40,61 +38,11 @@ class StoreError(ThenarError, OSError):
     """A store that cannot be opened or written to, is in use by another run, or is another kind of file."""
 
 
-class Stored(Generic[P, R]):
-    """A function of a module whose results a `Cache` stores; see `stored`. A direct call computes a new result."""
-
-    def __init__(self, function: Callable[P, R], version: int, where: Place, without: Sequence[str]) -> None:
-        update_wrapper(self, function)
-        self.function, self.version, self.where, self.without = function, version, where, without
-
-    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Compute and return the result."""
-        return self.function(*args, **kwargs)
-
-    def __reduce__(self) -> str:
-        # Workers find it by name, like any function.
-        return self.function.__qualname__
-
-    def call(self, *args: P.args, **kwargs: P.kwargs) -> "Call[R]":
-        """Return a call for `Cache.ask`."""
-        return Call(self, args, kwargs)
+# The version of each stored function, and where it may run.
+_STORED: dict[Callable[..., Any], tuple[int, Place]] = {}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Call(Generic[R]):
-    """A stored function and its arguments."""
-
-    work: Stored[..., R]
-    args: tuple[Any, ...]
-    kwargs: Mapping[str, Any]
-
-    def __call__(self) -> R:
-        """Compute and return the result."""
-        return self.work(*self.args, **self.kwargs)
-
-    def question(self, digests: dict[int, str]) -> bytes:
-        """Return everything that determines the result within the store's scope: function name, version and arguments.
-
-        digests  of arrays by their ids, while these live: each is digested once
-        """
-
-        def plain(value: Any) -> object:
-            if isinstance(value, np.ndarray):
-                return digests.get(id(value)) or digests.setdefault(id(value), _digest(value))
-            return value.identity  # of a class that supports caching; AttributeError for all others
-
-        bound = signature(self.work.function).bind(*self.args, **self.kwargs)
-        bound.apply_defaults()
-        arguments = {name: value for name, value in bound.arguments.items() if name not in self.work.without}
-        machine = platform.node() if self.work.where == "process" else ""
-        name = f"{self.work.function.__module__}.{self.work.function.__qualname__}"
-        asked = (name, self.work.version, machine, arguments)
-        return msgspec.json.encode(asked, enc_hook=plain, order="deterministic")
-
-
-def stored(
-    version: int, *, where: Place = "cluster", without: Sequence[str] = ()
-) -> Callable[[Callable[P, R]], Stored[P, R]]:
+def stored(version: int, *, where: Place = "cluster") -> Callable[[F], F]:
     """Return a decorator of functions whose results a `Cache` stores.
 
     Parameters
@@ -103,15 +51,38 @@ def stored(
         Raise it when the function's results change.
     where : {"cluster", "machine", "process"}
         The farthest place where it may run.
-    without : sequence of str
-        Names of arguments that do not affect the result.
 
     Notes
     -----
     The function must be one of a module, its result of a type that JSON carries without loss. Arguments must be
-    encodable by msgspec, arrays, or objects with an encodable `identity`.
+    encodable by msgspec, arrays, or objects with an encodable `identity`. A direct call computes a new result.
     """
-    return lambda function: Stored(function, version, where, without)
+
+    def register(function: F) -> F:
+        _STORED[function] = version, where
+        return function
+
+    return register
+
+
+def question(function: Callable[..., Any], args: Sequence[Any], digests: dict[int, str]) -> bytes:
+    """Return everything that determines a stored function's result within the store's scope: its name, its version and
+    the arguments.
+
+    digests  of arrays by their ids, while these live: each is digested once
+    """
+
+    def plain(value: Any) -> object:
+        if isinstance(value, np.ndarray):
+            return digests.get(id(value)) or digests.setdefault(id(value), _digest(value))
+        return value.identity  # of a class that supports caching; AttributeError for all others
+
+    version, where = _STORED[function]
+    bound = signature(function).bind(*args)
+    bound.apply_defaults()
+    machine = platform.node() if where == "process" else ""
+    asked = (f"{function.__module__}.{function.__qualname__}", version, machine, bound.arguments)
+    return msgspec.json.encode(asked, enc_hook=plain, order="deterministic")
 
 
 class Store(Closing):
@@ -161,10 +132,10 @@ class Store(Closing):
             self._database.close()
             self._database = None
 
-    def get(self, question: bytes, kind: type[R]) -> R | None:
+    def get(self, asked: bytes, kind: type[R]) -> R | None:
         """Return the result, or None if there is none that decodes as `kind`, and it must be computed."""
         with self._asked() as database:
-            found = database.execute("SELECT result FROM results WHERE key = ?", (self._key(question),)).fetchone()
+            found = database.execute("SELECT result FROM results WHERE key = ?", (self._key(asked),)).fetchone()
         if found is None:
             return None
         try:
@@ -172,9 +143,9 @@ class Store(Closing):
         except (ValueError, TypeError, RecursionError):
             return None
 
-    def put(self, question: bytes, result: object) -> None:
+    def put(self, asked: bytes, result: object) -> None:
         """Store the result, which replaces an older one. Raises StoreError, for example if the disk is full."""
-        row = self._key(question), msgspec.json.encode(result)
+        row = self._key(asked), msgspec.json.encode(result)
         if self._database is None:
             raise StoreError(f"{self._path} is closed")
         try:
@@ -185,8 +156,8 @@ class Store(Closing):
                 "this again"
             ) from reason
 
-    def _key(self, question: bytes) -> bytes:
-        return blake2b(self._scope + b"\0" + question, digest_size=16).digest()
+    def _key(self, asked: bytes) -> bytes:
+        return blake2b(self._scope + b"\0" + asked, digest_size=16).digest()
 
     def _connect(self) -> None:
         """Open the database, or make it in an empty file."""
@@ -228,8 +199,8 @@ class Cache:
         self._store, self._report, self._rounds, self._jobs = store, report, rounds, jobs
         self._begun = 0
 
-    def ask(self, calls: Sequence[Call[R]]) -> list[R]:
-        """Return the results in the order of `calls`, all of one function; equal calls are computed once.
+    def ask(self, function: Callable[..., R], calls: Sequence[tuple[Any, ...]]) -> list[R]:
+        """Return the results of a stored function for each tuple of arguments; equal calls are computed once.
 
         Raises StoreError, exceptions of the function, and those of in_workers; results computed until then are stored.
         """
@@ -237,35 +208,34 @@ class Cache:
         if not calls:
             self._tell(1, 1)
             return []
-        kind: type[R] = get_type_hints(calls[0].work.function)["return"]
-        digests: dict[int, str] = {}
-        questions = [call.question(digests) for call in calls]
+        kind: type[R] = get_type_hints(function)["return"]
+        where, digests = _STORED[function][1], dict[int, str]()
+        questions = [question(function, args, digests) for args in calls]
         asked = dict(zip(questions, calls, strict=True))
         found = {key: known for key in asked if (known := self._store.get(key, kind)) is not None}
         todo = [key for key in asked if key not in found]
         self._tell(len(found), len(asked))
-        for number, result in self._found([asked[key] for key in todo], calls[0].work.where):
+        tasks = ((number, function, asked[key]) for number, key in enumerate(todo))
+        jobs = 1 if where == "process" else self._jobs
+        for number, result in in_workers(_computed, tasks, jobs, here=where != "cluster"):
             key = todo[number]
             self._store.put(key, result)
             # Decode it as a later run would: a new result must not differ from a stored one.
             read = self._store.get(key, kind)
             if read is None:
-                raise TypeError(f"the result of {asked[key].work.function.__name__} is no {kind} when read from JSON")
+                raise TypeError(f"the result of {function.__name__} is no {kind} when read from JSON")
             found[key] = read
             self._tell(len(found), len(asked))
         return [found[key] for key in questions]
-
-    def _found(self, calls: Sequence[Call[R]], where: Place) -> Iterator[tuple[int, R]]:
-        return in_workers(_computed, enumerate(calls), 1 if where == "process" else self._jobs, here=where != "cluster")
 
     def _tell(self, done: int, calls: int) -> None:
         """Report the share of this round that is done, and the rounds before it."""
         self._report((self._begun - 1) * ROUND + ROUND * done // calls, self._rounds * ROUND)
 
 
-def _computed(numbered: tuple[int, Call[R]]) -> tuple[int, R]:
-    number, call = numbered
-    return number, call()
+def _computed(task: tuple[int, Callable[..., R], tuple[Any, ...]]) -> tuple[int, R]:
+    number, function, args = task
+    return number, function(*args)
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from ..evaluation.rates import Rate
 from ..trainers.base import TRAINERS, Training
 from .finalists import EvaluatedFinalist
 from .latency import POLICIES
-from .points import DecisionKind, Latency, Point, PointSetting, Time, front
+from .points import DecisionKind, FrontierPoint, Latency, PointSetting, PointTime, front
 from .price import PricedTables, Wired
 from .screen import Screened
 from .search import Candidate, Shape
@@ -33,8 +33,8 @@ class Design:
     tables: PricedTables
     classified: Classified
     wired: Wired | None
-    transfer: Time
-    measured: Time | None = None
+    transfer: PointTime
+    measured: PointTime | None = None
 
     @property
     def judged(self) -> TrialAccuracy:
@@ -49,32 +49,32 @@ class Design:
     @property
     def n_switches(self) -> int:
         """The number of switches that are read."""
-        return len(self.close.screened.columns)
+        return len(self.close.screened.elements)
 
     @property
-    def scan(self) -> Time:
+    def scan(self) -> PointTime:
         """Time of reading the switches."""
-        return Time(0.0, "wire") if self.wired is None else Time(self.wired.scan.us, self.wired.scan.how)
+        return PointTime(0.0, "wire") if self.wired is None else PointTime(self.wired.scan.us, self.wired.scan.how)
 
     @property
-    def classify(self) -> Time:
+    def classify(self) -> PointTime:
         """Time of classifying."""
-        return self.measured or Time(self.classified.us, self.classified.how)
+        return self.measured or PointTime(self.classified.us, self.classified.how)
 
     @property
-    def frame(self) -> Time:
+    def frame(self) -> PointTime:
         """Time of reading everything, on separate lines in parallel, and classifying."""
-        return Time(max(self.scan.us, self.transfer.us) + self.classify.us, self.classify.how)
+        return PointTime(max(self.scan.us, self.transfer.us) + self.classify.us, self.classify.how)
 
 
 Latencies = Mapping[tuple[Design, DecisionKind], Latency]
 
 
-def designs(close: EvaluatedFinalist, read: Time = NO_TIME) -> Iterator[Design]:
+def designs(close: EvaluatedFinalist, read: PointTime = NO_TIME) -> Iterator[Design]:
     """Yield all designs of a finalist, whose joints take `read`."""
     for tables in close.priced:
         if tables.classified is not None:
-            wirings = tables.wired if close.screened.columns else (None, *tables.wired)
+            wirings = tables.wired if close.screened.elements else (None, *tables.wired)
             yield from (Design(close, tables, tables.classified, wired, read) for wired in wirings)
 
 
@@ -109,12 +109,12 @@ def lucks(
     closes = list(dict.fromkeys(design.close for design in several))
     chosen = {close.screened.choice for close in closes}
     picked_from = [
-        (judged, quickest[close, tabled.shape], len(close.screened.columns))
+        (judged, quickest[close, tabled.shape], len(close.screened.elements))
         for close in closes
         for tabled, judged in close.tables.items()
         if (close, tabled.shape) in quickest
     ]
-    picked_from += [(one.judged, one.frame_us, len(one.columns)) for one in screened if one.choice not in chosen]
+    picked_from += [(one.judged, one.frame_us, len(one.elements)) for one in screened if one.choice not in chosen]
     judged, *costs = zip(*picked_from, strict=True)
     most = max(each.repeats for each in judged)
     hits = np.array([each.hits * (most // each.repeats) for each in judged])
@@ -141,7 +141,7 @@ def points_of(
     names: Callable[[Candidate], Sequence[str]],
     training: Callable[[Candidate], Training],
     joints: Callable[[Candidate], Sequence[str]] = lambda _: (),
-) -> tuple[Point, ...]:
+) -> tuple[FrontierPoint, ...]:
     """Return the points on a front, numbered from the fastest frame on.
 
     luck   the optimism to subtract from each rate
@@ -205,10 +205,10 @@ def _point(
     names: tuple[str, ...],
     training: Training,
     joints: tuple[str, ...],
-) -> Point:
+) -> FrontierPoint:
     wired, tabled, close = design.wired, design.tables.tabled, design.close
     choice = close.screened.choice
-    return Point(
+    return FrontierPoint(
         number=number,
         setting=PointSetting(
             placement=choice.placement,

@@ -7,7 +7,7 @@ from .cache import Cache, stored
 from .timing.classify_times import ClassifyModel
 from .timing.python_times import PythonCost
 from .timing.scan_times import NO_RECORDS, Overhead, Records, overhead_of
-from .timing.wirings import Wiring
+from .timing.wirings import WiringOption
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -15,11 +15,11 @@ class Equipment:
     """The target's model, the candidate wirings, the overhead of a transaction, and the time of a record."""
 
     model: ClassifyModel
-    wirings: tuple[Wiring, ...]
+    wirings: tuple[WiringOption, ...]
     overhead: Overhead
     records: Records = NO_RECORDS
 
-    def fitting(self, names: Sequence[str]) -> tuple[Wiring, ...]:
+    def fitting(self, names: Sequence[str]) -> tuple[WiringOption, ...]:
         """Return the wirings with a place for all of these switches; none if there are no switches."""
         return tuple(wiring for wiring in self.wirings if wiring.fits(names)) if names else ()
 
@@ -30,7 +30,9 @@ def calibrate(target: str) -> tuple[PythonCost | None, Overhead]:
     return ClassifyModel(target).python, overhead_of(target)
 
 
-def equipment_for(target: str, wirings: tuple[Wiring, ...], cache: Cache, records: Records = NO_RECORDS) -> Equipment:
+def equipment_for(
+    target: str, wirings: tuple[WiringOption, ...], cache: Cache, records: Records = NO_RECORDS
+) -> Equipment:
     """Return the hardware options for `target`, measured here once."""
-    ((python, overhead),) = cache.ask([calibrate.call(target)])
+    ((python, overhead),) = cache.ask(calibrate, [(target,)])
     return Equipment(ClassifyModel(target, python=python), wirings, overhead, records)

@@ -65,7 +65,7 @@ def _fronts(screened: Sequence[Screened]) -> list[Screened]:
     found = front(screened, lambda one: one.frame_us, lambda one: one.mean, _STEP)
     for kind in _kinds(screened):
         mine = [one for one in screened if one.choice.inputs == kind]
-        found += front(mine, lambda one: len(one.columns), lambda one: one.mean, _STEP)
+        found += front(mine, lambda one: len(one.elements), lambda one: one.mean, _STEP)
     known = {id(one) for one in found}
     return [one for one in screened if id(one) in known]
 
@@ -76,7 +76,7 @@ def _spread(mine: list[Screened]) -> list[Screened]:
         return []
     best = max(mine, key=lambda one: one.mean)
     level = [one for one in mine if one.mean >= best.mean - _LEVEL]
-    order = list(dict.fromkeys([best, min(level, key=lambda one: len(one.columns))]))
+    order = list(dict.fromkeys([best, min(level, key=lambda one: len(one.elements))]))
     left = [one for one in mine if one not in order]
     while left:
         order.append(max(left, key=lambda one: min(_distance(one, known) for known in order)))
@@ -94,9 +94,9 @@ def _errors(one: Screened) -> float:
 
 
 def _different(screened: Sequence[Screened]) -> list[Screened]:
-    return list(
-        {(replace(one.choice, placement=NO_SWITCHES), *sorted(one.columns)): one for one in reversed(screened)}.values()
-    )[::-1]
+    """Return the first of those that keep the same inputs."""
+    first = {(replace(one.choice, placement=NO_SWITCHES), *sorted(one.elements)): one for one in reversed(screened)}
+    return list(first.values())[::-1]
 
 
 def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[EvaluatedFinalist, ...]:
@@ -120,10 +120,11 @@ def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[Eval
         for choice, depth in depths.items()
     }
     calls = [
-        price.call(
-            survey.read(one.choice, cuts.everything),
+        (
+            survey.samples,
             survey.names(one.choice),
-            one.columns,
+            cuts.everything.train,
+            survey.selection(one.choice),
             tuple(dict.fromkeys([*worthwhile(judged[one.choice][1]), papers_tables(searches[one.choice])])),
             survey.training(one.choice),
             survey.equipment,
@@ -131,7 +132,7 @@ def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[Eval
         )
         for one in chosen
     ]
-    prices = survey.cache.ask(calls)
+    prices = survey.cache.ask(price, calls)
     return tuple(
         EvaluatedFinalist(one, *judged[one.choice], priced, survey.choosing_s(one.choice))
         for one, priced in zip(chosen, prices, strict=True)

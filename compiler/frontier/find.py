@@ -34,14 +34,14 @@ from .latency import POLICIES, Pace, latencies
 from .marks import choices_to_mark, marks_of, own_build
 from .measure import measured
 from .plots import PICTURES, pictures
-from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, frontier_to_bytes
+from .points import SCHEMA, Frontier, FrontierError, FrontierPoint, ReferencePoint, Tried, frontier_to_bytes
 from .replay import Replay, replay_of
 from .screen import Screened, screen, screen_fewer, screen_others
 from .search import TAXEL_LEVELS, Candidate, Search
 from .segments import MovementSamples
 from .survey import Cuts, Survey
 from .timing.scan_times import Records, records_of
-from .timing.wirings import Wiring, is_avr, wirings
+from .timing.wirings import WiringOption, is_avr, wirings
 from .words import csv_bytes
 
 RecordTime = Literal["formula", "wire"]
@@ -74,7 +74,7 @@ class PointGoal:
             return f"the best within {self.budget_us:g} us a frame"
         return "" if self.rate is None else f"the fastest that recognises {100 * self.rate:g} %"
 
-    def pick(self, points: Sequence[Point]) -> Point | None:
+    def pick(self, points: Sequence[FrontierPoint]) -> FrontierPoint | None:
         """Return the selected point, or None."""
         single = [point for point in points if point.setting.decision == "single"]
         if self.budget_us is not None:
@@ -230,7 +230,7 @@ def _samples(grasp_set: GraspSet) -> Samples:
     return Samples.of(grasp_set)
 
 
-def _wirings(grasp_set: GraspSet, harness: Harness | None, target: str) -> tuple[Wiring, ...]:
+def _wirings(grasp_set: GraspSet, harness: Harness | None, target: str) -> tuple[WiringOption, ...]:
     return wirings(
         harness,
         target,
@@ -296,10 +296,10 @@ def _replay(survey: Survey, given: GraspSet | None) -> Replay:
 
 
 def _found(
-    survey: Survey, replay: Replay, wanted: PointGoal, own: tuple[Mark, ...], lacking: tuple[str, ...]
+    survey: Survey, replay: Replay, wanted: PointGoal, own: tuple[ReferencePoint, ...], lacking: tuple[str, ...]
 ) -> Frontier:
     search, n_switches, most = survey.search, survey.samples.n_switches, survey.levels[-1]
-    n_elements = len(survey.elements(most))
+    n_elements = survey.size(most)
     screened, curves = screen(survey)
     if not screened:
         raise FrontierError(
@@ -356,20 +356,20 @@ def _latencies(survey: Survey, replay: Replay, kept: Sequence[Design]) -> Latenc
     for design in kept:
         grouped.setdefault(design.close.screened.choice, []).append(design)
     calls = [
-        latencies.call(
-            survey.read(choice, fold),
+        (
+            survey.samples,
             fold.train,
-            survey.columns(choice, fold),
-            replay.reading(survey.elements(choice.levels, fold), survey.joints(choice, fold)),
+            survey.selection(choice, fold),
+            replay,
             tuple(Pace(design.tables.tabled, design.frame.us) for design in mine),
             survey.training(choice, fold),
-            movements and movements.reading(survey.elements(choice.levels, fold), survey.joints(choice, fold)),
+            movements,
         )
         for choice, mine in grouped.items()
     ]
     return {
         (design, kind): latency
-        for mine, found in zip(grouped.values(), survey.cache.ask(calls), strict=True)
+        for mine, found in zip(grouped.values(), survey.cache.ask(latencies, calls), strict=True)
         for design, several in zip(mine, found, strict=True)
         for kind, latency in zip(POLICIES, several, strict=True)
     }
@@ -384,7 +384,7 @@ def _tried(screened: Sequence[Screened], closes: Sequence[EvaluatedFinalist], se
         Tried(
             one.choice.placement,
             one.choice.inputs,
-            len(one.columns),
+            len(one.elements),
             rounds if searches[one.choice.trainer].staged else None,
             rate,
             one.frame_us,

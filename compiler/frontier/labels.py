@@ -27,7 +27,7 @@ _DIRECTIONS: Floats = np.column_stack((np.cos(_TURNS), np.sin(_TURNS)))
 
 
 @dataclass(frozen=True, slots=True)
-class Label:
+class ChartLabel:
     """Text for a point at `at`, in data coordinates; of several places, the first with room is labelled.
 
     texts  variants, longest first: the last is always written, an earlier one only if there is room for it
@@ -60,14 +60,14 @@ class Labels:
         """Keep labels off the markers at these places, in data coordinates."""
         self._markers = np.concatenate((self._markers, self._on_paper(xs, ys)))
 
-    def write(self, *labels: Label) -> None:
+    def write(self, *labels: ChartLabel) -> None:
         """Write each label at the nearest place with room."""
         for label in labels:
             anchors = self._on_paper(*zip(*label.at, strict=True))
             if not any(self._write(label, text, anchors, _NEAR) for text in label.texts[:-1]):
                 self._write(label, label.texts[-1], anchors, _ANYWHERE)
 
-    def _write(self, label: Label, text: str, anchors: Floats, radii: Sequence[float]) -> bool:
+    def _write(self, label: ChartLabel, text: str, anchors: Floats, radii: Sequence[float]) -> bool:
         """Write a text at the first radius with room, and return whether there is one."""
         style: dict[str, Any] = {
             **{"ha": "center", "va": "center", "ma": "center", "zorder": 6, "color": for_letters(label.colour)},
@@ -89,20 +89,6 @@ class Labels:
                 self._boxes = np.concatenate((self._boxes, [[*(centre - half), *(centre + half)]]))
                 return True
         return False
-
-    def _annotate(
-        self,
-        label: Label,
-        text: str,
-        anchors: Floats,
-        anchor: int,
-        centre: Floats,
-        radius: float,
-        style: dict[str, Any],
-    ) -> None:
-        led = {"arrowstyle": "-", "color": label.colour, "lw": 0.6, "shrinkA": 1, "shrinkB": 3}
-        arrow, offset = led if radius >= _LED_FROM else None, tuple(centre - anchors[anchor])
-        self.axes.annotate(text, label.at[anchor], offset, textcoords="offset points", arrowprops=arrow, **style)
 
     def _free(self, lows: Floats, highs: Floats) -> NDArray[np.bool_]:
         """Return which boxes (n,) lie within the frame and on no label and no marker."""

@@ -21,7 +21,8 @@ from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.folds import Rows
-from ..samples import Columns, Samples
+from ..placement.placement import InputSelection
+from ..samples import Samples
 from ..tables.quantise import integer_scores
 from ..trainers.base import Training
 from .cache import stored
@@ -144,25 +145,26 @@ class Pace(Struct, frozen=True):
     frame_us: float
 
 
-@stored(7)
+@stored(8)
 def latencies(
     samples: Samples,
     rows: Rows,
-    columns: Columns,
+    selection: InputSelection,
     replay: Replay,
     paces: tuple[Pace, ...],
     training: Training,
     movements: MovementSamples | None = None,
 ) -> tuple[tuple[Latency, ...], ...]:
-    """Train on some rows, on the switches `columns` and the joints; return the latencies on a replay for every pace
+    """Train on some rows, on the selected inputs; return the latencies on a replay for every pace
     and each of POLICIES. The replay holds none of the rows.
 
     movements  the same rows with those in which nothing is held: segments use tables trained with these rows, and costs
                learnt from them. None: segments have the default costs
     """
+    replay, columns = replay.reading(selection.kept, selection.joints), range(len(selection.kept))
     shapes = tuple(dict.fromkeys(pace.tabled for pace in paces))
-    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, shapes, training)}
-    learnt = movements.segment_tables(columns, shapes, training) if movements else {}
+    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, selection, shapes, training)}
+    learnt = movements.segment_tables(selection, shapes, training) if movements else {}
 
     def of(pace: Pace, kind: DecisionKind) -> Latency:
         if kind == "segments" and pace.tabled in learnt:

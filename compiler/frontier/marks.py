@@ -12,7 +12,7 @@ from ..placement.methods.base import BEST, PAPERS
 from ..recordings.graspset import GraspSet
 from .equipment import Equipment
 from .finalists import EvaluatedFinalist, papers_tables
-from .points import FrontierError, Mark, PlacementChoice
+from .points import FrontierError, PlacementChoice, ReferencePoint
 from .search import Candidate
 from .survey import Survey
 from .timing.scan_times import scan_times
@@ -37,7 +37,9 @@ def choices_to_mark(
     return alone | (with_joints if n_joints else {})
 
 
-def marks_of(named: dict[Candidate, str], closes: Sequence[EvaluatedFinalist], survey: Survey) -> tuple[Mark, ...]:
+def marks_of(
+    named: dict[Candidate, str], closes: Sequence[EvaluatedFinalist], survey: Survey
+) -> tuple[ReferencePoint, ...]:
     """Return the marks of those choices that were fully evaluated, with the paper's rounds."""
     found, tabled = [], papers_tables(survey.search)
     for close in closes:
@@ -46,11 +48,13 @@ def marks_of(named: dict[Candidate, str], closes: Sequence[EvaluatedFinalist], s
             priced = next(tables for tables in close.priced if tables.tabled == tabled)
             us = priced.fastest_us(survey.transfer(screened.choice).us)
             if us is not None:
-                found.append(Mark(named[screened.choice], len(screened.columns), close.tables[tabled].rate, us))
+                found.append(
+                    ReferencePoint(named[screened.choice], len(screened.elements), close.tables[tabled].rate, us)
+                )
     return tuple(found)
 
 
-def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
+def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> ReferencePoint:
     """Return the user's build as a mark: its recorded rate, and its frame in the fastest wiring for its switches.
 
     Raises FrontierError if it has no rate, or is not for these recordings or this equipment.
@@ -72,7 +76,7 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     _check(joints, [joint.name for joint in grasp_set.joints], folder)
     scans = [scan_times(names, wiring, equipment.overhead).us for wiring in fitting]
     frame_us = max(min(scans, default=0.0), equipment.records.of(len(joints)).us) + cost.us
-    return Mark(
+    return ReferencePoint(
         f"build {folder.name}", len(names), Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled"), frame_us
     )
 

@@ -12,7 +12,7 @@ from ..firmware.words import numbered
 from .cache import Cache, stored
 from .designs import Design
 from .equipment import Equipment
-from .points import Time
+from .points import PointTime
 from .timing.classify_times import ClassifyModel, fitting
 from .timing.python_times import classify_us
 
@@ -74,15 +74,15 @@ def _contents(designs: Sequence[Design]) -> tuple[bytes, ...]:
 def _timed(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> list[Design]:
     contents = _contents(designs)
     assert model.python is not None
-    (us,) = cache.ask([time_here.call(contents, model.python.yardstick)])
+    (us,) = cache.ask(time_here, [(contents, model.python.yardstick)])
     times = dict(zip(contents, us, strict=True))
-    return [replace(design, measured=Time(times[design.tables.content], "measured")) for design in designs]
+    return [replace(design, measured=PointTime(times[design.tables.content], "measured")) for design in designs]
 
 
 def _simulated(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> list[Design]:
-    calls = [count_steps.call(design.tables.content, model) for design in designs]
-    steps = cache.ask(calls)
+    calls = [(design.tables.content, model) for design in designs]
+    steps = cache.ask(count_steps, calls)
     return [
-        replace(design, measured=Time(model.us(round(each)), "simulated"))
+        replace(design, measured=PointTime(model.us(round(each)), "simulated"))
         for design, each in zip(designs, steps, strict=True)
     ]

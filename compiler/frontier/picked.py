@@ -14,8 +14,8 @@ from thenar.runtime.scanning.propose import CONVERTER
 from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
 from ..trainers.base import TRAINERS
-from .points import MAX_BYTES, Frontier, FrontierError, Point, frontier_from_bytes
-from .timing.wirings import AS_WIRED, BOARD, Wiring
+from .points import MAX_BYTES, Frontier, FrontierError, FrontierPoint, frontier_from_bytes
+from .timing.wirings import AS_WIRED, BOARD, WiringOption
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Picked:
     """A frontier, the selected point, and the names of the set's joints; see `picked`."""
 
     frontier: Frontier
-    point: Point
+    point: FrontierPoint
     joints: tuple[str, ...]
 
     @property
@@ -75,7 +75,7 @@ class Picked:
             if given is not None and setting.wiring == AS_WIRED:
                 return given
             joints = () if setting.inputs == "switches" else self.point.joints or self.joints
-            return Wiring(setting.wiring, setting.clock_hz).harness_of(kept, joints)
+            return WiringOption(setting.wiring, setting.clock_hz).harness_of(kept, joints)
 
         return harness_of
 
@@ -117,7 +117,7 @@ def picked(path: Path, number: int | None, grasp_set: GraspSet) -> Picked:
     return Picked(found, point, tuple(joint.name for joint in grasp_set.joints))
 
 
-def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
+def _check(point: FrontierPoint, grasp_set: GraspSet, what: str) -> None:
     """Raise FrontierError if a point cannot be built here: before the training, not after it."""
     setting = point.setting
     levels = [taxel_and_code(name) or (name, 0) for name in point.switches]
@@ -140,5 +140,5 @@ def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
         raise FrontierError(f"{what} has an unknown wiring: {shortened(repr(setting.wiring))}")
     if setting.wiring in clocks and not SLOWEST_HZ <= setting.clock_hz <= clocks[setting.wiring]:
         raise FrontierError(f"{what} runs its {setting.wiring} at {setting.clock_hz} Hz, which it cannot")
-    if setting.wiring not in ("", AS_WIRED) and not Wiring(setting.wiring, setting.clock_hz).fits(point.switches):
+    if setting.wiring not in ("", AS_WIRED) and not WiringOption(setting.wiring, setting.clock_hz).fits(point.switches):
         raise FrontierError(f"{what} has no room for its {len(point.switches)} switches on {setting.wiring}")

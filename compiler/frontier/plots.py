@@ -12,8 +12,8 @@ from thenar.runtime.recipe import Inputs
 from ..evaluation.rates import Rate
 from ..pictures import on_paper, painting, rendered
 from ..text import counted, duration, percent
-from .labels import Label, Labels
-from .points import Curve, Frontier, Mark, Point, Tried, front
+from .labels import ChartLabel, Labels
+from .points import Curve, Frontier, FrontierPoint, ReferencePoint, Tried, front
 from .words import counted_elements, elements_of, featured, inputs_of, of_time, shorten
 
 if TYPE_CHECKING:
@@ -54,13 +54,13 @@ class _Cost:
 
     title: str
     axis: str
-    of_point: Callable[[Point], float | None]
-    of_mark: Callable[[Mark], float | None]
+    of_point: Callable[[FrontierPoint], float | None]
+    of_mark: Callable[[ReferencePoint], float | None]
     of_tried: Callable[[Tried], float | None]
     front: str = ""
     best: str = ""
-    end: Callable[[Point], float | None] = lambda _: None
-    words: Callable[[Point], str] = lambda _: ""
+    end: Callable[[FrontierPoint], float | None] = lambda _: None
+    words: Callable[[FrontierPoint], str] = lambda _: ""
 
     @property
     def is_time(self) -> bool:
@@ -99,7 +99,7 @@ _LATENCY = _Cost(
 )
 
 
-def _waited(point: Point) -> float | None:
+def _waited(point: FrontierPoint) -> float | None:
     """Return the mean latency; None if every grasp was missed."""
     return None if point.latency.missed >= 1 else point.latency.mean_us
 
@@ -283,7 +283,7 @@ def _draw_best(axes: "Axes", best: Iterable[tuple[float, float]], name: str) -> 
     axes.fill_between(xs, ys, axes.get_ylim()[0], step="post", color=_INK, alpha=0.04, lw=0, zorder=0.5)
 
 
-def _draw_points(labels: Labels, points: Sequence[tuple[float, Point]], best: str, kept: str) -> None:
+def _draw_points(labels: Labels, points: Sequence[tuple[float, FrontierPoint]], best: str, kept: str) -> None:
     """Draw points with intervals: those of the front `best` filled, the others hollow; all filled without a front.
     `kept` names the elements, such as "switches".
     """
@@ -308,7 +308,7 @@ def _draw_points(labels: Labels, points: Sequence[tuple[float, Point]], best: st
         labels.axes.scatter([], [], s=_SIZE, facecolor=_WHITE, edgecolor=_GREY, lw=1.2, label="not the best here")
 
 
-def _draw_ends(axes: "Axes", ends: Iterable[tuple[float, float, Point]]) -> None:
+def _draw_ends(axes: "Axes", ends: Iterable[tuple[float, float, FrontierPoint]]) -> None:
     """Draw lines from each point's mean to its end."""
     for start, end, point in ends:
         level = (point.rate.mean, point.rate.mean)
@@ -316,7 +316,7 @@ def _draw_ends(axes: "Axes", ends: Iterable[tuple[float, float, Point]]) -> None
         axes.plot((start, end), level, color=colour, lw=0.9, alpha=0.45, marker="|", ms=5, markevery=[1])
 
 
-def _draw_marks(labels: Labels, marks: Sequence[tuple[float, Mark]]) -> None:
+def _draw_marks(labels: Labels, marks: Sequence[tuple[float, ReferencePoint]]) -> None:
     """Draw marks with their intervals."""
     _draw_whiskers(labels.axes, [(x, mark.rate) for x, mark in marks], _INK)
     xs, ys = [x for x, _ in marks], [mark.rate.mean for _, mark in marks]
@@ -334,7 +334,7 @@ def _shown(curves: tuple[Curve, ...]) -> list[Rate]:
     return [rate for size, rate in pairs if size >= _FEW] or [rate for _, rate in pairs]
 
 
-def _draw_curves(axes: "Axes", curves: Sequence[Curve]) -> Iterator[Label]:
+def _draw_curves(axes: "Axes", curves: Sequence[Curve]) -> Iterator[ChartLabel]:
     """Draw ours and the baselines' curves, and yield their names, ours first."""
     ours, baselines = ([curve for curve in curves if curve.ours == wanted] for wanted in (True, False))
     for number, curve in enumerate(ours):
@@ -344,7 +344,7 @@ def _draw_curves(axes: "Axes", curves: Sequence[Curve]) -> Iterator[Label]:
         yield from _draw_curve(axes, curve, _BASELINES[colour], _DASHES[turn % len(_DASHES)])
 
 
-def _draw_curve(axes: "Axes", curve: Curve, colour: str, dash: "Dash") -> Iterator[Label]:
+def _draw_curve(axes: "Axes", curve: Curve, colour: str, dash: "Dash") -> Iterator[ChartLabel]:
     pairs = [(size, rate) for size, rate in zip(curve.sizes, curve.rates, strict=True) if size >= 1]
     if not pairs:
         return
@@ -355,25 +355,25 @@ def _draw_curve(axes: "Axes", curve: Curve, colour: str, dash: "Dash") -> Iterat
     axes.fill_between(xs, lows, highs, color=colour, alpha=shade, lw=0, zorder=1)
     places = tuple(zip(xs, means, strict=True))
     seen = tuple(place for place in places if place[1] >= axes.get_ylim()[0])
-    yield Label(seen or places, (shorten(curve.method),), colour, size=9.0 if curve.ours else 8.0, bold=curve.ours)
+    yield ChartLabel(seen or places, (shorten(curve.method),), colour, size=9.0 if curve.ours else 8.0, bold=curve.ours)
 
 
-def _loud_label(x: float, point: Point, cost: str) -> Label:
+def _loud_label(x: float, point: FrontierPoint, cost: str) -> ChartLabel:
     text = f"point {point.number}: {inputs_of(point)}\n{_and_rate(cost, point.rate)}"
-    return Label(((x, point.rate.mean),), (text,), _INK, size=9.5, bold=True)
+    return ChartLabel(((x, point.rate.mean),), (text,), _INK, size=9.5, bold=True)
 
 
-def _point_label(x: float, point: Point, words: str) -> Label:
+def _point_label(x: float, point: FrontierPoint, words: str) -> ChartLabel:
     """Return the label of a point, with just its number as the short variant."""
     texts = (f"{point.number}: {words}", str(point.number)) if words else (str(point.number),)
-    return Label(((x, point.rate.mean),), texts, _COLOURS[point.setting.inputs])
+    return ChartLabel(((x, point.rate.mean),), texts, _COLOURS[point.setting.inputs])
 
 
-def _mark_label(x: float, mark: Mark, cost: str, frontier: Frontier) -> Label:
+def _mark_label(x: float, mark: ReferencePoint, cost: str, frontier: Frontier) -> ChartLabel:
     name = shorten(mark.name)
     if str(mark.n_switches) not in name:
         name = f"{name} ({counted_elements(frontier, mark.n_switches)})"
-    return Label(((x, mark.rate.mean),), (f"{name}\n{_and_rate(cost, mark.rate)}",), _INK)
+    return ChartLabel(((x, mark.rate.mean),), (f"{name}\n{_and_rate(cost, mark.rate)}",), _INK)
 
 
 def _and_rate(cost: str, rate: Rate) -> str:

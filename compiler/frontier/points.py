@@ -39,7 +39,7 @@ class FrontierError(ThenarError, ValueError):
     """A frontier that cannot be computed as requested, or a file that is none."""
 
 
-class Time(Struct, frozen=True, forbid_unknown_fields=True):
+class PointTime(Struct, frozen=True, forbid_unknown_fields=True):
     """A time in microseconds, and its source."""
 
     us: Microseconds
@@ -93,7 +93,7 @@ class Latency(Struct, frozen=True, forbid_unknown_fields=True):
     wrong: Share = 0.0
 
 
-class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A design of the glove.
 
     number      the argument of `compile --from frontier.json --point`
@@ -116,10 +116,10 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     luck: Share
     frames: Rate | None
     other_rate: Rate | None
-    scan: Time
-    transfer: Time
-    classify: Time
-    frame: Time
+    scan: PointTime
+    transfer: PointTime
+    classify: PointTime
+    frame: PointTime
     latency: Latency
     flash: Count
     ram: Count
@@ -156,7 +156,7 @@ class Curve(Struct, frozen=True, forbid_unknown_fields=True):
     rates: tuple[Rate, ...]
 
 
-class Mark(Struct, frozen=True, forbid_unknown_fields=True):
+class ReferencePoint(Struct, frozen=True, forbid_unknown_fields=True):
     """A reference mark on the pictures: the paper's choices, all switches, the user's build."""
 
     name: str
@@ -192,10 +192,10 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     folds: Count
     repeats: Count
     combinations: Count
-    points: tuple[Point, ...]
+    points: tuple[FrontierPoint, ...]
     tried: tuple[Tried, ...]
     curves: tuple[Curve, ...]
-    marks: tuple[Mark, ...]
+    marks: tuple[ReferencePoint, ...]
     skipped: tuple[str, ...]
     picked: int | None = None
     wanted: str = ""
@@ -219,7 +219,7 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
             return None
         return "pooled" if self.by == "new subject" else "new subject"
 
-    def point(self, number: int) -> Point:
+    def point(self, number: int) -> FrontierPoint:
         """Return the point with that number. Raises FrontierError."""
         for point in self.points:
             if point.number == number:
@@ -287,7 +287,7 @@ def _contradictions(frontier: Frontier) -> Iterator[str]:
             yield f"has a point {point.number} that {fault}"
 
 
-def _fault(point: Point, frontier: Frontier) -> str:
+def _fault(point: FrontierPoint, frontier: Frontier) -> str:
     """Return the first contradiction in a point's setting, or ""."""
     setting = point.setting
     if len(set(point.switches)) < len(point.switches) or len(point.switches) > frontier.n_switches + frontier.n_levels:

@@ -2,17 +2,17 @@
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
-import numpy as np
 from msgspec import Struct
 
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ..evaluation.folds import Rows
-from ..samples import Columns, Samples
-from ..tables.collapse import collapse
-from ..tables.quantise import quantise
-from ..tables.standing_in import fit_lost
+from ..placement.placement import InputSelection
+from ..recogniser import Recogniser
+from ..samples import Samples
 from ..trainers.base import Training
 from .cache import stored
 from .equipment import Equipment
@@ -59,31 +59,31 @@ class PricedTables(Struct, frozen=True):
 def price(
     samples: Samples,
     names: tuple[str, ...],
-    columns: Columns,
+    rows: Rows,
+    selection: InputSelection,
     tables: tuple[Tabled, ...],
     training: Training,
     equipment: Equipment,
     lost: bool,
 ) -> tuple[PricedTables, ...]:
-    """Train on all rows, on the switches `columns`, which have these names, and the joints; price the tables.
+    """Train on some rows, on the selected inputs, whose elements have these names; price the tables.
 
     lost  fit the substitutes for lost inputs, which is needed if exact flash sizes matter
     """
-    rows = np.arange(len(samples.labels))
     wired = tuple(
         Wired(wiring.name, wiring.clock_hz, scan_times(names, wiring, equipment.overhead))
         for wiring in equipment.fitting(names)
     )
     return tuple(
         PricedTables(tabled, tables_to_bytes(made), equipment.model.cost(made), wired, seconds)
-        for tabled, made, seconds in tables_of(samples, rows, columns, tables, training, lost=lost)
+        for tabled, made, seconds in tables_of(samples, rows, selection, tables, training, lost=lost)
     )
 
 
 def tables_of(
     samples: Samples,
     rows: Rows,
-    columns: Columns,
+    selection: InputSelection,
     tables: tuple[Tabled, ...],
     training: Training,
     *,
@@ -95,12 +95,10 @@ def tables_of(
           frames do not. Otherwise they are mean rows
     """
     began, most = time.perf_counter(), max(one.rounds for one in tables)
-    kept = samples.rows(rows).keeping(columns)
-    models = training.stages(kept, [one.rounds for one in tables])
+    made = Recogniser.stages(samples, Recipe(), rows, selection, training, [one.rounds for one in tables])
     training_s = time.perf_counter() - began
-    for tabled, model in zip(tables, models, strict=True):
+    for tabled, recogniser in zip(tables, made, strict=True):
         began = time.perf_counter()
-        scores = collapse(model, kept.n_switches)
-        made = quantise(scores, kept.switches, kept.codes, tabled.shape.width, tabled.shape.table_bits)
-        made = fit_lost(made, kept.switches, kept.codes, kept.labels) if lost else made
-        yield tabled, made, training_s * tabled.rounds / most + time.perf_counter() - began
+        shaped = replace(recogniser, recipe=tabled.shape.recipe)
+        integers = shaped.tables if lost else shaped.integers
+        yield tabled, integers, training_s * tabled.rounds / most + time.perf_counter() - began

@@ -69,12 +69,8 @@ class Replay:
     what: str
 
     def reading(self, elements: Elements, joints: Columns) -> "Replay":
-        """Return the same replay with these elements as switches, if it has taxels, and with these joints, if any."""
-        bits, codes = self.bits, self.codes
-        if self.taxels.shape[1]:
-            bits = above(bits, self.taxels, elements)
-        if joints:
-            codes = codes[:, list(joints)]
+        """Return the same replay with these elements as switches, and these joints."""
+        bits, codes = above(self.bits, self.taxels, elements), self.codes[:, list(joints)]
         return replace(self, bits=bits, codes=codes, taxels=self.taxels[:, :0])
 
 

@@ -3,8 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from ..placement.elements import Elements
 from ..placement.methods.base import METHODS
-from ..samples import Columns
 from .points import Curve
 from .price import Tabled, price
 from .search import JOINTS, NO_SWITCHES, Candidate, Shape, available_inputs, curve_placements, tried_placements
@@ -12,14 +14,15 @@ from .survey import Survey, TrialAccuracy
 
 # The frame time hardly depends on the numbers of rounds and rows: tables of few suffice.
 _TABLED = Tabled(12, Shape(16))
+_FEW_ROWS = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class Screened:
-    """A choice after screening: its switches when chosen from all rows, its rate, its frame time (us)."""
+    """A choice after screening: its elements when chosen from all rows, its rate, its frame time (us)."""
 
     choice: Candidate
-    columns: Columns
+    elements: Elements
     judged: TrialAccuracy
     frame_us: float
 
@@ -33,7 +36,7 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     """Return the accuracy and frame time of every choice that can be built, with the first trainer; and the curves of
     all methods, including the baselines.
     """
-    search, cuts, sizes = survey.search, survey.cuts, {most: len(survey.elements(most)) for most in survey.levels}
+    search, cuts, sizes = survey.search, survey.cuts, {most: survey.size(most) for most in survey.levels}
     inputs, first = available_inputs(sizes[survey.levels[-1]], survey.n_joints), search.trainers[0]
     every = [
         (choice, most)
@@ -53,7 +56,7 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     ]
     survey.choose(choices, (cuts.everything, *cuts.screening))
     # Drop placements that keep nothing.
-    choices = [one for one in choices if one.placement == NO_SWITCHES or survey.columns(one, cuts.everything)]
+    choices = [one for one in choices if one.placement == NO_SWITCHES or survey.elements(one)]
     survey.choose(baselines, cuts.screening)
     rates = _rates(survey, choices, baselines)
     names = dict.fromkeys([*search.methods, *search.baselines])
@@ -91,17 +94,19 @@ def _screened(
     survey: Survey, choices: Sequence[Candidate], rates: Mapping[Candidate, TrialAccuracy]
 ) -> tuple[Screened, ...]:
     """Return the choices that can be built."""
+    rows = len(survey.samples.labels)
+    few = np.linspace(0, rows - 1, min(_FEW_ROWS, rows)).astype(np.intp)
     calls = []
     for choice in choices:
-        columns = survey.columns(choice, survey.cuts.everything)
-        some, training = survey.read(choice, survey.cuts.everything, few=True), survey.training(choice)
-        names, tabled = survey.names(choice), (_TABLED,)
-        calls.append(price.call(some, names, columns, tabled, training, survey.equipment, False))
+        names, training = survey.names(choice), survey.training(choice)
+        calls.append(
+            (survey.samples, names, few, survey.selection(choice), (_TABLED,), training, survey.equipment, False)
+        )
     found = []
-    for choice, (priced,) in zip(choices, survey.cache.ask(calls), strict=True):
+    for choice, (priced,) in zip(choices, survey.cache.ask(price, calls), strict=True):
         us = priced.fastest_us(survey.transfer(choice).us)
         if us is not None and (priced.wired or choice.placement == NO_SWITCHES):
-            found.append(Screened(choice, survey.columns(choice, survey.cuts.everything), rates[choice], us))
+            found.append(Screened(choice, survey.elements(choice), rates[choice], us))
     return tuple(found)
 
 
@@ -110,6 +115,6 @@ def _curve(survey: Survey, name: str, rates: dict[Candidate, TrialAccuracy]) -> 
     folds, points = survey.cuts.screening, {}
     for choice, judged in rates.items():
         if (choice.placement.method, choice.inputs, choice.levels) == (name, "switches", survey.levels[-1]):
-            points[sum(len(survey.columns(choice, fold)) for fold in folds) / len(folds)] = judged.rate
+            points[sum(len(survey.elements(choice, fold)) for fold in folds) / len(folds)] = judged.rate
     sizes = tuple(sorted(points))
     return Curve(name, METHODS[name].help, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))

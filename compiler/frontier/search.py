@@ -24,6 +24,11 @@ class Shape(NamedTuple):
     width: int
     table_bits: TableBits = 16
 
+    @property
+    def recipe(self) -> Recipe:
+        """A recipe of tables of this shape."""
+        return Recipe(width=self.width, table_bits=self.table_bits)
+
 
 SHAPES = (*(Shape(width) for width in (16, 12, 8, 6, 5, 4)), Shape(16, 8))
 # The numbers of levels of each taxel to choose from, at most.

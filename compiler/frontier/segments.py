@@ -13,9 +13,9 @@ from thenar.runtime.tables import IntegerTables
 from ..evaluation.folds import leave_groups_out, trial_folds
 from ..movements.learning import learnt
 from ..movements.streams import TICK_US, MovementError, Stream, streams_of
-from ..placement.elements import Elements, bits_of
+from ..placement.placement import InputSelection
 from ..recordings.graspset import GraspSet
-from ..samples import Columns, Samples
+from ..samples import Samples
 from ..tables.quantise import integer_scores
 from ..trainers.base import Training
 from .price import Tabled, tables_of
@@ -53,12 +53,8 @@ class MovementSamples:
             streams += [replace(part, rows=place[part.rows]) for part in parts if inside[part.rows[0]]]
         return cls(Samples.of(grasp_set).rows(inside), tuple(streams), seed)
 
-    def reading(self, elements: Elements, joints: Columns) -> "MovementSamples":
-        """Return the same movements with these elements and joints."""
-        return replace(self, samples=bits_of(self.samples, elements).with_joints(joints))
-
     def segment_tables(
-        self, columns: Columns, tables: Sequence[Tabled], training: Training
+        self, selection: InputSelection, tables: Sequence[Tabled], training: Training
     ) -> Mapping[Tabled, SegmentTables]:
         """Return tables of these rows with a class for nothing held, and the costs of segments, for each of `tables`.
 
@@ -72,16 +68,12 @@ class MovementSamples:
             folds = trial_folds(samples.labels, samples.movements, 2, self.seed)
         scores = {tabled: np.zeros((len(samples.labels), samples.n_classes)) for tabled in tables}
         for fold in folds:
-            test = samples.rows(fold.test).keeping(columns)
-            for tabled, made in self._tables(fold.train, columns, tables, training):
+            test = selection.read(samples.rows(fold.test))
+            for tabled, made, _ in tables_of(samples, fold.train, selection, tuple(tables), training):
                 scores[tabled][fold.test] = integer_scores(made, test.switches, test.codes) / made.scale
         return {
             tabled: (made, learnt(self.streams, samples.labels, scores[tabled], samples.n_types, made.scale, TICK_US))
-            for tabled, made in self._tables(np.arange(len(samples.labels)), columns, tables, training)
+            for tabled, made, _ in tables_of(
+                samples, np.arange(len(samples.labels)), selection, tuple(tables), training
+            )
         }
-
-    def _tables(
-        self, rows: NDArray[np.intp], columns: Columns, tables: Sequence[Tabled], training: Training
-    ) -> list[tuple[Tabled, IntegerTables]]:
-        some = rows[self.samples.rows(rows).balanced()]
-        return [(tabled, made) for tabled, made, _ in tables_of(self.samples, some, columns, tuple(tables), training)]

@@ -2,37 +2,36 @@
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Fitting
-from thenar.runtime.recipe import Inputs
+from thenar.runtime.recipe import Inputs, Recipe
 
 from ..boosting.stumps import winners
 from ..evaluation.choosing import choose_training
 from ..evaluation.folds import EvaluationError, Fold, Rows, leave_groups_out, trial_folds
 from ..evaluation.rates import Rate
-from ..placement.elements import Element, Elements, bits_of, elements_of, names_of, ports_of
+from ..placement.elements import Elements, bits_of, elements_of, names_of, ports_of
 from ..placement.joints import joint_order
 from ..placement.methods.base import METHODS
+from ..placement.placement import InputSelection
 from ..placement.ports import PortCosts
+from ..recogniser import Recogniser, predicted_classes
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples, decided
-from ..tables.collapse import ScoreTables, collapse, model_scores
-from ..tables.quantise import integer_scores, quantise
+from ..tables.collapse import model_scores
 from ..trainers.base import Training
 from .cache import Cache, stored
 from .equipment import Equipment
-from .points import By, Time
+from .points import By, PointTime
 from .search import NO_SWITCHES, SHAPES, TAXEL_LEVELS, Candidate, Choosing, Search, Shape
 
 # Settings are selected on the placement whose number of switches is nearest to the paper's.
 _TYPICAL = 33
-# Rows for the tables that frame times are measured on.
-_FEW_ROWS = 1000
 
 
 # The rounds after which models are tested, and those after which tables are made.
@@ -134,7 +133,7 @@ class TrialAccuracy:
 class PlacementPath(Struct, frozen=True):
     """The placements of a method, one for each parameter, and their total time."""
 
-    columns: tuple[Columns, ...]
+    elements: tuple[Elements, ...]
     seconds: float
 
 
@@ -166,9 +165,7 @@ class Survey:
     cuts: Cuts
     equipment: Equipment
     cache: Cache
-    _elements: dict[tuple[int, Fold], Elements] = field(default_factory=dict, init=False)
-    _inputs: dict[tuple[bool, int | None, Fold, bool], Samples] = field(default_factory=dict, init=False)
-    _columns: dict[tuple[Choosing, float, Fold], Columns] = field(default_factory=dict, init=False)
+    _elements: dict[tuple[Choosing, float, Fold], Elements] = field(default_factory=dict, init=False)
     _seconds: dict[Choosing, float] = field(default_factory=dict, init=False)
     _joints: dict[tuple[Choosing, float, Fold], Columns] = field(default_factory=dict, init=False)
     _trainings: dict[tuple[str, Inputs, Fold], Training] = field(default_factory=dict, init=False)
@@ -178,26 +175,30 @@ class Survey:
         """The numbers of levels of a taxel that are tried; only None if there are no taxels."""
         return TAXEL_LEVELS if self.samples.taxels.shape[1] else (None,)
 
-    def elements(self, levels: int | None, fold: Fold | None = None) -> Elements:
-        """Return the elements to choose from, by the training rows of `fold`, or by all rows."""
-        if levels is None:
-            return tuple(map(Element, range(self.samples.n_switches)))
-        key = levels, fold or self.cuts.everything
-        if key not in self._elements:
-            self._elements[key] = elements_of(self.samples.rows(key[1].train), levels)
-        return self._elements[key]
+    def size(self, levels: int | None) -> int:
+        """Return how many elements there are to choose from in all rows."""
+        return len(elements_of(self.samples, levels))
+
+    def elements(self, choice: Candidate, fold: Fold | None = None) -> Elements:
+        """Return the elements that a choice keeps by the training rows of `fold`, or by all rows, once chosen."""
+        if choice.placement == NO_SWITCHES:
+            return ()
+        return self._elements[choice.chosen_by, choice.placement.parameter, fold or self.cuts.everything]
+
+    def selection(self, choice: Candidate, fold: Fold | None = None) -> InputSelection:
+        """Return the inputs that a choice keeps by the training rows of `fold`, or by all rows."""
+        return InputSelection.of(self.elements(choice, fold), self.joints(choice, fold or self.cuts.everything))
 
     def names(self, choice: Candidate) -> tuple[str, ...]:
         """Return the names of the elements that a choice keeps by all rows."""
-        elements, columns = self.elements(choice.levels), self.columns(choice, self.cuts.everything)
-        return names_of(self.grasp_set, tuple(elements[column] for column in columns))
+        return names_of(self.grasp_set, self.elements(choice))
 
     @property
     def n_joints(self) -> int:
         """How many joints a frame has."""
         return int(self.samples.codes.shape[1])
 
-    def transfer(self, choice: Candidate) -> Time:
+    def transfer(self, choice: Candidate) -> PointTime:
         """Return the time of reading the joints of a choice."""
         return self.equipment.records.of(len(self.joints(choice, self.cuts.everything)))
 
@@ -213,26 +214,6 @@ class Survey:
         names = self.grasp_set.joint_names
         return () if choice.keep_joints is None else tuple(names[n] for n in self.joints(choice, self.cuts.everything))
 
-    def read(self, choice: Candidate, fold: Fold, *, few: bool = False) -> Samples:
-        """Return all rows, or a few of them, with the joints of a choice."""
-        some = self.inputs(choice.joints, choice.levels, fold, few=few)
-        return some if choice.keep_joints is None else some.with_joints(self.joints(choice, fold))
-
-    def inputs(self, joints: bool, levels: int | None, fold: Fold, *, few: bool = False) -> Samples:
-        """Return all rows, or a few of them, with the joints or without; their switches are the elements to choose
-        from, by the training rows of `fold`.
-        """
-        key = joints, levels, self.cuts.everything if levels is None else fold, few
-        if key not in self._inputs:
-            if few:
-                spread = np.linspace(0, len(self.samples.labels) - 1, min(_FEW_ROWS, len(self.samples.labels)))
-                found = self.inputs(joints, levels, fold).rows(spread.astype(np.intp))
-            else:
-                rows = self.samples if joints else self.samples.with_joints(())
-                found = bits_of(rows, self.elements(levels, fold))
-            self._inputs[key] = found
-        return self._inputs[key]
-
     def training(self, choice: Candidate, fold: Fold | None = None) -> Training:
         """Return the training of a choice on the training rows of a fold, or on all rows; call `tune` first."""
         fold = fold or self.cuts.everything
@@ -247,7 +228,7 @@ class Survey:
         for choice in choices:
             if len(self.search.alone(choice.trainer).candidates) > 1:
                 alike.setdefault((choice.trainer, choice.inputs), []).append(choice)
-        kept = {one: len(self.columns(one, self.cuts.everything)) for mine in alike.values() for one in mine}
+        kept = {one: len(self.elements(one)) for mine in alike.values() for one in mine}
         return [min(mine, key=lambda one: abs(kept[one] - _TYPICAL)) for mine in alike.values()]
 
     def tune(self, typical: Sequence[Candidate], folds: Sequence[Fold]) -> None:
@@ -256,17 +237,17 @@ class Survey:
         """
         places = [(choice, fold) for choice in typical for fold in folds]
         calls = [
-            choose_settings.call(
-                self.inputs(choice.joints, choice.levels, fold),
+            (
+                self.samples,
                 fold.train,
-                self.columns(choice, fold),
+                self.selection(replace(choice, keep_joints=None), fold),
                 self.search.alone(choice.trainer).candidates,
                 self.search.seed,
                 self.cuts.by == "new subject",
             )
             for choice, fold in places
         ]
-        for (choice, fold), fitting in zip(places, self.cache.ask(calls), strict=True):
+        for (choice, fold), fitting in zip(places, self.cache.ask(choose_settings, calls), strict=True):
             self._trainings[choice.trainer, choice.inputs, fold] = Training.chosen(fitting)
 
     def choose(self, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
@@ -277,20 +258,20 @@ class Survey:
                 asked.setdefault(choice.chosen_by, {})[choice.placement.parameter] = None
         places = [(key, fold) for key in asked for fold in folds]
         calls = [
-            choose_path.call(
-                self.inputs(joints, levels, fold),
+            (
+                self.samples,
                 fold.train,
                 method,
                 tuple(asked[method, joints, levels]),
-                ports_of(self.ports, self.elements(levels, fold))
-                if self.ports is not None and METHODS[method].uses_ports
-                else None,
+                joints,
+                levels,
+                self.ports if METHODS[method].uses_ports else None,
             )
             for (method, joints, levels), fold in places
         ]
-        for (key, fold), path in zip(places, self.cache.ask(calls), strict=True):
-            for parameter, columns in zip(asked[key], path.columns, strict=True):
-                self._columns[key, parameter, fold] = columns
+        for (key, fold), path in zip(places, self.cache.ask(choose_path, calls), strict=True):
+            for parameter, elements in zip(asked[key], path.elements, strict=True):
+                self._elements[key, parameter, fold] = elements
             if fold is self.cuts.everything:
                 self._seconds[key] = path.seconds
 
@@ -298,18 +279,9 @@ class Survey:
         """Rank the joints, given the switches, for choices that keep only some, by the training rows of these folds."""
         alike = {(one.chosen_by, one.placement.parameter): one for one in choices if one.keep_joints is not None}
         places = [(key, fold) for key in alike for fold in folds]
-        calls = [
-            rank_joints.call(self.inputs(True, key[0][2], fold), fold.train, self.columns(alike[key], fold))
-            for key, fold in places
-        ]
-        for (key, fold), order in zip(places, self.cache.ask(calls), strict=True):
+        calls = [(self.samples, fold.train, self.elements(alike[key], fold)) for key, fold in places]
+        for (key, fold), order in zip(places, self.cache.ask(rank_joints, calls), strict=True):
             self._joints[(*key, fold)] = order
-
-    def columns(self, choice: Candidate, fold: Fold) -> Columns:
-        """Return the switches of a choice from the training rows of `fold`; call `choose` first."""
-        return (
-            () if choice.placement == NO_SWITCHES else self._columns[choice.chosen_by, choice.placement.parameter, fold]
-        )
 
     def choosing_s(self, choice: Candidate) -> float:
         """Return the time of choosing the switches of a choice from all rows."""
@@ -324,80 +296,91 @@ class Survey:
         """Return the tallies of every choice in every fold, trained to its `depth`."""
         places = [(choice, fold) for choice in choices for fold in folds]
         calls = [
-            fit_stages.call(
-                self.read(choice, fold),
+            (
+                self.samples,
                 fold,
-                self.columns(choice, fold),
+                self.selection(choice, fold),
                 *depth(choice),
                 SHAPES if depth(choice)[1] else (),
                 self.training(choice, fold),
             )
             for choice, fold in places
         ]
-        return dict(zip(places, self.cache.ask(calls), strict=True))
-
-
-@stored(1)
-def choose_path(
-    samples: Samples, rows: Rows, method: str, parameters: tuple[float, ...], ports: PortCosts | None
-) -> PlacementPath:
-    """Choose switches from some rows by one method, for all of its parameters."""
-    began = time.perf_counter()
-    choose = METHODS[method].chooser(samples.rows(rows), ports)
-    columns = tuple(choose(parameter) for parameter in parameters)
-    return PlacementPath(columns, time.perf_counter() - began)
-
-
-@stored(1)
-def rank_joints(samples: Samples, rows: Rows, columns: Columns) -> Columns:
-    """Return the joints in the order of their value in addition to these switches, in some rows."""
-    return joint_order(samples.rows(rows).keeping(columns))
+        return dict(zip(places, self.cache.ask(fit_stages, calls), strict=True))
 
 
 @stored(2)
+def choose_path(
+    samples: Samples,
+    rows: Rows,
+    method: str,
+    parameters: tuple[float, ...],
+    joints: bool,
+    levels: int | None,
+    ports: PortCosts | None,
+) -> PlacementPath:
+    """Choose from these levels of the taxels, and the switches, in some rows by one method, for all of its parameters;
+    given the joints, or not.
+    """
+    began, learning = time.perf_counter(), samples.rows(rows)
+    elements = elements_of(learning, levels)
+    bits = bits_of(learning if joints else learning.with_joints(()), elements)
+    choose = METHODS[method].chooser(bits, None if ports is None else ports_of(ports, elements))
+    kept = tuple(tuple(elements[column] for column in choose(parameter)) for parameter in parameters)
+    return PlacementPath(kept, time.perf_counter() - began)
+
+
+@stored(2)
+def rank_joints(samples: Samples, rows: Rows, elements: Elements) -> Columns:
+    """Return the joints in the order of their value in addition to these elements, in some rows."""
+    return joint_order(bits_of(samples.rows(rows), elements))
+
+
+@stored(3)
 def choose_settings(
-    samples: Samples, rows: Rows, columns: Columns, candidates: tuple[Training, ...], seed: int, by_subject: bool
+    samples: Samples,
+    rows: Rows,
+    selection: InputSelection,
+    candidates: tuple[Training, ...],
+    seed: int,
+    by_subject: bool,
 ) -> Fitting:
-    """Select settings by inner folds of some rows, on the switches `columns` and the joints."""
-    learning = samples.rows(rows).keeping(columns)
+    """Select settings by inner folds of some rows, on the selected inputs."""
+    learning = selection.read(samples.rows(rows))
     return choose_training(learning, candidates, seed=seed, groups=learning.subjects if by_subject else None)
 
 
-@stored(2)
+@stored(3)
 def fit_stages(
     samples: Samples,
     fold: Fold,
-    columns: Columns,
+    selection: InputSelection,
     stages: tuple[int, ...],
     tabled: tuple[int, ...],
     shapes: tuple[Shape, ...],
     training: Training,
 ) -> FoldHits:
-    """Train once on a fold's training rows, on the switches `columns` and the joints; test at every stage.
+    """Train once on a fold's training rows, on the selected inputs; test at every stage.
 
-    Rows get the most frequent type if a placement has no switch that varies.
+    Rows get the most frequent type if no selected input varies.
     """
-    kept = samples.keeping(columns)
-    train, test = kept.rows(fold.train), kept.rows(fold.test)
+    train, test = (selection.read(samples.rows(rows)) for rows in (fold.train, fold.test))
     if not (train.inputs != train.inputs[0]).any():
         same = np.full(len(test.labels), np.bincount(train.labels).argmax())
         trials, frames = _packed(same, test)
         return FoldHits((trials,) * len(stages), *(((each,) * len(shapes),) * len(tabled) for each in (trials, frames)))
     rounds = (*stages, *tabled)
-    models = dict(zip(rounds, training.stages(train, rounds), strict=True))
-    predictions = (winners(model_scores(models[stage], test.switches, test.codes)) for stage in stages)
+    made = dict(zip(rounds, Recogniser.stages(samples, Recipe(), fold.train, selection, training, rounds), strict=True))
+    predictions = (winners(model_scores(made[stage].model, test.switches, test.codes)) for stage in stages)
     by_stage = tuple(_packed(predicted, test)[0] for predicted in predictions)
-    scores = [collapse(models[stage], kept.n_switches) for stage in tabled]
-    found = [[_packed(_predicted(each, shape, train, test), test) for shape in shapes] for each in scores]
+    found = [
+        [
+            _packed(predicted_classes(tables, None, test.switches, test.codes), test)
+            for tables in (replace(made[stage], recipe=shape.recipe).integers for shape in shapes)
+        ]
+        for stage in tabled
+    ]
     return FoldHits(by_stage, *(tuple(tuple(each[which] for each in row) for row in found) for which in (0, 1)))
-
-
-def _predicted(scores: ScoreTables, shape: Shape, train: Samples, test: Samples) -> Rows:
-    # Training rows determine the substitutes for lost inputs, which are not used here; they affect scores only if
-    # entries are narrow.
-    seen = train if shape.table_bits < 16 else train.rows(np.arange(1))
-    tables = quantise(scores, seen.switches, seen.codes, shape.width, shape.table_bits)
-    return np.asarray(integer_scores(tables, test.switches, test.codes).argmax(axis=1))
 
 
 def _packed(predictions: Rows, test: Samples) -> tuple[bytes, bytes]:

@@ -11,7 +11,7 @@ from thenar.runtime.recipe import PAPERS_TRAINER
 from ..evaluation.rates import Rate
 from ..sensors import SensorCount
 from ..text import cells, counted, duration, interval, listed, percent
-from .points import Frontier, Mark, Point, PointSetting, Time
+from .points import Frontier, FrontierPoint, PointSetting, PointTime, ReferencePoint
 
 COLUMNS = (
     *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width"),
@@ -41,7 +41,7 @@ _LONGEST = 40  # letters of a name on a picture
 _SPARED = 0.005  # rates within half a point count as equal
 
 
-def inputs_of(point: Point) -> str:
+def inputs_of(point: FrontierPoint) -> str:
     """Return a point's inputs in words: "33 switches", "joints alone", "8 switches + joints"."""
     if point.setting.inputs == "joints":
         return f"{counted(len(point.joints), 'joint')} alone" if point.joints else "joints alone"
@@ -52,7 +52,7 @@ def inputs_of(point: Point) -> str:
     return " + ".join(kept + (joints if point.setting.inputs == "both" else []))
 
 
-def _kinds(point: Point) -> tuple[int, int, int]:
+def _kinds(point: FrontierPoint) -> tuple[int, int, int]:
     """Return how many switches and levels a point keeps, and of how many taxels."""
     if point.setting.levels is None:
         return len(point.switches), 0, 0
@@ -117,7 +117,7 @@ def wiring_of(setting: PointSetting) -> str:
     return f"{setting.wiring} {setting.clock_hz} {unit}"
 
 
-def featured(frontier: Frontier) -> Point | None:
+def featured(frontier: Frontier) -> FrontierPoint | None:
     """Return the featured point, or None: the picked one; else the fastest whose accuracy is within half a point of the
     mark of most switches, the first of equals; else the best.
     """
@@ -158,7 +158,7 @@ def folds_of(frontier: Frontier) -> str:
     return f"Pooled, trials: {counted(frontier.folds, 'fold')} of whole trials, {repeats}"
 
 
-def luck_of(point: Point) -> str:
+def luck_of(point: FrontierPoint) -> str:
     """Return the correction of a point's rate, with the reason, in a sentence without a full stop; or ""."""
     if round(100 * point.luck, 1) == 0:
         return ""
@@ -168,11 +168,11 @@ def luck_of(point: Point) -> str:
     )
 
 
-def rates_of(frontier: Frontier) -> dict[str, Callable[[Point], Rate | None]]:
+def rates_of(frontier: Frontier) -> dict[str, Callable[[FrontierPoint], Rate | None]]:
     """Return the kinds of rates of a point with their getters, first the one by which points are chosen; of trials
     unless the kind says frames.
     """
-    found: dict[str, Callable[[Point], Rate | None]] = {frontier.by: lambda point: point.rate}
+    found: dict[str, Callable[[FrontierPoint], Rate | None]] = {frontier.by: lambda point: point.rate}
     if any(point.frames is not None for point in frontier.points):
         found[f"{frontier.by}, frames"] = lambda point: point.frames
     if frontier.other is not None:
@@ -180,7 +180,7 @@ def rates_of(frontier: Frontier) -> dict[str, Callable[[Point], Rate | None]]:
     return found
 
 
-def _inputs(frontier: Frontier, point: Point) -> str:
+def _inputs(frontier: Frontier, point: FrontierPoint) -> str:
     switches, levels, taxels = _kinds(point)
     joints, none = (len(point.joints) or frontier.n_joints, frontier.n_joints), (0, 0)
     elements, inputs = ((switches, frontier.n_switches), (taxels, frontier.n_taxels)), point.setting.inputs
@@ -188,7 +188,7 @@ def _inputs(frontier: Frontier, point: Point) -> str:
     return str(SensorCount(*kept, joints if inputs != "switches" else none, levels))
 
 
-def _mark(mark: Mark, frontier: Frontier) -> str:
+def _mark(mark: ReferencePoint, frontier: Frontier) -> str:
     named = str(mark.n_switches) in mark.name
     name = mark.name if named else f"{counted_elements(frontier, mark.n_switches)} ({mark.name})"
     return f"{percent(mark.rate.mean)} in {duration(mark.frame_us)} with {name}"
@@ -217,7 +217,7 @@ def csv_bytes(frontier: Frontier) -> bytes:
     return file.getvalue().encode()
 
 
-def _values(point: Point) -> Iterator[object]:
+def _values(point: FrontierPoint) -> Iterator[object]:
     setting, latency = point.setting, point.latency
     yield from (point.number, _list(point.fronts), len(point.switches), setting.inputs)
     yield from (setting.placement.method, setting.placement.parameter, setting.rounds, setting.width)
@@ -234,7 +234,7 @@ def _rate(rate: Rate | None) -> tuple[object, ...]:
     return ("", "", "", "") if rate is None else (rate.what, rate.mean, rate.low, rate.high)
 
 
-def _time(time: Time) -> tuple[object, ...]:
+def _time(time: PointTime) -> tuple[object, ...]:
     return time.us, time.how
 
 

@@ -5,7 +5,7 @@ reset, bus pull-ups, muxes, and the host's plugs.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from msgspec import Struct
 
@@ -16,8 +16,99 @@ from thenar.drivers.i2c.chips.base import RESET, Package
 from thenar.drivers.i2c.chips.base import SUPPLY as SUPPLY_PINS
 from thenar.runtime.harness.wiring import ChipWiring, Harness, MuxChannel, SpiWiring
 
-from .layout import GROUND, PUSH_BUTTON, SUPPLY, End, PlacedSensor, Unit, Wire, net_of
-from .parts import Circuit, Kind, Terminal, capacitor, header, resistor, two_pins
+from .layout import GROUND, PUSH_BUTTON, SUPPLY, GloveWire, PlacedSensor, Unit, WireEnd, net_of
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentKind:
+    """A kind of component: its name in KiCad, and the part to buy.
+
+    pins holds (number, name, KiCad's electrical type) triples. part and maker are empty unless an orderable part number
+    is known; sure says whether everything here is confirmed twice, and note what is not, or what to watch for.
+    """
+
+    value: str
+    library: str
+    symbol: str
+    footprint: str
+    pins: tuple[tuple[str, str, str], ...]
+    part: str = ""
+    maker: str = ""
+    sure: bool = True
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """One component: its designator, and whether it sits on the board at the wrist or elsewhere on the glove."""
+
+    ref: str
+    kind: ComponentKind
+    on_board: bool = True
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentPin:
+    """A pin of a component."""
+
+    ref: str
+    pin: str
+
+
+@dataclass(slots=True)
+class Circuit:
+    """Components in order of insertion, nets by name; built up piece by piece, then only read."""
+
+    components: list[Component] = field(default_factory=list)
+    nets: dict[str, list[ComponentPin]] = field(default_factory=dict)
+
+    def put(self, ref: str, kind: ComponentKind, *, on_board: bool = True, name: str = "") -> Component:
+        """Add a component called `ref`."""
+        self.components.append(Component(ref, kind, on_board, name))
+        return self.components[-1]
+
+    def next(self, letter: str, kind: ComponentKind) -> str:
+        """Add a component with the next free designator of `letter`, and return that."""
+        used = sum(component.ref[: len(letter)] == letter for component in self.components)
+        return self.put(f"{letter}{used + 1}", kind).ref
+
+    def join(self, net: str, ref: str, pin: str) -> None:
+        """Connect a pin to a net. A pin is on one net at most."""
+        self.nets.setdefault(net, []).append(ComponentPin(ref, pin))
+
+    def between(self, letter: str, kind: ComponentKind, first: str, second: str) -> str:
+        """Add a component with two pins, the first on net `first`; return its designator."""
+        ref = self.next(letter, kind)
+        for net, (pin, _, _) in zip((first, second), kind.pins, strict=True):
+            self.join(net, ref, pin)
+        return ref
+
+
+def header(count: int) -> ComponentKind:
+    """Return a row of `count` pins, or of holes to solder wires to."""
+    pins = tuple((str(pin), f"Pin_{pin}", "passive") for pin in range(1, count + 1))
+    footprint = f"Connector_PinHeader_2.54mm:PinHeader_1x{count:02}_P2.54mm_Vertical"
+    return ComponentKind(f"{count} pins", "Connector_Generic", f"Conn_01x{count:02}", footprint, pins)
+
+
+def two_pins(names: Sequence[str] = ("~", "~")) -> tuple[tuple[str, str, str], ...]:
+    """Return the pins 1 and 2 of a passive component."""
+    return tuple((str(number), name, "passive") for number, name in enumerate(names, start=1))
+
+
+def resistor(value: str, note: str = "") -> ComponentKind:
+    """Return a resistor to solder by hand."""
+    return ComponentKind(
+        value, "Device", "R", "Resistor_SMD:R_0805_2012Metric_Pad1.20x1.40mm_HandSolder", two_pins(), note=note
+    )
+
+
+def capacitor(value: str, note: str = "") -> ComponentKind:
+    """Return a ceramic capacitor to solder by hand."""
+    footprint = "Capacitor_SMD:C_0805_2012Metric_Pad1.18x1.45mm_HandSolder"
+    return ComponentKind(value, "Device", "C", footprint, two_pins(), note=note)
+
 
 _HOST = ("VCC", "GND", "SDA", "SCL")
 _TYPES = {
@@ -34,7 +125,7 @@ _BULK = capacitor("10u", "at the host's plug")
 _RESET_PULL = resistor("10k", "holds RESET high")
 
 
-def _add_expanders(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End], harness: Harness) -> None:
+def _add_expanders(circuit: Circuit, units: Sequence[Unit], ends: Sequence[WireEnd], harness: Harness) -> None:
     """Add the expanders `units` and the muxes in front of them, and a plug and pull-ups for each bus."""
     for unit in units:
         _add_expander(circuit, unit, [end for end in ends if end.unit == unit])
@@ -46,7 +137,7 @@ def _add_expanders(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End],
         _add_plug(circuit, bus, clock_hz)
 
 
-def _add_expander(circuit: Circuit, unit: Unit, ends: Sequence[End]) -> None:
+def _add_expander(circuit: Circuit, unit: Unit, ends: Sequence[WireEnd]) -> None:
     wiring = unit.wiring
     if not isinstance(wiring, ChipWiring):
         return
@@ -60,7 +151,9 @@ def _add_expander(circuit: Circuit, unit: Unit, ends: Sequence[End]) -> None:
         _ground_unused(circuit, unit, package, chip.pins, ends)
 
 
-def _ground_unused(circuit: Circuit, unit: Unit, package: Package, pins: Sequence[str], ends: Sequence[End]) -> None:
+def _ground_unused(
+    circuit: Circuit, unit: Unit, package: Package, pins: Sequence[str], ends: Sequence[WireEnd]
+) -> None:
     """Ground unconnected inputs: a floating one draws current, or disturbs its neighbours."""
     used = {end.pin for end in ends}
     for pin in pins:
@@ -68,7 +161,7 @@ def _ground_unused(circuit: Circuit, unit: Unit, package: Package, pins: Sequenc
             circuit.join(GROUND, unit.ref, package.number(pin))
 
 
-def _add_spi(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End]) -> None:
+def _add_spi(circuit: Circuit, units: Sequence[Unit], ends: Sequence[WireEnd]) -> None:
     """Add the converters on SPI, and a plug for each bus with a select line for each of them."""
     lines: dict[str, list[str]] = {}
     for unit in units:
@@ -91,7 +184,7 @@ def _add_spi(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End]) -> No
         circuit.between("C", _BULK, SUPPLY, GROUND)
 
 
-def _add_multiplexers(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End]) -> None:
+def _add_multiplexers(circuit: Circuit, units: Sequence[Unit], ends: Sequence[WireEnd]) -> None:
     """Add the multiplexers of boards: a board selects the same channel on all of them, and reads their commons."""
     package = cd74hc4067.PACKAGE
     inputs = tuple(f"I{channel}" for channel in range(cd74hc4067.CHANNELS))
@@ -150,7 +243,7 @@ def _wires(bus: int, mux: MuxChannel | None) -> tuple[str, str]:
     return f"SDA{where}", f"SCL{where}"
 
 
-def _pull_up(clock_hz: int) -> Kind:
+def _pull_up(clock_hz: int) -> ComponentKind:
     """Return a bus pull-up with which 150 pF and more rise in the time that the speed allows (UM10204)."""
     note = "leave it out if the host has its own"
     if clock_hz <= 100_000:
@@ -160,14 +253,14 @@ def _pull_up(clock_hz: int) -> Kind:
     return resistor("1k", f"{note}; for {clock_hz} Hz, with short wires only: measure the rise time")
 
 
-def _kind(package: Package, inputs: Sequence[str]) -> Kind:
+def _kind(package: Package, inputs: Sequence[str]) -> ComponentKind:
     def type_of(name: str) -> str:
         if name in (*SUPPLY_PINS, *GROUND_PINS):
             return "power_in"
         return "bidirectional" if name in inputs or name[:2] in ("SD", "SC") else _TYPES.get(name, "input")
 
     pins = tuple((str(number), name, type_of(name)) for number, name in enumerate(package.pins, start=1))
-    return Kind(
+    return ComponentKind(
         package.part,
         package.library,
         package.symbol,
@@ -180,7 +273,7 @@ def _kind(package: Package, inputs: Sequence[str]) -> Kind:
     )
 
 
-_BUTTON = Kind(
+_BUTTON = ComponentKind(
     PUSH_BUTTON,
     "Switch",
     "SW_Push",
@@ -190,7 +283,7 @@ _BUTTON = Kind(
     maker="Panasonic",
     note="light touch switch, 4.9 x 4.9 x 1.5 mm; its operating force of 1.0 N is not confirmed by a data sheet",
 )
-_OWN_SWITCH = Kind(
+_OWN_SWITCH = ComponentKind(
     "your own switch or pad",
     "Switch",
     "SW_SPST",
@@ -198,7 +291,7 @@ _OWN_SWITCH = Kind(
     two_pins(("1", "2")),
     note="a contact between its two wires; a pad recorded as a voltage needs a comparator at its threshold",
 )
-_PAD = Kind(
+_PAD = ComponentKind(
     "your own force sensing pad",
     "Device",
     "R_Variable",
@@ -206,7 +299,7 @@ _PAD = Kind(
     two_pins(("1", "2")),
     note="its resistance falls with force; it is the upper half of a divider between the supply and an analog input",
 )
-_DIODE = Kind(
+_DIODE = ComponentKind(
     "Schottky, 30 V",
     "Device",
     "D_Schottky",
@@ -221,7 +314,11 @@ _PULL_UP = resistor("10k", "pulls up an input of a chip without pull-ups")
 
 
 def glove_circuit(
-    switches: Sequence[PlacedSensor], ends: Sequence[End], wires: Sequence[Wire], harness: Harness, part_number: str
+    switches: Sequence[PlacedSensor],
+    ends: Sequence[WireEnd],
+    wires: Sequence[GloveWire],
+    harness: Harness,
+    part_number: str,
 ) -> Circuit:
     """Return the circuit in which each sensor reaches its `end` through its bundle's connector.
 
@@ -247,8 +344,8 @@ def glove_circuit(
     return circuit
 
 
-def _add_connectors(circuit: Circuit, wires: Sequence[Wire]) -> None:
-    bundles: dict[tuple[str, str], list[Wire]] = {}
+def _add_connectors(circuit: Circuit, wires: Sequence[GloveWire]) -> None:
+    bundles: dict[tuple[str, str], list[GloveWire]] = {}
     for wire in wires:
         bundles.setdefault((wire.connector, wire.bundle), []).append(wire)
     for (ref, bundle), group in bundles.items():
@@ -257,7 +354,7 @@ def _add_connectors(circuit: Circuit, wires: Sequence[Wire]) -> None:
             circuit.join(wire.net, ref, str(wire.pin))
 
 
-def _add_board(circuit: Circuit, ref: str, ends: Sequence[End], multiplexers: Sequence[Unit]) -> None:
+def _add_board(circuit: Circuit, ref: str, ends: Sequence[WireEnd], multiplexers: Sequence[Unit]) -> None:
     """Add a board, with ground and every pin that a kept switch or a multiplexer needs."""
     signals = {end.pad: end.pin for end in ends}
     lines = [f"{ref}_{pin}" for pin in cd74hc4067.SELECTS] if multiplexers else []
@@ -265,26 +362,26 @@ def _add_board(circuit: Circuit, ref: str, ends: Sequence[End], multiplexers: Se
     nets = dict.fromkeys([*(end.other for end in ends), *lines, GROUND])
     named = {**signals, **{str(number): net for number, net in enumerate(nets, start=len(signals) + 1)}}
     pins = tuple((pad, name, "bidirectional") for pad, name in named.items())
-    circuit.put(ref, Kind("board", "thenar", f"board_{ref}", "", pins), on_board=False)
+    circuit.put(ref, ComponentKind("board", "thenar", f"board_{ref}", "", pins), on_board=False)
     for number, net in enumerate(nets, start=len(signals) + 1):
         circuit.join(net, ref, str(number))
     for end in {end.pad: end for end in ends if end.unit.diodes and not end.taxel}.values():
         circuit.join(f"{ref}_{end.pin}", ref, end.pad)
 
 
-def _add_signal(circuit: Circuit, end: End, switch: PlacedSensor) -> None:
+def _add_signal(circuit: Circuit, end: WireEnd, switch: PlacedSensor) -> None:
     net = net_of(end, switch)
     circuit.join(net, switch.ref, "1")
     circuit.join(end.other, switch.ref, "2")
     if end.unit.diodes and not end.taxel:
         circuit.between("D", _DIODE, net, f"{end.unit.ref}_{end.pin}")
         return
-    if Terminal(end.unit.ref, end.pad) not in circuit.nets[net]:
+    if ComponentPin(end.unit.ref, end.pad) not in circuit.nets[net]:
         circuit.join(net, end.unit.ref, end.pad)
     _add_pull(circuit, end, net)
 
 
-def _add_pull(circuit: Circuit, end: End, net: str) -> None:
+def _add_pull(circuit: Circuit, end: WireEnd, net: str) -> None:
     wiring = end.unit.wiring
     if end.taxel:
         circuit.between("R", _DIVIDER, net, GROUND)
@@ -297,7 +394,7 @@ def _add_pull(circuit: Circuit, end: End, net: str) -> None:
         circuit.between("R", _PULL_UP, net, SUPPLY)
 
 
-def _units(ends: Sequence[End]) -> list[Unit]:
+def _units(ends: Sequence[WireEnd]) -> list[Unit]:
     """Return the readers of switches: the boards, then the expanders, by number."""
     return sorted({end.unit.ref: end.unit for end in ends}.values(), key=lambda unit: (unit.ref[0], int(unit.ref[1:])))
 
@@ -320,9 +417,9 @@ class BillLine(Struct, frozen=True):
     note: str
 
 
-def bill_of(circuit: Circuit, wires: Sequence[Wire]) -> tuple[BillLine, ...]:
+def bill_of(circuit: Circuit, wires: Sequence[GloveWire]) -> tuple[BillLine, ...]:
     """Return the bill of materials for a glove's circuit and its wires."""
-    groups: dict[Kind, list[str]] = {}
+    groups: dict[ComponentKind, list[str]] = {}
     for component in circuit.components:
         groups.setdefault(component.kind, []).append(component.ref)
     return (*(_pieces(kind, refs) for kind, refs in groups.items()), *_wire_lines(wires))
@@ -337,7 +434,7 @@ def bill_of_joints(joints: Sequence[str], cyberglove: bool) -> tuple[BillLine, .
     return (BillLine(len(names) or 1, "pcs", what, "", "", "", names, True, note),)
 
 
-def _pieces(kind: Kind, refs: Sequence[str]) -> BillLine:
+def _pieces(kind: ComponentKind, refs: Sequence[str]) -> BillLine:
     what = {"Device": f"{_named(kind)}{kind.value}", "Connector_Generic": f"header or holes, {kind.value}"}
     return BillLine(
         quantity=len(refs),
@@ -352,12 +449,12 @@ def _pieces(kind: Kind, refs: Sequence[str]) -> BillLine:
     )
 
 
-def _named(kind: Kind) -> str:
+def _named(kind: ComponentKind) -> str:
     return {"R": "resistor ", "C": "ceramic capacitor ", "R_Variable": ""}.get(kind.symbol, "diode ")
 
 
-def _wire_lines(wires: Sequence[Wire]) -> Iterator[BillLine]:
-    colours: dict[str, list[Wire]] = {}
+def _wire_lines(wires: Sequence[GloveWire]) -> Iterator[BillLine]:
+    colours: dict[str, list[GloveWire]] = {}
     for wire in wires:
         colours.setdefault(wire.colour.partition(",")[0], []).append(wire)
     for colour, group in colours.items():

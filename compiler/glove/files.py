@@ -20,9 +20,9 @@ from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..hand import HandShape
 from ..publication import check_folder, entries, publish_folder
+from .circuit import Circuit, Component, ComponentKind
 from .lists import materials_csv, readme_of, sensors_csv, wiring_csv
-from .parts import Circuit, Component, Kind
-from .pattern import LAYERS, Circle, Line, Pattern, Shape, Text
+from .pattern import LAYERS, Circle, Pattern, PatternLine, Shape, Text
 from .spec import GloveSpec, SpecError, glove_spec
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def _layer(name: str) -> dict[str, str]:
 
 def _add_to_svg(group: ET.Element, shape: Shape, height_mm: float) -> None:
     match shape:
-        case Line(points=points, closed=closed):
+        case PatternLine(points=points, closed=closed):
             places = " ".join(f"{x:.3f},{height_mm - y:.3f}" for x, y in points)
             ET.SubElement(group, "polygon" if closed else "polyline", {"points": places})
         case Circle(x=x, y=y, radius=radius):
@@ -135,7 +135,7 @@ def _add_to_dxf(space: "Modelspace", shape: Shape) -> None:
 
     on_layer = {"layer": shape.layer}
     match shape:
-        case Line(points=points, closed=closed):
+        case PatternLine(points=points, closed=closed):
             space.add_lwpolyline(points.tolist(), close=closed, dxfattribs=on_layer)
         case Circle(x=x, y=y, radius=radius):
             space.add_circle((x, y), radius, dxfattribs=on_layer)
@@ -202,12 +202,12 @@ def _component(component: Component) -> Iterator[str]:
     yield f"      (tstamps {_quoted(str(uuid.uuid5(_NAMESPACE, component.ref)))}))"
 
 
-def _symbols(circuit: Circuit) -> list[Kind]:
+def _symbols(circuit: Circuit) -> list[ComponentKind]:
     """Return one kind of component for each symbol."""
     return list({(c.kind.library, c.kind.symbol): c.kind for c in circuit.components}.values())
 
 
-def _libpart(kind: Kind) -> Iterator[str]:
+def _libpart(kind: ComponentKind) -> Iterator[str]:
     yield f"    (libpart (lib {_quoted(kind.library)}) (part {_quoted(kind.symbol)})"
     yield "      (pins"
     for number, name, electrical in kind.pins:
@@ -259,7 +259,7 @@ def files_of(spec: GloveSpec) -> Mapping[str, bytes]:
     """Return name -> content of a spec's files; without a cutting pattern if the switch positions are unknown."""
     summary = spec.summary
     files = {
-        "README.txt": readme_of(summary).encode(),
+        "README.txt": readme_of(spec).encode(),
         "bom.csv": materials_csv(summary.materials),
         "glove.net": netlist_of(spec.circuit, summary.glove),
         "glove.toml": harness_to_toml(spec.harness).encode(),

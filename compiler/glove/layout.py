@@ -110,7 +110,7 @@ class Unit:
 
 
 @dataclass(frozen=True, slots=True)
-class End:
+class WireEnd:
     """The end of a switch's wire: pin is a name, pad its number in the netlist.
 
     other is the net of its other contact: ground, supply, or a row of the board's matrix. A taxel is the upper half of
@@ -152,14 +152,14 @@ def elements_of(harness: Harness, names: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(taxels.get(number, name) for number, name in enumerate(names)))
 
 
-def ends_of(harness: Harness, names: Sequence[str]) -> tuple[End, ...]:
+def ends_of(harness: Harness, names: Sequence[str]) -> tuple[WireEnd, ...]:
     """Return the ends of the switches called `names`, in order; each is wired once in the harness."""
     numbers, chips = {name: number for number, name in enumerate(names)}, count(1)
     found = [*_of_chips(harness, numbers, chips), *_of_boards(harness, numbers, chips)]
     return tuple(sorted(found, key=lambda end: end.switch))
 
 
-def _of_chips(harness: Harness, numbers: Mapping[str, int], used: Iterator[int]) -> Iterator[End]:
+def _of_chips(harness: Harness, numbers: Mapping[str, int], used: Iterator[int]) -> Iterator[WireEnd]:
     chips: list[tuple[int, ChipWiring | SpiWiring]] = [
         (bus, chip) for bus, wiring in enumerate(harness.buses) for chip in wiring.chips
     ]
@@ -171,10 +171,10 @@ def _of_chips(harness: Harness, numbers: Mapping[str, int], used: Iterator[int])
         taxels = isinstance(chip, SpiWiring) or chip.measures
         other = SUPPLY if isinstance(chip, SpiWiring) or taxels or chip.closed == "high" else GROUND
         number = chip.chip.package.number
-        yield from (End(numbers[name], unit, pin, number(pin), other, taxels) for pin, name in kept.items())
+        yield from (WireEnd(numbers[name], unit, pin, number(pin), other, taxels) for pin, name in kept.items())
 
 
-def _of_boards(harness: Harness, numbers: Mapping[str, int], used: Iterator[int]) -> Iterator[End]:
+def _of_boards(harness: Harness, numbers: Mapping[str, int], used: Iterator[int]) -> Iterator[WireEnd]:
     """Yield the ends at boards; the pins of a sender whose board is not known are its columns."""
     for number, stream in enumerate(harness.streams):
         board = stream.board or BoardWiring(pins={name: name for name in (*stream.switches, *stream.taxels)})
@@ -194,14 +194,14 @@ def _of_boards(harness: Harness, numbers: Mapping[str, int], used: Iterator[int]
             ]
         pads = {pin: str(pad) for pad, pin in enumerate(dict.fromkeys(pin for _, pin, _ in plain), start=1)}
         for name, pin, other in plain:
-            yield End(numbers[name], unit, pin, pads[pin], other, taxel=name in stream.taxels)
+            yield WireEnd(numbers[name], unit, pin, pads[pin], other, taxel=name in stream.taxels)
         if stream.board is not None:
             yield from _of_multiplexers(stream, stream.board, ref, numbers, used)
 
 
 def _of_multiplexers(
     stream: StreamWiring, board: BoardWiring, ref: str, numbers: Mapping[str, int], used: Iterator[int]
-) -> Iterator[End]:
+) -> Iterator[WireEnd]:
     """Yield the ends of a board's taxels at its multiplexers; multiplexers without a kept taxel are left out."""
     units: dict[str, Unit] = {}
     for name, pin in board.pins.items():
@@ -211,10 +211,12 @@ def _of_multiplexers(
                 place = f"cd74hc4067 at {common} of the board at {stream.port}"
                 units[common] = Unit(f"U{next(used)}", place, len(units), board=ref)
             package = cd74hc4067.PACKAGE
-            yield End(numbers[name], units[common], f"I{channel}", package.number(f"I{channel}"), SUPPLY, taxel=True)
+            yield WireEnd(
+                numbers[name], units[common], f"I{channel}", package.number(f"I{channel}"), SUPPLY, taxel=True
+            )
 
 
-class Wire(Struct, frozen=True):
+class GloveWire(Struct, frozen=True):
     """A wire from switches to the wrist: through pin `pin` of connector `connector` to `net`.
 
     switches are the numbers of those on it: one for a signal, all that share it for a return. unit and input say which
@@ -232,17 +234,19 @@ class Wire(Struct, frozen=True):
     length_mm: int | None
 
 
-def wires_of(switches: Sequence[PlacedSensor], ends: Sequence[End], hand: HandShape | None) -> tuple[Wire, ...]:
+def wires_of(
+    switches: Sequence[PlacedSensor], ends: Sequence[WireEnd], hand: HandShape | None
+) -> tuple[GloveWire, ...]:
     """Return all wires, bundle by bundle: the signals in the switches' order, then the returns chip by chip.
 
     A bundle holds the wires of one digit; or those of one unit, if the positions are unknown.
     """
     home = None if hand is None else hand.wrist
-    bundles: dict[str, list[End]] = {}
+    bundles: dict[str, list[WireEnd]] = {}
     for end in ends:
         bundles.setdefault(switches[end.switch].part or end.unit.ref, []).append(end)
     order = list(bundles) if hand is None else [part for part in hand.part_names if part in bundles]
-    made: list[Wire] = []
+    made: list[GloveWire] = []
     connectors = 0
     for bundle in order:
         wires = [*_signals(bundle, bundles[bundle], switches, home), *_returns(bundle, bundles[bundle], switches, home)]
@@ -257,7 +261,7 @@ def marked(colour: str, times: int) -> str:
     return colour if not times else f"{colour}, {times} mark{'s' if times > 1 else ''}"
 
 
-def net_of(end: End, switch: PlacedSensor) -> str:
+def net_of(end: WireEnd, switch: PlacedSensor) -> str:
     """Return the net of a switch's contact 1: a separate one, or its column's in a matrix without diodes.
 
     The stroke distinguishes it from GND and VCC, whatever a switch is called.
@@ -266,14 +270,16 @@ def net_of(end: End, switch: PlacedSensor) -> str:
     return f"{end.unit.ref}_{end.pin}" if shared else f"/{switch.name}"
 
 
-def _connected(wires: Sequence[Wire], connector: str) -> Iterator[Wire]:
+def _connected(wires: Sequence[GloveWire], connector: str) -> Iterator[GloveWire]:
     return (replace(wire, connector=connector, pin=pin) for pin, wire in enumerate(wires, start=1))
 
 
-def _signals(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSensor], home: Place | None) -> Iterator[Wire]:
+def _signals(
+    bundle: str, ends: Sequence[WireEnd], switches: Sequence[PlacedSensor], home: Place | None
+) -> Iterator[GloveWire]:
     for number, end in enumerate(ends):
         switch = switches[end.switch]
-        yield Wire(
+        yield GloveWire(
             bundle=bundle,
             connector="",
             pin=0,
@@ -286,14 +292,16 @@ def _signals(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSensor],
         )
 
 
-def _returns(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSensor], home: Place | None) -> Iterator[Wire]:
+def _returns(
+    bundle: str, ends: Sequence[WireEnd], switches: Sequence[PlacedSensor], home: Place | None
+) -> Iterator[GloveWire]:
     shared: dict[tuple[str, str], list[PlacedSensor]] = {}
     for end in ends:
         shared.setdefault((end.unit.ref, end.other), []).append(switches[end.switch])
     for number, ((_, net), group) in enumerate(shared.items()):
         colour = marked(_RETURN, number)
         numbers = tuple(switch.number for switch in group)
-        yield Wire(bundle, "", 0, colour, net, numbers, "", "", _length(group, home))
+        yield GloveWire(bundle, "", 0, colour, net, numbers, "", "", _length(group, home))
 
 
 def _length(group: Sequence[PlacedSensor], home: Place | None) -> int | None:

@@ -5,13 +5,15 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from textwrap import fill
 
-from ..text import cells
+from ..text import cells, sentence
 from .circuit import BillLine
 from .layout import CONTACT_MM, counted_sensors
-from .spec import Expected, SpecSummary
+from .spec import GloveSpec, SpecSummary
 
 Row = Sequence[object]
 _WIDTH = 100
+# Topics of facts that say what to expect of the glove.
+_EXPECTED = ("scan", "accuracy", "caution", "faults")
 
 
 def sensors_csv(summary: SpecSummary) -> bytes:
@@ -68,39 +70,20 @@ def _csv(header: Sequence[str], rows: Iterable[Row]) -> bytes:
     return text.getvalue().encode()
 
 
-def readme_of(summary: SpecSummary) -> str:
+def readme_of(spec: GloveSpec) -> str:
     """Return the text of README.txt."""
+    summary = spec.summary
     parts = [f"{summary.glove}: a glove with {summary.kept}", *_building(summary)]
-    parts += ["What to expect", *expectations(summary.expected)]
+    parts += ["What to expect", *expectations(spec)]
     doubts = [f"{m.part or m.what}: {m.note}" for m in summary.materials if not m.sure]
     parts += ["Please note", *_advice(summary), *summary.remarks, *doubts]
     headings = {parts[0], "To cut and sew", "To wire", "To solder", "To run", "What to expect", "Please note"}
     return "\n".join(_laid_out(part, part in headings) for part in parts)
 
 
-def expectations(expected: Expected) -> Iterator[str]:
+def expectations(spec: GloveSpec) -> Iterator[str]:
     """Yield sentences on times and accuracy."""
-    if expected.transactions:
-        full = "" if expected.full_us == expected.scan_us else f"; for all wired sensors, {expected.full_us:.1f} us"
-        yield (
-            f"A whole scan takes {expected.scan_us:.1f} us on the wire, in {expected.transactions} "
-            f"transaction{'s' if expected.transactions > 1 else ''}{full}. thenar doctor measures what the "
-            "computer adds to each of them."
-        )
-    for us in expected.rows_us:
-        yield f"A board sends a row every {us} us."
-    if expected.glove_us is not None:
-        yield (
-            f"The CyberGlove sends a record of {expected.sensors} sensors every {expected.glove_us:.0f} us at best, by "
-            "the vendor's formula or as measured in glove.toml."
-        )
-    for rate in sorted(expected.rates, key=lambda rate: rate.protocol == "training"):
-        yield f"Accuracy, {rate}."
-    for each in expected.detection:
-        if each.held.protocol != "training":
-            yield f"Nothing held, {each}."
-    for sentence in () if expected.faults is None else expected.faults.sentences:
-        yield f"At worst, on the training rows: {sentence}."
+    return (sentence(str(fact)) for fact in spec.facts if fact.topic in _EXPECTED)
 
 
 def _building(summary: SpecSummary) -> Iterator[str]:
@@ -125,7 +108,8 @@ def _building(summary: SpecSummary) -> Iterator[str]:
     yield "To run"
     yield (
         "glove.toml: the wiring as thenar run, record, emulate and doctor read it. Device files and ports are the "
-        "lines to check. spec.json: all of this for machines."
+        "lines to check. thenar doctor measures what the computer adds to each transaction. spec.json: all of this for "
+        "machines."
     )
 
 

@@ -58,7 +58,7 @@ def _tiles(length_mm: float, sheet_mm: float) -> int:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Line:
+class PatternLine:
     """A line through points (k, 2), back to the first one if `closed`."""
 
     layer: str
@@ -88,7 +88,7 @@ class Text:
     centred: bool = False
 
 
-Shape = Line | Circle | Text
+Shape = PatternLine | Circle | Text
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,9 +123,9 @@ def pattern_of(switches: Sequence[PlacedSensor], hand: HandShape, title: str) ->
 
 def _hand(hand: HandShape, move: Floats) -> Iterator[Shape]:
     if len(hand.outline):
-        yield Line("outline", hand.outline + move, closed=True)
-    yield from (Line("strips", strip + move, closed=True) for strip in hand.strips)
-    yield from (Line("creases", crease + move, closed=False) for crease in hand.creases)
+        yield PatternLine("outline", hand.outline + move, closed=True)
+    yield from (PatternLine("strips", strip + move, closed=True) for strip in hand.strips)
+    yield from (PatternLine("creases", crease + move, closed=False) for crease in hand.creases)
     for name, (x, y) in zip(hand.part_names, hand.labels + move, strict=False):
         yield Text("names", float(x), float(y), _TEXT_MM, name, centred=True)
 
@@ -138,9 +138,9 @@ def _holes(switches: Sequence[PlacedSensor], move: Floats, across_mm: float) -> 
 
 
 def _bar(x: float, y: float) -> Iterator[Shape]:
-    yield Line("scale", np.array([[x, y], [x + SCALE_BAR_MM, y]]), closed=False)
+    yield PatternLine("scale", np.array([[x, y], [x + SCALE_BAR_MM, y]]), closed=False)
     for at in (x, x + SCALE_BAR_MM):
-        yield Line("scale", np.array([[at, y - _TICK_MM], [at, y + _TICK_MM]]), closed=False)
+        yield PatternLine("scale", np.array([[at, y - _TICK_MM], [at, y + _TICK_MM]]), closed=False)
     yield Text("names", x, y + _TICK_MM + 1.0, _TEXT_MM, "50 mm: measure it on paper, and print without scaling")
 
 

@@ -17,13 +17,14 @@ from thenar.runtime.scanning.propose import own_joints, propose_cyberglove, prop
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us
 
+from ..facts import Fact, facts
 from ..hand import HandShape
 from ..sensors import SensorCount
-from .circuit import BillLine, bill_of, bill_of_joints, glove_circuit
+from .circuit import BillLine, Circuit, bill_of, bill_of_joints, glove_circuit
 from .layout import (
-    End,
+    GloveWire,
     PlacedSensor,
-    Wire,
+    WireEnd,
     as_soldered,
     counted_sensors,
     crowded,
@@ -32,7 +33,6 @@ from .layout import (
     place_sensors,
     wires_of,
 )
-from .parts import Circuit
 from .pattern import Pattern, pattern_of
 
 
@@ -40,7 +40,7 @@ class SpecError(ThenarError, ValueError):
     """There is no glove to describe, or it does not match the wiring."""
 
 
-class Expected(Struct, frozen=True):
+class ExpectedPerformance(Struct, frozen=True):
     """Times calculated from bus arithmetic, in microseconds, without the computer's overhead per transaction.
 
     scan_us      scan of all kept switches on expanders, in `transactions` transactions, mux selections included
@@ -63,11 +63,11 @@ class Expected(Struct, frozen=True):
     detection: tuple[Detected, ...] = ()
 
 
-def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected:
+def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> ExpectedPerformance:
     """Return the expected times and rates of a build's switches in a harness, with a complete scan by `scan`."""
     time = scan_us(scan, harness)
     glove = harness.cyberglove if manifest.joints else None
-    return Expected(
+    return ExpectedPerformance(
         transactions=len(scan.ports) + time.selects,
         scan_us=time.us,
         full_us=time.full_us,
@@ -106,21 +106,24 @@ class SpecSummary(Struct, frozen=True):
     print_on: str
     sensors: tuple[PlacedSensor, ...]
     readers: tuple[SwitchReader, ...]
-    wires: tuple[Wire, ...]
+    wires: tuple[GloveWire, ...]
     materials: tuple[BillLine, ...]
-    expected: Expected
+    expected: ExpectedPerformance
     remarks: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GloveSpec:
-    """A reduced glove: its summary, drawing, circuit and firmware. pattern is None if the positions are unknown."""
+    """A reduced glove: its summary, drawing, circuit and firmware, and the facts of the build as it is wired. pattern
+    is None if the positions are unknown.
+    """
 
     summary: SpecSummary
     harness: Harness
     scan: ScanMap
     circuit: Circuit
     pattern: Pattern | None
+    facts: tuple[Fact, ...]
 
 
 def glove_spec(
@@ -166,7 +169,7 @@ def glove_spec(
         expected=expected_of(manifest, read, wired),
         remarks=(*_remarks(manifest, wired, switches, known), *_of_boards(wired)),
     )
-    return GloveSpec(summary, wired, read, circuit, pattern)
+    return GloveSpec(summary, wired, read, circuit, pattern, facts(manifest, read, wired))
 
 
 def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) -> Harness:
@@ -211,8 +214,8 @@ def _of_boards(harness: Harness) -> Iterator[str]:
             )
 
 
-def _readers(ends: Sequence[End]) -> tuple[SwitchReader, ...]:
-    groups: dict[str, list[End]] = {}
+def _readers(ends: Sequence[WireEnd]) -> tuple[SwitchReader, ...]:
+    groups: dict[str, list[WireEnd]] = {}
     for end in ends:
         groups.setdefault(end.unit.ref, []).append(end)
     return tuple(
@@ -254,5 +257,5 @@ def _remarks(
         closed = list_names([level.closed for level in levels])
         yield f"{refs[taxel]} is the pad {taxel}, whose counts thenar compares: {closed}"
     joints = own_joints([joint.name for joint in manifest.joints])
-    if joints and harness.cyberglove is None:
+    if joints and harness.joint_device is None:
         yield joints

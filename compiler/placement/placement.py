@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import accumulate
 from math import inf
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 import numpy as np
@@ -45,6 +45,11 @@ class InputSelection:
     elements: Elements
     chosen: "Chosen"
     joints: Columns
+
+    @classmethod
+    def of(cls, kept: Elements, joints: Columns) -> Self:
+        """Return the selection of these elements and joints, of which all are kept."""
+        return cls(kept, Chosen(tuple(range(len(kept))), (), None), joints)
 
     @property
     def kept(self) -> Elements:

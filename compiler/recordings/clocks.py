@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.names import list_names
 
-from .summary import Finding
+from .summary import Oddity
 from .trials import UNITS
 
 Values = NDArray[np.float64]
@@ -239,7 +239,7 @@ def numbers_trials(values: Values, group: NDArray[np.intp]) -> bool:
     return bool((values == np.rint(values)).all() and ((steps == 0) | next_one | anew).all())
 
 
-def possible_clocks(columns: Iterable[tuple[str, Values]], course: Course) -> list[Finding]:
+def possible_clocks(columns: Iterable[tuple[str, Values]], course: Course) -> list[Oddity]:
     """Return a finding about those of the inputs `columns` that may be clocks, counters or trial numbers."""
     found = {}
     for name, values in columns:
@@ -255,4 +255,4 @@ def possible_clocks(columns: Iterable[tuple[str, Values]], course: Course) -> li
         f"{len(found)} inputs may be clocks, counters or trial numbers, which say nothing about the hand: {listed}; "
         "leave out those that are (columns.toml)"
     )
-    return [Finding(POSSIBLE_CLOCKS, len(found), message, columns=tuple(found))]
+    return [Oddity(POSSIBLE_CLOCKS, len(found), message, columns=tuple(found))]

@@ -13,7 +13,7 @@ from thenar.runtime.names import list_names
 from .columns import JointColumns, TaxelColumns
 from .errors import TableError, list_rows
 from .graspset import CODES, LARGEST_VALUE, Joint
-from .summary import Finding
+from .summary import Oddity
 
 # The second point of a grid's straight line: so far out that its step equals the grid within a bit or two.
 _FAR = 1000
@@ -131,7 +131,7 @@ def _round_up(number: float) -> float:
     return next(step for factor in (1, 2, 5, 10) if (step := float(f"{factor}e{exponent}")) >= number * (1 - 1e-9))
 
 
-def coarse(coded: Iterable[tuple[CodingCost, NDArray[np.float64]]]) -> list[Finding]:
+def coarse(coded: Iterable[tuple[CodingCost, NDArray[np.float64]]]) -> list[Oddity]:
     """Return a finding about the joints that lost most of their distinct values, given costs and values."""
     lost = [
         (cost, sound_grid(values))
@@ -145,4 +145,4 @@ def coarse(coded: Iterable[tuple[CodingCost, NDArray[np.float64]]]) -> list[Find
         for cost, grid in lost
     ]
     message = f"{len(lost)} joints keep few of their values on their grid: {list_names(shown)}"
-    return [Finding("coarse grids", len(lost), message, columns=tuple(cost.joint for cost, _ in lost))]
+    return [Oddity("coarse grids", len(lost), message, columns=tuple(cost.joint for cost, _ in lost))]

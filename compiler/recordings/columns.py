@@ -29,7 +29,7 @@ LONGEST_GLOB = 3 * LONGEST_NAME
 COMPARISONS = 20_000_000
 
 
-class Calibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+class CalibrationPoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """Two points of the straight line between codes and values, as in `Joint`."""
 
     code_a: int
@@ -51,7 +51,7 @@ class JointColumns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
     codes: bool = False
     grid: float | None = None
     origin: float | None = None
-    calibration: Calibration | None = None
+    calibration: CalibrationPoints | None = None
 
     def __post_init__(self) -> None:
         if (self.codes or self.calibration) and (self.grid is not None or self.origin is not None):
@@ -126,7 +126,7 @@ class TextFormat(NamedTuple):
 PLAIN = TextFormat()
 
 
-class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+class ColumnRoles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A columns.toml, key by key. Lists of inputs hold globs (`*`, `?`, `[...]`); other keys hold columns by name.
 
     A label, subject, object, session or trial may be spread over several columns, whose values are combined. Otherwise
@@ -214,17 +214,17 @@ class Selection:
         return (*self.joints, *self.learnt)
 
 
-def read_columns(path: Path) -> Columns:
+def read_columns(path: Path) -> ColumnRoles:
     """Read a columns.toml; raises ColumnsError with file, line and key."""
     source = read_source(path, ColumnsError)
-    return convert(source, (), source.tables(), Columns)
+    return convert(source, (), source.tables(), ColumnRoles)
 
 
 # The keys that name columns other than inputs.
 KEYS = ("label", "subject", "object", "session", "trial", "time")
 
 
-def select(columns: Columns, names: Sequence[str]) -> Selection:
+def select(columns: ColumnRoles, names: Sequence[str]) -> Selection:
     """Find the columns that `columns` refers to among a table's `names`.
 
     Raises ColumnsError if a column is missing or used twice, a glob matches nothing, or there are no inputs.
@@ -269,7 +269,7 @@ def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
         )
 
 
-def _matched(columns: Columns, names: Sequence[str]) -> Iterator[tuple[str, JointColumns | None]]:
+def _matched(columns: ColumnRoles, names: Sequence[str]) -> Iterator[tuple[str, JointColumns | None]]:
     """Yield each matched column, with its taxel or joint entry, None for a switch."""
     there = frozenset(names)
     for pattern in columns.switches:

@@ -11,14 +11,13 @@ from thenar.runtime.toml_source import TomlText
 from thenar.runtime.toml_struct import convert
 
 from .clocks import POSSIBLE_CLOCKS
-from .columns import Columns, read_columns
+from .columns import ColumnRoles, read_columns
 from .errors import ColumnsError, TableError, check_names
 from .export import COLUMNS_TOML
 from .graspset import GraspSet
 from .importer import import_table
-from .lists import unlisted
 from .propose import propose
-from .table import Column, Table
+from .table import Column, Table, unlisted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 _WHAT = "the DataFrame"
 
 
-def from_dataframe(frame: "pd.DataFrame", columns: Columns | str | Path | None = None) -> GraspSet:
+def from_dataframe(frame: "pd.DataFrame", columns: ColumnRoles | str | Path | None = None) -> GraspSet:
     """Return the set in a DataFrame with one row per frame; its index is ignored.
 
     Parameters
@@ -34,9 +33,10 @@ def from_dataframe(frame: "pd.DataFrame", columns: Columns | str | Path | None =
     frame : pandas.DataFrame
         Any dtypes: switches are bool, or 0 and 1; joints are numbers; names are text, numbers or categories. NaN, None
         and NA are missing values.
-    columns : Columns, str or Path, optional
-        The roles of the columns: `thenar.compiler.Columns`, or the path of a columns.toml. A frame from `to_dataframe`
-        has them in its `attrs`; for any other they are guessed from names and values, as by `thenar import`.
+    columns : ColumnRoles, str or Path, optional
+        The roles of the columns: `thenar.compiler.ColumnRoles`, or the path of a columns.toml. A frame from
+        `to_dataframe` has them in its `attrs`; for any other they are guessed from names and values, as by `thenar
+        import`.
 
     Raises
     ------
@@ -46,34 +46,38 @@ def from_dataframe(frame: "pd.DataFrame", columns: Columns | str | Path | None =
     Examples
     --------
     >>> import pandas as pd
-    >>> from thenar.compiler import Columns, from_dataframe
+    >>> from thenar.compiler import ColumnRoles, from_dataframe
     >>> frame = pd.DataFrame({"grasp": ["pinch", "hook"], "thumb": [True, False], "n": [1, 2]})
-    >>> from_dataframe(frame, Columns(label="grasp", switches=("thumb",), trial="n"))
+    >>> from_dataframe(frame, ColumnRoles(label="grasp", switches=("thumb",), trial="n"))
     GraspSet: 2 trials of 2 frames, 2 grasp types (own), 1 switches, 0 joints, 1 subjects, 1 objects
     """
     table = table_of(frame)
     if columns is None:
         columns = _said(frame) or _proposed(table)
-    grasp_set, report = import_table(table, columns if isinstance(columns, Columns) else read_columns(Path(columns)))
+    grasp_set, report = import_table(
+        table, columns if isinstance(columns, ColumnRoles) else read_columns(Path(columns))
+    )
     for finding in report.warnings:
         if finding.kind == POSSIBLE_CLOCKS:
             warnings.warn(finding.message, stacklevel=2)
     return grasp_set
 
 
-def _said(frame: "pd.DataFrame") -> Columns | None:
+def _said(frame: "pd.DataFrame") -> ColumnRoles | None:
     """Return the columns that a frame describes in its attributes."""
     text = frame.attrs.get(COLUMNS_TOML)
     if not isinstance(text, str):
         return None
     source = TomlText(f"attrs[{COLUMNS_TOML!r}] of {_WHAT}", text, ColumnsError)
-    return convert(source, (), source.tables(), Columns)
+    return convert(source, (), source.tables(), ColumnRoles)
 
 
-def _proposed(table: Table) -> Columns:
+def _proposed(table: Table) -> ColumnRoles:
     proposal = propose(table)
     if proposal.lacks:
-        raise ColumnsError(f"{_WHAT}: {proposal.lacks}; say so in `columns`: a Columns, or the path of a columns.toml")
+        raise ColumnsError(
+            f"{_WHAT}: {proposal.lacks}; say so in `columns`: a ColumnRoles, or the path of a columns.toml"
+        )
     return proposal.columns
 
 

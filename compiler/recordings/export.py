@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,23 +27,21 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-class Heads(NamedTuple):
-    """The names of the columns other than inputs in an exported table."""
-
-    label: str
-    subject: str
-    object: str
-    session: str
-    trial: str
-    time: str
+_KEYS = ("label", "subject", "object", "session", "trial", "time")
 
 
-def heads_of(grasp_set: GraspSet) -> Heads:
-    """Return "grasp", "subject", "object", "session", "trial", "time_us", with an underscore appended where an input
+def heads_of(grasp_set: GraspSet) -> dict[str, str]:
+    """Return the names of the exported columns other than inputs, by their keys in a columns.toml.
+
+    They are "grasp", "subject", "object", "session", "trial" and "time_us", with an underscore appended where an input
     has that name.
     """
-    taken = {*grasp_set.element_names, *grasp_set.joint_names}
-    return Heads(*(_free(name, taken) for name in ("grasp", "subject", "object", "session", "trial", "time_us")))
+    inputs = {*grasp_set.element_names, *grasp_set.joint_names}
+    heads = dict(zip(_KEYS, ("grasp", *_KEYS[1:-1], "time_us"), strict=True))
+    for key in heads:
+        while heads[key] in inputs:
+            heads[key] += "_"
+    return heads
 
 
 def meta_of(grasp_set: GraspSet) -> dict[str, NDArray[np.generic]]:
@@ -52,7 +50,7 @@ def meta_of(grasp_set: GraspSet) -> dict[str, NDArray[np.generic]]:
     There is a session only if the set has several, a time only if it is known, and a trial only if rows are not
     independent.
     """
-    found = {key: getattr(grasp_set, f"{key}s" if key != "time" else "times_us") for key in Heads._fields[1:]}
+    found = {key: getattr(grasp_set, f"{key}s" if key != "time" else "times_us") for key in _KEYS[1:]}
     absent = {"time"} if not grasp_set.times_us.size else set()
     absent |= {"trial"} if grasp_set.independent else set()
     absent |= {"session"} if not (grasp_set.sessions != "1").any() else set()
@@ -67,8 +65,8 @@ def types_of(grasp_set: GraspSet) -> tuple[str, ...]:
 def columns_of(grasp_set: GraspSet, codes: bool = False) -> str:
     """Return the text of the columns.toml that imports the exported table again; `codes` as in `export`."""
     heads, taxonomy = heads_of(grasp_set), grasp_set.taxonomy
-    lines = [f"label = {_text(heads.label)}"]
-    lines += [f"{key} = {_text(getattr(heads, key))}" for key in meta_of(grasp_set)]
+    lines = [f"label = {_text(heads['label'])}"]
+    lines += [f"{key} = {_text(heads[key])}" for key in meta_of(grasp_set)]
     if grasp_set.times_us.size:
         lines.append('time_unit = "us"')
     if grasp_set.independent:
@@ -103,12 +101,6 @@ def _entry(joints: list[Joint], codes: bool) -> list[str]:
 def _alike(joints: Iterable[Joint]) -> Iterable[list[Joint]]:
     """Group neighbours with the same calibration; only neighbours, since their order is the order of the codes."""
     return (list(group) for _, group in groupby(joints, key=lambda joint: replace(joint, name="any")))
-
-
-def _free(name: str, taken: set[str]) -> str:
-    while name in taken:
-        name += "_"
-    return name
 
 
 def _text(text: str) -> str:
@@ -162,7 +154,7 @@ def to_csv(grasp_set: GraspSet, codes: bool = False, delimiter: str = ",") -> st
     """
     file, heads, meta = io.StringIO(), heads_of(grasp_set), meta_of(grasp_set)
     writer = csv.writer(file, delimiter=delimiter, lineterminator="\n")
-    names = (heads.label, *(getattr(heads, key) for key in meta), *grasp_set.element_names, *grasp_set.joint_names)
+    names = (heads["label"], *(heads[key] for key in meta), *grasp_set.element_names, *grasp_set.joint_names)
     writer.writerow(map(cell, names))
     who = (cells(column.tolist()) for column in (grasp_set.grasps, *meta.values()))
     writer.writerows(zip(*who, *_inputs(grasp_set, codes), strict=True))
@@ -202,8 +194,8 @@ def to_dataframe(grasp_set: GraspSet, codes: bool = False) -> "pd.DataFrame":
 
     heads = heads_of(grasp_set)
     columns: dict[str, object] = {
-        heads.label: pd.Categorical.from_codes(grasp_set.labels, categories=list(types_of(grasp_set))),
-        **{getattr(heads, key): column for key, column in meta_of(grasp_set).items()},
+        heads["label"]: pd.Categorical.from_codes(grasp_set.labels, categories=list(types_of(grasp_set))),
+        **{heads[key]: column for key, column in meta_of(grasp_set).items()},
         **dict(zip(grasp_set.switch_names, grasp_set.switches.T, strict=True)),
     }
     for joint, column in _coded(grasp_set):
@@ -216,10 +208,10 @@ def to_dataframe(grasp_set: GraspSet, codes: bool = False) -> "pd.DataFrame":
 def to_arff(grasp_set: GraspSet, codes: bool = False, meta: bool = False) -> str:
     """Return the set as ARFF: switches nominal {0,1}, joints numeric, the grasp type nominal and last."""
     heads, who = heads_of(grasp_set), meta_of(grasp_set) if meta else {}
-    attributes = [f"{_quote(getattr(heads, key))} {_kind(column)}" for key, column in who.items()]
+    attributes = [f"{_quote(heads[key])} {_kind(column)}" for key, column in who.items()]
     attributes += [f"{_quote(name)} {{0,1}}" for name in grasp_set.switch_names]
     attributes += [f"{_quote(joint.name)} numeric" for joint, _ in _coded(grasp_set)]
-    attributes.append(f"{_quote(heads.label)} {_nominal(types_of(grasp_set))}")
+    attributes.append(f"{_quote(heads['label'])} {_nominal(types_of(grasp_set))}")
     first = ([_quote(str(value)) for value in column.tolist()] for column in who.values())
     rows = zip(*first, *_inputs(grasp_set, codes), map(_quote, grasp_set.grasps.tolist()), strict=True)
     lines = ["@relation grasps", "", *(f"@attribute {attribute}" for attribute in attributes), "", "@data"]

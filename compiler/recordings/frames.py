@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from thenar.drivers.errors import ThenarError
 
 from .graspset import GraspSet
-from .summary import Finding
+from .summary import Oddity
 from .trials import groups
 
 Rows = NDArray[np.intp]
@@ -36,7 +36,7 @@ class _Likeness(NamedTuple):
     )
 
 
-def check_trials(grasp_set: GraspSet, error: type[ThenarError]) -> list[Finding]:
+def check_trials(grasp_set: GraspSet, error: type[ThenarError]) -> list[Oddity]:
     """Raise `error`, with the remedies, if rows that count as separate trials look like frames of fewer trials.
 
     Return a finding if trials resemble their neighbours, but are apart. Does nothing if the set states that its rows
@@ -51,7 +51,7 @@ def check_trials(grasp_set: GraspSet, error: type[ThenarError]) -> list[Finding]
         f"{found.reason}: if they were recorded in blocks, with the glove worn or the object placed anew for each "
         "block, name the blocks (`session`), since accuracies on new trials of the same block are too high"
     )
-    return [Finding("alike trials", len(np.unique(grasp_set.trial_ids)), message)]
+    return [Oddity("alike trials", len(np.unique(grasp_set.trial_ids)), message)]
 
 
 def looks_like_frames(grasp_set: GraspSet) -> str | None:

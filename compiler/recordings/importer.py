@@ -18,12 +18,12 @@ from thenar.runtime.published import NONE
 from .cells import Parsed, Value, bits, codes, integers, names, numbers, times
 from .clocks import Course, possible_clocks, words_of
 from .coding import CodingCost, coarse, code_joint
-from .columns import KEYS, Columns, Selection, read_columns, select
+from .columns import KEYS, ColumnRoles, Selection, read_columns, select
 from .errors import TYPES, ColumnsError, RecordingError, TableError, check_names, check_room, list_rows
 from .frames import check_trials, looks_like_frames
 from .graspset import GraspSet
 from .inputs import WORDS
-from .summary import Finding, find_oddities
+from .summary import Oddity, find_oddities
 from .table import Table, read_table
 from .taxonomy import Taxonomy, own, plain, published
 from .trial_files import Report, find_files, is_pattern, read_files
@@ -61,11 +61,11 @@ class Read(NamedTuple):
 
     readings: Readings
     times_us: NDArray[np.int64]
-    warnings: list[Finding]
+    warnings: list[Oddity]
     notes: list[str]
 
 
-def read_cells(table: Table, columns: Columns, selection: Selection) -> Read:
+def read_cells(table: Table, columns: ColumnRoles, selection: Selection) -> Read:
     """Read the cells of `table`.
 
     Columns that are not named are "1" throughout. Raises TableError naming the first wrong or missing cells and their
@@ -112,7 +112,7 @@ def read_cells(table: Table, columns: Columns, selection: Selection) -> Read:
     return Read(readings, times_us, warnings, notes)
 
 
-def _micros(what: str, columns: Columns, time: NDArray[np.float64], notes: list[str]) -> float:
+def _micros(what: str, columns: ColumnRoles, time: NDArray[np.float64], notes: list[str]) -> float:
     """Return the number of microseconds in the unit of `time`, 0.0 if there is no time or its unit is unknown.
 
     Raises TableError if a time is too large.
@@ -130,7 +130,7 @@ def _micros(what: str, columns: Columns, time: NDArray[np.float64], notes: list[
     return micros
 
 
-def nothing_held(columns: Columns, labels: NDArray[np.str_]) -> NDArray[np.bool_]:
+def nothing_held(columns: ColumnRoles, labels: NDArray[np.str_]) -> NDArray[np.bool_]:
     """Return which rows (n,) have a label that means, in general or by `columns`, that nothing is held."""
     types = next(iter(columns.taxonomy.values())) if isinstance(columns.taxonomy, dict) else columns.taxonomy
     meant = {*map(plain, columns.parts("none")), *((NONE,) if isinstance(types, str) or NONE not in types else ())}
@@ -139,7 +139,7 @@ def nothing_held(columns: Columns, labels: NDArray[np.str_]) -> NDArray[np.bool_
     return np.array(none, np.bool_)[where]
 
 
-def _fill_from_next_grasp(readings: Readings, none: NDArray[np.bool_], columns: Columns, reader: "_Reader") -> None:
+def _fill_from_next_grasp(readings: Readings, none: NDArray[np.bool_], columns: ColumnRoles, reader: "_Reader") -> None:
     """Allow cells to be empty in rows in which nothing is held.
 
     This applies to the label, if an empty one means none, and to object, session and trial, which are taken from the
@@ -224,7 +224,7 @@ def _kept(array: NDArray[Value], pick: NDArray[np.bool_] | NDArray[np.intp]) -> 
     return array[:count]
 
 
-def _dropped(readings: Readings, keep: NDArray[np.bool_], missing: dict[str, NDArray[np.bool_]]) -> list[Finding]:
+def _dropped(readings: Readings, keep: NDArray[np.bool_], missing: dict[str, NDArray[np.bool_]]) -> list[Oddity]:
     """Return the findings about leaving out all rows except those to `keep`."""
     rows = readings.rows[~keep]
     if not rows.size:
@@ -237,7 +237,7 @@ def _dropped(readings: Readings, keep: NDArray[np.bool_], missing: dict[str, NDA
     cost = [f"{lost} of {len(np.unique(trial_ids))} trials"] * bool(lost)
     cost += [f"grasp type{'s' if len(types) > 1 else ''} {list_names(types)}"] * bool(types)
     message += f"; so {' and '.join(cost)} are lost" if cost else ""
-    return [Finding("dropped rows", int(rows.size), message, tuple(rows[:SHOWN].tolist()), tuple(missing))]
+    return [Oddity("dropped rows", int(rows.size), message, tuple(rows[:SHOWN].tolist()), tuple(missing))]
 
 
 def _filled(
@@ -246,7 +246,7 @@ def _filled(
     selection: Selection,
     missing: dict[str, NDArray[np.bool_]],
     trial_ids: NDArray[np.intp],
-) -> list[Finding]:
+) -> list[Oddity]:
     """Fill the cells of inputs that are `missing`, in place, and return a finding about them."""
     inputs = [*selection.switches, *(name for name, _ in selection.taxels)]
     arrays: dict[str, NDArray[np.bool_] | NDArray[np.float64]] = dict(zip(inputs, readings.switches.T, strict=True))
@@ -263,7 +263,7 @@ def _filled(
         f"{cells} missing cells in {rows.size} rows were filled: {cells - strange} from the nearest frame of their "
         f"trial, {strange} with their column's median ({list_rows(rows)}; columns {list_names([*masks])})"
     )
-    return [Finding("filled cells", cells, message, tuple(rows[:SHOWN].tolist()), tuple(masks))]
+    return [Oddity("filled cells", cells, message, tuple(rows[:SHOWN].tolist()), tuple(masks))]
 
 
 def _reduced(readings: Readings, how: str, trial_ids: NDArray[np.intp], notes: list[str]) -> Readings:
@@ -294,7 +294,7 @@ _MISSING = 'missing (missing = "keep" fills them, "drop" leaves their rows out)'
 class _Reader:
     """Reads columns of one table and records which cells are missing or wrong."""
 
-    def __init__(self, table: Table, columns: Columns) -> None:
+    def __init__(self, table: Table, columns: ColumnRoles) -> None:
         self.table = table
         # Columns that a row must have: there is no substitute for their cells.
         self.needed = {name for key in KEYS if key != "time" for name in columns.parts(key)}
@@ -404,7 +404,7 @@ class ImportReport(msgspec.Struct, frozen=True):
     joints: int
     coding: tuple[CodingCost, ...]
     notes: tuple[str, ...]
-    warnings: tuple[Finding, ...]
+    warnings: tuple[Oddity, ...]
 
 
 def import_file(
@@ -420,7 +420,7 @@ def import_file(
     return import_table(read_files(find_files(table)[0], wanted.text, progress), wanted)
 
 
-def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport]:
+def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportReport]:
     """Import `table` with `columns`; raises TableError, ColumnsError or RecordingError."""
     table = _renamed(table, columns.rename)
     selection = select(columns, list(table.columns))
@@ -471,7 +471,7 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
     return grasp_set, report_of(table.what, grasp_set, costs, warnings, notes)
 
 
-def _trials_by_name(grasp_set: GraspSet, columns: Columns) -> tuple[GraspSet, list[Finding]]:
+def _trials_by_name(grasp_set: GraspSet, columns: ColumnRoles) -> tuple[GraspSet, list[Oddity]]:
     """Return the set, and a finding where its rows are alike but count as trials all the same: one each, by a column
     whose name says so. Nothing else in them differs from frames.
     """
@@ -484,7 +484,7 @@ def _trials_by_name(grasp_set: GraspSet, columns: Columns) -> tuple[GraspSet, li
         f"{reason}: they count as trials, because column {shortened(named[0])} numbers them; the accuracy of frames "
         "would be too high: if they are frames, name the column that numbers whole trials"
     )
-    return replace(grasp_set, independent=True), [Finding("alike trials", len(grasp_set), message)]
+    return replace(grasp_set, independent=True), [Oddity("alike trials", len(grasp_set), message)]
 
 
 def _renamed(table: Table, names: dict[str, str]) -> Table:
@@ -498,7 +498,7 @@ def _renamed(table: Table, names: dict[str, str]) -> Table:
     return replace(table, columns=dict(zip(renamed, table.columns.values(), strict=True)))
 
 
-def _course(readings: Readings, columns: Columns) -> Course:
+def _course(readings: Readings, columns: ColumnRoles) -> Course:
     """Return the order of the rows, for the search for clocks among the inputs."""
     owner = groups(readings.subjects, readings.sessions)
     group = groups(owner, readings.labels, readings.objects)
@@ -511,7 +511,7 @@ def report_of(
     what: str,
     grasp_set: GraspSet,
     coding: tuple[CodingCost, ...],
-    warnings: Iterable[Finding],
+    warnings: Iterable[Oddity],
     notes: Iterable[str] = (),
 ) -> ImportReport:
     """Return the report on `grasp_set`, which was imported from `what`."""
@@ -533,7 +533,7 @@ def report_of(
     )
 
 
-def _labels(table: Table, columns: Columns, readings: Readings) -> tuple[NDArray[np.str_], Taxonomy, list[Finding]]:
+def _labels(table: Table, columns: ColumnRoles, readings: Readings) -> tuple[NDArray[np.str_], Taxonomy, list[Oddity]]:
     """Return each row's grasp type, the taxonomy, and a finding about unused aliases."""
     found, where = np.unique(readings.labels, return_inverse=True)
     if len(found) > TYPES:
@@ -562,7 +562,7 @@ def _labels(table: Table, columns: Columns, readings: Readings) -> tuple[NDArray
     return (
         np.array(types, np.str_)[where],
         taxonomy,
-        [Finding("unused aliases", len(unused), message)] if unused else [],
+        [Oddity("unused aliases", len(unused), message)] if unused else [],
     )
 
 
@@ -584,7 +584,7 @@ def _unknown(labels: list[str], taxonomy: Taxonomy) -> str:
     return ", ".join(shown) + (f" and {more} more" if more else "")
 
 
-def _taxonomy(columns: Columns, labels: list[str]) -> Taxonomy:
+def _taxonomy(columns: ColumnRoles, labels: list[str]) -> Taxonomy:
     try:
         if isinstance(columns.taxonomy, tuple):
             return own(columns.taxonomy)

@@ -31,19 +31,19 @@ from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.taxels import TaxelLine, Taxels
 
 from .coding import CodingCost, code_joint
-from .columns import Calibration, JointColumns
+from .columns import CalibrationPoints, JointColumns
 from .errors import ColumnsError, TableError, list_rows
 from .graspset import CODES, GraspSet, Joint
 from .importer import ImportReport, import_file, import_table, report_of
 from .propose import propose_file
-from .summary import Finding, find_oddities
+from .summary import Oddity, find_oddities
 from .taxonomy import Taxonomy
 from .trial_files import Report
 
 WRIST = ("wrist_pitch", "wrist_yaw")
 # Half degrees, the paper's resolution, from below the range of a calibrated hand.
-_HALF_DEGREES = Calibration(code_a=0, value_a=-250.0, code_b=1000, value_b=250.0)
-_BYTES = Calibration(code_a=1, value_a=1.0, code_b=255, value_b=255.0)
+_HALF_DEGREES = CalibrationPoints(code_a=0, value_a=-250.0, code_b=1000, value_b=250.0)
+_BYTES = CalibrationPoints(code_a=1, value_a=1.0, code_b=255, value_b=255.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,12 +128,12 @@ def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[Gras
     RecordingError naming the file, and OSError.
     """
     parts: list[_Part] = []
-    findings: list[Finding] = []
+    findings: list[Oddity] = []
     size = 0
     for path in paths:
         reader = Reader(path)
         parts += _parts(reader, stream)
-        findings += [Finding(fault.kind, fault.count, fault.message) for fault in reader.faults()]
+        findings += [Oddity(fault.kind, fault.count, fault.message) for fault in reader.faults()]
         size += reader.end.size if reader.end is not None else 0
     what = ", ".join(path.name for path in paths)
     _check_alike(parts)
@@ -338,12 +338,12 @@ def _taxels(reader: Reader) -> Taxels:
     return Taxels(session.taxels, [[]] * len(session.taxels), session.taxel_calibration, settings)
 
 
-def _left_out(parts: Sequence[_Part], stream: bool) -> Iterator[Finding]:
+def _left_out(parts: Sequence[_Part], stream: bool) -> Iterator[Oddity]:
     trials = [grasp.label.trial for part in parts for grasp in part.grasps if not grasp.whole(part.session)]
     if trials:
         what = f"{len(trials)} {'rows' if stream else 'trials'} in which not everything was read"
         message = f"{what} were left out: {list_rows(np.array(trials))}"
-        yield Finding("dropped rows", len(trials), message, tuple(trials[:SHOWN]))
+        yield Oddity("dropped rows", len(trials), message, tuple(trials[:SHOWN]))
 
 
 def _check_alike(parts: Sequence[_Part]) -> None:

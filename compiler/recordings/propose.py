@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from thenar.runtime.names import list_names, printable, shortened
 from thenar.runtime.published import NONE
 
-from .cells import names, times
+from .cells import names, numbers, times
 from .clocks import Course, is_time, numbers_trials
-from .columns import KEYS, PLAIN, Columns, TaxelColumns, TextFormat, TimeUnit
-from .errors import FileRows, TableError
+from .columns import KEYS, PLAIN, ColumnRoles, TaxelColumns, TextFormat, TimeUnit
+from .errors import FileRows, TableError, list_rows
 from .headers import skipped
 from .inputs import WORDS, Facts, Role, bits_of, facts_of, globs, inputs_of, joints_of, listed
-from .oddities import first_oddity
 from .sniff import sniff
 from .table import Table, is_text, read_table
 from .taxonomy import plain, published_for
@@ -34,15 +33,15 @@ _SHARED = 3
 _TYPES = 200
 
 
-class Proposal(msgspec.Struct, frozen=True):
+class ColumnProposal(msgspec.Struct, frozen=True):
     """The proposed roles of a table's columns; `lacks` is what only the user can say, "" if nothing."""
 
-    columns: Columns
+    columns: ColumnRoles
     roles: tuple[Role, ...]
     remarks: tuple[str, ...]
     lacks: str = ""
 
-    def independent(self) -> "Proposal":
+    def independent(self) -> "ColumnProposal":
         """Return the proposal with the statement that each row is a separate trial."""
         return replace(self, columns=replace(self.columns, frames="independent"), lacks="")
 
@@ -55,7 +54,7 @@ class Proposal(msgspec.Struct, frozen=True):
         )
 
 
-def propose_file(path: Path, progress: Report = lambda _done, _total: None) -> tuple[Table, Proposal]:
+def propose_file(path: Path, progress: Report = lambda _done, _total: None) -> tuple[Table, ColumnProposal]:
     """Return the table in `path`, or in the files that match it as a pattern, and the proposed roles of its columns.
 
     `progress` takes the number of files that were read, and of all. Raises TableError, OSError.
@@ -72,14 +71,33 @@ def propose_file(path: Path, progress: Report = lambda _done, _total: None) -> t
     try:
         proposal = propose(emptied(table, paths), text, remarks)
     except TableError as reason:
-        raise TableError(f"{reason}; {odd}" if (odd := first_oddity(table)) else str(reason)) from reason
+        raise TableError(f"{reason}; {odd}" if (odd := _first_oddity(table)) else str(reason)) from reason
     if others:
         left = f"{len(others)} tables next to them do not match: {list_names([shortened(name) for name in others])}"
         proposal = replace(proposal, remarks=(f"files: {len(files)}; {left}", *proposal.remarks))
     return table, _by_file(table, proposal, tuple(paths)) if files else proposal
 
 
-def _by_file(table: Table, proposal: Proposal, paths: tuple[str, ...]) -> Proposal:
+def _first_oddity(table: Table) -> str:
+    """Return the first oddity of `table` as the end of a sentence, with what to do; "" if there is none."""
+    if len(table.columns) == 1:
+        (name,) = table.columns
+        return f"its rows have one cell each, under {shortened(repr(name))}: name the `delimiter` in a columns.toml"
+    odd: list[tuple[int, str, str]] = []
+    for name, column in table.columns.items():
+        wrong = np.flatnonzero(numbers(column, table.decimal).wrong)
+        if not wrong.size:
+            continue
+        row, cell = int(wrong[0]), str(column[wrong[0]]).strip()
+        shown = f"{list_rows(table.rows[[row]])} has {shortened(repr(cell))} in column {shortened(repr(name))}"
+        if cell[:1] in ("[", "("):
+            odd.append((row, name, f"{shown}: write a list of numbers in each cell, or a column for each number"))
+        elif 2 * wrong.size < len(column):
+            odd.append((row, name, f"{shown}, which holds numbers elsewhere: correct the cell or delete the row"))
+    return min(odd)[2] if odd else ""
+
+
+def _by_file(table: Table, proposal: ColumnProposal, paths: tuple[str, ...]) -> ColumnProposal:
     """Return the proposal with the file among the columns of the trial, unless no trial is in two files.
 
     Not in a stream with rest, whose trials are runs of rows of one label. `paths` are the columns that only the path
@@ -113,7 +131,7 @@ def _by_file(table: Table, proposal: Proposal, paths: tuple[str, ...]) -> Propos
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ()) -> Proposal:
+def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ()) -> ColumnProposal:
     """Return the proposed roles of the columns of `table`. Raises TableError if there is no label or no input."""
     found = [facts_of(table, name) for name in table.columns]
     chosen, why = _named(found)
@@ -139,7 +157,7 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
         bool((~column.there & (held | (column.name not in excused))).any()) for column in found if column.name in used
     )
     taxonomy = published_for({*labels[held].tolist()} - {""}) or "own"
-    columns = Columns(
+    columns = ColumnRoles(
         **{key: those[0] if len(those) == 1 else those for key, those in chosen.items()},  # type: ignore[arg-type]
         time_unit=unit,
         none=none[0] if len(none) == 1 else none,
@@ -161,7 +179,7 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
         shown = ", ".join(shortened(repr(label)) for label in none)
         notes += [f"nothing is held where the label is {shown} ({np.mean(~held):.0%} of the rows): see `none`"]
     roles = [Role(chosen[key], key, why[key]) for key in KEYS if key in chosen]
-    return Proposal(columns, (*roles, *inputs), (*remarks, *notes), lacks)
+    return ColumnProposal(columns, (*roles, *inputs), (*remarks, *notes), lacks)
 
 
 def _named(found: Sequence[Facts]) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:

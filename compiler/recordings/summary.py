@@ -1,4 +1,4 @@
-"""Summarise a set of grasps: counts, balance, columns, oddities, and the separability of its grasp types."""
+"""Summarise a set of grasps: counts, balance, columns and oddities."""
 
 from collections.abc import Iterator, Sequence
 
@@ -29,7 +29,7 @@ def contacts(grasp_set: GraspSet) -> NDArray[np.bool_]:
     return np.hstack([grasp_set.switches, pressed])
 
 
-class Finding(msgspec.Struct, frozen=True):
+class Oddity(msgspec.Struct, frozen=True):
     """One kind of oddity: its count, the first rows as the user counts them, the columns, and a sentence."""
 
     kind: str
@@ -39,7 +39,7 @@ class Finding(msgspec.Struct, frozen=True):
     columns: tuple[str, ...] = ()
 
 
-def find_oddities(grasp_set: GraspSet, rows: NDArray[np.int64]) -> tuple[Finding, ...]:
+def find_oddities(grasp_set: GraspSet, rows: NDArray[np.int64]) -> tuple[Oddity, ...]:
     """Return all oddities of `grasp_set`, whose rows have the numbers `rows` (n,) for the user.
 
     Rows in which nothing is held are naturally alike, and so not compared.
@@ -84,7 +84,7 @@ def disagreeing(frames: NDArray[np.intp], what: NDArray[np.generic]) -> NDArray[
     return np.bincount(pairs // max(len(found), 1), minlength=len(frames))[frames] > 1
 
 
-def _odd_columns(grasp_set: GraspSet) -> Iterator[Finding]:
+def _odd_columns(grasp_set: GraspSet) -> Iterator[Oddity]:
     for kind, columns, names in (
         ("switch", grasp_set.switches, grasp_set.switch_names),
         ("taxel", grasp_set.taxels, grasp_set.taxel_names),
@@ -93,16 +93,16 @@ def _odd_columns(grasp_set: GraspSet) -> Iterator[Finding]:
         plural = "switches" if kind == "switch" else f"{kind}s"
         if constant := constant_columns(columns, names):
             message = f"{len(constant)} {plural} never change: {list_names(constant)}"
-            yield Finding(f"constant {plural}", len(constant), message, columns=constant)
+            yield Oddity(f"constant {plural}", len(constant), message, columns=constant)
         if pairs := duplicate_columns(columns, names):
             shown = list_names([f"{name} = {original}" for name, original in pairs])
             repeated = tuple(name for name, _ in pairs)
-            yield Finding(
+            yield Oddity(
                 f"duplicate {plural}", len(pairs), f"{len(pairs)} {plural} repeat others: {shown}", (), repeated
             )
 
 
-def _odd_frames(grasp_set: GraspSet, rows: NDArray[np.int64]) -> Iterator[Finding]:
+def _odd_frames(grasp_set: GraspSet, rows: NDArray[np.int64]) -> Iterator[Oddity]:
     frames = frame_numbers(grasp_set.switches, np.hstack([grasp_set.taxels, grasp_set.codes]))
     for kind, what, sentence in (
         ("frames shared by subjects", grasp_set.subjects, "have a frame that another subject has as well"),
@@ -111,10 +111,10 @@ def _odd_frames(grasp_set: GraspSet, rows: NDArray[np.int64]) -> Iterator[Findin
         found = rows[disagreeing(frames, what)]
         if found.size:
             message = f"{found.size} rows {sentence}: {list_rows(found)}"
-            yield Finding(kind, int(found.size), message, tuple(found[:SHOWN].tolist()))
+            yield Oddity(kind, int(found.size), message, tuple(found[:SHOWN].tolist()))
 
 
-def _gaps(grasp_set: GraspSet) -> Iterator[Finding]:
+def _gaps(grasp_set: GraspSet) -> Iterator[Oddity]:
     subjects, subject = np.unique(grasp_set.subjects, return_inverse=True)
     present, grasp = np.unique(grasp_set.grasps, return_inverse=True)
     # Encoded as numbers: many more pairs can be absent than there are rows, so only those shown are listed.
@@ -123,82 +123,10 @@ def _gaps(grasp_set: GraspSet) -> Iterator[Finding]:
     if count:
         absent = np.setdiff1d(np.arange(min(len(pairs) + SHOWN, len(subjects) * len(present))), pairs)[:SHOWN]
         shown = [f"subject {subjects[pair // len(present)]} has no {present[pair % len(present)]}" for pair in absent]
-        yield Finding("grasp types that a subject lacks", count, list_names(shown, count))
+        yield Oddity("grasp types that a subject lacks", count, list_names(shown, count))
 
 
-# The most rows compared with each other, a sample of a larger set: the time is quadratic.
-NEIGHBOUR_ROWS = 2000
-
-
-class Separability(msgspec.Struct, frozen=True):
-    """How well some inputs distinguish grasp types.
-
-    `ceiling` is the accuracy of the best possible memory: the most frequent grasp type of every distinct frame. No
-    classifier with only these inputs is more accurate on these rows. `neighbour_rate` is the accuracy by frames of the
-    nearest frame of another trial (Euclidean; joints in standard deviations, switches as 0 and 1) over
-    `neighbour_rows` rows, None without scikit-learn.
-    """
-
-    inputs: str
-    distinct_frames: int
-    ceiling: float
-    neighbour_rate: float | None
-    neighbour_rows: int
-
-
-def separabilities(grasp_set: GraspSet) -> tuple[Separability, ...]:
-    """Return the separability by switches, by taxels, by joints, and by all of them, if the set has them.
-
-    Rows in which nothing is held are ignored.
-    """
-    grasp_set = grasp_set.without_none()
-    there = (("switches", grasp_set.switch_names), ("taxels", grasp_set.taxel_columns), ("joints", grasp_set.joints))
-    kinds = [name for name, columns in there if columns]
-    inputs = [*kinds, "both" if len(kinds) == 2 else "all"] if len(kinds) > 1 else kinds
-    return tuple(_separability(grasp_set, name) for name in inputs) if len(grasp_set) else ()
-
-
-def _separability(grasp_set: GraspSet, inputs: str) -> Separability:
-    every = inputs in ("both", "all")
-    switches = grasp_set.switches[:, : None if every or inputs == "switches" else 0]
-    coded = (("taxels", grasp_set.taxels), ("joints", grasp_set.codes))
-    codes = np.hstack([part[:, : None if every or inputs == name else 0] for name, part in coded])
-    frames = frame_numbers(switches, codes)
-    rate, rows = _neighbour_rate(switches, codes, grasp_set.labels, grasp_set.trial_ids)
-    return Separability(inputs, int(frames.max()) + 1, _ceiling(frames, grasp_set.labels), rate, rows)
-
-
-def _ceiling(frames: NDArray[np.intp], labels: NDArray[np.intp]) -> float:
-    """Return the sum over distinct frames of their most frequent label's count, over n."""
-    pairs, counts = np.unique(np.stack([frames, labels], axis=1), axis=0, return_counts=True)
-    commonest = np.zeros(int(frames.max()) + 1, np.intp)
-    np.maximum.at(commonest, pairs[:, 0], counts)
-    return float(commonest.sum() / len(frames))
-
-
-def _neighbour_rate(
-    switches: NDArray[np.bool_], codes: NDArray[np.uint16], labels: NDArray[np.intp], trials: NDArray[np.intp]
-) -> tuple[float | None, int]:
-    try:
-        from sklearn.neighbors import NearestNeighbors
-    except ImportError:
-        return None, 0
-    rows = np.arange(len(labels))
-    if len(rows) > NEIGHBOUR_ROWS:
-        rows = np.sort(np.random.default_rng(0).choice(rows, NEIGHBOUR_ROWS, replace=False))
-    trial = trials[rows]
-    most = int(np.bincount(trial).max(initial=0))
-    if most == len(rows):
-        return None, len(rows)
-    spread = codes.std(axis=0)
-    points = np.hstack([switches[rows], codes[rows] / np.where(spread, spread, 1.0)])
-    # This many are certain to include one of another trial.
-    near = NearestNeighbors(n_neighbors=most, algorithm="kd_tree").fit(points).kneighbors(return_distance=False)
-    nearest = near[np.arange(len(rows)), (trial[near] != trial[:, np.newaxis]).argmax(axis=1)]
-    return float(np.mean(labels[rows][nearest] == labels[rows])), len(rows)
-
-
-class Count(msgspec.Struct, frozen=True):
+class FrameCount(msgspec.Struct, frozen=True):
     """The number of frames with `name`."""
 
     name: str
@@ -244,22 +172,21 @@ class Summary(msgspec.Struct, frozen=True):
     independent: bool
     fingerprint: str
     taxonomy: str
-    grasps: tuple[Count, ...]
+    grasps: tuple[FrameCount, ...]
     absent: tuple[str, ...]
     balance: float
-    subjects: tuple[Count, ...]
-    objects: tuple[Count, ...]
+    subjects: tuple[FrameCount, ...]
+    objects: tuple[FrameCount, ...]
     switches: tuple[SwitchUse, ...]
     taxels: tuple[JointRange, ...]
     joints: tuple[JointRange, ...]
-    separability: tuple[Separability, ...]
-    warnings: tuple[Finding, ...]
+    warnings: tuple[Oddity, ...]
 
 
 def summarise(grasp_set: GraspSet) -> Summary:
-    """Return the summary of `grasp_set`, with rows counted from 1. An empty set has no separability."""
+    """Return the summary of `grasp_set`, with rows counted from 1."""
     counts = np.bincount(grasp_set.labels[~grasp_set.is_none], minlength=len(grasp_set.taxonomy.types))
-    grasps = [Count(name, int(rows)) for name, rows in zip(grasp_set.taxonomy.types, counts, strict=True)]
+    grasps = [FrameCount(name, int(rows)) for name, rows in zip(grasp_set.taxonomy.types, counts, strict=True)]
     present = counts[counts > 0]
     return Summary(
         frames=len(grasp_set),
@@ -280,7 +207,6 @@ def summarise(grasp_set: GraspSet) -> Summary:
         switches=_switches(grasp_set),
         taxels=_ranges(grasp_set.taxel_columns, grasp_set.taxels),
         joints=_ranges(grasp_set.joints, grasp_set.codes),
-        separability=separabilities(grasp_set),
         warnings=find_oddities(grasp_set, np.arange(1, len(grasp_set) + 1)),
     )
 
@@ -294,9 +220,9 @@ def _seconds(grasp_set: GraspSet) -> float | None:
     return float(steps[steps > 0].sum() / 1e6)
 
 
-def _counts(names: NDArray[np.str_]) -> tuple[Count, ...]:
+def _counts(names: NDArray[np.str_]) -> tuple[FrameCount, ...]:
     found, counts = np.unique(names, return_counts=True)
-    return tuple(map(Count, found.tolist(), counts.tolist()))
+    return tuple(map(FrameCount, found.tolist(), counts.tolist()))
 
 
 def _switches(grasp_set: GraspSet) -> tuple[SwitchUse, ...]:

@@ -30,7 +30,7 @@ from .arrays import AnyArray, read_arrays
 from .columns import PLAIN, TextFormat
 from .errors import COLUMNS, LARGEST, LINES, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
 from .foreign import READERS, read_foreign
-from .lists import unlisted
+from .headers import MISSING_NUMBERS
 
 if TYPE_CHECKING:
     from _csv import Reader
@@ -467,3 +467,69 @@ def _unquote(where: str, value: str) -> str:
     if not _CLOSED.fullmatch(value):
         raise TableError(f"{where} cannot be read as values: nothing closes the quote of {shortened(repr(value))}")
     return re.sub(r"\\(.)", r"\1", value[1:-1])
+
+
+# Columns whose cells hold lists of numbers become several columns, as those of Parquet files do.
+
+# A list as pandas and numpy write it, with commas or blanks, and a number of numpy in it.
+_LIST = re.compile(r"[\[(](.*)[\])]", re.DOTALL)
+_SCALAR = re.compile(r"np\.\w+\(([^()]*)\)")
+_LISTS = 1 << 14
+
+
+def unlisted(what: str, columns: Mapping[str, Column], rows: NDArray[np.int64]) -> dict[str, Column]:
+    """Return `columns` with lists such as "[0.56, 0.83]" in the cells of `data` as columns data.0, data.1, ...
+
+    what  the table in messages
+    rows  (n,) the numbers of its rows in messages
+
+    Raises TableError if a column holds lists that are unequally long, or lists and other cells; RecordingError if two
+    columns get one name.
+    """
+    made: list[tuple[str, Column]] = []
+    for name, column in columns.items():
+        is_text = not isinstance(column, np.ndarray) or column.dtype.kind == "U"
+        first = next((cell for cell in column if cell), "") if is_text else ""
+        if not _list_of(str(first)):
+            made.append((name, column))
+            continue
+        values = _of_lists(f"{what}: column {shortened(repr(name))}", column, rows)
+        many = values.shape[1] > 1
+        made += [(f"{name}.{place}" if many else name, part) for place, part in enumerate(values.T)]
+    if len(made) != len(columns):
+        check_names("column", [name for name, _ in made])
+        if len(made) > COLUMNS:
+            raise TableError(f"{what} has more than {COLUMNS} columns, the most that are read of a table")
+    return dict(made)
+
+
+def _of_lists(where: str, column: Column, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the numbers (n, k) of lists of k, NaN for missing ones. Raises TableError."""
+    cells = ((row, str(cell)) for row, cell in enumerate(column))
+    first_row, first = next((row, found) for row, cell in cells if (found := _list_of(cell)))
+    parts = [np.full((first_row, len(first)), np.nan), np.array([first])]
+    while piece := list(islice(cells, _LISTS)):
+        lists = []
+        for row, cell in piece:
+            found = _list_of(cell) if cell.strip() else []
+            if found is None:
+                shown = f"but row {rows[row]} has {shortened(repr(cell))}: write each list whole"
+                raise TableError(f"{where} holds lists of numbers, {shown}")
+            if len(found) not in (0, len(first)):
+                shown = f"{len(first)} in row {rows[first_row]} and {len(found)} in row {rows[row]}"
+                raise TableError(f"{where} holds lists of unequal lengths, {shown}: write lists of one length")
+            lists.append(found or [np.nan] * len(first))
+        parts.append(np.array(lists))
+    return np.concatenate(parts)
+
+
+def _list_of(cell: str) -> list[float] | None:
+    """Return the numbers of a list, or None if `cell` is no list of numbers."""
+    inner = _LIST.fullmatch(cell.strip())
+    if inner is None:
+        return None
+    parts = _SCALAR.sub(r"\1", inner[1]).replace(",", " ").split()
+    try:
+        return [np.nan if part.casefold() in MISSING_NUMBERS else float(part) for part in parts]
+    except ValueError:
+        return None

@@ -12,6 +12,7 @@ from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.study import Study
+from ..facts import Fact
 from ..frontier.points import Frontier
 from ..hand import HandShape
 from ..movements.transitions import Transitions
@@ -28,10 +29,8 @@ class ReportError(ThenarError, ValueError):
 class ReportContent:
     """A build and everything known about it; None where something was not requested or does not apply.
 
-    tables        the build's integer tables; tables_bytes is their size in `tables.bin`
-    rounds        the number of boosting rounds in the ensemble
-    firmware      a sentence: the part that the firmware in the build is laid out for, or why there is none
-    only_answer   the grasp type predicted for every row, if there is only one
+    tables        the build's integer tables
+    facts         the facts of the build; warnings: sentences on what is wrong with it
     tree          the tree that chose the switches, over the recordings' switches; classes index manifest.grasps
     confusion     (K, K) counts of frames in the headline's folds, row: true, column: predicted; K types, with "none" if
                   the build can predict it
@@ -50,10 +49,8 @@ class ReportContent:
 
     manifest: Manifest
     tables: IntegerTables
-    tables_bytes: int
-    rounds: int
-    firmware: str = ""
-    only_answer: str | None = None
+    facts: tuple[Fact, ...]
+    warnings: tuple[str, ...] = ()
     tree: Tree | None = None
     confusion: NDArray[np.intp] | None = None
     study: Study | None = None

@@ -12,7 +12,7 @@ from msgspec import Struct
 from thenar.drivers.extras import optional
 
 from ..frontier.plots import POINT_ID, RING_ID, pictures
-from ..frontier.points import Frontier, Point, Time
+from ..frontier.points import Frontier, FrontierPoint, PointTime
 from ..frontier.words import (
     LUCK,
     elements_of,
@@ -64,7 +64,7 @@ class Chart:
     drawing: Markup
 
 
-class Detail(Struct, frozen=True):
+class PointDetail(Struct, frozen=True):
     """The details of a picked point: a sentence, names and values, its switches, their numbers on the drawn hand, and
     the command that builds it.
     """
@@ -83,8 +83,8 @@ class FrontierView:
 
     charts: tuple[Chart, ...]
     points: PlainTable
-    details: tuple[Detail, ...]
-    picked: Detail | None
+    details: tuple[PointDetail, ...]
+    picked: PointDetail | None
     hand: HandPicture | None
     tables: tuple[PlainTable, ...]
     warnings: tuple[str, ...]
@@ -120,14 +120,14 @@ def frontier_view(
     )
 
 
-def _charts(frontier: Frontier, details: Mapping[int, Detail], picked: Detail) -> Iterator[Chart]:
+def _charts(frontier: Frontier, details: Mapping[int, PointDetail], picked: PointDetail) -> Iterator[Chart]:
     drawn = pictures(msgspec.structs.replace(frontier, picked=picked.number), "svg", letters=True)
     for name, svg in drawn.items():
         ident = f"by-{name}"
         yield Chart(ident, _CAPTIONS[name], _embedded(svg, ident, details, picked.number))
 
 
-def _embedded(svg: bytes, ident: str, details: Mapping[int, Detail], picked: int) -> Markup:
+def _embedded(svg: bytes, ident: str, details: Mapping[int, PointDetail], picked: int) -> Markup:
     """Return an SVG file as a part of a page, in the page's colours; its points are clickable and have titles.
 
     Only ids that are referenced are kept, prefixed with `ident`.
@@ -173,11 +173,11 @@ def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
     ElementTree.SubElement(marker, "circle", circle)
 
 
-def _detail(point: Point, frontier: Frontier, hand: HandShape | None) -> Detail:
+def _detail(point: FrontierPoint, frontier: Frontier, hand: HandShape | None) -> PointDetail:
     setting = point.setting
     what = (inputs_of(point), setting.placement.method, trainer_of(setting), f"{setting.width} bits")
     words = ", ".join(filter(None, (*what, _wiring(point))))
-    return Detail(
+    return PointDetail(
         number=point.number,
         said=f"Point {point.number}: {words}; {point.rate} in {_time(point.frame)}.",
         facts=tuple(_facts(point, frontier)),
@@ -190,7 +190,7 @@ def _detail(point: Point, frontier: Frontier, hand: HandShape | None) -> Detail:
     )
 
 
-def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
+def _facts(point: FrontierPoint, frontier: Frontier) -> Iterable[tuple[str, str]]:
     setting = point.setting
     for what, rate in rates_of(frontier).items():
         yield f"Accuracy in %, {what}", interval(rate(point))
@@ -211,21 +211,21 @@ def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
     yield "To compile", f"{point.compile_s:.1f} s"
 
 
-def _placement(point: Point) -> str:
+def _placement(point: FrontierPoint) -> str:
     return way_of(point.setting) if point.switches else DASH
 
 
-def _wiring(point: Point) -> str:
+def _wiring(point: FrontierPoint) -> str:
     return wiring_of(point.setting) or point.setting.wiring
 
 
-def _latency(point: Point) -> tuple[str, str]:
+def _latency(point: FrontierPoint) -> tuple[str, str]:
     """Return mean and 99th percentile of the latency, µs; dashes where no grasp was decided on correctly."""
     latency = point.latency
     return (DASH, DASH) if latency.missed >= 1 else (microseconds(latency.mean_us), microseconds(latency.p99_us))
 
 
-def _time(time: Time) -> str:
+def _time(time: PointTime) -> str:
     return "unknown, not included" if time.how == "unknown" else f"{microseconds(time.us)} µs ({time.how})"
 
 

@@ -1,7 +1,7 @@
 """`report_html`: one HTML file that needs no other file, no network and no date."""
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from thenar.drivers.extras import optional
 
@@ -34,6 +34,7 @@ def report_html(content: ReportContent) -> bytes:
     page = environment.get_template("report.html.j2").render(
         content=content,
         manifest=manifest,
+        facts=partial(_facts, content),
         sections=sections,
         results=results,
         hand=_hand(content),
@@ -48,6 +49,12 @@ def report_html(content: ReportContent) -> bytes:
         points=embedded({str(detail.number): detail for detail in (() if frontier is None else frontier.details)}),
     )
     return page.encode()
+
+
+def _facts(content: ReportContent, *topics: str) -> list[tuple[str, str]]:
+    """Return labels and texts of the facts about `topics`."""
+    chosen = (fact for fact in content.facts if fact.topic in topics)
+    return [(f"{fact.label[:1].upper()}{fact.label[1:]}", fact.text) for fact in chosen]
 
 
 @lru_cache(maxsize=1)

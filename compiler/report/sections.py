@@ -1,23 +1,20 @@
 """The sections on the build itself: summary, placement, guarantee, scan map and provenance."""
 
 import shlex
-from collections.abc import Iterator
 from itertools import accumulate
 
 import msgspec
 
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.published import NONE
 from thenar.runtime.recipe import AUTO
-from thenar.runtime.scanning.propose import own_joints
-from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us
+from thenar.runtime.scanning.timing import port_us, reading_of
 
 from ..evaluation.rates import RecipeWords, placement_words
+from ..facts import recognises
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
-from ..sensors import SensorCount
 from ..tables.faults import FaultCounts
-from ..text import INDEPENDENT, NBSP, counted, microseconds, percent, sentence
+from ..text import NBSP, counted, microseconds, percent
 from ..trainers.base import TRAINERS
 from .content import PlainTable, ReportContent
 
@@ -27,8 +24,7 @@ Pairs = tuple[tuple[str, str], ...]
 def headline(content: ReportContent) -> str:
     """Return the build in one sentence, with its accuracy, the interval, and what the choice of a point added to it."""
     manifest = content.manifest
-    types = len(manifest.grasps) - (manifest.grasps[-1] == NONE)
-    said = f"This build recognises {types} grasp types from {SensorCount.of_build(manifest)}"
+    said = f"This build recognises {recognises(manifest)}"
     rate = manifest.headline
     if rate is None:
         return f"{said}; the accuracy on new grasps was not measured."
@@ -53,66 +49,6 @@ def recipe(manifest: Manifest) -> RecipeWords:
     """Return the recipe of a build."""
     method = placement_words(manifest.options) if manifest.switches else "none, joints alone"
     return RecipeWords(method, str(manifest.fit))
-
-
-def facts(content: ReportContent) -> Iterator[tuple[str, str, str]]:
-    """Yield the key numbers: the name of each, the large number, and what it is a part of."""
-    manifest = content.manifest
-    for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
-        yield f"Recognised, {rate.title}", percent(rate.rate, NBSP), rate.basis
-    if (found := manifest.detected) is not None:
-        yield (
-            f"Held, {found.held.title}",
-            percent(found.held.rate, NBSP),
-            f"of grasps recognised as held, {found.held.basis}",
-        )
-        if found.none is not None:
-            yield (
-                f"Nothing held, {found.none.title}",
-                percent(found.none.rate, NBSP),
-                f"recognised as none, {found.none.basis}",
-            )
-    sensors, source = SensorCount.of_build(manifest), manifest.source
-    if source.switches:
-        yield "Switches kept", f"{sensors.switches[0]}", f"of {source.switches}"
-    if source.taxels:
-        yield "Pads kept", f"{sensors.pads[0]}", f"of {source.taxels}, with {counted(sensors.levels, 'level')}"
-    whose = "from a custom source" if _unread(content) else "of the CyberGlove"
-    yield "Joints kept", f"{sensors.joints[0]}", f"of {source.joints}, {whose}" if manifest.joints else "none are used"
-    fit = manifest.fit
-    yield "Trainer", fit.trainer, f"chosen among {counted(fit.tried, 'fit')}" if fit.compared else "given"
-    if content.rounds:
-        ended = f"of {fit.number('rounds'):g}: training stopped at the tolerance"
-        yield "Rounds", f"{content.rounds}", ended if manifest.stopped_after else "of boosting"
-    yield "Tables", f"{content.tables_bytes:,}", "bytes of tables.bin"
-    yield "Changed by rounding", f"{manifest.proof.changed}", f"of {counted(manifest.source.rows, 'row')}"
-
-
-def _unread(content: ReportContent) -> str:
-    """Return a sentence on joints that no CyberGlove measures; "" without joints, or where a glove is wired."""
-    wired = content.harness is not None and content.harness.cyberglove is not None
-    return "" if wired else own_joints([joint.name for joint in content.manifest.joints])
-
-
-def warnings(content: ReportContent) -> Iterator[str]:
-    """Yield warnings."""
-    manifest = content.manifest
-    if not manifest.knows_none:
-        yield "No row of the recordings shows an empty hand: the build may announce a grasp where nothing is held."
-    if unread := _unread(content):
-        yield sentence(unread)
-    if content.only_answer is not None:
-        yield (
-            f"Every row is predicted as {content.only_answer}: no single input distinguishes grasp types, and the "
-            "model uses one at a time."
-        )
-    if manifest.zero_gain_nodes:
-        nodes = counted(manifest.zero_gain_nodes, "decision")
-        yield f"At {nodes} of the placement no switch gains anything alone: the one with the lowest number was chosen."
-    if manifest.source.independent:
-        yield sentence(INDEPENDENT)
-    if manifest.source.simulated:
-        yield f"The recordings are simulated ({manifest.source.simulated})."
 
 
 def kept_table(content: ReportContent) -> PlainTable:
@@ -158,19 +94,6 @@ def placement_sentences(content: ReportContent) -> tuple[str, str]:
     )
 
 
-def fit_sentences(manifest: Manifest) -> Iterator[str]:
-    """Yield which trainer made the model, and how it was chosen."""
-    fit = manifest.fit
-    if not fit.compared:
-        yield f"The model was trained by {fit}, as given by the options; nothing was chosen."
-        return
-    yield f"The model was trained by {fit}, because {fit.why}."
-    yield (
-        f"{counted(fit.tried, 'fit')} were compared in {counted(fit.folds, 'fold')} of the training rows ({fit.of}). "
-        "Each fold of the accuracies above repeated the choice on its training rows only."
-    )
-
-
 def fit_table(manifest: Manifest) -> PlainTable | None:
     """Return the best fit of each trainer in the inner folds, and the chosen one; None where nothing was chosen."""
     rows = []
@@ -197,24 +120,16 @@ def no_tree(manifest: Manifest) -> str:
     return f"No tree: the switches were chosen by {manifest.options.placement}."
 
 
-def guarantee_sentences(content: ReportContent) -> Iterator[str]:
-    """Yield the guarantees for the integers in build.json, and those of the worst-case analysis."""
-    proof, rows, worst = content.manifest.proof, content.manifest.source.rows, content.worst
-    yield (
-        f"Scores are sums of integers, {proof.scale:.1f} steps per unit of score. No sum of them, in any order and "
-        f"with any inputs missing, exceeds {proof.bound:,} steps, so all fit in {proof.width} bits."
+def worst_sentence(content: ReportContent) -> str:
+    """Return the guarantee of the worst-case analysis; "" without one."""
+    rows, worst = content.manifest.source.rows, content.worst
+    if worst is None:
+        return ""
+    return (
+        f"In the worst case over all possible frames, recorded or not, {worst.leader} loses {worst.loss:.3f} steps "
+        f"of its lead over {worst.competitor}. By this exact analysis, ties included, a lead of more than "
+        f"{worst.safe_margin:.3f} steps is safe: {_share(worst.covered, rows)} training rows have it."
     )
-    yield (
-        f"Rounding changes no score by more than {proof.error:g} steps, so a lead of more than "
-        f"{proof.safe_margin:g} steps keeps its grasp type: {_share(proof.covered, rows)} training rows have it. "
-        f"{counted(proof.changed, 'row')} changed grasp type."
-    )
-    if worst is not None:
-        yield (
-            f"In the worst case over all possible frames, recorded or not, {worst.leader} loses {worst.loss:.3f} steps "
-            f"of its lead over {worst.competitor}. By this exact analysis, ties included, a lead of more "
-            f"than {worst.safe_margin:.3f} steps is safe: {_share(worst.covered, rows)} training rows have it."
-        )
 
 
 def guarantee_table(content: ReportContent) -> PlainTable | None:
@@ -288,31 +203,6 @@ def scan_table(content: ReportContent) -> PlainTable | None:
     caption = "Transactions, in the order in which they are made; times on the wire, by arithmetic"
     columns = ("Order", "Bus", "Chip", "Reads", "Switches", "µs")
     return PlainTable(caption, columns, tuple(rows), words=(1, 2, 3, 4))
-
-
-def scan_sentences(content: ReportContent) -> Iterator[str]:
-    """Yield sentences on the time on the wires; nothing without a scan map."""
-    scan, harness, joints = content.scan, content.harness, len(content.manifest.joints)
-    if scan is None or harness is None:
-        return
-    if scan.ports:
-        time = scan_us(scan, harness)
-        muxes = f", {counted(time.selects, 'write')} to muxes among them" if time.selects else ""
-        yield (
-            f"A whole scan is {counted(len(scan.ports) + time.selects, 'transaction')}{muxes}: "
-            f"{microseconds(time.us)} µs on the wire, {percent(time.share, NBSP)} of the "
-            f"{microseconds(time.full_us)} µs that all {harness.on_chips} wired ones take."
-        )
-    for stream, read in zip(harness.streams, scan.streams, strict=True):
-        yield (
-            f"The stream from {stream.port} shows {counted(len(read.switches), 'kept switch', 'kept switches')} and "
-            f"{counted(len(read.levels), 'level')} of taxels, a row every {microseconds(stream.period_us)} µs."
-        )
-    if harness.cyberglove is not None and joints:
-        us, glove = microseconds(glove_us(harness.cyberglove, joints)), harness.cyberglove
-        how = "by the vendor's formula" if glove.record_us is None else "as measured"
-        record = f"A record of {counted(joints, 'sensor')} of the CyberGlove"
-        yield f"{record} takes {us} µs on its own line, {how}, in addition to the scan."
 
 
 def provenance(manifest: Manifest) -> Pairs:

@@ -10,21 +10,18 @@ from msgspec import Meta
 
 from thenar.simulator.body.cyberglove import SENSORS
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Effect, EffectParameters, SceneSetting, Step
+from thenar.simulator.pipeline.effect import Effect, SceneSetting, Step
 from thenar.simulator.streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """Standard deviation, over sensors and subjects, of how far a sensor is off."""
+def prepare(setting: SceneSetting, *, sd_deg: Annotated[float, Meta(ge=0.0, le=45.0)] = 4.0) -> Step:
+    """Return the step that shifts every sensor, by a different number of degrees for each subject.
 
-    sd_deg: Annotated[float, Meta(ge=0.0, le=45.0)] = 4.0
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that shifts every sensor, by a different number of degrees for each subject."""
+    Standard deviation, over sensors and subjects, of how far a sensor is off.
+    """
 
     def step(batch: Batch, draw: Draw) -> None:
-        batch.sensors_deg = batch.sensors_deg + parameters.sd_deg * draw.per_subject(len(SENSORS)).normal()
+        batch.sensors_deg = batch.sensors_deg + sd_deg * draw.per_subject(len(SENSORS)).normal()
 
     return step
 
@@ -35,6 +32,5 @@ MEMBER = Effect(
     order=525,
     reads=("sensors_deg",),
     writes=("sensors_deg",),
-    parameters=Parameters,
     prepare=prepare,
 )

@@ -1,6 +1,7 @@
 """contact.quasistatic: hand and object at rest, in numpy. The default contact model of a scene."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
 from typing import Annotated
@@ -14,37 +15,32 @@ from ..body.shapes import rotation_vector
 from ..contact.balance import USUAL, Skin, SolverCase, SolverSettings
 from ..contact.model import Contact, ContactModel, Load, split
 from ..contact.settle import Rest, close
-from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, EffectParameters, SceneSetting
+from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, SceneSetting
 
 _Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)]
 # Repetitions solved at a time: enough to amortise numpy's calls, few enough for the processor's cache.
 _TOGETHER = 512
 
 
-class Parameters(EffectParameters, frozen=True):
-    """The compliance of skin, and the limit of steps. Defaults are ours, of the order of published finger pulp.
+# Defaults are ours, of the order of published finger pulp.
+USUAL_SKIN = Skin(press_n_per_mm=3.0, soft_mm=0.5, drag_n_per_mm=1.5, friction=0.8)
+REACH_MM = 1.0
+MOST_STEPS = 40
 
-    press_n_per_mm, soft_mm  stiffness of each point of skin, and the depth of its softer first part
-    drag_n_per_mm, friction  sideways, until it slips
-    reach_mm                 height above its top at which a switch touches: skin bulges, and a glove spreads the load
-    most_steps               Newton steps before a repetition counts as not settled
+
+@dataclass(frozen=True, slots=True)
+class Quasistatic:
+    """The contact model of hands and objects at rest.
+
+    skin        its compliance
+    reach_mm    height above its top at which a switch touches: skin bulges, and a glove spreads the load
+    most_steps  Newton steps before a repetition counts as not settled
     """
 
-    press_n_per_mm: _Positive = 3.0
-    soft_mm: Annotated[float, msgspec.Meta(gt=0.0, le=5.0)] = 0.5
-    drag_n_per_mm: _Positive = 1.5
-    friction: Annotated[float, msgspec.Meta(ge=0.0, le=2.0)] = 0.8
-    reach_mm: Annotated[float, msgspec.Meta(ge=0.0, le=5.0)] = 1.0
-    most_steps: Annotated[int, msgspec.Meta(ge=1, le=1000)] = 40
-
-
-class Quasistatic:
-    """The contact model of hands and objects at rest."""
-
-    def __init__(self, parameters: Parameters, pace: SolverSettings = USUAL) -> None:
-        self.pace = pace
-        self.skin = Skin(parameters.press_n_per_mm, parameters.soft_mm, parameters.drag_n_per_mm, parameters.friction)
-        self.reach_mm, self.most_steps = parameters.reach_mm, parameters.most_steps
+    skin: Skin = USUAL_SKIN
+    reach_mm: float = REACH_MM
+    most_steps: int = MOST_STEPS
+    pace: SolverSettings = USUAL
 
     def solve(self, loads: Sequence[Load]) -> list[Contact]:
         """Return the rest of the hands (contact.ContactModel)."""
@@ -95,9 +91,23 @@ def _bundles(loads: list[Load]) -> list[list[Load]]:
     return bundles
 
 
-def model(parameters: Parameters, setting: SceneSetting) -> ContactModel:
-    """Return the contact model."""
-    return Quasistatic(parameters)
+def model(
+    setting: SceneSetting,
+    *,
+    press_n_per_mm: _Positive = USUAL_SKIN.press_n_per_mm,
+    soft_mm: Annotated[float, msgspec.Meta(gt=0.0, le=5.0)] = USUAL_SKIN.soft_mm,
+    drag_n_per_mm: _Positive = USUAL_SKIN.drag_n_per_mm,
+    friction: Annotated[float, msgspec.Meta(ge=0.0, le=2.0)] = USUAL_SKIN.friction,
+    reach_mm: Annotated[float, msgspec.Meta(ge=0.0, le=5.0)] = REACH_MM,
+    most_steps: Annotated[int, msgspec.Meta(ge=1, le=1000)] = MOST_STEPS,
+) -> ContactModel:
+    """Return the contact model.
+
+    press_n_per_mm, soft_mm  stiffness of each point of skin, and the depth of its softer first part
+    drag_n_per_mm, friction  sideways, until it slips
+    reach_mm, most_steps     `Quasistatic`
+    """
+    return Quasistatic(Skin(press_n_per_mm, soft_mm, drag_n_per_mm, friction), reach_mm, most_steps)
 
 
 MEMBER = Effect(
@@ -106,6 +116,5 @@ MEMBER = Effect(
     order=200,
     reads=CONTACT_READS,
     writes=CONTACT_WRITES,
-    parameters=Parameters,
     model=model,
 )

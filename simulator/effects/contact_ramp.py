@@ -15,33 +15,34 @@ from msgspec import Meta
 from ..contact.model import Contact, ContactModel, Load
 from ..errors import SceneError
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Together
+from ..pipeline.effect import Effect, SceneSetting, Together
 from ..pipeline.ramp import NEVER, Ramp, crossings
 from ..streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """The duration of the growth in milliseconds, and the number of solved levels.
+def prepare(
+    setting: SceneSetting,
+    contact: ContactModel,
+    *,
+    rise_ms: Annotated[float, Meta(gt=0.0, le=10_000.0)] = 200.0,
+    levels: Annotated[int, Meta(ge=1, le=100)] = 10,
+) -> Together:
+    """Return the step that times every switch. Raises SceneError if the grip is not full when the row is read.
+
+    The duration of the growth in milliseconds, and the number of solved levels.
 
     The default time is ours, of the order of the load phase of lifts (Johansson and Westling 1984, Exp. Brain Res. 56).
     """
-
-    rise_ms: Annotated[float, Meta(gt=0.0, le=10_000.0)] = 200.0
-    levels: Annotated[int, Meta(ge=1, le=100)] = 10
-
-
-def prepare(parameters: Parameters, setting: SceneSetting, contact: ContactModel) -> Together:
-    """Return the step that times every switch. Raises SceneError if the grip is not full when the row is read."""
-    rise_us = 1e3 * parameters.rise_ms
+    rise_us = 1e3 * rise_ms
     if rise_us > setting.hold_us:
         raise SceneError(
-            f"effects.contact.ramp: the grip still grows when the row is read: rise_ms = {parameters.rise_ms:g} is"
+            f"effects.contact.ramp: the grip still grows when the row is read: rise_ms = {rise_ms:g} is"
             f" longer than recording.hold_ms = {setting.hold_us / 1e3:g}"
         )
-    below = parameters.levels - 1
+    below = levels - 1
 
     def act(batches: Sequence[Batch], draws: Sequence[Draw]) -> None:
-        found = iter(contact.solve([load for batch in batches for load in _loads(batch, parameters.levels)]))
+        found = iter(contact.solve([load for batch in batches for load in _loads(batch, levels)]))
         for batch, draw in zip(batches, draws, strict=True):
             grown = list(islice(found, below))
             draw.count("grips solved", len(batch) * below)
@@ -86,6 +87,5 @@ MEMBER = Effect(
     ),
     writes=("on_us", "off_us", "settled", "residual_n", "residual_nmm", "ramp"),
     timed=True,
-    parameters=Parameters,
     together=prepare,
 )

@@ -11,18 +11,15 @@ from msgspec import Meta
 
 from ..errors import SceneError
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, frame_times
+from ..pipeline.effect import Effect, SceneSetting, Step, frame_times
 from ..streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """The force on the most loaded place, in newtons, at the last frame but one."""
+def prepare(setting: SceneSetting, *, to_n: Annotated[float, Meta(gt=0.0, le=100.0)] = 1.0) -> Step:
+    """Return the step that moves the frames. Raises SceneError if there are too few.
 
-    to_n: Annotated[float, Meta(gt=0.0, le=100.0)] = 1.0
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that moves the frames. Raises SceneError if there are too few."""
+    The force on the most loaded place, in newtons, at the last frame but one.
+    """
     times = frame_times(setting)
     held = np.flatnonzero((times >= 0) & (times <= setting.hold_us))
     between = len(held) - 2
@@ -35,7 +32,7 @@ def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
     def step(batch: Batch, draw: Draw) -> None:
         if batch.ramp is None:
             return  # The full force is present at once.
-        steps = [batch.ramp.reached_us(parameters.to_n * number / between) for number in range(1, between + 1)]
+        steps = [batch.ramp.reached_us(to_n * number / between) for number in range(1, between + 1)]
         moved = batch.frame_us.copy()
         moved[:, held[:-1]] = np.minimum(np.column_stack([np.zeros(len(batch), np.int64), *steps]), setting.hold_us)
         batch.frame_us = moved
@@ -50,6 +47,5 @@ MEMBER = Effect(
     reads=("frame_us", "ramp"),
     writes=("frame_us",),
     timed=True,
-    parameters=Parameters,
     prepare=prepare,
 )

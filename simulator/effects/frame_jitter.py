@@ -6,22 +6,19 @@ import numpy as np
 from msgspec import Meta
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, drawn_rows
+from ..pipeline.effect import Effect, SceneSetting, Step, drawn_rows
 from ..streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """Standard deviation of the start of frames in microseconds."""
+def prepare(setting: SceneSetting, *, sd_us: Annotated[float, Meta(gt=0.0, le=1e6)] = 300.0) -> Step:
+    """Return the step that moves every frame by an independent normal deviate, and keeps them in order.
 
-    sd_us: Annotated[float, Meta(gt=0.0, le=1e6)] = 300.0
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that moves every frame by an independent normal deviate, and keeps them in order."""
+    Standard deviation of the start of frames in microseconds.
+    """
     rows = drawn_rows(setting)
 
     def step(batch: Batch, draw: Draw) -> None:
-        shift = np.rint(parameters.sd_us * draw.per_repetition(len(rows)).normal()[:, rows])
+        shift = np.rint(sd_us * draw.per_repetition(len(rows)).normal()[:, rows])
         batch.frame_us = np.sort(batch.frame_us + shift.astype(np.int64), axis=1)
 
     return step
@@ -34,6 +31,5 @@ MEMBER = Effect(
     reads=("frame_us",),
     writes=("frame_us",),
     timed=True,
-    parameters=Parameters,
     prepare=prepare,
 )

@@ -7,21 +7,18 @@ from msgspec import Meta
 from thenar.compiler.elementary import exp
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
+from ..pipeline.effect import Effect, SceneSetting, Step
 from ..streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """Standard deviation of the logarithm of the force: 0.25 is about a quarter. Fitted to the paper's rates."""
+def prepare(setting: SceneSetting, *, log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.25) -> Step:
+    """Return the step that multiplies the grip by a lognormal factor of median 1.
 
-    log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.25
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that multiplies the grip by a lognormal factor of median 1."""
+    Standard deviation of the logarithm of the force: 0.25 is about a quarter. Fitted to the paper's rates.
+    """
 
     def step(batch: Batch, draw: Draw) -> None:
-        batch.grip_n = batch.grip_n * exp(parameters.log_sd * draw.per_repetition().normal())
+        batch.grip_n = batch.grip_n * exp(log_sd * draw.per_repetition().normal())
 
     return step
 
@@ -32,6 +29,5 @@ MEMBER = Effect(
     order=140,
     reads=("grip_n",),
     writes=("grip_n",),
-    parameters=Parameters,
     prepare=prepare,
 )

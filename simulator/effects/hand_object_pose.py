@@ -8,24 +8,25 @@ from msgspec import Meta
 from thenar.compiler.elementary import Floats, add_up, sincos
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
+from ..pipeline.effect import Effect, SceneSetting, Step
 from ..streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """Standard deviations along and about each axis of the hand. The defaults were fitted to the paper's rates."""
+def prepare(
+    setting: SceneSetting,
+    *,
+    sd_mm: Annotated[float, Meta(ge=0.0, le=50.0)] = 1.5,
+    sd_deg: Annotated[float, Meta(ge=0.0, le=45.0)] = 2.5,
+) -> Step:
+    """Return the step that shifts and rotates the object by normal deviates.
 
-    sd_mm: Annotated[float, Meta(ge=0.0, le=50.0)] = 1.5
-    sd_deg: Annotated[float, Meta(ge=0.0, le=45.0)] = 2.5
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that shifts and rotates the object by normal deviates."""
+    Standard deviations along and about each axis of the hand. The defaults were fitted to the paper's rates.
+    """
 
     def step(batch: Batch, draw: Draw) -> None:
         deviates = draw.per_repetition(6).normal()
-        position = batch.pose[:, :3] + parameters.sd_mm * deviates[:, :3]
-        turn = parameters.sd_deg * np.pi / 180.0 * deviates[:, 3:]
+        position = batch.pose[:, :3] + sd_mm * deviates[:, :3]
+        turn = sd_deg * np.pi / 180.0 * deviates[:, 3:]
         batch.pose = np.concatenate([position, turned(batch.pose[:, 3:], turn)], axis=1)
 
     return step
@@ -53,6 +54,5 @@ MEMBER = Effect(
     order=130,
     reads=("pose",),
     writes=("pose",),
-    parameters=Parameters,
     prepare=prepare,
 )

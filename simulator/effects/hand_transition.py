@@ -18,23 +18,19 @@ from ..body.cyberglove import sensors_deg
 from ..body.hand import DOF, LIMITS_DEG
 from ..errors import SceneError
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, frame_times
+from ..pipeline.effect import Effect, SceneSetting, Step, frame_times
 from ..streams import Draw
 
 _FLEXES = np.array([not name.endswith("abduction") for name in DOF])
 _BUMP = 3.0**9 / 2.0**6  # makes t^6 (1 - t)^3 one at its top, t = 2/3
 
 
-class Parameters(EffectParameters, frozen=True):
-    """The opening of every flexing joint on the way, in degrees."""
-
-    opening_deg: Annotated[float, Meta(ge=0.0, le=90.0)] = 20.0
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
+def prepare(setting: SceneSetting, *, opening_deg: Annotated[float, Meta(ge=0.0, le=90.0)] = 20.0) -> Step:
     """Return the step that moves the angles of the frames before contact, and after the release where the hand rests.
 
     Raises SceneError if there are none before contact.
+
+    The opening of every flexing joint on the way, in degrees.
     """
     if not (frame_times(setting) < 0).any():
         raise SceneError(
@@ -51,7 +47,7 @@ def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
             away = until_us < 0
             some = away.any(axis=0)
             way = np.clip(1.0 - until_us[:, some] / setting.first_us, 0.0, 1.0)
-            felt = sensors_deg(path(open_deg, batch.posture_deg, way, parameters.opening_deg))
+            felt = sensors_deg(path(open_deg, batch.posture_deg, way, opening_deg))
             moved[:, some] = np.where(away[:, some, None], felt, moved[:, some])
         batch.sensors_deg = moved
 
@@ -79,6 +75,5 @@ MEMBER = Effect(
     reads=("previous_deg", "rest_deg", "posture_deg", "frame_us", "sensors_deg"),
     writes=("sensors_deg",),
     timed=True,
-    parameters=Parameters,
     prepare=prepare,
 )

@@ -10,27 +10,23 @@ from msgspec import Meta
 
 from ..body.cyberglove import SENSORS
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, drawn_rows
+from ..pipeline.effect import Effect, SceneSetting, Step, drawn_rows
 from ..streams import Draw
 
 _Degrees = Annotated[float, Meta(ge=0.0, le=45.0)]
 
 
-class Parameters(EffectParameters, frozen=True):
-    """Standard deviations of each sensor: `sd_deg` drawn for every frame, `trial_sd_deg` once per repetition."""
+def prepare(setting: SceneSetting, *, sd_deg: _Degrees = 2.0, trial_sd_deg: _Degrees = 0.0) -> Step:
+    """Return the step that adds normal noise to every sensor.
 
-    sd_deg: _Degrees = 2.0
-    trial_sd_deg: _Degrees = 0.0
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that adds normal noise to every sensor."""
+    Standard deviations of each sensor: `sd_deg` drawn for every frame, `trial_sd_deg` once per repetition.
+    """
     rows = drawn_rows(setting)
 
     def step(batch: Batch, draw: Draw) -> None:
         deviates = draw.per_repetition(1 + len(rows), len(SENSORS)).normal()
-        of_frame = parameters.sd_deg * deviates[:, 1 + rows]
-        batch.sensors_deg = batch.sensors_deg + (parameters.trial_sd_deg * deviates[:, :1] + of_frame)
+        of_frame = sd_deg * deviates[:, 1 + rows]
+        batch.sensors_deg = batch.sensors_deg + (trial_sd_deg * deviates[:, :1] + of_frame)
 
     return step
 
@@ -41,6 +37,5 @@ MEMBER = Effect(
     order=520,
     reads=("sensors_deg",),
     writes=("sensors_deg",),
-    parameters=Parameters,
     prepare=prepare,
 )

@@ -9,27 +9,23 @@ from msgspec import Meta
 
 from ..body.layout import murakami160
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
-from ..pipeline.parts import chooser, port_count, port_of
+from ..pipeline.effect import Effect, SceneSetting, Step
+from ..pipeline.parts import Count, chooser, port_count, port_of
 from ..streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """Either the numbers of the dead ports, from 0, or their count, drawn for the glove; one by default."""
+def prepare(
+    setting: SceneSetting,
+    *,
+    ports: Annotated[tuple[Annotated[int, Meta(ge=0)], ...], Meta(min_length=1)] | None = None,
+    count: Count = None,
+) -> Step:
+    """Return the step that opens every switch of the dead ports. Raises SceneError if there are no such ports.
 
-    ports: Annotated[tuple[Annotated[int, Meta(ge=0)], ...], Meta(min_length=1)] | None = None
-    count: Annotated[int, Meta(ge=1)] | None = None
-
-    def __post_init__(self) -> None:
-        """Reject both at once."""
-        if self.ports is not None and self.count is not None:
-            raise ValueError("say which `ports` are dead or their `count`, not both")
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that opens every switch of the dead ports. Raises SceneError if there are no such ports."""
+    Either the numbers of the dead ports, from 0, or their count, drawn for the glove; one by default.
+    """
     switches = len(murakami160())
-    dead = chooser("port.dead", "port", "dead", port_count(switches), parameters.ports or (), parameters.count)
+    dead = chooser("port.dead", "port", "dead", port_count(switches), ports or (), count)
     port = port_of(switches)
 
     def step(batch: Batch, draw: Draw) -> None:
@@ -44,6 +40,6 @@ MEMBER = Effect(
     order=760,
     reads=("bits",),
     writes=("bits",),
-    parameters=Parameters,
+    either=("ports", "count"),
     prepare=prepare,
 )

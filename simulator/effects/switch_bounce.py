@@ -12,26 +12,27 @@ from msgspec import Meta
 from thenar.compiler.elementary import Floats
 
 from ..pipeline.batch import Batch, Bits, Integers
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
+from ..pipeline.effect import Effect, SceneSetting, Step
 from ..pipeline.ramp import NEVER
 from ..streams import Draw
 
 _MOST_PAIRS = 5
 
 
-class Parameters(EffectParameters, frozen=True):
-    """The longest burst when a switch closes, and when it opens, in milliseconds."""
+def prepare(
+    setting: SceneSetting,
+    *,
+    on_ms: Annotated[float, Meta(ge=0.0, le=1000.0)] = 3.0,
+    off_ms: Annotated[float, Meta(ge=0.0, le=1000.0)] = 8.0,
+) -> Step:
+    """Return the step that flips the bits read while their contact bounces.
 
-    on_ms: Annotated[float, Meta(ge=0.0, le=1000.0)] = 3.0
-    off_ms: Annotated[float, Meta(ge=0.0, le=1000.0)] = 8.0
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that flips the bits read while their contact bounces."""
+    The longest burst when a switch closes, and when it opens, in milliseconds.
+    """
 
     def step(batch: Batch, draw: Draw) -> None:
         chances = draw.per_repetition(batch.on_us.shape[1], 4).uniform()
-        on_us, off_us = chances[:, :, 0] * (1e3 * parameters.on_ms), chances[:, :, 2] * (1e3 * parameters.off_ms)
+        on_us, off_us = chances[:, :, 0] * (1e3 * on_ms), chances[:, :, 2] * (1e3 * off_ms)
         closing = _flipped(batch, batch.on_us, batch.off_us, on_us, chances[:, :, 1])
         opening = _flipped(batch, batch.off_us, np.full_like(batch.off_us, NEVER), off_us, chances[:, :, 3])
         batch.bits = batch.bits ^ closing ^ opening
@@ -65,6 +66,5 @@ MEMBER = Effect(
     reads=("bits", "on_us", "off_us", "frame_us", "delay_us"),
     writes=("bits",),
     timed=True,
-    parameters=Parameters,
     prepare=prepare,
 )

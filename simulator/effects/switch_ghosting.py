@@ -9,17 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pipeline.batch import Batch, Bits
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
+from ..pipeline.effect import Effect, SceneSetting, Step
 from ..pipeline.parts import PORT, port_count, port_of
 from ..streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """No parameters: a row of the matrix is a port, a column one of its sixteen places."""
+def prepare(setting: SceneSetting) -> Step:
+    """Return the step that closes every switch with a current path.
 
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that closes every switch with a current path."""
+    No parameters: a row of the matrix is a port, a column one of its sixteen places.
+    """
 
     def step(batch: Batch, draw: Draw) -> None:
         batch.bits = joined(batch.bits)
@@ -56,6 +55,5 @@ MEMBER = Effect(
     order=750,
     reads=("bits",),
     writes=("bits",),
-    parameters=Parameters,
     prepare=prepare,
 )

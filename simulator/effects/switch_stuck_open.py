@@ -2,17 +2,16 @@
 
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, SceneSetting, Step
-from ..pipeline.parts import StuckParameters, stuck
+from ..pipeline.parts import Count, SwitchList, stuck
 from ..streams import Draw
 
 
-class Parameters(StuckParameters, frozen=True):
-    """Which switches. One that is also stuck closed (switch.stuck_closed) reads closed."""
+def prepare(setting: SceneSetting, *, switches: SwitchList = None, count: Count = None) -> Step:
+    """Return the step that opens them. Raises SceneError if the glove has no such switch.
 
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that opens them. Raises SceneError if the glove has no such switch."""
-    chosen = stuck(MEMBER.name, parameters)
+    Which switches: `parts.stuck`. One that is also stuck closed (switch.stuck_closed) reads closed.
+    """
+    chosen = stuck(MEMBER.name, switches, count)
 
     def step(batch: Batch, draw: Draw) -> None:
         batch.bits = batch.bits & ~chosen(draw)
@@ -26,6 +25,6 @@ MEMBER = Effect(
     order=730,
     reads=("bits",),
     writes=("bits",),
-    parameters=Parameters,
+    either=("switches", "count"),
     prepare=prepare,
 )

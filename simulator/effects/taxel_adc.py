@@ -11,32 +11,33 @@ from msgspec import Meta
 
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, SceneSetting, Step
-from ..pipeline.glove import TaxelConverter
+from ..pipeline.glove import TAXEL_ADC, TaxelConverter
 from ..streams import Draw
 
 
-class Parameters(TaxelConverter, frozen=True):
-    """Number of bits, and full-scale force in newtons."""
+def prepare(
+    setting: SceneSetting,
+    *,
+    bits: Annotated[int, Meta(ge=1, le=15)] = 12,
+    full_n: Annotated[float, Meta(gt=0.0, le=1000.0)] = 10.0,
+) -> Step:
+    """Return the step that converts every reading.
 
-    bits: Annotated[int, Meta(ge=1, le=15)] = 12
-    full_n: Annotated[float, Meta(gt=0.0, le=1000.0)] = 10.0
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that converts every reading."""
+    Number of bits, and full-scale force in newtons.
+    """
+    converter = TaxelConverter(bits, full_n)
 
     def step(batch: Batch, draw: Draw) -> None:
-        batch.taxels = parameters.codes(batch.taxels_n)
+        batch.taxels = converter.codes(batch.taxels_n)
 
     return step
 
 
 MEMBER = Effect(
-    name="taxel.adc",
+    name=TAXEL_ADC,
     summary="a converter quantises forces to counts",
     order=770,
     reads=("taxels_n",),
     writes=("taxels",),
-    parameters=Parameters,
     prepare=prepare,
 )

@@ -13,20 +13,17 @@ from msgspec import Meta
 from thenar.compiler.elementary import Floats, exp
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
+from ..pipeline.effect import Effect, SceneSetting, Step
 from ..streams import Draw
 
 _TIMES_US = np.array([0.1e6, 1e6, 10e6])
 
 
-class Parameters(EffectParameters, frozen=True):
-    """Growth of a reading, as a share of the force, per tenfold time under load."""
+def prepare(setting: SceneSetting, *, per_decade: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05) -> Step:
+    """Return the step that adds the creep since contact to each reading.
 
-    per_decade: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that adds the creep since contact to each reading."""
+    Growth of a reading, as a share of the force, per tenfold time under load.
+    """
 
     def step(batch: Batch, draw: Draw) -> None:
         crept: list[Floats] = []
@@ -39,7 +36,7 @@ def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
             states = force + (states - force) * kept[:, :, None]
             crept.append(states[0] + states[1] + states[2])
             before = at
-        batch.taxels_n = batch.taxels_n + parameters.per_decade * np.stack(crept, axis=1)
+        batch.taxels_n = batch.taxels_n + per_decade * np.stack(crept, axis=1)
 
     return step
 
@@ -50,6 +47,5 @@ MEMBER = Effect(
     order=580,
     reads=("frame_us", "taxels_n"),
     writes=("taxels_n",),
-    parameters=Parameters,
     prepare=prepare,
 )

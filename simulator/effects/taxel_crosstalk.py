@@ -16,22 +16,23 @@ from msgspec import Meta
 from thenar.compiler.elementary import add_up
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
+from ..pipeline.effect import Effect, SceneSetting, Step
 from ..pipeline.parts import PORT
 from ..streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """The resistance of the driver of a row, and of a pad at 1 N (its conductance is proportional to the force)."""
+def prepare(
+    setting: SceneSetting,
+    *,
+    row_ohm: Annotated[float, Meta(ge=0.0, le=1e5)] = 70.0,
+    pad_ohm: Annotated[float, Meta(gt=0.0, le=1e9)] = 10_000.0,
+) -> Step:
+    """Return the step that lowers every reading by its row's conductance; a row has the places of a port.
 
-    row_ohm: Annotated[float, Meta(ge=0.0, le=1e5)] = 70.0
-    pad_ohm: Annotated[float, Meta(gt=0.0, le=1e9)] = 10_000.0
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that lowers every reading by its row's conductance; a row has the places of a port."""
+    The resistance of the driver of a row, and of a pad at 1 N (its conductance is proportional to the force).
+    """
     rows = np.array(setting.taxels, dtype=np.intp) // PORT
-    per_n = parameters.row_ohm / parameters.pad_ohm
+    per_n = row_ohm / pad_ohm
 
     def step(batch: Batch, draw: Draw) -> None:
         felt = np.empty_like(batch.taxels_n)
@@ -50,6 +51,5 @@ MEMBER = Effect(
     order=590,
     reads=("taxels_n",),
     writes=("taxels_n",),
-    parameters=Parameters,
     prepare=prepare,
 )

@@ -13,26 +13,26 @@ from msgspec import Meta
 from thenar.compiler.elementary import exp
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
+from ..pipeline.effect import Effect, SceneSetting, Step
 from ..streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """Standard deviation of the logarithm of the gain between the pads of a glove, and the actuation force of a typical
+def prepare(
+    setting: SceneSetting,
+    *,
+    log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.06,
+    actuates_n: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.1,
+) -> Step:
+    """Return the step that scales every pad's force, once it actuates.
+
+    Standard deviation of the logarithm of the gain between the pads of a glove, and the actuation force of a typical
     pad in newtons, which is inversely proportional to the gain.
     """
 
-    log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.06
-    actuates_n: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.1
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that scales every pad's force, once it actuates."""
-
     def step(batch: Batch, draw: Draw) -> None:
-        gains = exp(parameters.log_sd * draw.per_glove(batch.taxels_n.shape[2]).normal())
+        gains = exp(log_sd * draw.per_glove(batch.taxels_n.shape[2]).normal())
         felt = batch.taxels_n * gains
-        batch.taxels_n = np.where(felt >= parameters.actuates_n, felt, 0.0)
+        batch.taxels_n = np.where(felt >= actuates_n, felt, 0.0)
 
     return step
 
@@ -43,6 +43,5 @@ MEMBER = Effect(
     order=560,
     reads=("taxels_n",),
     writes=("taxels_n",),
-    parameters=Parameters,
     prepare=prepare,
 )

@@ -12,19 +12,16 @@ import numpy as np
 from msgspec import Meta
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
+from ..pipeline.effect import Effect, SceneSetting, Step
 from ..streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """Excess of the reading at falling over rising force, as a share of the force."""
+def prepare(setting: SceneSetting, *, share: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.1) -> Step:
+    """Return the step that lets readings follow the force with play, frame by frame.
 
-    share: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.1
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that lets readings follow the force with play, frame by frame."""
-    most = 1.0 + parameters.share
+    Excess of the reading at falling over rising force, as a share of the force.
+    """
+    most = 1.0 + share
 
     def step(batch: Batch, draw: Draw) -> None:
         felt = batch.taxels_n.copy()
@@ -43,6 +40,5 @@ MEMBER = Effect(
     reads=("taxels_n",),
     writes=("taxels_n",),
     timed=True,
-    parameters=Parameters,
     prepare=prepare,
 )

@@ -11,25 +11,26 @@ from msgspec import Meta
 from thenar.compiler.elementary import exp
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, drawn_rows
+from ..pipeline.effect import Effect, SceneSetting, Step, drawn_rows
 from ..streams import Draw
 
 
-class Parameters(EffectParameters, frozen=True):
-    """Standard deviations: of the logarithm of a pad's gain, drawn for each repetition; of each reading, in newtons."""
+def prepare(
+    setting: SceneSetting,
+    *,
+    trial_log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.02,
+    sd_n: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.005,
+) -> Step:
+    """Return the step that adds normal noise to every reading.
 
-    trial_log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.02
-    sd_n: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.005
-
-
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that adds normal noise to every reading."""
+    Standard deviations: of the logarithm of a pad's gain, drawn for each repetition; of each reading, in newtons.
+    """
     rows = drawn_rows(setting)
 
     def step(batch: Batch, draw: Draw) -> None:
         deviates = draw.per_repetition(1 + len(rows), batch.taxels_n.shape[2]).normal()
-        gains = exp(parameters.trial_log_sd * deviates[:, :1])
-        batch.taxels_n = batch.taxels_n * gains + parameters.sd_n * deviates[:, 1 + rows]
+        gains = exp(trial_log_sd * deviates[:, :1])
+        batch.taxels_n = batch.taxels_n * gains + sd_n * deviates[:, 1 + rows]
 
     return step
 
@@ -40,6 +41,5 @@ MEMBER = Effect(
     order=600,
     reads=("taxels_n",),
     writes=("taxels_n",),
-    parameters=Parameters,
     prepare=prepare,
 )

@@ -8,16 +8,10 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, drawn_rows
+from ..pipeline.effect import Effect, SceneSetting, Step, drawn_rows
 from ..streams import Draw
 
 Bytes = NDArray[np.uint8]
-
-
-class Parameters(EffectParameters, frozen=True):
-    """The share of damaged bytes."""
-
-    rate: Annotated[float, Meta(gt=0.0, lt=1.0)] = 1e-4
 
 
 def damaged(data: Bytes, chances: NDArray[np.float64], rate: float) -> Bytes:
@@ -26,14 +20,17 @@ def damaged(data: Bytes, chances: NDArray[np.float64], rate: float) -> Bytes:
     return np.where(chances < rate, data ^ (np.uint8(1) << bit), data)
 
 
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that damages bytes."""
+def prepare(setting: SceneSetting, *, rate: Annotated[float, Meta(gt=0.0, lt=1.0)] = 1e-4) -> Step:
+    """Return the step that damages bytes.
+
+    The share of damaged bytes.
+    """
     rows = drawn_rows(setting)
 
     def step(batch: Batch, draw: Draw) -> None:
         traffic = batch.traffic
         chances = draw.per_repetition(*traffic.data.shape[1:]).uniform()[:, rows]
-        batch.traffic = replace(traffic, data=damaged(traffic.data, chances, parameters.rate))
+        batch.traffic = replace(traffic, data=damaged(traffic.data, chances, rate))
 
     return step
 
@@ -45,6 +42,5 @@ MEMBER = Effect(
     reads=("traffic",),
     writes=("traffic",),
     on_wire=True,
-    parameters=Parameters,
     prepare=prepare,
 )

@@ -8,14 +8,8 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step, drawn_rows
+from ..pipeline.effect import Effect, SceneSetting, Step, drawn_rows
 from ..streams import Draw
-
-
-class Parameters(EffectParameters, frozen=True):
-    """The share of lost bytes."""
-
-    rate: Annotated[float, Meta(gt=0.0, lt=1.0)] = 1e-4
 
 
 def arrives(chances: NDArray[np.float64], rate: float) -> NDArray[np.bool_]:
@@ -23,14 +17,17 @@ def arrives(chances: NDArray[np.float64], rate: float) -> NDArray[np.bool_]:
     return chances >= rate
 
 
-def prepare(parameters: Parameters, setting: SceneSetting) -> Step:
-    """Return the step that loses bytes."""
+def prepare(setting: SceneSetting, *, rate: Annotated[float, Meta(gt=0.0, lt=1.0)] = 1e-4) -> Step:
+    """Return the step that loses bytes.
+
+    The share of lost bytes.
+    """
     rows = drawn_rows(setting)
 
     def step(batch: Batch, draw: Draw) -> None:
         traffic = batch.traffic
         chances = draw.per_repetition(*traffic.data.shape[1:]).uniform()[:, rows]
-        batch.traffic = replace(traffic, arrives=traffic.arrives & arrives(chances, parameters.rate))
+        batch.traffic = replace(traffic, arrives=traffic.arrives & arrives(chances, rate))
 
     return step
 
@@ -42,6 +39,5 @@ MEMBER = Effect(
     reads=("traffic",),
     writes=("traffic",),
     on_wire=True,
-    parameters=Parameters,
     prepare=prepare,
 )

@@ -1,13 +1,14 @@
 """Effects: the record of one change of a batch, and the order of effects and the glove's own steps.
 
-An effect's module holds three things:
+An effect's module holds two things:
 
-    class Parameters(EffectParameters)         the parameters of a scene, with defaults and limits
-    def prepare(parameters, setting) -> Step   the one-time work; the step does the rest, batch by batch
-    MEMBER = Effect(...)                       its name, order, fields that it reads and writes, and these two
+    def prepare(setting, *, sd_deg: float = 2.0) -> Step   the one-time work; the step does the rest, batch by batch
+    MEMBER = Effect(...)                                   its name, order, fields that it reads and writes, and this
 
-A contact model has `model(parameters, setting) -> ContactModel` instead of `prepare`. An effect that calls the contact
-model again has `together(parameters, setting, contact) -> Together`.
+The keyword arguments of `prepare` are the parameters of a scene, with defaults and limits (msgspec.Meta).
+
+A contact model has `model(setting, *, ...) -> ContactModel` instead of `prepare`. An effect that calls the contact
+model again has `together(setting, contact, *, ...) -> Together`.
 
 `Effect.name` is the key of the scene: [effects.joint.noise] is "joint.noise", in the module effects/joint_noise.py.
 Other packages add effects by entry points of that name in the group `thenar.effects`.
@@ -22,7 +23,8 @@ Steps act in the order of their numbers, effects and the glove's own alike:
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from inspect import Parameter, signature
+from typing import get_type_hints
 
 import msgspec
 import numpy as np
@@ -48,10 +50,6 @@ Step = Callable[[Batch, Draw], None]
 Together = Callable[[Sequence[Batch], Sequence[Draw]], None]
 
 
-class EffectParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The parameters of an effect in a scene: none, unless it has some."""
-
-
 @dataclass(frozen=True, slots=True)
 class Effect:
     """The record of an effect for the pipeline.
@@ -60,8 +58,8 @@ class Effect:
     reads, writes  fields of `Batch`
     timed          True if the effect depends on time, so that whole streams of frames are simulated
     on_wire        True if it acts on bytes, so that frames are sent and received as bytes
-    parameters     the parameters of a scene
-    prepare, model, together   one of them creates the step
+    either         parameters of which a scene gives at most one
+    prepare, model, together   one of them creates the step; its keyword arguments are the parameters of a scene
     """
 
     name: str
@@ -71,10 +69,22 @@ class Effect:
     writes: tuple[str, ...]
     timed: bool = False
     on_wire: bool = False
-    parameters: type[EffectParameters] = EffectParameters
-    prepare: Callable[[Any, "SceneSetting"], Step] | None = None
-    model: Callable[[Any, "SceneSetting"], ContactModel] | None = None
-    together: Callable[[Any, "SceneSetting", ContactModel], Together] | None = None
+    either: tuple[str, ...] = ()
+    prepare: Callable[..., Step] | None = None
+    model: Callable[..., ContactModel] | None = None
+    together: Callable[..., Together] | None = None
+
+    def parameters(self) -> type[msgspec.Struct]:
+        """Return the struct of the parameters of a scene, which checks them."""
+        function = self.prepare or self.model or self.together
+        assert function is not None
+        kinds = get_type_hints(function, include_extras=True)
+        fields = [
+            (name, kinds[name], argument.default)
+            for name, argument in signature(function).parameters.items()
+            if argument.kind is Parameter.KEYWORD_ONLY
+        ]
+        return msgspec.defstruct(self.name, fields, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)

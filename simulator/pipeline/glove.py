@@ -5,10 +5,10 @@ and after them, by their order numbers.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from typing import Annotated, NamedTuple
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +20,7 @@ from ..body.hand import DOF, LIMITS_DEG, RESTS_DEG
 from ..errors import SceneError
 from ..streams import Draw, DrawCounts
 from .batch import Batch
-from .effect import Effect, EffectParameters, SceneSetting, Step, frame_times
+from .effect import Effect, SceneSetting, Step, frame_times
 from .ramp import NEVER
 
 Act = Callable[[Batch, SceneSetting], None]
@@ -31,7 +31,7 @@ def _own(order: int, summary: str, reads: tuple[str, ...], writes: tuple[str, ..
     """Add the decorated function to `STEPS`; _recall is "glove.recall". It draws no random numbers."""
 
     def add(act: Act) -> Act:
-        def prepare(_parameters: EffectParameters, setting: SceneSetting) -> Step:
+        def prepare(setting: SceneSetting) -> Step:
             def step(batch: Batch, _draw: Draw) -> None:
                 act(batch, setting)
 
@@ -88,13 +88,18 @@ def _sample(batch: Batch, setting: SceneSetting) -> None:
     batch.bits = (batch.on_us[:, None] <= at) & (at < batch.off_us[:, None])
 
 
-class TaxelConverter(EffectParameters, frozen=True):
-    """Counts of `bits` bits in even steps up to the full scale of `full_n` newtons; by default a thousandth of a newton
-    per count.
+TAXEL_ADC = "taxel.adc"
+
+
+@dataclass(frozen=True, slots=True)
+class TaxelConverter:
+    """The converter of taxels (`TAXEL_ADC`): counts of `bits` bits in even steps up to the full scale of `full_n`.
+
+    By default a count is a thousandth of a newton.
     """
 
-    bits: Annotated[int, msgspec.Meta(ge=1, le=15)] = 15
-    full_n: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 32.768
+    bits: int = 15
+    full_n: float = 32.768
 
     def codes(self, newtons: Floats) -> NDArray[np.uint16]:
         """Return the counts of forces of any shape, clipped to the first and the last."""
@@ -106,10 +111,7 @@ class TaxelConverter(EffectParameters, frozen=True):
         return Joint(name, "N", 0, 0.0, 1 << (self.bits - 1), self.full_n / 2.0)
 
 
-IDEAL = TaxelConverter()
-
-
-def _feel(parameters: EffectParameters, setting: SceneSetting) -> Step:
+def _feel(setting: SceneSetting) -> Step:
     places = list(setting.taxels)
 
     def step(batch: Batch, draw: Draw) -> None:
@@ -126,9 +128,11 @@ def _feel(parameters: EffectParameters, setting: SceneSetting) -> Step:
     return step
 
 
-def _count(parameters: EffectParameters, setting: SceneSetting) -> Step:
+def _count(setting: SceneSetting) -> Step:
+    ideal = TaxelConverter()
+
     def step(batch: Batch, draw: Draw) -> None:
-        batch.taxels = IDEAL.codes(batch.taxels_n)
+        batch.taxels = ideal.codes(batch.taxels_n)
 
     return step
 
@@ -157,25 +161,20 @@ TAXEL_STEPS = (
 _STYLE, _POSTURE, _TRANSITION = "hand.style", "hand.posture", "hand.transition"
 
 
-class RestSpreads(NamedTuple):
-    """Standard deviations of rests in degrees: between subjects, in addition to that of all postures; between rests."""
-
-    sd_deg: float = 0.0
-    habit_sd_deg: float = 0.0
-    each_sd_deg: float = 0.0
-
-
-def _prepare_rest(parameters: RestSpreads, setting: SceneSetting) -> Step:
+def _prepare_rest(setting: SceneSetting, *, sd_deg: float, habit_sd_deg: float, rest_sd_deg: float) -> Step:
+    """Return the step for these standard deviations of rests in degrees: between subjects, of all postures and in
+    addition of rests; between the rests of one.
+    """
     assert setting.rest is not None
     usual = RESTS_DEG[setting.rest]
 
     def step(batch: Batch, draw: Draw) -> None:
         style = replace(draw, effect=_STYLE, draws=DrawCounts()).per_subject(len(DOF) + 1).normal()[:-1]
         resting = draw.at_rest(batch.trials)
-        mean = usual + parameters.sd_deg * style + parameters.habit_sd_deg * resting.per_type(len(DOF)).normal()
+        mean = usual + sd_deg * style + habit_sd_deg * resting.per_type(len(DOF)).normal()
 
         def rest(before: Draw) -> Floats:
-            varied = mean + parameters.each_sd_deg * before.per_repetition(len(DOF)).normal()
+            varied = mean + rest_sd_deg * before.per_repetition(len(DOF)).normal()
             return np.clip(varied, LIMITS_DEG[:, 0], LIMITS_DEG[:, 1])
 
         # The rest after a trial is the one before the next.
@@ -184,7 +183,7 @@ def _prepare_rest(parameters: RestSpreads, setting: SceneSetting) -> Step:
     return step
 
 
-def rest_step(listed: Mapping[str, msgspec.Struct], setting: SceneSetting) -> Effect:
+def rest_step(listed: Mapping[str, Mapping[str, Any]], setting: SceneSetting) -> Effect:
     """Return the step that sets the rests of the hand, varied by the `listed` effects like other postures.
 
     Raises SceneError if nothing would move the hand, or no row would show it.
@@ -197,17 +196,17 @@ def rest_step(listed: Mapping[str, msgspec.Struct], setting: SceneSetting) -> Ef
     }
     if lacking := [what for what, given in needs.items() if not given]:
         raise SceneError(f"recording.rest: for the hand to return to an open rest the scene needs {', '.join(lacking)}")
-    style, posture = listed.get(_STYLE), listed.get(_POSTURE)
-    spreads = RestSpreads(
-        sd_deg=getattr(style, "sd_deg", 0.0),
-        habit_sd_deg=getattr(style, "habit_sd_deg", 0.0),
-        each_sd_deg=getattr(posture, "sd_deg", 0.0),
-    )
+    style, posture = listed.get(_STYLE, {}), listed.get(_POSTURE, {})
+    spreads = {
+        "sd_deg": style.get("sd_deg", 0.0),
+        "habit_sd_deg": style.get("habit_sd_deg", 0.0),
+        "rest_sd_deg": posture.get("sd_deg", 0.0),
+    }
     return Effect(
         name="glove.rest",
         summary="opens the hand before and after each grasp",
         order=105,
         reads=("trials",),
         writes=("previous_deg", "rest_deg"),
-        prepare=lambda _parameters, setting: _prepare_rest(spreads, setting),
+        prepare=partial(_prepare_rest, **spreads),
     )

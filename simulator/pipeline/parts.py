@@ -12,7 +12,6 @@ from thenar.runtime.names import nearest
 from ..body.layout import murakami160
 from ..errors import SceneError
 from ..streams import Draw
-from .effect import EffectParameters
 
 PORT = 16
 _MANY = {"port": "ports", "switch": "switches"}
@@ -31,29 +30,24 @@ def port_of(switches: int) -> NDArray[np.int64]:
 Bits = NDArray[np.bool_]
 
 
-class StuckParameters(EffectParameters, frozen=True):
-    """Either `switches`, by number from 0 or by name, or their `count`, drawn for the glove; one by default.
+# The parameters of an effect that names faulty parts: their numbers from 0 or names, or how many are drawn.
+SwitchList = Annotated[tuple[int | str, ...], Meta(min_length=1)] | None
+Count = Annotated[int, Meta(ge=1)] | None
 
-    Effects draw independently: two may draw the same switch.
+
+def stuck(effect: str, switches: SwitchList, count: Count) -> Callable[[Draw], Bits]:
+    """Return a function for the mask (s,) of stuck switches: `switches`, by number or name, or `count` of them.
+
+    Those that are only counted are drawn for the glove; one by default.
+
+    Effects draw independently: two may draw the same switch. Raises SceneError if there is no such switch.
     """
-
-    switches: Annotated[tuple[int | str, ...], Meta(min_length=1)] | None = None
-    count: Annotated[int, Meta(ge=1)] | None = None
-
-    def __post_init__(self) -> None:
-        """Reject both at once."""
-        if self.switches is not None and self.count is not None:
-            raise ValueError("say which `switches` are stuck or their `count`, not both")
-
-
-def stuck(effect: str, parameters: StuckParameters) -> Callable[[Draw], Bits]:
-    """Return a function for the mask (s,) of stuck switches. Raises SceneError if there is no such switch."""
     names, numbers = [patch.name for patch in murakami160()], list[int]()
-    for switch in parameters.switches or ():
+    for switch in switches or ():
         if isinstance(switch, str) and switch not in names:
             raise SceneError(f"effects.{effect}.switches: the glove has no switch {switch!r}{nearest(switch, names)}")
         numbers.append(names.index(switch) if isinstance(switch, str) else switch)
-    return chooser(effect, "switch", "stuck", len(names), numbers, parameters.count)
+    return chooser(effect, "switch", "stuck", len(names), numbers, count)
 
 
 def chooser(

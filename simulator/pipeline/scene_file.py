@@ -29,7 +29,7 @@ from ..scenes.scene import (
     SurveyPopulation,
     draw_subjects,
 )
-from .effect import EFFECTS, Effect, EffectParameters
+from .effect import EFFECTS, Effect
 
 _SHAPES: dict[str, type[Shape]] = {str(shape.__struct_config__.tag): shape for shape in get_args(Shape)}
 _OF_ANY_SHAPE = SceneObject.__struct_encode_fields__
@@ -252,10 +252,14 @@ class _Decoder:
     def _effects(self) -> tuple[ListedEffect, ...]:
         tables = dict(self._effect_tables())
         effects = sorted((EFFECTS[name] for name in tables), key=lambda effect: (effect.order, effect.name))
-        return tuple(ListedEffect(effect.name, self._parameters(effect, tables[effect.name])) for effect in effects)
+        return tuple(self._listed(effect, tables[effect.name]) for effect in effects)
 
-    def _parameters(self, effect: Effect, table: object) -> EffectParameters:
-        return convert(self.source, ("effects", *effect.name.split(".")), table, effect.parameters)
+    def _listed(self, effect: Effect, table: object) -> ListedEffect:
+        place = ("effects", *effect.name.split("."))
+        parameters = convert(self.source, place, table, effect.parameters())
+        if sum(getattr(parameters, name) is not None for name in effect.either) > 1:
+            raise self.source.error(place, f"give {' or '.join(f'`{name}`' for name in effect.either)}, not both")
+        return ListedEffect(effect.name, tuple(msgspec.structs.asdict(parameters).items()))
 
     def _effect_tables(self) -> Iterator[tuple[str, object]]:
         for group, value in as_table(self.source, ("effects",), self.file.effects).items():

@@ -22,7 +22,7 @@ from ..scenes.scene import Scene, Subject
 from ..streams import Draw, DrawCounts
 from .batch import Batch, Integers
 from .effect import at_a_time
-from .glove import IDEAL, TaxelConverter
+from .glove import TAXEL_ADC, TaxelConverter
 from .report import (
     Codes,
     Notes,
@@ -206,8 +206,9 @@ def _gathered(results: Iterator[_Done], total: int, progress: Progress | None) -
 
 def _taxels(scene: Scene, without: str | None) -> tuple[Joint, ...]:
     """Return the joints of the scene's taxels: the meaning of counts by the effect that converts them."""
-    listed = (effect.parameters for effect in scene.effects if effect.name != without)
-    converter = next((one for one in listed if isinstance(one, TaxelConverter)), IDEAL)
+    listed = dict(scene.effects)
+    converts = TAXEL_ADC in listed and without != TAXEL_ADC
+    converter = TaxelConverter(**dict(listed[TAXEL_ADC])) if converts else TaxelConverter()
     return tuple(converter.column(murakami160()[place].name) for place in taxel_places(scene.glove.taxels))
 
 

@@ -7,9 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter_ns
-from typing import Self
-
-import msgspec
+from typing import Any, Self
 
 from thenar.runtime.names import nearest
 
@@ -134,31 +132,28 @@ def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
     models = [effect for effect in effects.values() if effect.model is not None]
     if default := not models:
         models = [EFFECTS[DEFAULT_CONTACT]]
-        listed[DEFAULT_CONTACT] = models[0].parameters()
+        listed[DEFAULT_CONTACT] = {}
     effects[models[0].name] = models[0]
     setting = SceneSetting.of(scene, effects.values())
     for name, effect in effects.items():
         if not setting.taxels and {"taxels", "taxels_n"} & {*effect.writes}:
             raise SceneError(f'effects.{name}: the glove has no taxels: list them in [glove], as in taxels = "all"')
-    steps = [
-        PipelineStep(effect, _prepared(effect, effect.parameters(), setting), own=True)
-        for effect in _own_steps(listed, setting)
-    ]
+    steps = [PipelineStep(effect, _prepared(effect, {}, setting), own=True) for effect in _own_steps(listed, setting)]
     assert models[0].model is not None
-    model = models[0].model(listed[models[0].name], setting)
+    model = models[0].model(setting, **listed[models[0].name])
     for name, effect in effects.items():
         if effect is models[0]:
             steps.append(PipelineStep(effect, _closing(model), own=default))
         elif effect.together is not None:
-            steps.append(PipelineStep(effect, effect.together(listed[name], setting, model), own=False))
+            steps.append(PipelineStep(effect, effect.together(setting, model, **listed[name]), own=False))
         else:
             steps.append(PipelineStep(effect, _prepared(effect, listed[name], setting), own=False))
     return Pipeline(setting, tuple(sorted(steps, key=lambda step: (step.effect.order, step.effect.name))))
 
 
-def _listed(scene: Scene, without: str | None) -> dict[str, msgspec.Struct]:
+def _listed(scene: Scene, without: str | None) -> dict[str, Mapping[str, Any]]:
     """Return the parameters of the effects that the scene lists, by name, except for `without`."""
-    listed = dict(scene.effects)
+    listed = {name: dict(parameters) for name, parameters in scene.effects}
     if without is not None and without not in listed:
         near = nearest(without, list(listed))
         raise SceneError(f"effect {without!r} cannot be left out: the scene does not list it{near}")
@@ -167,7 +162,7 @@ def _listed(scene: Scene, without: str | None) -> dict[str, msgspec.Struct]:
     return {name: parameters for name, parameters in listed.items() if name != without}
 
 
-def _own_steps(listed: Mapping[str, msgspec.Struct], setting: SceneSetting) -> Iterator[Effect]:
+def _own_steps(listed: Mapping[str, Mapping[str, Any]], setting: SceneSetting) -> Iterator[Effect]:
     yield from STEPS
     if setting.taxels:
         yield from TAXEL_STEPS
@@ -179,10 +174,10 @@ def _own_steps(listed: Mapping[str, msgspec.Struct], setting: SceneSetting) -> I
         yield rest_step(listed, setting)
 
 
-def _prepared(effect: Effect, parameters: msgspec.Struct, setting: SceneSetting) -> Together:
+def _prepared(effect: Effect, parameters: Mapping[str, Any], setting: SceneSetting) -> Together:
     if effect.prepare is None:
         raise SceneError(f"effect {effect.name!r} has no step: give its record a `prepare`")
-    step = effect.prepare(parameters, setting)
+    step = effect.prepare(setting, **parameters)
 
     def act(batches: Sequence[Batch], draws: Sequence[Draw]) -> None:
         for batch, draw in zip(batches, draws, strict=True):

@@ -20,7 +20,7 @@ from ..body.layout import murakami160
 from ..errors import SceneError
 from ..streams import Draw
 from .batch import Batch, Bits, Integers, SerialTraffic
-from .effect import Effect, EffectParameters, SceneSetting, Step
+from .effect import Effect, SceneSetting, Step
 
 Bytes = NDArray[np.uint8]
 Codes = NDArray[np.uint16]
@@ -37,7 +37,7 @@ _CODE = "<u2"
 _MOST_COUNTS = np.iinfo(np.uint16).max
 
 
-def _send(parameters: EffectParameters, setting: SceneSetting) -> Step:
+def _send(setting: SceneSetting) -> Step:
     _check_rate(setting)
 
     def send(batch: Batch, draw: Draw) -> None:
@@ -187,5 +187,5 @@ RECEIVE = Effect(
     reads=("traffic", "bits", "settled", "taxels"),
     writes=("bits", "raw", "lost", "settled", "taxels"),
     on_wire=True,
-    prepare=lambda _parameters, _setting: receive,
+    prepare=lambda _setting: receive,
 )

@@ -47,18 +47,21 @@ def cable_of(scene: Scene, line: int) -> Cable | None:
 
     Each line has its own draws, reproducible by the seed.
     """
-    rates = {listed.name: listed.parameters for listed in scene.effects}
-    lost, damaged = rates.get(wire_lost_bytes.MEMBER.name), rates.get(wire_damaged_bytes.MEMBER.name)
+    listed = dict(scene.effects)
+    lost, damaged = (
+        dict(listed[effect.name])["rate"] if effect.name in listed else None
+        for effect in (wire_lost_bytes.MEMBER, wire_damaged_bytes.MEMBER)
+    )
     if lost is None and damaged is None:
         return None
     random = np.random.Generator(np.random.Philox(key=[scene.seed, line]))
 
     def cable(message: bytes) -> bytes:
         data = np.frombuffer(message, dtype=np.uint8)
-        if isinstance(damaged, wire_damaged_bytes.Parameters):
-            data = wire_damaged_bytes.damaged(data, random.random(len(data)), damaged.rate)
-        if isinstance(lost, wire_lost_bytes.Parameters):
-            data = data[wire_lost_bytes.arrives(random.random(len(data)), lost.rate)]
+        if damaged is not None:
+            data = wire_damaged_bytes.damaged(data, random.random(len(data)), damaged)
+        if lost is not None:
+            data = data[wire_lost_bytes.arrives(random.random(len(data)), lost)]
         return data.tobytes()
 
     return cable

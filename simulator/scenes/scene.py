@@ -9,7 +9,7 @@ Every subject has separate draws, so that a larger count leaves the first subjec
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import floor, sqrt
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import msgspec
 import numpy as np
@@ -94,10 +94,10 @@ class SceneGlove(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 class ListedEffect(NamedTuple):
-    """An effect that the scene lists."""
+    """An effect that the scene lists, and its parameters by name, the usual ones included."""
 
     name: str
-    parameters: msgspec.Struct
+    parameters: tuple[tuple[str, Any], ...] = ()
 
 
 class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.boosting.binning import midpoints
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.recordings.columns import Columns, JointColumns
+from thenar.compiler.recordings.columns import ColumnRoles, JointColumns
 from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
@@ -153,9 +153,9 @@ def _imported(values: Sequence[float], grid: float) -> tuple[GraspSet, ImportRep
         return import_table(read_table(table), _columns(JointColumns(("joint",), grid=grid)))
 
 
-def _columns(joint: JointColumns, trial: str | None = None) -> Columns:
+def _columns(joint: JointColumns, trial: str | None = None) -> ColumnRoles:
     frames: Literal["independent"] | None = None if trial else "independent"
-    return Columns(label="grasp", trial=trial, frames=frames, switches=("switch",), joints=(joint,))
+    return ColumnRoles(label="grasp", trial=trial, frames=frames, switches=("switch",), joints=(joint,))
 
 
 def _csv(folder: Path, rows: Sequence[Sequence[str]], heads: Sequence[str] = ("grasp", "switch", "joint")) -> Path:

@@ -16,7 +16,7 @@ from thenar.simulator.body.layout import murakami160
 from thenar.simulator.contact.balance import USUAL, SolverSettings
 from thenar.simulator.contact.model import Contact, Load
 from thenar.simulator.effects import switch_threshold
-from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
+from thenar.simulator.effects.contact_quasistatic import Quasistatic
 from thenar.simulator.pipeline.batch import SLID_OUT_MM
 from thenar.simulator.pipeline.ramp import crossings
 from thenar.simulator.pipeline.scene_file import load_scene
@@ -28,7 +28,7 @@ from ..finding import Finding, Worst
 Bits = NDArray[np.bool_]
 
 THRESHOLD_N = 1.0
-SPREAD_N = switch_threshold.Parameters().sd_n
+SPREAD_N = switch_threshold.SD_N
 _DRAWS = 20
 _LEVELS = 5
 _THRESHOLDS_N = np.full(len(murakami160()), THRESHOLD_N)
@@ -37,13 +37,13 @@ _THRESHOLDS_N = np.full(len(murakami160()), THRESHOLD_N)
 def findings(full: bool) -> Iterator[Finding]:
     """Yield the changes of forces and of switches by halved steps."""
     loads = list(shipped(4 if full else 1))
-    rest = Quasistatic(Parameters()).solve(loads)
-    nearer = Quasistatic(Parameters(), SolverSettings(USUAL.rest_n / 2, USUAL.rest_nmm / 2)).solve(loads)
+    rest = Quasistatic().solve(loads)
+    nearer = Quasistatic(pace=SolverSettings(USUAL.rest_n / 2, USUAL.rest_nmm / 2)).solve(loads)
     yield _nearer(loads, rest, nearer)
-    halved = Quasistatic(Parameters(), SolverSettings(parts=2)).solve(loads)
+    halved = Quasistatic(pace=SolverSettings(parts=2)).solve(loads)
     yield _turned("quasistatic: Newton steps halved", loads, rest, halved)
     if full:
-        again = Quasistatic(Parameters(), SolverSettings(parts=4)).solve(loads)
+        again = Quasistatic(pace=SolverSettings(parts=4)).solve(loads)
         yield _turned("quasistatic: Newton steps halved again", loads, halved, again)
     yield _finer_grip(loads[:: 1 if full else 14])
 
@@ -100,7 +100,7 @@ def _finer_grip(loads: Sequence[Load]) -> Finding:
     may differ by at most a coarse level.
     """
     worst = Worst("ramp: twice as many levels of the grip", "the usual levels", 0.0, "switches")
-    model = Quasistatic(Parameters())
+    model = Quasistatic()
     for load in loads:
         coarse, fine = (_grown(model, load, levels) for levels in (_LEVELS, 2 * _LEVELS))
         worst.see(float(np.count_nonzero(fine[::2] != coarse)), load.condition.thing.name, coarse[0].size)

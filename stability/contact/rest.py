@@ -11,7 +11,7 @@ from thenar.simulator.body.shapes import Pose
 from thenar.simulator.contact.balance import USUAL, Skin
 from thenar.simulator.contact.model import Contact, Load
 from thenar.simulator.contact.settle import close
-from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
+from thenar.simulator.effects.contact_quasistatic import MOST_STEPS, USUAL_SKIN, Quasistatic
 
 from ..finding import REFERENCE, Finding, Worst
 from .grasps import BAR, HAND, Grasp, case_of, hard, held, otherwise
@@ -22,11 +22,10 @@ RULE = "the rule itself"
 MOST_SWITCHES = max(Counter(patch.capsule for patch in murakami160()).values())
 _STATE = ("posture_deg", "pose", "forces_n", "capsules_n", "between_n")
 _FIELDS = (*_STATE, "residual_n", "residual_nmm")
-_USUAL = Parameters()
-SKIN = Skin(_USUAL.press_n_per_mm, _USUAL.soft_mm, _USUAL.drag_n_per_mm, _USUAL.friction)
+SKIN = USUAL_SKIN
 # Skin and friction at the limits of a scene.
 _LIMITS = tuple(
-    Parameters(press_n_per_mm=press, soft_mm=soft, drag_n_per_mm=drag, friction=friction)
+    Skin(press_n_per_mm=press, soft_mm=soft, drag_n_per_mm=drag, friction=friction)
     for press, soft, drag, friction in (
         (5e-324, 5.0, 1000.0, 2.0),
         (1000.0, 5e-324, 1e-300, 0.0),
@@ -48,7 +47,7 @@ def findings(full: bool) -> Iterator[Finding]:
 def _numbers(grasps: Sequence[Grasp]) -> Finding:
     """Count results that are not finite but reported as settled, with all skins."""
     wrong = Worst("quasistatic: finite, or not settled", RULE, 0.0, "results")
-    for given, tried in ((_USUAL, grasps), *((given, grasps[::8]) for given in _LIMITS)):
+    for given, tried in ((SKIN, grasps), *((given, grasps[::8]) for given in _LIMITS)):
         for grasp, contact in zip(tried, Quasistatic(given).solve([each.load for each in tried]), strict=True):
             wrong.see(float(not is_honest(contact)), grasp.name)
     return wrong.finding()
@@ -78,7 +77,7 @@ def _nothing() -> Finding:
         ("the smallest grip", gripless, grasps[f"a grip of {5e-324:g} N"]),
     )
     for what, one, other in pairs:
-        first, second = Quasistatic(_USUAL).solve([one, other])
+        first, second = Quasistatic().solve([one, other])
         same = all(np.array_equal(getattr(first, field), getattr(second, field)) for field in _FIELDS)
         wrong.see(float(not same), what)
     return wrong.finding()
@@ -93,14 +92,14 @@ def _on_the_surface(full: bool) -> Finding:
     check = "quasistatic: switches exactly on the surface"
     lost = Worst(check, "exact sums", MOST_SWITCHES + 1.0, "x 2^-53 of the force")
     grasp = held()
-    (rest,) = Quasistatic(_USUAL).solve([grasp.load])
+    (rest,) = Quasistatic().solve([grasp.load])
     switches = SwitchPlaces(HAND, murakami160())
     tops = switches.tops(HAND.skeleton(rest.posture_deg.T * (np.pi / 180.0)))
     gaps = Pose.of(rest.pose.T).distance(BAR, tops)[0][:, 0]
     near = np.flatnonzero((gaps > 0.0) & (gaps < 4.0) & (rest.capsules_n[0, switches.capsules] > 0.0))
     for switch in near[:: 1 if full else 8].tolist():
         for reach_mm in (float(gaps[switch]), float(np.nextafter(gaps[switch], 9.0))):
-            (found,) = Quasistatic(Parameters(reach_mm=reach_mm)).solve([grasp.load])
+            (found,) = Quasistatic(reach_mm=reach_mm).solve([grasp.load])
             borne = fsum([*found.forces_n[0].tolist(), float(found.between_n[0]), *(-found.capsules_n[0]).tolist()])
             lost.see(abs(borne) / fsum(found.capsules_n[0].tolist()) * 2.0**53, switches.layout[switch].name)
     return lost.finding()
@@ -118,7 +117,7 @@ def _balanced(grasps: Sequence[Grasp]) -> Iterator[Finding]:
     cones = Worst("quasistatic: friction outside its cone", REFERENCE, 0.0, "spheres of skin")
     for name, load in grasps:
         case = case_of(load)
-        (rest,) = close([case], SKIN, _USUAL.most_steps)
+        (rest,) = close([case], SKIN, MOST_STEPS)
         if not rest.settled[0] or not _has_directions(load):
             continue
         left = left_of(case, rest, SKIN)

@@ -113,7 +113,7 @@ def test_a_pose_that_was_not_taken_up_is_asked_for_again(line: PtyLine, tmp_path
     assert {sensor.raw_b for sensor in load_calibration(output).sensors if "mpj" in sensor.name} == {80, 100}
 
 
-def test_it_may_be_kept_all_the_same_and_what_did_not_move_is_left_out(line: PtyLine, tmp_path: Path) -> None:
+def test_a_doubtful_pose_may_be_kept_without_its_unmoved_sensors(line: PtyLine, tmp_path: Path) -> None:
     output = tmp_path / "a.toml"
     with EmulatedCyberGlove(line) as glove, calibrating(line, output, "--subject", "Anna B") as process:
         code, out, said = converse(process, Wearer(glove, 18, {6: 60, 7: "k"}))
@@ -222,7 +222,7 @@ def test_on_a_terminal_the_bytes_are_shown_live(line: PtyLine, tmp_path: Path) -
     assert b"interrupted" in shown
 
 
-def test_a_port_that_is_not_there_and_a_wrong_baud_rate_are_told_in_a_sentence(thenar: Thenar, tmp_path: Path) -> None:
+def test_missing_port_and_wrong_baud_rate_are_reported_in_a_sentence(thenar: Thenar, tmp_path: Path) -> None:
     done = thenar("calibrate", tmp_path / "none", "-o", tmp_path / "a.toml")
     assert (done.returncode, done.stdout) == (2, "")
     assert re.fullmatch(r"thenar: .*/none: there is no such port: .*\n", done.stderr)

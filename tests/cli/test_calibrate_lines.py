@@ -14,7 +14,7 @@ def keyboard() -> Iterator[tuple[int, int]]:
     os.close(ends[0])
 
 
-def test_a_line_is_taken_when_it_is_whole_and_nothing_is_waited_for(keyboard: tuple[int, int]) -> None:
+def test_a_whole_line_is_taken_without_waiting(keyboard: tuple[int, int]) -> None:
     reading, writing = keyboard
     typed = TypedLines(reading)
     assert typed.take() is None

@@ -62,7 +62,7 @@ def calibrated(folder: Path, presses: Sequence[Sequence[int]], *options: str) ->
             return process.wait(HANGING_S), said
 
 
-def test_rest_and_press_are_learnt_and_what_was_not_pressed_is_left_out(tmp_path: Path) -> None:
+def test_rest_and_press_are_learnt_except_of_taxels_never_pressed(tmp_path: Path) -> None:
     code, said = calibrated(tmp_path, [(800, 900, 503), (40, 120, 500)], "--newtons", "2.5", "--subject", "anna")
     assert code == 0, said
     assert "Not calibrated, because their counts did not move: p2" in said

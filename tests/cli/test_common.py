@@ -34,14 +34,14 @@ def test_one_file_under_two_names_is_found(tmp_path: Path, monkeypatch: pytest.M
             keep_apart(Path("a"), other)
 
 
-def test_an_output_that_is_a_pipe_or_device_is_refused_before_any_work(tmp_path: Path) -> None:
+def test_a_pipe_or_device_as_output_is_refused_before_work(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(click.BadParameter, match="is a device or a pipe: name a file"):
         OutputFile("pipe").convert(str(tmp_path / "pipe"), None, None)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_that_may_not_be_written_into_is_refused_before_any_work(tmp_path: Path) -> None:
+def test_a_read_only_folder_is_refused_before_any_work(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(click.BadParameter, match="is not writable"):
         OutputFile(".grasps").convert(str(tmp_path / "set.grasps"), None, None)

@@ -95,13 +95,13 @@ def test_a_build_that_answers_one_grasp_type_only_says_so(thenar: Thenar, small_
     done = thenar("compile", tmp_path / "xor.grasps", "-o", tmp_path / "build", "--folds", 0)
     assert done.returncode == 0
     assert "for every row: no single input distinguishes grasp types" in " ".join(done.stderr.split())
-    assert "of the placement's decisions no switch alone gains anything" in done.stdout
+    assert "no switch alone gains anything" in done.stdout
 
 
 def test_it_says_what_the_firmware_in_the_build_is_laid_out_for(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 10, "--folds", 0, "--no-report")
     assert done.returncode == 0, done.stderr
-    assert "\nfirmware for atmega328p: 4 switches a lookup, " in done.stdout
+    assert "\nfirmware: for atmega328p: 4 switches a lookup, " in done.stdout
     made = sorted(path.name for path in (tmp_path / "build" / "firmware").iterdir())
     assert made == [
         "thenar.c",

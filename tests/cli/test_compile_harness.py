@@ -15,7 +15,7 @@ Thenar = Callable[..., subprocess.CompletedProcess[str]]
 FEW = ("--rounds", 3, "--folds", 0)
 
 
-def test_a_proposed_harness_is_loaded_and_reads_every_kept_switch_in_one_go(
+def test_a_proposed_harness_loads_and_reads_every_kept_switch_at_once(
     thenar: Thenar, set_file: Path, tmp_path: Path
 ) -> None:
     build, glove = tmp_path / "build", tmp_path / "glove.toml"
@@ -36,11 +36,11 @@ def test_a_proposed_harness_is_loaded_and_reads_every_kept_switch_in_one_go(
     assert scan is not None
     assert len(scan.ports) == 1
     assert "mcp23017 at 0x20" in done.stdout
-    assert "a whole scan: 1 transaction, 98.8 us on the wire, 100.0% of the 98.8 us" in " ".join(done.stdout.split())
+    assert "a whole scan: 1 transaction, 98.8 us on the wire, 100.0 % of the 98.8 us" in " ".join(done.stdout.split())
     assert thenar("verify", build, set_file).returncode == 0
 
 
-def test_the_map_is_printed_chip_by_chip_with_its_share_of_all_that_is_wired(
+def test_the_map_is_printed_by_chip_with_its_share_of_the_wiring(
     thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
 ) -> None:
     names = [*small_set.switch_names, *(f"more {number}" for number in range(50))]
@@ -49,7 +49,7 @@ def test_the_map_is_printed_chip_by_chip_with_its_share_of_all_that_is_wired(
     done = thenar("compile", set_file, "-o", tmp_path / "build", *FEW, "--glove", glove)
     assert done.returncode == 0, done.stderr
     assert "/dev/i2c-1" in done.stdout
-    assert "20.4% of the 485.2 us for all 56 wired switches" in " ".join(done.stdout.split())
+    assert "20.4 % of the 485.2 us for all 56 wired switches" in " ".join(done.stdout.split())
 
 
 def test_a_board_is_proposed_with_a_key_for_every_kept_switch(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
@@ -71,7 +71,7 @@ def test_streams_are_told_with_their_switches(
     done = thenar("compile", set_file, "-o", tmp_path / "build", *FEW, "--glove", glove)
     assert done.returncode == 0, done.stderr
     kept = len(Build.load(tmp_path / "build").manifest.switches)
-    assert f"stream /dev/ttyACM0: {kept} kept switches and levels, a row every 5000 us" in " ".join(done.stdout.split())
+    assert f"stream /dev/ttyACM0: {kept} kept switches, a row every 5000 us" in " ".join(done.stdout.split())
 
 
 def test_a_file_is_replaced_only_if_asked(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
@@ -135,7 +135,7 @@ def test_a_preset_sets_options_and_explicit_ones_win(thenar: Thenar, set_file: P
         assert (options.placement, options.keep, options.rounds, options.table_bits) == expected
 
 
-def test_a_glove_that_lacks_a_joint_is_refused_by_compile_as_by_run(
+def test_compile_and_run_refuse_a_glove_that_lacks_a_joint(
     thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
 ) -> None:
     names = list(small_set.switch_names)
@@ -163,7 +163,7 @@ def test_a_glove_that_measures_no_joints_is_a_warning(thenar: Thenar, set_file: 
     assert "warning: nothing in 'glove' reads the build's joints, and every grasp is degraded" in done.stderr
 
 
-def test_verify_run_and_segment_say_the_same_of_inputs_that_a_set_lacks(
+def test_verify_run_and_segment_report_missing_inputs_alike(
     thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
 ) -> None:
     build, other = tmp_path / "build", tmp_path / "other.grasps"

@@ -104,9 +104,7 @@ def test_a_build_is_made_verified_and_run_or_refused(
         assert all(line["grasp"] == line["recorded"] for line in found)
 
 
-def test_an_exclusive_or_is_placed_told_and_built_without_a_word_too_few(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_exclusive_or_is_placed_explained_and_built(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "xor.grasps"
     parity(2).save(path)
     tree, table = command(capsys, "place", path, "--tree")[1].split("Placement", 1)

@@ -36,7 +36,7 @@ def calibrated(harness: Path, *joints: str) -> None:
     harness.write_text(harness.read_text() + 'calibration = "anna.toml"\n')
 
 
-def test_what_is_there_is_said_with_both_times_and_a_record_against_the_formula(thenar: Thenar, harness: Path) -> None:
+def test_doctor_reports_devices_scan_times_and_records_against_the_formula(thenar: Thenar, harness: Path) -> None:
     before = harness.read_text() + "# mine\n"
     harness.write_text(before)
     done = thenar("doctor", harness, "--json", "--write")
@@ -69,9 +69,7 @@ def test_a_port_that_is_not_there_is_exit_code_1(thenar: Thenar, tmp_path: Path)
 
 
 @pytest.mark.parametrize("table", ["[cyberglove]\nport = {}", "[[stream]]\nswitches = ['s']\nport = {}"])
-def test_a_port_that_would_write_to_a_file_is_refused_and_the_file_kept(
-    thenar: Thenar, tmp_path: Path, table: str
-) -> None:
+def test_a_port_that_writes_to_a_file_is_refused(thenar: Thenar, tmp_path: Path, table: str) -> None:
     path, victim = tmp_path / "glove.toml", tmp_path / "victim"
     victim.write_text("kept")
     path.write_text(table.format(f'"spy:///dev/null?file={victim}"'))

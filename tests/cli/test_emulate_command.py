@@ -52,7 +52,7 @@ def glove(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_command_runs_beside_the_emulated_glove_and_its_exit_code_is_handed_on(
+def test_emulate_runs_a_command_and_returns_its_exit_code(
     thenar: Thenar, scene: Path, glove: Path, tmp_path: Path
 ) -> None:
     folder, log = tmp_path / "em", tmp_path / "played.jsonl"
@@ -148,7 +148,7 @@ def test_nothing_that_it_reads_is_written_over(thenar: Thenar, scene: Path, glov
     assert scene.read_text() == SCENE
 
 
-def test_a_command_that_a_signal_ended_gives_the_exit_code_that_a_shell_gives(
+def test_a_command_ended_by_a_signal_gives_the_shells_exit_code(
     thenar: Thenar, scene: Path, glove: Path, tmp_path: Path
 ) -> None:
     program = "import os, signal; os.kill(os.getpid(), signal.SIGTERM)"
@@ -256,9 +256,7 @@ def test_a_glove_toml_of_the_users_is_replaced_only_if_asked(
 
 
 @pytest.mark.slow
-def test_a_scene_with_taxels_is_recognised_live_from_a_boards_switches_and_counts(
-    thenar: Thenar, tmp_path: Path
-) -> None:
+def test_a_scene_with_taxels_is_recognised_live_from_a_board(thenar: Thenar, tmp_path: Path) -> None:
     scene = tmp_path / "pads.toml"
     tables = '[glove]\ntaxels = ["thumb_distal", "index_distal", "middle_distal"]\n\n'
     tables += "[effects.taxel.noise]\n[effects.taxel.adc]\n"

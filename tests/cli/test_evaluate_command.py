@@ -154,9 +154,7 @@ def test_a_composition_without_inputs_is_marked_and_explained(grasps: str, capsy
     assert any("VI " in line and "]*" in line for line in printed.splitlines())
 
 
-def test_a_grasp_type_too_rare_for_the_folds_is_a_warning_on_stderr(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_grasp_type_too_rare_for_folds_warns_on_stderr(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     make_set(per_type=3).save(tmp_path / "few.grasps")
     assert run(["evaluate", str(tmp_path / "few.grasps"), *QUICK, "--tables", "compositions", "--json"]) == 0
     printed, complaints = capsys.readouterr()

@@ -248,7 +248,7 @@ def test_a_base_install_does_what_needs_no_extra(set_file: Path, build_folder: P
     assert done.returncode == 0, done.stderr
 
 
-def test_a_port_on_the_command_line_is_held_to_the_rule_for_those_in_files(thenar: Thenar, tmp_path: Path) -> None:
+def test_ports_on_the_command_line_obey_the_rules_of_files(thenar: Thenar, tmp_path: Path) -> None:
     victim = tmp_path / "victim"
     victim.write_text("kept")
     said = _one_sentence(thenar("calibrate", f"spy:///dev/null?file={victim}", "-o", tmp_path / "anna.toml"))

@@ -85,7 +85,7 @@ def test_neither_the_set_nor_the_table_is_overwritten(
     assert grasps.read_bytes() == before
 
 
-def test_a_columns_file_that_cannot_be_written_stops_the_export_before_it_begins(grasps: Path) -> None:
+def test_an_unwritable_columns_file_stops_the_export_before_it_begins(grasps: Path) -> None:
     columns = grasps.with_name("no") / "columns.toml"
     assert run(["export", str(grasps), "-o", str(grasps.with_name("t.csv")), "--columns", str(columns)]) == 2
     assert [path.name for path in grasps.parent.iterdir()] == ["set.grasps"]

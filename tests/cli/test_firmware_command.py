@@ -35,7 +35,7 @@ NEXT_STEP = {
 
 
 @pytest.mark.parametrize("target", NEXT_STEP)
-def test_a_folder_is_written_and_its_cost_told_and_what_to_do_next(
+def test_firmware_writes_a_folder_and_reports_cost_and_next_steps(
     thenar: Thenar, build: Path, tmp_path: Path, target: str
 ) -> None:
     done = thenar("firmware", build, "--target", target, "-o", tmp_path / "made")
@@ -158,7 +158,7 @@ def test_firmware_is_replaced_when_asked_and_the_users_files_stay(thenar: Thenar
     assert "thenar_glove.c" not in content(tmp_path / "made")
 
 
-def test_a_glove_s_ranges_are_what_its_pins_read_and_boards_that_fit_are_told(
+def test_a_gloves_ranges_calibrate_its_pins_and_fitting_boards_are_listed(
     thenar: Thenar, build: Path, tmp_path: Path
 ) -> None:
     joints = [joint.name for joint in Build.load(build).manifest.joints]

@@ -11,8 +11,8 @@ from thenar.cli import run
 from thenar.compiler import GraspSet
 from thenar.compiler.frontier.points import (
     FrontierError,
+    FrontierPoint,
     PlacementChoice,
-    Point,
     frontier_from_bytes,
     frontier_to_bytes,
 )
@@ -20,7 +20,7 @@ from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness
 
 Captured = pytest.CaptureFixture[str]
-Change = Callable[[Point], Point]
+Change = Callable[[FrontierPoint], FrontierPoint]
 
 
 def _setting(**changes: Any) -> Change:

@@ -56,7 +56,7 @@ def test_points_are_numbered_from_the_fastest_on(found: Frontier) -> None:
     assert times == sorted(times)
 
 
-def test_a_record_is_the_vendors_formula_unless_the_wire_alone_is_asked_for(
+def test_record_time_is_the_vendors_formula_unless_wire_only(
     thenar: Thenar, small_set: GraspSet, tmp_path: Path
 ) -> None:
     joints = tuple(replace(joint, name=name) for joint, name in zip(small_set.joints, SENSORS_18, strict=False))

@@ -55,7 +55,7 @@ def test_where_nothing_is_near_all_names_are_listed(set_file: Path, capsys: pyte
     assert f"there is no method 'foo': choose one of {', '.join(METHODS)}." in capsys.readouterr().err
 
 
-def test_a_target_that_is_none_is_answered_with_the_one_for_all_others(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_target_is_answered_with_the_general_one(capsys: pytest.CaptureFixture[str]) -> None:
     for wrong, said in (("rp2400", "(did you mean 'rp2040'"), ("z80", ": choose one of host, avr328p")):
         assert run(["firmware", ".", "--target", wrong, "-o", "new"]) == 2
         line = capsys.readouterr().err

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from thenar.cli import run
-from thenar.compiler import Columns, GraspSet, from_dataframe
+from thenar.compiler import ColumnRoles, GraspSet, from_dataframe
 from thenar.compiler.recordings.columns import JointColumns
 
 Cells = Mapping[str, "list[str] | NDArray[np.generic]"]
@@ -96,7 +96,7 @@ def test_a_clock_or_counter_is_no_sensor_whatever_its_name(
     assert "clocks" not in warnings
 
 
-def test_a_second_clock_is_left_out_and_the_one_with_a_unit_is_the_time(cases: Path, import_cells: Import) -> None:
+def test_of_two_clocks_the_one_with_a_unit_is_the_time(cases: Path, import_cells: Import) -> None:
     grasp_set, said, _ = import_cells(cases / "second_clock_is_joint" / "two_clocks.csv")
     assert inputs(grasp_set) == ("thumb_flex", "index_flex")
     assert grasp_set.times_us[:2].tolist() == [0, 16667]
@@ -138,7 +138,7 @@ def test_a_clock_among_the_inputs_of_a_users_columns_is_named(tmp_path: Path, im
     )
     some = clocks()
     cells = {**hand(), "x": some["unix_time"] - 1.7e9, "nsecs": (some["nsecs"] / 1e6).round()}
-    columns = Columns("grasp", trial="trial", joints=(JointColumns(("f?", "x", "nsecs")),))
+    columns = ColumnRoles("grasp", trial="trial", joints=(JointColumns(("f?", "x", "nsecs")),))
     grasp_set, _, warnings = import_cells(cells, "--columns", str(tmp_path / "mine.toml"))
     assert "x" in inputs(grasp_set)
     for words in ("2 inputs may be clocks", "x (it rises from trial to trial", "nsecs (its name"):

@@ -56,9 +56,7 @@ def test_what_contradicts_or_is_not_known_is_refused(thenar: Thenar, set_file: P
         assert reason in done.stderr
 
 
-def test_a_build_says_what_it_obeys_and_its_report_how_to_make_it_again(
-    thenar: Thenar, set_file: Path, tmp_path: Path
-) -> None:
+def test_a_build_states_its_limits_and_its_report_the_command(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     build = tmp_path / "build"
     asked = "--method elimination --keep 3 --never s2 --keep-these s5,s0 --at-most 4 taxels --budget-us 300 --robust"
     done = thenar("compile", set_file, "-o", build, "--rounds", 4, "--folds", 2, *asked.split())

@@ -30,7 +30,7 @@ def sound(text: str) -> bool:
 
 
 @given(TEXTS)
-def test_what_is_shown_is_what_was_meant_and_nothing_that_a_terminal_obeys(text: str) -> None:
+def test_shown_text_keeps_its_meaning_and_holds_no_terminal_commands(text: str) -> None:
     assert sound(shown(text))
     assert shown(shown(text)) == shown(text)
     assert text.isprintable() <= (shown(text) == text)

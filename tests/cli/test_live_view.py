@@ -67,7 +67,7 @@ def test_the_picture_says_which_segment_it_is_and_since_when() -> None:
     assert "segment 7, Tripod: held, 1.5 s" in picture(replace(held, segment_us=1_500_000))
 
 
-def test_the_view_says_where_the_hand_is_in_its_task_and_what_deviates() -> None:
+def test_the_view_shows_the_step_of_the_task_and_deviations() -> None:
     terminal = Terminal()
     progress = Progress(2, 3, "rod", ("cup",), "skipped", "skipped: pen")
     with view_on(terminal) as view:
@@ -75,7 +75,7 @@ def test_the_view_says_where_the_hand_is_in_its_task_and_what_deviates() -> None
         terminal.until("step 2 of 3, rod held; next cup. skipped: pen")
 
 
-def test_the_picture_says_what_is_held_how_sure_that_is_and_how_every_device_fares() -> None:
+def test_the_view_shows_grasp_certainty_and_state_of_every_device() -> None:
     devices = DeviceHealth("glove", False, "no such port"), DeviceHealth("bus 1", True, "")
     assert picture(grasp("Tripod"), devices, ("120 frames", "drifting: none")) == [
         "grasp Tripod",
@@ -108,7 +108,7 @@ def test_what_is_missing_is_named_six_of_it_at_most() -> None:
     assert not any(line.startswith("missing") for line in picture(grasp("Tripod")))
 
 
-def test_what_is_in_quarantine_or_takes_nothing_is_drawn_with_the_reason_with_or_without_status() -> None:
+def test_quarantined_switches_and_stalled_sinks_are_drawn_with_their_reason() -> None:
     wrong = (Quarantined("palm", "stuck closed"), Quarantined("tip", "chattering", used=True))
     terminal = Terminal()
     health = HealthReport(0, (), (), (), (), 100.0, 90.0, 120, 0, 0, 0, quarantined=wrong)
@@ -128,7 +128,7 @@ def test_the_newest_grasp_is_drawn() -> None:
         terminal.until("second", "no such port", "120 frames", "chattering: s7")
 
 
-def test_a_terminal_that_is_held_holds_nobody_up_and_then_shows_the_present() -> None:
+def test_a_stopped_terminal_delays_nobody_and_then_shows_the_present() -> None:
     terminal = Terminal()
     with view_on(terminal) as view:
         terminal.going.clear()

@@ -173,7 +173,7 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
 
 
 @pytest.mark.slow
-def test_a_frontier_leaves_the_unknown_time_of_joints_out_and_says_so_or_takes_what_it_is_told(
+def test_a_frontier_omits_unknown_joint_times_unless_they_are_given(
     thenar: Thenar, grasps: Path, tmp_path: Path
 ) -> None:
     few = ("--methods", "id3", "--baselines", "none", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)

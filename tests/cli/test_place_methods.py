@@ -53,7 +53,7 @@ def near_and_far(tmp_path_factory: pytest.TempPathFactory) -> Path:
     [(None, ["s0", "s1"]), ((0, 8, 2, 3, 4, 5, 6, 7, 1, 9), ["s0", "s8"])],
     ids=["as the names stand", "wired otherwise"],
 )
-def test_a_switch_on_a_port_that_is_read_anyway_is_preferred_as_compile_does(
+def test_place_and_compile_prefer_switches_on_ports_already_read(
     near_and_far: Path, tmp_path: Path, order: tuple[int, ...] | None, kept: list[str], capsys: Captured
 ) -> None:
     how = ["--keep", "2"]

@@ -353,7 +353,7 @@ def test_a_port_without_anybody_at_its_other_end_is_no_device(folder: Path) -> N
     assert not list(folder.glob("set.*"))
 
 
-def test_a_full_disk_ends_it_with_a_sentence_and_room_lets_it_go_on(folder: Path, start: Start) -> None:
+def test_a_full_disk_ends_recording_and_room_lets_it_resume(folder: Path, start: Start) -> None:
     code, said = start(most_bytes=16_384).finish()
     assert code == 2
     words = " ".join(said.split())
@@ -448,9 +448,7 @@ def test_without_its_devices_nothing_is_recorded(folder: Path) -> None:
     assert not list(folder.glob("set.*"))
 
 
-def test_without_a_terminal_lines_are_the_keys_and_the_empty_hand_is_recorded_too(
-    folder: Path, board: BoardSender
-) -> None:
+def test_without_a_terminal_lines_are_keys(folder: Path, board: BoardSender) -> None:
     board.show({"s1": 0, "s2": 0})
     options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
     options += ["--subject", "A", "--repetitions", "1", "--countdown", "0", "-o", folder / "set.grasps"]

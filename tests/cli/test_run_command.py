@@ -256,7 +256,7 @@ def test_a_replayed_recording_takes_preshapes_too(
     assert len(shapes) == 30
 
 
-def test_a_table_of_preshapes_that_names_none_of_the_grasp_types_is_refused(
+def test_a_preshape_table_without_the_builds_grasp_types_is_refused(
     thenar: Thenar, set_file: Path, build_folder: Path
 ) -> None:
     done = thenar("run", build_folder, "--replay", set_file, "--preshape", "parallel_gripper")

@@ -192,7 +192,7 @@ def grasps_of(path: Path) -> list[LiveGrasp]:
     return [entry for entry in Reader(path) if isinstance(entry, LiveGrasp)]
 
 
-def test_a_frozen_recording_delays_nothing_is_said_and_is_whole_after_the_thaw(start: Start, tmp_path: Path) -> None:
+def test_a_frozen_recording_is_reported_delays_nothing_and_stays_whole(start: Start, tmp_path: Path) -> None:
     path = tmp_path / "disk" / "run.mcap"
     run = start("--sink", "jsonl:-", "--record", path)
     run.goes_on()
@@ -224,7 +224,7 @@ def test_a_signal_ends_a_run_whose_disk_is_frozen(start: Start, tmp_path: Path, 
     assert f"jsonl:{tmp_path}/disk/lines: " in run.said
 
 
-def test_a_file_on_a_frozen_disk_holds_up_no_other_sink_and_gets_nothing_old(start: Start, tmp_path: Path) -> None:
+def test_a_frozen_disk_delays_no_other_sink(start: Start, tmp_path: Path) -> None:
     path = tmp_path / "disk" / "lines"
     run = start("--sink", f"jsonl:{path}", "--sink", "jsonl:-")
     run.goes_on()

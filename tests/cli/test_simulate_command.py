@@ -80,9 +80,7 @@ def test_the_first_subjects_of_a_scene_are_those_that_their_names_give(tmp_path:
     assert first.read_bytes() == named.read_bytes()
 
 
-def test_whole_movements_may_have_a_rest_between_them_and_the_summary_says_how_many_rows_are_none(
-    tmp_path: Path, capsys: Captured
-) -> None:
+def test_rests_between_movements_are_simulated_and_counted_as_none(tmp_path: Path, capsys: Captured) -> None:
     path = tmp_path / "set.grasps"
     assert run(["simulate", "continuous", *SMALL, "--subject", "C", "--rest", "flat", "-o", str(path)]) == 0
     made = GraspSet.load(path)
@@ -92,9 +90,7 @@ def test_whole_movements_may_have_a_rest_between_them_and_the_summary_says_how_m
     assert f"{path}: {made.size}, simulated" in capsys.readouterr().out
 
 
-def test_fresh_grasps_are_asked_for_with_more_and_the_help_says_what_a_seed_draws(
-    tmp_path: Path, capsys: Captured
-) -> None:
+def test_more_draws_fresh_grasps_and_help_explains_the_seed(tmp_path: Path, capsys: Captured) -> None:
     path = tmp_path / "fresh.grasps"
     assert run(["simulate", "quick", *SMALL, "--more", "3", "-o", str(path)]) == 0
     assert "scene quick, seed 1, after repetition 1, 2 subjects, 84 grasps" in capsys.readouterr().out
@@ -225,7 +221,7 @@ def test_a_bad_scene_is_one_sentence_with_file_and_line(tmp_path: Path, capsys: 
         ("[effects.switch.stuck_open]\ncount = 161", "line 46: effects.switch.stuck_open.count: 161 switches cannot"),
     ],
 )
-def test_what_shows_when_effects_are_put_together_is_told_with_file_and_line(
+def test_faults_of_combined_effects_name_file_and_line(
     added: str, sentence: str, mode: str, tmp_path: Path, capsys: Captured
 ) -> None:
     scene = tmp_path / "bad.toml"

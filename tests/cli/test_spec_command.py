@@ -64,7 +64,7 @@ def test_a_spec_is_printed_and_written(thenar: Thenar, hand_build: Path, tmp_pat
     sensors = f"{len(names)} of {manifest.source.switches} switches"
     assert f"{sensors}; a proposed wiring, for a right hand of 190 mm" in told
     assert all(name in told for name in names)
-    assert "us on the wire, in 1 transaction." in told
+    assert "A whole scan: 1 transaction, " in told
     written = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert written == spec_files(manifest, hand=hand_map().fitted(names))
     assert load_harness(folder / "glove.toml").switches == tuple(names)

@@ -102,7 +102,7 @@ def test_json_holds_every_number_and_the_verdicts(here: Thenar) -> None:
     assert report["cases"][1]["checks"][0]["finding"]["error"] == 1.5
 
 
-def test_no_word_no_number_and_no_verdict_is_cut_on_a_narrow_terminal(
+def test_a_narrow_terminal_cuts_no_word_number_or_verdict(
     here: Thenar, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     check = "intervals of compensated averages that leave 0 to 1, or their own mean, in the worst of all"

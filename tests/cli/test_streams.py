@@ -67,9 +67,7 @@ def moving(tmp_path: Path) -> Iterator[SocketLines]:
 
 
 @pytest.mark.slow
-def test_doctor_shows_what_comes_and_proposes_a_harness_that_it_then_finds_sound(
-    thenar: Thenar, moving: SocketLines, tmp_path: Path
-) -> None:
+def test_doctor_shows_rows_and_proposes_a_sound_harness(thenar: Thenar, moving: SocketLines, tmp_path: Path) -> None:
     path = tmp_path / "glove.toml"
     done = thenar("doctor", "--line", moving.port, "--seconds", "2", "--propose", path, "--json")
     assert done.returncode == 0, done.stderr
@@ -150,7 +148,7 @@ def test_columns_that_did_not_move_are_said_and_get_no_range() -> None:
     assert said in found["remarks"]
 
 
-def test_a_table_with_labels_and_coarse_times_is_proposed_as_a_harness_that_loads(tmp_path: Path) -> None:
+def test_a_table_with_labels_and_coarse_times_proposes_a_valid_harness(tmp_path: Path) -> None:
     path = tmp_path / "glove.toml"
     header = "time,ms,thumb,flex,weight,label\n"
     rows = (
@@ -178,9 +176,7 @@ def test_a_table_with_labels_and_coarse_times_is_proposed_as_a_harness_that_load
         ('{"fingers": {"thumb": 1}}', "no column is a switch, a joint or a taxel, so no glove.toml is proposed"),
     ],
 )
-def test_lines_from_which_nothing_can_be_proposed_are_shown_and_no_file_is_written(
-    line: str, said: str, tmp_path: Path
-) -> None:
+def test_unusable_lines_are_shown_and_no_file_is_written(line: str, said: str, tmp_path: Path) -> None:
     done = listened(f"{line}\n" * 9, "--propose", str(tmp_path / "glove.toml"))
     assert done.returncode
     assert said in " ".join(done.stderr.split())
@@ -188,7 +184,7 @@ def test_lines_from_which_nothing_can_be_proposed_are_shown_and_no_file_is_writt
     assert not any(tmp_path.iterdir())
 
 
-def test_names_are_stripped_checked_and_left_to_a_sender_that_names_its_columns() -> None:
+def test_column_names_are_stripped_and_checked_unless_the_sender_names_them() -> None:
     rows = "".join(f"{20 * n},{n % 2}\n" for n in range(30))
     found = json.loads(listened(rows, "--names", "ms, thumb", "--json").stdout)
     assert found["stream"]["columns"] == ["ms", "thumb"]
@@ -200,7 +196,7 @@ def test_names_are_stripped_checked_and_left_to_a_sender_that_names_its_columns(
 
 
 @pytest.mark.parametrize("words", [True, False])
-def test_lines_of_one_word_are_shown_and_rows_that_end_with_carriage_returns_are_read(cases: Path, words: bool) -> None:
+def test_words_are_shown_and_rows_ending_in_carriage_returns_read(cases: Path, words: bool) -> None:
     sender = [sys.executable, str(cases / "word_lines_silent" / "send.py"), *([] if words else ["cr"])]
     with subprocess.Popen(sender, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
         command = [sys.executable, "-m", "thenar.cli", "doctor", "--line", "-", "--seconds", "3", "--json"]
@@ -213,7 +209,7 @@ def test_lines_of_one_word_are_shown_and_rows_that_end_with_carriage_returns_are
         assert json.loads(done.stdout)["stream"]["columns"] == ["c1", "c2", "c3", "c4", "c5", "c6"]
 
 
-def test_two_senders_and_late_rows_are_said_and_datagrams_have_no_baud_rate(thenar: Thenar, tmp_path: Path) -> None:
+def test_doctor_reports_two_senders_and_late_rows(thenar: Thenar, tmp_path: Path) -> None:
     path, done = tmp_path / "glove.toml", Event()
     with DatagramLines() as first, DatagramLines() as second:
         second.to = first.to
@@ -346,7 +342,7 @@ def test_an_emulated_sender_is_recognised_by_every_way_and_replays_alike(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("inputs", ["both", "switches", "joints"])
-def test_a_board_that_prints_the_kept_elements_is_recognised_and_recorded_beside_a_harness_of_all(
+def test_a_board_printing_kept_elements_only_is_recognised_and_recorded(
     thenar: Thenar, small_set: GraspSet, tmp_path: Path, inputs: str
 ) -> None:
     folder = compile_build(small_set, tmp_path / "build", rounds=5, folds=0, inputs=inputs).folder

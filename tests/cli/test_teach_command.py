@@ -228,7 +228,7 @@ class Played:
         return Snapshot(time_us, switches, glove, (), glove)
 
 
-def test_a_live_glove_says_where_the_hand_is_in_its_task_and_in_its_sinks(
+def test_a_live_glove_reports_task_steps_to_view_and_sinks(
     thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path
 ) -> None:
     assert thenar("teach", *demos[:1], "-b", build, "-o", tmp_path / "task.json").returncode == 0
@@ -309,9 +309,7 @@ def collected(path: Path, held: list[int], switches: tuple[str, ...], joint: str
     return path
 
 
-def test_a_recording_of_another_build_or_of_none_is_cut_into_the_same_grasps(
-    thenar: Thenar, build: Path, tmp_path: Path
-) -> None:
+def test_teach_cuts_recordings_of_any_build_into_the_same_grasps(thenar: Thenar, build: Path, tmp_path: Path) -> None:
     types = "cprrpc"
     grasp_set = grasps_of(np.array(states("cprrpcpcr" * 2)))
     whole = compile_build(grasp_set, tmp_path / "whole", rounds=9, folds=0, placement="elimination", keep=3).folder

@@ -145,7 +145,7 @@ def test_a_name_that_is_no_part_of_a_files_name_is_refused(
     assert set(tmp_path.rglob("*")) == before
 
 
-def test_a_recording_of_the_command_is_marked_by_pages_and_ended_by_none(
+def test_pages_mark_but_never_end_the_commands_recording(
     start: Callable[..., Command], build_folder: Path, glove: Path, tmp_path: Path
 ) -> None:
     options = ("--web", "127.0.0.1:0", "--record", tmp_path / "own.mcap")

@@ -42,10 +42,6 @@ def column_sum(column: int, rows: NDArray[np.uint16]) -> tuple[int, int]:
     return column, int(rows[:, column].sum())
 
 
-def where(_number: int) -> int:
-    return os.getpid()
-
-
 def test_the_answers_are_those_of_one_job_here(scheduler: str) -> None:
     work = partial(column_sum, rows=X)
     there = sorted(in_cluster(work, range(8), scheduler))
@@ -54,11 +50,6 @@ def test_the_answers_are_those_of_one_job_here(scheduler: str) -> None:
 
 def test_more_tasks_than_are_handed_out_ahead_are_all_answered(scheduler: str) -> None:
     assert sorted(in_cluster(operator.neg, iter(range(150)), scheduler)) == sorted(-n for n in range(150))
-
-
-def test_both_workers_work_and_this_process_does_not(scheduler: str) -> None:
-    assert 1 <= len({*in_cluster(where, range(40), scheduler)} - {os.getpid()}) <= 2
-    assert os.getpid() not in {*in_cluster(where, range(4), scheduler)}
 
 
 def test_what_is_wrong_in_a_worker_is_raised_here(scheduler: str) -> None:
@@ -70,7 +61,7 @@ def times_out(number: int) -> None:
     raise TimeoutError(f"piece {number}")
 
 
-def test_a_timeout_of_the_work_is_not_taken_for_one_of_the_cluster(scheduler: str) -> None:
+def test_a_timeout_in_the_work_is_not_the_clusters(scheduler: str) -> None:
     with pytest.raises(TimeoutError, match="piece 3"):
         list(in_cluster(times_out, [3], scheduler))
 
@@ -153,7 +144,7 @@ def killed(_number: int) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_work_that_kills_every_worker_it_meets_is_an_error_and_the_cluster_lives_on(scheduler: str) -> None:
+def test_work_that_kills_workers_fails_without_ending_the_cluster(scheduler: str) -> None:
     with pytest.raises(ClusterError, match="one task ended 4 workers"):
         list(in_cluster(killed, [0], scheduler))
     assert list(in_cluster(operator.neg, [1], scheduler)) == [-1]

@@ -67,7 +67,7 @@ def test_a_sum_of_logarithms_counts_two_errors_a_term_and_four(terms: dict[int, 
     assert float(bound.scaleb(digits)) == pytest.approx(10 * 2 * (len(terms) + 2) * size, rel=1e-9, abs=0)
 
 
-def test_rounding_moves_a_score_by_half_a_step_for_the_bias_and_each_input() -> None:
+def test_rounding_error_is_half_a_step_for_bias_and_inputs() -> None:
     def of(switches: int, *lines: Line) -> ScoreTables:
         no, row = np.array([], np.uint16), np.zeros((1, 2))
         return ScoreTables(row[0], np.zeros((switches, 2)), (no,) * len(lines), (row,) * len(lines), lines)
@@ -80,7 +80,7 @@ def test_rounding_moves_a_score_by_half_a_step_for_the_bias_and_each_input() -> 
     assert rounding_error(of(0, Line(0, 0, 1000, row)), 0.5) == 0.5 + 0.5 + 62.5 + 1.5 * 2.0 * 0.5
 
 
-def test_doubles_lose_a_unit_of_the_largest_magnitudes_for_each_input_joint_and_eight() -> None:
+def test_the_float_slack_counts_a_unit_per_input_and_eight() -> None:
     rows = (np.array([[1.0, -3.0], [2.0, 0.5]]), np.array([[0.25, 0.0]]))
     none = np.array([], np.uint16)
     tables = ScoreTables(np.array([-5.0, 4.0]), np.array([[-7.0, 6.0]]), (np.array([3], np.uint16), none), rows)
@@ -88,7 +88,7 @@ def test_doubles_lose_a_unit_of_the_largest_magnitudes_for_each_input_joint_and_
 
 
 @pytest.mark.parametrize("shrinkage", [1.0, 0.25])
-def test_collapsing_may_lose_its_tolerance_of_twice_the_largest_answer_of_every_round(shrinkage: float) -> None:
+def test_the_collapse_bound_is_twice_the_largest_answers_tolerance(shrinkage: float) -> None:
     # What a missing input answers is in no table.
     values = np.array([[[0.5, -2.0, 99.0], [0.25, 0.75, 99.0]], [[0.125, 0.0, 99.0], [-0.25, 0.5, 99.0]]])
     stumps = Stumps(2, np.array([[0, 1], [1, 0]], np.int32), np.array([[0.5, 7.0], [9.0, 0.5]]), values, shrinkage)

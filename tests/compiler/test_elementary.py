@@ -38,7 +38,7 @@ SCORES = arrays(np.float64, (5, 3), elements=st.floats(-800, 800))
 
 
 @given(st.floats(0.0, 744.0), st.integers(2, 5))
-def test_the_loss_of_a_class_that_is_next_to_certain_keeps_its_bits(lead: float, classes: int) -> None:
+def test_the_loss_of_an_almost_certain_class_keeps_its_bits(lead: float, classes: int) -> None:
     scores = np.zeros((classes, 1))
     scores[1:] = -lead
     _, loss = softmax_and_loss(scores, np.array([0]), None)

@@ -42,7 +42,7 @@ def test_so_they_are_where_one_quarter_ends_and_the_next_begins(quarter: int) ->
 
 
 @given(arrays(np.float64, (3, 2), elements=st.floats(-FURTHEST, FURTHEST)))
-def test_a_number_has_the_same_bits_in_any_company_and_the_sine_is_odd(x: np.ndarray) -> None:
+def test_sine_and_cosine_are_elementwise_and_sine_is_odd(x: np.ndarray) -> None:
     sine, cosine = sincos(x)
     assert sine.shape == cosine.shape == x.shape
     for row, column in np.ndindex(*x.shape):

@@ -81,9 +81,7 @@ def test_joints_beyond_what_a_build_holds_are_refused_before_the_training(make_s
         compile_build(make_set(joints=300), tmp_path / "build", folds=0)
 
 
-def test_more_switches_than_a_build_holds_are_refused_before_a_frontier_and_where_they_would_be_kept(
-    make_set: Make, tmp_path: Path
-) -> None:
+def test_more_switches_than_a_build_holds_are_refused_early(make_set: Make, tmp_path: Path) -> None:
     wide = make_set(switches=5000)
     with pytest.raises(FrontierError, match="5000 switches, a build has at most 4096"):
         find_frontier(wide)
@@ -135,9 +133,7 @@ def test_the_baselines_of_an_evaluation_take_a_set_of_many_switches(wide: GraspS
     assert [row.name for row in studies[0].tables[0].rows] == ["ID3", "CMIM", "top-k", "random"]
 
 
-def test_all_switches_that_do_not_fit_into_memory_are_refused_before_placements_are_chosen(
-    wide: GraspSet, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_switches_beyond_memory_are_refused_before_placement(wide: GraspSet, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("os.sysconf", {"SC_PHYS_PAGES": 200, "SC_PAGE_SIZE": 4096}.__getitem__)
     monkeypatch.setattr("thenar.compiler.evaluation.study.Planner", None)
     with pytest.raises(

@@ -104,7 +104,7 @@ def test_an_additive_logit_becomes_a_build_of_the_columns_that_it_gets(
 
 
 @pytest.mark.parametrize("subjects", [1, 3])
-def test_the_papers_recipe_is_the_same_from_a_pipeline_and_from_compile_build(
+def test_a_pipeline_and_compile_build_make_the_same_papers_recipe(
     make_set: Callable[..., GraspSet], tmp_path: Path, subjects: int
 ) -> None:
     grasp_set = make_set(subjects=subjects, frames=2)

@@ -57,9 +57,7 @@ def folder(tmp_path: Path) -> Path:
         *((kind, "renames, no links") for kind in ("spec", "frontier")),
     ],
 )
-def test_killed_at_any_instant_a_folder_is_the_old_one_or_the_new_one_and_the_next_run_clears_up(
-    kind: str, system: str, tmp_path: Path
-) -> None:
+def test_killed_at_any_instant_the_folder_is_old_or_new(kind: str, system: str, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, SCRIPT, kind, system, tmp_path / "work"], stdout=subprocess.PIPE, check=True, text=True
     )
@@ -132,7 +130,7 @@ def test_what_the_user_does_while_the_folder_is_replaced_is_not_lost(
     assert names(folder.parent) == ["folder"]
 
 
-def test_what_is_left_after_a_kill_and_holds_a_file_that_is_nowhere_else_stays(folder: Path) -> None:
+def test_leftovers_of_a_kill_with_unique_files_stay(folder: Path) -> None:
     box = folder.with_name(".folder.01234567.part")
     for place in ("new", "gone", "part"):
         (box / place).mkdir(parents=True)
@@ -156,7 +154,7 @@ def test_what_a_living_process_writes_is_not_cleared(folder: Path) -> None:
     assert names(folder.parent) == ["folder"]
 
 
-def test_files_and_links_by_such_a_name_and_the_boxes_of_others_stay(folder: Path, tmp_path: Path) -> None:
+def test_files_links_and_foreign_folders_of_temporary_names_stay(folder: Path, tmp_path: Path) -> None:
     (tmp_path / ".folder.01234567.part").write_text("mine")
     (tmp_path / ".folder.01234568.part").symlink_to(folder)
     (tmp_path / ".other.01234567.part" / "part").mkdir(parents=True)
@@ -198,7 +196,7 @@ def test_a_full_disk_leaves_the_old_folder_and_the_message_names_it(
 
 
 @pytest.mark.parametrize("path", ["a", "inner/c", "inner"])
-def test_a_users_file_where_one_of_ours_is_to_be_written_is_not_replaced(tmp_path: Path, path: str) -> None:
+def test_a_users_file_in_the_way_is_not_replaced(tmp_path: Path, path: str) -> None:
     (tmp_path / "folder" / path).parent.mkdir(parents=True)
     (tmp_path / "folder" / path).write_text("mine")
     with pytest.raises(ThenarError, match=f"holds {path}, which thenar has not written"):

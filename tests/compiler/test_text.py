@@ -67,6 +67,6 @@ def test_everything_else_stays_as_it_is(text: str) -> None:
 
 
 @given(TEXTS)
-def test_every_text_comes_back_from_its_cell_and_no_cell_is_a_formula(text: str) -> None:
+def test_texts_survive_their_cells_which_are_never_formulas(text: str) -> None:
     assert text_of(cell(text)) == text
     assert not cell(text).startswith(("=", "+", "-", "@", "\t", "\r"))

@@ -40,7 +40,7 @@ def killed(_number: int) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_a_worker_that_is_killed_is_an_error_and_the_next_work_has_new_ones() -> None:
+def test_a_killed_worker_is_an_error_and_is_replaced() -> None:
     with pytest.raises(BrokenExecutor, match="ended before its work was done"):
         list(in_workers(killed, range(3), 2))
     assert len(list(in_workers(squared_where, range(3), 2))) == 3

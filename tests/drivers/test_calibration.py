@@ -20,7 +20,7 @@ LINES = st.builds(
 
 
 @given(LINES, RAW)
-def test_a_line_goes_through_its_first_point_and_rises_by_one_stated_formula(line: SensorCalibration, raw: int) -> None:
+def test_a_line_passes_its_first_point_by_the_stated_formula(line: SensorCalibration, raw: int) -> None:
     gain = (line.value_b - line.value_a) / (line.raw_b - line.raw_a)
     assert line.value(raw) == line.value_a + (raw - line.raw_a) * gain
     assert line.value(line.raw_a) == line.value_a
@@ -44,7 +44,7 @@ def test_every_sensor_is_for_one_pose_besides_the_flat_hand() -> None:
     assert FLAT.degrees == {}
 
 
-def test_what_is_held_is_the_middle_of_what_came_whatever_a_glitch_says() -> None:
+def test_a_held_pose_is_the_median_despite_glitches() -> None:
     assert held([b"\x64\x10", b"\x66\x10", b"\xff\x10", b"\x65\x10", b"\x65\x10"]) == Held(b"\x65\x10", (155, 0))
     assert held([b"\x01\xff"]) == Held(b"\x01\xff", (0, 0))
 
@@ -56,7 +56,7 @@ def test_a_good_pose_has_no_problems() -> None:
 
 
 @pytest.mark.parametrize("raw", [100, 91, 109])
-def test_a_joint_that_did_not_move_enough_is_a_problem_of_its_pose_alone(raw: int) -> None:
+def test_an_unmoved_joint_is_a_problem_of_its_pose_only(raw: int) -> None:
     bent = with_bytes(**(dict.fromkeys(FIST.degrees, 150) | {"ring_pij": raw}))
     (problem,) = problems(SENSORS_18, with_bytes(), FIST, bent)
     assert problem.startswith(f"ring_pij went from 100 to {raw} only")

@@ -99,7 +99,7 @@ def source_of(sender: DatagramLines) -> tuple[str, int]:
     return "127.0.0.1", int(sender._line.getsockname()[1])
 
 
-def test_datagrams_of_a_second_sender_are_left_out_and_said_until_the_first_is_silent() -> None:
+def test_a_second_sender_counts_only_after_the_first_is_silent() -> None:
     with contextlib.ExitStack() as stack:
         first, second = (stack.enter_context(sender) for sender in datagrams(2))
         reader = stack.enter_context(LineReader(first.port))
@@ -172,7 +172,7 @@ def test_bytes_without_a_row_are_counted() -> None:
         assert (reader.counts().misfits, reader.odd) == (1, "'A512B300'")
 
 
-def test_half_a_line_before_a_break_does_not_spoil_the_first_one_after_it(tmp_path: Path) -> None:
+def test_half_a_line_before_a_break_spoils_no_later_line(tmp_path: Path) -> None:
     with LineReader(f"unix:{tmp_path}/s") as reader:
         for last in (b"1,2\n77,", b"3,4\n"):
             with SocketLines(tmp_path / "s") as server:

@@ -58,7 +58,7 @@ def members(site: Path, request: pytest.FixtureRequest) -> Callable[..., Members
 OTHER = "from test_members import Sort\nONE = Sort('one')\nTWO = Sort('two')\nNONE = 3\n"
 
 
-def test_members_come_by_rank_then_by_name_and_a_module_may_define_several_or_none(
+def test_members_come_by_rank_then_name(
     members: Callable[..., Members[Sort]],
 ) -> None:
     found = members(
@@ -68,15 +68,13 @@ def test_members_come_by_rank_then_by_name_and_a_module_may_define_several_or_no
     assert (len(found), found["late"].rank, found.named("a")) == (4, 2, Sort("a"))
 
 
-def test_members_of_other_packages_come_last_in_the_order_of_their_entry_points(
-    site: Path, members: Callable[..., Members[Sort]]
-) -> None:
+def test_members_of_other_packages_come_last_by_entry_point(site: Path, members: Callable[..., Members[Sort]]) -> None:
     (site / "other_last.py").write_text(OTHER)
     write_distribution(site, "somebody", b="other_last:ONE", a="other_last:TWO")
     assert list(members(a="MEMBER = Sort('z', 9)")) == ["z", "two", "one"]
 
 
-def test_a_name_that_there_is_not_is_answered_with_all_that_there_are(members: Callable[..., Members[Sort]]) -> None:
+def test_an_unknown_name_is_answered_with_all_members(members: Callable[..., Members[Sort]]) -> None:
     with pytest.raises(MemberError, match="there is no sort 'x': choose one of a, b"):
         members(a="MEMBER = Sort('b'), Sort('a')").named("x")
 
@@ -90,7 +88,7 @@ def test_a_name_that_there_is_not_is_answered_with_all_that_there_are(members: C
         ("other_bad:NONE", r"the sort 'b' \(other_bad:NONE\) of another package is not a Sort: docs/how-to/extend.md"),
     ],
 )
-def test_a_member_of_another_package_that_cannot_be_one_is_refused_in_a_sentence(
+def test_an_invalid_foreign_member_is_refused_in_a_sentence(
     site: Path, members: Callable[..., Members[Sort]], value: str, said: str
 ) -> None:
     (site / "other_bad.py").write_text(OTHER)
@@ -134,9 +132,7 @@ def test_names_are_listed_without_an_import_and_a_member_is_imported_alone(
         by_name["joint.lost"]
 
 
-def test_a_name_that_is_taken_or_that_the_entry_point_does_not_have_is_refused(
-    site: Path, by_name: MembersByName[Sort]
-) -> None:
+def test_taken_and_missing_member_names_are_refused(site: Path, by_name: MembersByName[Sort]) -> None:
     (site / "other_misnamed.py").write_text(OTHER)
     write_distribution(site, "somebody", **{"joint.one": "other_misnamed:ONE"})
     with pytest.raises(MemberError, match=r"'joint.one' .* has a different name, 'one': give its entry point"):

@@ -111,7 +111,7 @@ def test_after_any_damage_the_second_sound_frame_is_told(case: tuple[Parser, byt
 
 @pytest.mark.parametrize("name", sorted(PARSERS))
 @pytest.mark.parametrize("byte", [0, 1, ord("S"), 255])
-def test_a_megabyte_of_one_byte_holds_no_memory_and_makes_no_more_calls_than_one(
+def test_a_megabyte_of_one_byte_costs_no_memory_or_calls(
     name: str, byte: int, calls: Callable[[Callable[[], object]], int]
 ) -> None:
     feed, held = PARSERS[name].make()
@@ -136,9 +136,7 @@ REPLIES = st.lists(
 
 
 @given(COMMANDS, REPLIES, st.booleans())
-def test_an_answer_has_the_length_it_must_have_and_stands_in_what_came(
-    command: Command, received: bytes, last: bool
-) -> None:
+def test_an_answer_has_its_length_and_occurs_in_the_stream(command: Command, received: bytes, last: bool) -> None:
     answer = find_reply(command, received, last=last)
     if answer is None or answer.error is not None:
         return

@@ -72,7 +72,7 @@ def test_a_port_that_is_not_there_is_named_with_what_to_check(tmp_path: Path) ->
     assert isinstance(raised.value, OSError)
 
 
-def test_a_folder_and_a_file_are_no_ports_and_stay_as_they_are(tmp_path: Path) -> None:
+def test_folders_and_files_are_no_ports_and_stay(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_bytes(EVERY_BYTE)
     before = file.stat()
@@ -227,7 +227,7 @@ def test_a_port_behind_rfc_2217_is_a_line(echo: EchoLine) -> None:
         assert line.read(0.0) == line.read(-1.0) == b""
 
 
-def test_a_name_that_comes_to_lead_to_another_port_is_an_error_and_one_that_is_gone_is_none(tmp_path: Path) -> None:
+def test_a_redirected_port_name_is_an_error_a_missing_one_not(tmp_path: Path) -> None:
     """The port that is open may be there still: it is another device's."""
     with PtyLine(tmp_path / "first") as first, PtyLine(tmp_path / "second") as second:
         link = tmp_path / "port"
@@ -260,7 +260,7 @@ def test_pieces_are_what_lies_between_zeros(stream: bytes) -> None:
 
 
 @given(STREAMS, st.integers(1, 5))
-def test_a_piece_that_is_too_long_is_cut_to_one_more_than_the_longest(stream: bytes, longest: int) -> None:
+def test_overlong_pieces_are_cut_to_the_longest_plus_one(stream: bytes, longest: int) -> None:
     whole = stream.split(b"\0")
     assert Pieces(longest).feed(stream + b"\0") == [piece[: longest + 1] for piece in whole]
 

@@ -28,7 +28,7 @@ def scenes(scene: Callable[[int], str], tmp_path: Path) -> tuple[Path, Path]:
 
 
 @pytest.mark.slow
-def test_an_effect_of_another_package_is_explained_and_acts_where_a_scene_lists_it(
+def test_a_foreign_effect_is_explained_and_acts_where_listed(
     install: Callable[..., Any], scenes: tuple[Path, Path]
 ) -> None:
     package = install("effect.py", "thenar.effects", "joint.offset")

@@ -69,7 +69,7 @@ def test_on_import_it_ends_a_command_with_a_sentence(
     assert "'member' (somebody_elses_exits:MEMBER) of another package cannot be loaded: SystemExit(0)" in said
 
 
-def test_a_method_that_does_so_at_work_ends_a_command_with_a_sentence(
+def test_a_method_failing_at_work_ends_commands_with_a_sentence(
     plug_in: Callable[[str, str], Any], material: Path
 ) -> None:
     there = plug_in(METHOD, "thenar.methods")

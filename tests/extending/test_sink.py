@@ -5,9 +5,7 @@ from pathlib import Path
 from typing import Any
 
 
-def test_a_sink_of_another_package_is_in_the_help_and_gets_every_grasp(
-    install: Callable[[str, str], Any], recorded: Path
-) -> None:
+def test_a_foreign_sink_is_in_the_help_and_gets_grasps(install: Callable[[str, str], Any], recorded: Path) -> None:
     package = install("sink.py", "thenar.sinks")
     help_text = " ".join(package.thenar("run", "--help").split())
     assert "udp:HOST:PORT, a datagram of JSON a grasp" in help_text

@@ -50,7 +50,7 @@ def build(sixty: Callable[..., GraspSet], tmp_path: Path) -> Build:
     return Build.load(compile_build(made, tmp_path / "build", rounds=10, folds=0).folder)
 
 
-def test_a_target_of_another_package_is_listed_and_its_firmware_answers_as_python_does(
+def test_a_foreign_target_is_listed_and_its_firmware_matches_python(
     install: Callable[[str, str], Any], tool: Callable[[str], str], build: Build, tmp_path: Path
 ) -> None:
     compiler = tool("g++")

@@ -30,9 +30,7 @@ def installed(install: Callable[[str, str], Any]) -> Any:
     return install("trainer.py", "thenar.trainers")
 
 
-def test_a_trainer_of_another_package_is_chosen_by_its_name_and_makes_a_build_that_holds(
-    installed: Any, recordings: Path, tmp_path: Path
-) -> None:
+def test_a_foreign_trainer_is_chosen_by_name_and_builds(installed: Any, recordings: Path, tmp_path: Path) -> None:
     build = tmp_path / "build"
     words = " ".join(installed.thenar("compile", "--help").split())
     assert "--trainer TRAINER What trains the model: logitboost (" in words
@@ -63,9 +61,7 @@ def test_the_trainer_is_evaluated_as_the_papers_is(installed: Any, recordings: P
     assert table["rows"][0]["rate"]["mean"] > 0.8
 
 
-def test_a_frontier_of_the_trainer_has_one_stage_and_its_points_are_built(
-    installed: Any, recordings: Path, tmp_path: Path
-) -> None:
+def test_a_foreign_trainers_frontier_has_one_stage_and_builds(installed: Any, recordings: Path, tmp_path: Path) -> None:
     words = " ".join(installed.thenar("frontier", "--help").split())
     of_trainer = words[words.index("--trainer TRAINER What trains the model: ") :].partition(" --")[0]
     assert "naive-bayes (" in of_trainer
@@ -97,15 +93,13 @@ def test_a_frontier_of_the_trainer_has_one_stage_and_its_points_are_built(
     assert "naive-bayes, joint-bins 5" in (build / "report.html").read_text()
 
 
-def test_a_setting_names_the_trainer_that_takes_it_and_of_another_it_is_refused(
-    installed: Any, recordings: Path, tmp_path: Path
-) -> None:
+def test_a_setting_selects_its_trainer_and_others_refuse_it(installed: Any, recordings: Path, tmp_path: Path) -> None:
     given = ("compile", str(recordings), "-o", str(tmp_path / "build"), "--no-report", "--folds", "0")
     assert "--rounds is not a setting" in installed.thenar(*given, "--trainer", "naive-bayes", "--rounds", "5", code=2)
     assert "no trainer has all of rounds, smoothing" in installed.thenar(
         *given, "--smoothing", "2", "--rounds", "5", code=2
     )
     assert not (tmp_path / "build").exists()
-    assert "trained by naive-bayes, smoothing 2, joint-bins 8" in installed.thenar(*given, "--smoothing", "2")
+    assert "trainer: naive-bayes, smoothing 2, joint-bins 8" in installed.thenar(*given, "--smoothing", "2")
     # It takes part where the trainer is chosen.
-    assert "\n  naive-bayes, smoothing 1, joint-bins 8: " in installed.thenar(*given)
+    assert "\ncompared: naive-bayes, smoothing 1, joint-bins 8: " in installed.thenar(*given)

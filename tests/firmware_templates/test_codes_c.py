@@ -124,9 +124,7 @@ def random_joint(random: np.random.Generator, number: int) -> Calibration:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_every_reading_has_python_s_code_by_any_calibration_that_a_program_sets(
-    compiled: Callable[..., Codes], seed: int
-) -> None:
+def test_readings_have_pythons_codes_by_any_calibration_set(compiled: Callable[..., Codes], seed: int) -> None:
     random = np.random.default_rng(seed)
     names = names_of([random_joint(random, number) for number in range(6)])
     sensors = sensors_of(names)

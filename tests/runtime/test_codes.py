@@ -26,7 +26,7 @@ def raw_joint(name: str) -> Calibration:
 
 
 @given(a=codes, b=codes, value_a=values, value_b=values, raw_a=raws, raw_b=raws, low=values, high=values)
-def test_a_byte_gets_the_code_on_the_line_through_the_codes_of_the_two_points(
+def test_a_bytes_code_lies_on_the_calibrations_line(
     a: int, b: int, value_a: float, value_b: float, raw_a: int, raw_b: int, low: float, high: float
 ) -> None:
     assume(raw_a != raw_b and a != b and value_a != value_b)

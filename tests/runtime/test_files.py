@@ -77,7 +77,7 @@ write_atomically(Path(sys.argv[1]), b"theirs")
 """
 
 
-def test_what_a_killed_writer_leaves_is_deleted_and_what_a_living_one_writes_is_not(tmp_path: Path) -> None:
+def test_only_a_dead_writers_leftovers_are_deleted(tmp_path: Path) -> None:
     path = tmp_path / "a.bin"
     command = [sys.executable, "-c", WRITER, str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as writer:

@@ -68,12 +68,6 @@ def test_a_rate_says_what_it_is_of_its_interval_and_its_unit() -> None:
     assert str(Recognised("training", 0, 1, 4, 5)) == "rows trained on: 80.0 %, 4 of 5 frames"
 
 
-def test_it_is_json_that_people_can_read(manifest: Manifest) -> None:
-    data = manifest_to_bytes(manifest)
-    assert data.endswith(b"}\n")
-    assert json.loads(data)["switches"][3] == {"column": 3, "name": "s3", "gain": 0.5}
-
-
 @given(data=st.data())
 def test_any_changed_byte_is_refused(manifest: Manifest, data: st.DataObject) -> None:
     document = bytearray(manifest_to_bytes(manifest))
@@ -125,11 +119,6 @@ def test_two_switches_of_one_name_are_refused(manifest: Manifest) -> None:
     twice = replace(manifest, switches=(manifest.switches[0], manifest.switches[0]))
     with pytest.raises(BuildError, match="names two switches alike"):
         manifest_from_bytes(manifest_to_bytes(twice))
-
-
-def test_deep_nesting_is_refused() -> None:
-    with pytest.raises(BuildError):
-        manifest_from_bytes(b'{"a":' + b"[" * 200_000 + b"]" * 200_000 + b"}")
 
 
 def test_an_oversized_document_is_refused() -> None:

@@ -19,7 +19,7 @@ from thenar.runtime.nesting import DEEPEST_JSON, LONGEST_NUMBER, check_json
     ],
     ids=range(7),
 )
-def test_json_that_nests_too_deep_or_counts_too_far_is_refused_before_it_is_parsed(data: bytes, reason: str) -> None:
+def test_too_deep_or_long_json_is_refused_before_parsing(data: bytes, reason: str) -> None:
     if not reason:
         check_json(data)
         return

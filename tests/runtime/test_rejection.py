@@ -42,7 +42,7 @@ def test_a_live_frame_is_refused_as_a_row_of_an_array_is(
 
 
 @given(_rejections(), _scores, _masks, _masks, _codes, st.integers(0, (1 << J) - 1))
-def test_what_is_lost_is_refused_only_where_every_value_of_it_would_be(
+def test_a_lost_input_refuses_only_if_every_value_would(
     rejection: Rejection, scores: list[int], closed: int, lost: int, codes: list[int], joints: int
 ) -> None:
     rejector, lanes = Rejector(rejection), [score + LANE_OFFSET for score in scores]

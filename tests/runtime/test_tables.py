@@ -138,12 +138,6 @@ def test_the_most_negative_integer_does_not_slip_through(make_tables: MakeTables
         replace(tables, bias=np.full(5, -32768, np.int16))
 
 
-def test_thresholds_that_do_not_increase_are_refused(make_tables: MakeTables) -> None:
-    tables = make_tables()
-    with pytest.raises(BuildError, match="thresholds of joint 1 are not strictly increasing"):
-        replace(tables, thresholds=(tables.thresholds[0], tables.thresholds[1][::-1], tables.thresholds[2]))
-
-
 @pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf"), 1e308, 2.0**31])
 def test_a_scale_that_is_no_scale_is_refused(make_tables: MakeTables, scale: float) -> None:
     with pytest.raises(BuildError, match="scale"):

@@ -78,7 +78,7 @@ def test_steps_never_go_back_and_what_deviates_is_said(types: str, done: str) ->
         step = found.step
 
 
-def test_a_type_that_was_shown_to_follow_is_a_detour_and_no_deviation() -> None:
+def test_a_demonstrated_successor_is_a_detour_not_a_deviation() -> None:
     task = task_of("ab", {1: ("c",)})
     assert (begun(task, 1, "c").step, begun(task, 1, "c").deviation) == (1, "")
     assert begun(task, 1, "c").text == "step 1 of 2, c held; next b (or c)"

@@ -76,14 +76,14 @@ def test_a_key_has_the_line_on_which_it_stands(place: Place, line: int) -> None:
 
 
 @pytest.mark.parametrize("text", [AWKWARD, *(file.read_text() for file in shipped().values())])
-def test_everything_that_a_file_holds_has_a_line_of_its_own_and_its_last_key_stands_on_it(text: str) -> None:
+def test_every_toml_entry_has_its_own_line(text: str) -> None:
     source = TomlText("a.toml", text, OwnError)
     for place in places(tomllib.loads(text)):
         if place and isinstance(place[-1], str):
             assert place[-1] in text.splitlines()[source.line(place) - 1]
 
 
-def test_what_is_not_there_has_the_line_of_the_table_that_lacks_it() -> None:
+def test_a_missing_key_has_its_tables_line() -> None:
     source = TomlText("a.toml", AWKWARD, OwnError)
     assert source.line(("subjects", 1, "hand_length_mm")) == 16
     assert source.line(("nothing", 3, "at all")) == 1

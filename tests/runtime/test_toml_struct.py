@@ -78,7 +78,7 @@ def test_a_table_becomes_a_struct() -> None:
         (f"width_mm = 1{'0' * 400}", "a.toml, line 2: thing.width_mm: is a number out of range"),
     ],
 )
-def test_a_wrong_value_is_named_with_its_line_and_what_it_must_be(text: str, message: str) -> None:
+def test_a_wrong_value_is_named_with_line_and_requirement(text: str, message: str) -> None:
     assert message in complaint(text)
 
 

@@ -1,15 +1,17 @@
 """A hand round a bar, batches of it, settings and scenes, as small as can be."""
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import asdict
 
 from thenar.simulator.body.condition import Condition, Pad, PlannedGrasp, Thing
 from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Cylinder
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import EFFECTS, EffectParameters, SceneSetting
+from thenar.simulator.pipeline.effect import EFFECTS, SceneSetting
 from thenar.simulator.scenes.scene import ListedEffect, Recording, Scene, SceneGlove, SceneObject, Subject
 from thenar.simulator.streams import Draw, DrawCounts, Site
 
@@ -56,9 +58,11 @@ def _draw(effect: str, batch: Batch, seed: int = 7) -> Draw:
     return Draw(seed, effect, site, DrawCounts())
 
 
-def _scene(effects: Sequence[str | tuple[str, EffectParameters]] = (), **changes: object) -> Scene:
-    pairs = [(given, EFFECTS[given].parameters()) if isinstance(given, str) else given for given in effects]
-    listed = tuple(ListedEffect(*pair) for pair in sorted(pairs, key=lambda pair: EFFECTS[pair[0]].order))
+def _scene(effects: Sequence[str | tuple[str, dict[str, Any]]] = (), **changes: object) -> Scene:
+    pairs = [(given, {}) if isinstance(given, str) else given for given in effects]
+    ordered = sorted(pairs, key=lambda pair: EFFECTS[pair[0]].order)
+    whole = ((name, asdict(EFFECTS[name].parameters()(**given))) for name, given in ordered)
+    listed = tuple(ListedEffect(name, tuple(parameters.items())) for name, parameters in whole)
     usual = {
         "name": "small",
         "seed": 7,

@@ -43,7 +43,7 @@ LIVELY: dict[str, dict[str, Any]] = {
 
 
 def lively(names: Iterable[str]) -> list[tuple]:
-    return [(name, EFFECTS[name].parameters(**LIVELY.get(name, {}))) for name in names]
+    return [(name, LIVELY.get(name, {})) for name in names]
 
 
 @pytest.fixture(scope="module")

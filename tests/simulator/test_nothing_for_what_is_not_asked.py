@@ -146,7 +146,7 @@ def test_it_is_called_and_draws_where_it_is_listed_and_nowhere_else(
 
 
 @pytest.mark.parametrize("listed", [ONE, OTHER])
-def test_the_ledger_knows_the_scenes_effects_and_the_gloves_own_steps_which_draw_nothing(
+def test_the_ledger_knows_scene_effects_and_drawless_glove_steps(
     listed: tuple[str, ...], audits: dict[tuple[str, ...], Audit]
 ) -> None:
     steps = audits[listed].steps

@@ -1,6 +1,5 @@
 """What each shipped scene promises."""
 
-import msgspec
 import pytest
 from msgspec.structs import replace
 
@@ -30,7 +29,7 @@ ADDED["initial-contact"] = ONSET
 ADDED |= {"continuous-def": IN_TIME, "continuous-rest": IN_TIME}
 
 
-def effects(scene: Scene) -> dict[str, msgspec.Struct]:
+def effects(scene: Scene) -> dict[str, tuple]:
     return dict(scene.effects)
 
 
@@ -64,7 +63,7 @@ def test_a_shipped_scene_says_that_it_is_simulated_and_can_be_compiled(name: str
 
 
 @pytest.mark.parametrize("name", shipped())
-def test_every_hand_of_a_shipped_scene_has_a_planned_posture_for_every_object(name: str) -> None:
+def test_shipped_scenes_have_planned_postures_for_all_hands(name: str) -> None:
     scene = load_scene(name)
     postures = Postures.shipped(scene.taxonomy)
     for subject in (min(scene.subjects, key=length), max(scene.subjects, key=length)):
@@ -77,9 +76,7 @@ def length(subject: Subject) -> float:
 
 
 @pytest.mark.parametrize(("name", "taxonomy"), [("kamakura", "kamakura14"), ("cutkosky", "cutkosky16")])
-def test_the_scenes_of_the_paper_have_its_size_and_those_of_the_check_differ_in_people_alone(
-    name: str, taxonomy: str
-) -> None:
+def test_paper_scenes_have_its_size_check_scenes_differ_in_people(name: str, taxonomy: str) -> None:
     scene, check = load_scene(name), load_scene(f"{name}-def")
     assert (scene.taxonomy, scene.repetitions) == (taxonomy, 100)
     assert sizes(scene) == {subject: MEN[subject] for subject in "ABC"}

@@ -96,7 +96,7 @@ WORDS = st.integers(0, 2**64 - 1)
 
 
 @given(WORDS)
-def test_a_uniform_number_lies_strictly_between_nought_and_one_where_its_word_says(word: int) -> None:
+def test_uniform_numbers_lie_strictly_between_zero_and_one(word: int) -> None:
     (number,) = RandomWords(np.array([word], dtype=np.uint64)).uniform()
     assert 0.0 < number < 1.0
     assert abs(Fraction(float(number)) - Fraction(word, 2**64)) <= Fraction(1, 2**52)

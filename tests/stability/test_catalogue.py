@@ -5,7 +5,9 @@ import pkgutil
 import msgspec
 import pytest
 
+from thenar.simulator.effects.contact_quasistatic import Quasistatic
 from thenar.stability import cases
+from thenar.stability.contact.halving import kept, shipped
 from thenar.stability.report import NAMES, CaseReport, load, run_case
 
 
@@ -14,7 +16,7 @@ def test_every_case_in_the_folder_is_in_the_catalogue_once() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_case_says_what_it_is_and_what_could_go_wrong_in_a_sentence_each(name: str) -> None:
+def test_a_case_describes_itself_and_its_risk_in_sentences(name: str) -> None:
     about = load(name).CASE
     assert about.title
     assert about.danger
@@ -37,3 +39,8 @@ def test_a_case_holds_quickly(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_case_holds_in_full(name: str) -> None:
     _holds(run_case(name, full=True))
+
+
+def test_most_shipped_grasps_settle_so_that_halved_steps_are_compared() -> None:
+    loads = list(shipped(1))
+    assert kept(loads, Quasistatic().solve(loads)).mean() > 0.9

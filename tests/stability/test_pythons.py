@@ -48,7 +48,7 @@ def test_where_a_shim_refuses_pyenvs_own_version_is_taken(machine: Path) -> None
     assert list(pythons.found()) == [(version, python)]
 
 
-def test_a_program_that_is_of_another_version_than_its_name_says_is_not_taken(machine: Path) -> None:
+def test_misnamed_python_versions_are_not_taken(machine: Path) -> None:
     program(machine / "bin" / f"python{OTHERS[0]}", "echo 3.1.5")
     assert list(pythons.found()) == []
 

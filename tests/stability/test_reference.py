@@ -5,6 +5,7 @@ import math
 from fractions import Fraction
 from itertools import combinations, pairwise, product
 from pathlib import Path
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -31,6 +32,7 @@ from thenar.stability.reference.information import (
     sign_of_log_sum,
 )
 from thenar.stability.reference.intervals import normal_quantile, student, student_quantile, wilson
+from thenar.stability.reference.logit import Column, largest_derivative
 from thenar.stability.reference.numbers import DIGITS, cos, precisely, sin, turn
 from thenar.stability.reference.standing_in import Kind, stand_ins
 from thenar.stability.reference.tables import steps
@@ -85,7 +87,7 @@ def test_gains_compare_as_products_of_whole_numbers_do(one: list[list[int]], oth
     assert compare_gains(one, other) == (first > second) - (first < second)
 
 
-def test_one_row_in_a_billion_decides_and_equal_gains_of_other_terms_tie() -> None:
+def test_one_row_in_a_billion_decides_and_equal_gains_tie() -> None:
     m = 10**9
     nothing, least = [[m, m], [m, m]], [[m + 1, m - 1], [m, m]]
     assert compare_gains(least, nothing) == 1
@@ -204,7 +206,7 @@ def test_whole_steps_are_half_to_even(pairs: list[tuple[float, float]]) -> None:
 
 
 @pytest.mark.parametrize("counts", [(30, 10), (5, 12, 40), (1, 1, 1, 97)])
-def test_where_the_others_say_nothing_what_stands_in_says_how_frequent_each_class_is(counts: tuple[int, ...]) -> None:
+def test_uninformative_inputs_are_substituted_by_class_frequencies(counts: tuple[int, ...]) -> None:
     labels = [label for label, count in enumerate(counts) for _ in range(count)]
     rows = [[0] * len(counts)] * len(labels)
     ends = ((-9000,) * len(counts), (9000,) * len(counts))
@@ -214,7 +216,7 @@ def test_where_the_others_say_nothing_what_stands_in_says_how_frequent_each_clas
             assert found[one] - found[other] == pytest.approx(1000 * math.log(counts[one] / counts[other]), abs=2)
 
 
-def test_the_sum_of_a_kind_makes_up_for_what_its_inputs_say_twice() -> None:
+def test_the_sum_of_a_kind_compensates_redundant_inputs() -> None:
     # Each of two equal inputs is said by the other already, so nothing stands in for one alone; both are lost at once.
     labels = [0] * 30 + [1] * 10
     known, nothing = [[549, -549]] * 40, [[0, 0]] * 40
@@ -268,3 +270,30 @@ def test_a_turn_keeps_its_axis_and_all_lengths(axis: list[float], angle: float) 
         assert near(rows[0][0] + rows[1][1] + rows[2][2], 1 + 2 * mpmath.cos(angle))
     quarter = turn((0, 0, 2), float(mpmath.pi / 2))
     assert [round(float(x)) for row in quarter for x in row] == [0, -1, 0, 1, 0, 0, 0, 0, 1]
+
+
+@precisely()
+def test_the_derivative_is_that_of_the_loss() -> None:
+    rng = np.random.default_rng(1)
+    rows, labels, weights = rng.normal(size=(4, 3)), [0, 1, 2, 1, 0, 2], [1.0, 2.0, 1.0, 3.0, 1.0, 1.0]
+    added, pulls, smoothness = [0, 1, -1, 2, 3, 3], [0.5, 1.0, 2.0, 0.1], [(0, 1, 3.0), (0, 3, 0.5), (2, 3, 1.5)]
+
+    def loss(entries: Any) -> Any:
+        scores = [[mpf(0)] * 3 if row < 0 else list(entries[row]) for row in added]
+        total = mean_loss(scores, labels, weights) * sum(weights)
+        total += sum(pull * sum(each**2 for each in row) for pull, row in zip(pulls, entries, strict=True)) / 2
+        pairs = [(s, entries[one], entries[other]) for one, other, s in smoothness]
+        return total + sum(s * sum((b - a) ** 2 for a, b in zip(one, two, strict=True)) for s, one, two in pairs) / 2
+
+    def slope(row: int, k: int) -> Any:
+        def moved(by: Any) -> Any:
+            entries = [[mpf(each) for each in own] for own in rows.tolist()]
+            entries[row][k] += by
+            return loss(entries)
+
+        step = mpf(10) ** -20
+        return (moved(step) - moved(-step)) / (2 * step)
+
+    true = max(abs(slope(row, k)) for row in range(4) for k in range(3))
+    found = largest_derivative([Column(added, rows.tolist(), pulls, smoothness)], labels, weights)
+    assert abs(found - true) < mpf(10) ** -30

@@ -41,13 +41,13 @@ def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
 
 
 @pytest.mark.parametrize("name", [*FAULTS, "finds_nothing"])
-def test_a_case_in_which_anything_is_wrong_does_not_hold_and_keeps_its_name(folder: Path, name: str) -> None:
+def test_a_failing_case_keeps_its_name(folder: Path, name: str) -> None:
     found = run_case(name, full=False)
     assert not found.holds
     assert found.about.title == "a sound case"
 
 
-def test_cases_that_a_killed_worker_left_unfinished_have_failed_and_the_finished_ones_stay(
+def test_a_killed_workers_unfinished_cases_fail_finished_ones_stay(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def killed_after_one(work: object, names: list[str], jobs: int) -> Iterator[object]:
@@ -62,7 +62,7 @@ def test_cases_that_a_killed_worker_left_unfinished_have_failed_and_the_finished
     assert "a worker process ended early" in found[1].failure
 
 
-def test_the_worst_of_many_is_kept_with_where_it_was_and_nan_is_worse_than_all() -> None:
+def test_the_worst_is_kept_with_its_place_nan_worst() -> None:
     worst = Worst("sums", "60 digits", 2.0, "ulp")
     for error, at in ((0.5, "a"), (1.5, "b"), (1.0, "c")):
         worst.see(error, at)
@@ -79,7 +79,7 @@ def reported(*findings: Finding, failure: str | None = None) -> Report:
     return Report(False, (CaseReport("case", Case("A case", ""), checks, failure, False),), None, False)
 
 
-def test_all_that_fails_is_told_with_the_case_the_check_by_how_much_how_often_and_where() -> None:
+def test_failures_name_case_check_size_count_and_place() -> None:
     report = reported(
         Finding("sums", "60 digits", 0.5, 1.0, "ulp", 3, "row 1"),
         Finding("shares", "60 digits", 1.5, 1.0, "x rounding", 3000, "row 2", 1234),

@@ -98,7 +98,7 @@ def test_weka_parts_from_itself_and_thenar_from_weka_not_before(compared: Compar
     assert compared.weka_changed > 0
 
 
-def test_thenar_trained_in_any_order_of_rows_answers_the_same_to_the_last_bit(compared: Comparison) -> None:
+def test_training_in_any_row_order_gives_identical_bits(compared: Comparison) -> None:
     assert compared.our_shuffled == 0
     assert compared.shuffles > 1
 

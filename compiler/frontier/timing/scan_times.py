@@ -18,11 +18,11 @@ from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us
 
 from ...firmware.targets import TARGETS
-from ..points import How, Time
+from ..points import How, PointTime
 from .machine import on_a_pi
-from .wirings import Wiring
+from .wirings import WiringOption
 
-NO_TIME = Time(0.0, "wire")
+NO_TIME = PointTime(0.0, "wire")
 # Overhead of one transfer on a Raspberry Pi. Doubtful: a kernel trace of a Pi 3 has 20 us from the call to the adapter
 # and 6 us back; others measured 300 us (Pi Zero) with an older library.
 PI_CALL_US = 30.0
@@ -106,7 +106,7 @@ class ScanTimes:
     how: How
 
 
-def scan_times(names: Sequence[str], wiring: Wiring, overhead: Overhead = WIRE_ONLY) -> ScanTimes:
+def scan_times(names: Sequence[str], wiring: WiringOption, overhead: Overhead = WIRE_ONLY) -> ScanTimes:
     """Return the scan times of a build's switches `names`, in its order.
 
     overhead is added to every transaction. Streams and buses work in parallel, so the slowest counts. Raises
@@ -157,9 +157,9 @@ class Records:
     how: How = "wire"
     what: str = ""
 
-    def of(self, joints: int) -> Time:
+    def of(self, joints: int) -> PointTime:
         """Return the time of reading this number of joints."""
-        return Time(max(self.fixed_us + joints * self.each_us, self.least_us), self.how) if joints else NO_TIME
+        return PointTime(max(self.fixed_us + joints * self.each_us, self.least_us), self.how) if joints else NO_TIME
 
 
 NO_RECORDS = Records()

@@ -27,7 +27,7 @@ _AVR_HZ = range(50_000, 400_001)
 
 
 @dataclass(frozen=True, slots=True)
-class Wiring:
+class WiringOption:
     """A wiring of switches.
 
     name      "as wired" (the given harness), "board" (one that prints rows), or a kind of port expander or of converter
@@ -87,7 +87,7 @@ class Wiring:
 
 def wirings(
     given: Harness | None, target: str = "host", *, switches: bool = True, taxels: bool = False
-) -> tuple[Wiring, ...]:
+) -> tuple[WiringOption, ...]:
     """Return the candidate wirings for `target` (a name of `thenar frontier --target`): the given one, and those of a
     new glove with `switches` and `taxels`. Taxels are on ADS7828, or on one of the converters on SPI.
 
@@ -103,11 +103,11 @@ def wirings(
     for chip in expanders().values() if switches else (CHIPS[CONVERTER],) if taxels else ():
         if (chip.tried or not switches) and (chip.registers or not avr):
             clocks = (hz for hz in CLOCKS_HZ if hz <= chip.clock_hz and (not avr or hz in _AVR_HZ))
-            found += [Wiring(chip.name, hz, muxes=not avr) for hz in clocks]
+            found += [WiringOption(chip.name, hz, muxes=not avr) for hz in clocks]
     if taxels and not avr:
         most = max(len(chip.pins) for chip in SPI_CHIPS.values())
-        found += [Wiring(kind, chip.clock_hz) for kind, chip in SPI_CHIPS.items() if len(chip.pins) == most]
-    return tuple(found if avr else [*found, *(Wiring(BOARD, baud) for baud in BAUDS)])
+        found += [WiringOption(kind, chip.clock_hz) for kind, chip in SPI_CHIPS.items() if len(chip.pins) == most]
+    return tuple(found if avr else [*found, *(WiringOption(BOARD, baud) for baud in BAUDS)])
 
 
 def is_avr(target: str) -> bool:
@@ -120,10 +120,10 @@ def names_of(count: int) -> list[str]:
     return [f"s{number}" for number in range(count)]
 
 
-def _as_wired(given: Harness) -> Wiring:
+def _as_wired(given: Harness) -> WiringOption:
     clocks = [bus.clock_hz for bus in given.buses if bus.chips]
     lines = [chip.clock_hz for chip in given.spi] or [stream.baud for stream in given.streams]
-    return Wiring(AS_WIRED, min(clocks or lines), given)
+    return WiringOption(AS_WIRED, min(clocks or lines), given)
 
 
 def _of_an_avr(given: Harness) -> bool:

@@ -88,7 +88,7 @@ def test_joints_that_say_something_together_are_found_and_recognised() -> None:
     assert rate > 0.9 > without + 0.2
 
 
-def test_no_joint_is_in_two_pairs_and_none_without_two_bins_in_one() -> None:
+def test_pairs_share_no_joint_and_need_two_bins() -> None:
     switches, codes, labels = grasps(5, 300)
     codes = np.column_stack([codes, codes[:, 1], np.zeros_like(codes[:, 0])])
     tables = fit_pairs(switches, codes, labels, 3, **FIXED, pairs=9)

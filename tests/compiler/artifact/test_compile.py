@@ -44,9 +44,7 @@ def test_a_build_knows_its_inputs_and_recognises_what_it_was_trained_on(grasp_se
     assert [joint.name for joint in build.manifest.joints] == ["j0", "j1", "j2"]
 
 
-def test_the_headline_of_several_subjects_is_a_new_one_and_the_others_are_beside_it(
-    make_set: Make, tmp_path: Path
-) -> None:
+def test_the_headline_of_several_subjects_is_the_new_subject_rate(make_set: Make, tmp_path: Path) -> None:
     report = compile_build(make_set(subjects=3), tmp_path / "build", rounds=ROUNDS)
     rates = report.manifest.rates
     assert [(rate.protocol, rate.title, rate.unit, rate.folds, rate.total) for rate in rates] == [

@@ -68,13 +68,6 @@ def test_the_report_has_the_papers_tables_of_the_builds_own_folds(gloved: GraspS
     assert re.search(r"This build's recipe \(placement: .*; trainer: .*\), within subject, 3 nested folds", words)
 
 
-def test_without_folds_the_report_says_what_it_lacks(gloved: GraspSet, tmp_path: Path) -> None:
-    words = _compile(gloved, tmp_path / "build")
-    assert "The build was compiled without folds. thenar evaluate SET.grasps prints them." in words
-    assert "Not measured: the build was compiled without folds." in words
-    assert "the accuracy on new grasps was not measured" in words
-
-
 def test_the_report_of_very_many_subjects_has_no_column_for_each(make_set: Make, tmp_path: Path) -> None:
     words = _compile(make_set(rows=640, subjects=32), tmp_path / "build", folds=2)
     assert "have a column for each subject: 32 are too many for a page. thenar evaluate SET.grasps" in words

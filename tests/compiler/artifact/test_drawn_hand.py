@@ -28,9 +28,7 @@ def gloved(grasp_set: GraspSet) -> GraspSet:
     return replace(grasp_set, switch_names=hand_map().names[::11][: len(grasp_set.switch_names)])
 
 
-def test_all_switches_lie_where_the_hand_has_them_and_the_kept_ones_say_which_they_are(
-    gloved: GraspSet, tmp_path: Path
-) -> None:
+def test_switches_are_drawn_in_place_and_kept_ones_are_numbered(gloved: GraspSet, tmp_path: Path) -> None:
     hand, manifest = _drawn(gloved, tmp_path / "build", hand_map())
     assert hand.placed
     assert tuple(each.name for each in hand.switches) == gloved.switch_names

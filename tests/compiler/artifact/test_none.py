@@ -114,7 +114,7 @@ def test_of_a_long_movement_some_frames_are_trained_on(parts: list[tuple[int, in
             assert np.ptp(np.diff(own)) <= 1 if len(own) > 1 else True
 
 
-def test_a_build_without_such_rows_refuses_the_share_that_it_was_asked_for(moved: GraspSet, tmp_path: Path) -> None:
+def test_without_rows_of_none_the_requested_share_is_refused(moved: GraspSet, tmp_path: Path) -> None:
     held = moved.without_none()
     made = compile_build(held, tmp_path / "build", rounds=20, folds=3, refuse=0.02, jobs=1)
     build, found = Build.load(tmp_path / "build"), made.manifest.detected
@@ -204,7 +204,7 @@ def test_a_share_that_makes_no_sense_is_an_error(moved: GraspSet, tmp_path: Path
         compile_build(moved, tmp_path / "build", refuse=share)
 
 
-def test_a_type_of_ones_own_that_is_called_none_is_a_type_as_any_other(moved: GraspSet) -> None:
+def test_a_custom_type_called_none_is_an_ordinary_type(moved: GraspSet) -> None:
     old = replace(moved, taxonomy=own((*TYPES, "none")))
     samples = Samples.of(old)
     assert not samples.has_none

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.recordings.columns import Columns, JointColumns, TaxelColumns
+from thenar.compiler.recordings.columns import ColumnRoles, JointColumns, TaxelColumns
 from thenar.compiler.recordings.importer import import_table
 from thenar.compiler.recordings.table import read_table
 
@@ -22,7 +22,7 @@ def pressed(icub_table: Path) -> GraspSet:
     """Return the set with each taxel's fall since the first slice of its trial, as the contact bits of the set have it;
     absolute counts drift from object to object, and would tell them apart by that.
     """
-    columns = Columns(
+    columns = ColumnRoles(
         label="object",
         trial="rep",
         taxels=(TaxelColumns(tuple(f"{finger}_t*" for finger in FINGERS)),),

@@ -53,7 +53,7 @@ def test_a_build_of_real_recordings_holds_and_recognises(
 
 @pytest.mark.parametrize("inputs", ["both", "switches"])
 @pytest.mark.parametrize("entry_bits", [16, 8])
-def test_integers_recognise_within_a_fifth_of_a_point_of_what_the_ensemble_does_in_rows_not_trained_on(
+def test_integers_and_ensemble_differ_by_less_than_a_fifth_point(
     icub_table: Path, inputs: Inputs, entry_bits: int
 ) -> None:
     grasp_set, _ = import_file(icub_table, COLUMNS / "icub.toml")

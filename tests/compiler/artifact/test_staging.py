@@ -54,14 +54,14 @@ def test_a_users_files_are_never_deleted(tmp_path: Path, files: dict[str, bytes]
         check_target(tmp_path / "build")
 
 
-def test_a_folder_by_the_name_of_a_file_of_a_build_is_not_of_a_build(tmp_path: Path) -> None:
+def test_a_folder_named_like_a_builds_file_is_foreign(tmp_path: Path) -> None:
     _fill(tmp_path / "build", {"build.json": b"old"})
     _fill(tmp_path / "build" / "tables.bin", {"notes.txt": b"mine"})
     with pytest.raises(CompileError, match=r"holds tables\.bin, which is not part of a build"):
         check_target(tmp_path / "build")
 
 
-def test_a_link_by_the_name_of_a_folder_of_a_build_is_not_of_a_build(tmp_path: Path) -> None:
+def test_a_link_named_like_a_builds_folder_is_foreign(tmp_path: Path) -> None:
     _fill(tmp_path / "build", OLD)
     _fill(tmp_path / "mine", {"thenar_glove.c": b"mine"})
     (tmp_path / "build" / "firmware").symlink_to(tmp_path / "mine")
@@ -71,7 +71,7 @@ def test_a_link_by_the_name_of_a_folder_of_a_build_is_not_of_a_build(tmp_path: P
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_parent_that_may_not_be_written_to_is_refused_before_any_work(tmp_path: Path) -> None:
+def test_a_read_only_parent_folder_is_refused_before_any_work(tmp_path: Path) -> None:
     tmp_path.chmod(0o555)
     try:
         with pytest.raises(CompileError, match="is not writable"):
@@ -80,7 +80,7 @@ def test_a_parent_that_may_not_be_written_to_is_refused_before_any_work(tmp_path
         tmp_path.chmod(0o755)
 
 
-def test_what_a_killed_publication_of_its_spec_left_in_a_build_is_cleared(tmp_path: Path) -> None:
+def test_leftovers_of_a_killed_spec_publication_are_cleared(tmp_path: Path) -> None:
     _fill(tmp_path / "build", TOLD)
     (tmp_path / "build" / ".spec.01234567.part" / "part").mkdir(parents=True)
     (tmp_path / "build" / ".spec.01234567.part" / "part" / "bom.csv").write_bytes(b"ne")

@@ -98,22 +98,6 @@ def test_levels_are_learnt_inside_each_fold(padded: GraspSet, tmp_path: Path) ->
     assert seen - {everything}
 
 
-def test_a_set_is_replayed_by_the_builds_thresholds(
-    padded: GraspSet, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    padded.save(tmp_path / "set.grasps")
-    assert (
-        run(["compile", str(tmp_path / "set.grasps"), "-o", str(tmp_path / "build"), "--folds", "0", "--rounds", "5"])
-        == 0
-    )
-    assert "pad0>" in capfd.readouterr().out
-    assert run(["run", str(tmp_path / "build"), "--replay", str(tmp_path / "set.grasps")]) == 0
-    printed = capfd.readouterr()
-    lines = [json.loads(line) for line in printed.out.splitlines()]
-    correct = sum(line["grasp"] == line["recorded"] for line in lines)
-    assert (len(lines), correct) == (96, verify(tmp_path / "build", padded).recognised[0].integers)
-
-
 def test_pads_of_another_scale_or_kind_are_refused(padded: GraspSet, tmp_path: Path) -> None:
     compile_build(padded, tmp_path / "build", rounds=2, folds=0)
     scaled = replace(padded, taxel_columns=(replace(PADS[0], value_b=10.0), *padded.taxel_columns[1:]))

@@ -75,7 +75,7 @@ LINEAR = {"trainer": "logit", "penalty": 1.0, "smoothness": 1.0, "max_bins": 8, 
     ids=["linear, a byte", "linear", "switches", "joints"],
 )
 @pytest.mark.parametrize("kind", ["host", "avr"])
-def test_builds_of_linear_joints_and_of_one_kind_of_input_are_pythons_too(
+def test_firmware_of_linear_joints_and_single_kinds_matches_python(
     grasp_set: GraspSet, tool: Tool, tmp_path: Path, options: dict[str, Any], kind: str
 ) -> None:
     for name in TOOLS[kind]:

@@ -176,7 +176,7 @@ def test_every_loss_is_the_loss_of_the_scores_after_that_round(weighted: bool) -
     assert losses == tuple(softmax_and_loss(scores.T, labels, weights)[1] for scores in stages)
 
 
-def test_without_a_number_of_rounds_there_are_a_hundred_and_each_is_told() -> None:
+def test_the_default_is_a_hundred_rounds_each_reported() -> None:
     X, labels = grasps(3)
     told: list[tuple[int, int]] = []
     stumps, _ = boost(X, labels, 3, on_round=lambda *done: told.append(done))

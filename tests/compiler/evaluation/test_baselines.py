@@ -4,9 +4,8 @@ import numpy as np
 from sklearn.linear_model import LogisticRegression
 from sklearn.neighbors import KNeighborsClassifier
 
-from thenar.compiler.evaluation.baselines import CLASSIFIERS
 from thenar.compiler.evaluation.folds import Fold
-from thenar.compiler.evaluation.plan import Data, FoldFit, predictions
+from thenar.compiler.evaluation.plan import CLASSIFIERS, Data, FoldFit, predictions
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
@@ -26,7 +25,7 @@ def test_baselines_answer_as_scikit_learns_on_the_same_standardised_columns(make
         "logistic-regression": LogisticRegression(max_iter=10_000),
         "5-nearest-neighbours": KNeighborsClassifier(5, weights="distance"),
     }
-    assert oracles.keys() == CLASSIFIERS.keys()
+    assert oracles.keys() == {*CLASSIFIERS}
     for name, oracle in oracles.items():
         oracle.fit((learnt - mean) / spread, grasps.labels[fold.train])
         expected = oracle.predict((X[fold.test][:, columns] - mean) / spread)

@@ -134,7 +134,7 @@ def test_the_best_is_chosen_where_others_are_clearly_behind(monkeypatch: pytest.
     assert (shown.correct, shown.total, shown.behind, shown.rows) == (58, 60, 0.0, 1.0)
 
 
-def test_within_one_standard_error_small_tables_win_and_of_these_the_lowest_loss(
+def test_within_one_standard_error_small_tables_then_low_loss_win(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """One trial of difference is one standard error of it, or a little less."""
@@ -158,7 +158,7 @@ def test_within_one_standard_error_small_tables_win_and_of_these_the_lowest_loss
     assert choose_training(_samples([0], [0, 1], [0, 1]), candidates).settings["switch"] == 2
 
 
-def test_what_holds_for_the_known_people_alone_is_not_chosen_for_new_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_leads_within_one_subject_are_not_chosen_for_new_subjects(monkeypatch: pytest.MonkeyPatch) -> None:
     """The misses of one switch are all of one subject: over people that is no clear lead, over trials it is."""
     n, subjects = 60, 5
     of_one = [row for row in range(n) if row % subjects == 0][:6]
@@ -182,9 +182,7 @@ def test_what_holds_for_the_known_people_alone_is_not_chosen_for_new_ones(monkey
         ({"trainer": "logitboost"}, {"logitboost"}),
     ],
 )
-def test_settings_that_are_given_are_fixed_and_name_the_trainer_that_takes_them(
-    changes: dict[str, Any], trainers: set[str]
-) -> None:
+def test_given_settings_are_fixed_and_select_their_trainer(changes: dict[str, Any], trainers: set[str]) -> None:
     candidates = Training.candidates(changed(Recipe(), changes))
     assert {each.trainer for each in candidates} == trainers
     assert len({repr(each) for each in candidates}) == len(candidates)
@@ -201,7 +199,7 @@ def test_where_all_that_is_compared_is_given_one_candidate_is_left(changes: dict
 
 
 @pytest.mark.parametrize(("frames", "compared"), [(1, 240), (7, 238), (24, 80)])
-def test_of_trials_of_many_frames_some_are_compared_and_no_trial_is_left_out(
+def test_long_trials_are_sampled_and_none_is_left_out(
     monkeypatch: pytest.MonkeyPatch, frames: int, compared: int
 ) -> None:
     seen, train = list[int](), Pointer.train

@@ -45,9 +45,7 @@ def test_a_bound_that_java_refuses_is_refused(bound: int) -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 3)), min_size=2, max_size=60), seeds, st.integers(2, 5))
-def test_no_fold_parts_a_trial_and_trials_are_cut_as_weka_cuts_rows(
-    frames: list[tuple[int, int]], seed: int, n_folds: int
-) -> None:
+def test_folds_keep_trials_whole_and_cut_them_as_weka(frames: list[tuple[int, int]], seed: int, n_folds: int) -> None:
     """The label of a frame is a part of its trial's name."""
     names = list(dict.fromkeys(frames))
     trials, labels = np.array([names.index(frame) for frame in frames]), np.array([label for _, label in frames])

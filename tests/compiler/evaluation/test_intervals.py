@@ -32,7 +32,7 @@ def test_intervals_cover_the_truth_in_93_to_97_of_100_cases(unit: str, clusters:
 
 
 @pytest.mark.slow
-def test_so_they_do_for_1_to_50_frames_a_trial_and_20_to_1000_trials() -> None:
+def test_intervals_cover_the_truth_for_any_frames_and_trials() -> None:
     for frames, effect, trials, covered in of_frames(200):
         # Of frames as different as trials, which real ones are not, the interval may be a little wide.
         most = 0.97 if effect > 1.5 or frames == 1 else 0.985

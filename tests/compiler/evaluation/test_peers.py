@@ -36,7 +36,7 @@ def majorities(predicted: list[str], grasp_set: GraspSet) -> int:
     return sum(min(vote, key=lambda grasp: (-vote[grasp], grasp)) == trial[1] for trial, vote in votes.items())
 
 
-def test_each_subject_left_out_is_what_scikit_learn_predicts_with_a_selector_in_its_pipeline(make_grasps: Make) -> None:
+def test_leaving_subjects_out_matches_a_scikit_learn_pipeline(make_grasps: Make) -> None:
     grasp_set = framed(make_grasps)
     study = evaluate(grasp_set, scheme="subject", **NESTED)
     selected = make_pipeline(ID3Selector(), LogitBoostClassifier(rounds=10))
@@ -67,14 +67,6 @@ def test_sessions_left_out_are_those_of_scikit_learn_too(make_grasps: Make) -> N
         assert cell.frames.correct == (int((predicted == mine.grasps).sum()),)
         assert (cell.rate.what, cell.rate.over) == ("new session, trials", 2)
     assert row.rate.over == 6
-
-
-def test_random_folds_part_no_trial(make_grasps: Make) -> None:
-    study = evaluate(framed(make_grasps), scheme="trial", repeats=2, **NESTED)
-    (row,) = (row for row in study.tables[0].rows if row.name == "I")
-    assert (row.rate.total, len(row.rate.correct), row.rate.of) == (72, 2, "within subject")
-    assert study.trials == 72
-    assert np.array(row.cells[0].confusion).sum() == 2 * 24
 
 
 def test_frames_that_count_as_trials_are_refused(make_grasps: Make) -> None:

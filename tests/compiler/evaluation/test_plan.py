@@ -76,7 +76,7 @@ def test_every_cell_tests_each_row_of_its_subject_once_a_repeat(planner: Planner
                     assert np.array_equal(np.sort(np.concatenate([fit.fold.test for fit in run])), cell.part.rows)
 
 
-def test_the_papers_placement_is_one_a_subject_and_the_nested_one_differs_by_fold(planner: Planner) -> None:
+def test_the_papers_placement_is_per_subject_the_nested_one_per_fold(planner: Planner) -> None:
     for cell in row(planner.table("compositions", PAPER), "VI").cells:
         assert len({fit.elements for fit in cell.fits}) == 1
     columns = [{fit.elements for fit in cell.fits} for cell in row(planner.table("compositions", NESTED), "VI").cells]

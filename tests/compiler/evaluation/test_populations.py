@@ -118,7 +118,7 @@ def test_a_single_row_can_never_be_recognised_and_that_is_said(make_grasps: Make
     )
 
 
-def test_an_object_of_its_own_grasp_type_is_noticed_when_objects_are_left_out(make_grasps: Make) -> None:
+def test_leaving_objects_out_warns_of_types_with_one_object(make_grasps: Make) -> None:
     grasps = make_grasps(subjects="A")
     own_object = np.where(grasps.grasps == "hook", "bag", grasps.objects)
     grasps = GraspSet(

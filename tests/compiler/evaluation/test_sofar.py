@@ -96,7 +96,7 @@ def test_a_type_with_one_trial_has_no_accuracy_and_does_not_count() -> None:
     assert (first.total, first.correct, first.low, first.high) == (0, 0, 0.0, 1.0)
 
 
-def test_rows_of_a_trial_are_one_trial_and_an_input_that_never_changes_is_none() -> None:
+def test_rows_of_a_trial_count_once_and_constant_inputs_never() -> None:
     whole = grasps(6, noise=3)
     thrice = whole.rows(np.repeat(np.arange(len(whole)), 3))
     one, three = recognition_so_far(whole), recognition_so_far(thrice)

@@ -5,13 +5,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.compiler.evaluation.baselines import CLASSIFIERS
 from thenar.compiler.evaluation.folds import EvaluationError, Fold
-from thenar.compiler.evaluation.plan import REFERENCE, CellPlan, FoldFit, RowPlan, learners
+from thenar.compiler.evaluation.plan import CLASSIFIERS, REFERENCE, CellPlan, FoldFit, RowPlan, learners
 from thenar.compiler.evaluation.populations import Population, Scheme
 from thenar.compiler.evaluation.rates import Rate, RecipeWords
 from thenar.compiler.evaluation.study import TABLES, Study, StudyDesign, evaluate
-from thenar.compiler.evaluation.tables import RateTable, Reader, Row
+from thenar.compiler.evaluation.tables import RateReader, RateRow, RateTable
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import TRAINERS
@@ -30,7 +29,7 @@ ANSWERS = {
     SECOND[0]: np.array([2, 2, 2]),
     SECOND[1]: np.array([2, 2, 5]),
 }
-READER = Reader(LABELS, np.arange(6), (2, 5), ANSWERS, frozenset({SECOND[1]}), "within subject", None)
+READER = RateReader(LABELS, np.arange(6), (2, 5), ANSWERS, frozenset({SECOND[1]}), "within subject", None)
 CELL = CellPlan(PART, (FIRST, SECOND))
 
 
@@ -92,7 +91,7 @@ def table(study: Study, name: str, protocol: str = "nested") -> RateTable:
     return found
 
 
-def row(table: RateTable, name: str) -> Row:
+def row(table: RateTable, name: str) -> RateRow:
     (found,) = (candidate for candidate in table.rows if candidate.name == name)
     return found
 
@@ -107,7 +106,7 @@ def test_every_table_comes_under_both_protocols_in_the_papers_layout(study: Stud
     assert [r.name for r in table(study, "pruning").rows] == ["all", "0", "10"]
 
 
-def test_confusion_matrices_count_every_row_in_every_repeat_and_agree_with_the_rates(study: Study) -> None:
+def test_confusion_matrices_count_every_row_and_agree_with_rates(study: Study) -> None:
     assert study.grasps == ("hook", "pinch", "power", "tip")
     for protocol in ("paper", "nested"):
         for line in table(study, "compositions", protocol).rows:
@@ -117,9 +116,7 @@ def test_confusion_matrices_count_every_row_in_every_repeat_and_agree_with_the_r
                 assert np.trace(counts) == sum(cell.rate.correct)
 
 
-def test_the_same_set_and_options_give_the_same_result_on_any_number_of_workers(
-    make_grasps: Make, study: Study
-) -> None:
+def test_evaluations_are_identical_on_any_number_of_workers(make_grasps: Make, study: Study) -> None:
     again = evaluate(make_grasps(noise=0.2), QUICK, jobs=2)
     assert msgspec.json.encode(again) == msgspec.json.encode(study)
 
@@ -153,7 +150,7 @@ def test_without_switches_there_are_the_joints_and_no_placements(make_grasps: Ma
     assert [line.name for line in study.tables[0].rows] == ["IV"]
 
 
-def test_a_composition_left_without_inputs_shows_the_rate_of_the_most_frequent_grasp(make_grasps: Make) -> None:
+def test_a_composition_without_inputs_predicts_the_most_frequent_grasp(make_grasps: Make) -> None:
     grasps = make_grasps(n_joints=0, subjects="A")
     study = evaluate(grasps, QUICK.changed(prune=1000, tables=("compositions",), protocols=("nested",)), jobs=1)
     (cell,) = row(table(study, "compositions"), "VI").cells
@@ -172,7 +169,7 @@ def test_one_subject_alone_has_nobody_elses_placement(make_grasps: Make) -> None
     assert study.rows == 48
 
 
-def test_pruning_the_pool_of_one_subject_by_the_same_s_is_composition_six(make_grasps: Make) -> None:
+def test_one_subjects_pruning_at_equal_s_is_composition_six(make_grasps: Make) -> None:
     options = QUICK.changed(subjects=("A",), prune=10, tables=("compositions", "pruning", "baselines"))
     study = evaluate(make_grasps(noise=0.2), options, jobs=1)
     for protocol in ("paper", "nested"):

@@ -40,7 +40,7 @@ def test_as_many_rows_are_recognised_as_by_weka(weka_data: Path, name: str, roun
     assert correct == golden.n_correct
 
 
-def test_one_fold_differs_in_one_row_where_two_columns_tie_and_weka_lets_rounding_decide(weka_data: Path) -> None:
+def test_one_row_differs_where_weka_lets_rounding_break_a_tie(weka_data: Path) -> None:
     golden = Golden(weka_data, "bin3", 10)
     first, *others = weka_folds(golden.labels, 4, seed=1)
     for fold in others:

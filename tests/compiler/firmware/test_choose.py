@@ -23,14 +23,6 @@ def wide_tables(make_tables: MakeTables) -> IntegerTables:
     return make_tables(1, classes=14, switches=33, joints=16, bins=16, reach=300)
 
 
-@pytest.mark.parametrize("part", list(TARGETS))
-def test_a_fit_costs_what_the_formula_of_its_target_says(tables: IntegerTables, part: str) -> None:
-    fit = fit_for(TARGETS[part], tables)
-    assert fit.layout.tables is tables
-    assert fit.cost == (None if fit.target.formula is None else fit.target.formula.cost(fit.layout, avr=fit.target.avr))
-    assert fit.target is (SMALL if part == "arduino" else TARGETS[part])
-
-
 def test_switches_share_look_ups_where_there_is_flash_for_it(make_tables: MakeTables, tables: IntegerTables) -> None:
     small = make_tables(switches=8, joints=0)
     assert [fit_for(SMALL, each).layout.group for each in (small, tables)] == [4, 4]
@@ -78,15 +70,3 @@ def test_the_smallest_part_that_holds_a_build_is_found(make_tables: MakeTables, 
     assert smallest_fit(large, kind="avr").target is TARGETS["avr2560"]
     with pytest.raises(FirmwareError, match="an array of an AVR has at most 32767"):
         smallest_fit(make_tables(classes=60, switches=60, joints=20, bins=60, reach=100), kind="avr")
-
-
-@pytest.mark.parametrize(("switches", "joints"), [(0, 3), (5, 0), (1, 0)])
-def test_builds_that_lack_a_kind_of_input_fit_too(make_tables: MakeTables, switches: int, joints: int) -> None:
-    tables = make_tables(1, switches=switches, joints=joints)
-    for target in TARGETS.values():
-        assert fit_for(target, tables).layout.tables is tables
-
-
-def test_tables_without_inputs_are_refused(make_tables: MakeTables) -> None:
-    with pytest.raises(FirmwareError, match="no switch and no joint"):
-        fit_for(SMALL, make_tables(1, switches=0, joints=0))

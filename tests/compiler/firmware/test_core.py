@@ -117,7 +117,7 @@ def is_exact(tables: IntegerTables, runs: Any, frames: Probes, same: SameAsPytho
 
 
 @EACH
-def test_on_this_machine_results_are_python_s_without_a_warning_or_a_finding(
+def test_results_on_this_machine_are_pythons_without_warnings(
     tool: Tool, make_tables: MakeTables, probed: Probed, same_as_python: SameAsPython, shape: dict[str, Any]
 ) -> None:
     tool("gcc")
@@ -177,9 +177,7 @@ def test_any_tables_give_python_s_results(
     is_exact(tables, HOST, random_frames(tables, 60, seed), same_as_python, GROUPS[seed % 3])
 
 
-def test_tables_at_the_limit_of_16_bits_borrow_and_carry_as_they_should(
-    tool: Tool, same_as_python: SameAsPython
-) -> None:
+def test_tables_at_the_16_bit_limit_borrow_and_carry_correctly(tool: Tool, same_as_python: SameAsPython) -> None:
     # Neighbouring classes at opposite ends: whatever leaks from one half of a word into the other shows.
     tool("gcc")
     row = np.array([16383, -16383, -16383, 16383, 16383], np.int16)
@@ -254,7 +252,7 @@ def test_hands_share_nothing_and_unknown_numbers_do_nothing(tool: Tool, make_tab
     assert said[9:] == ["3 ...", "3 a..", "3 ab."]
 
 
-def test_the_core_is_the_same_for_every_build_and_reads_as_it_is(make_tables: MakeTables) -> None:
+def test_the_core_is_the_same_for_every_build(make_tables: MakeTables) -> None:
     texts = [Library("hand", numbered(t), Layout(t)).files for t in (make_tables(1), make_tables(2, classes=9))]
     assert [texts[0][name] == texts[1][name] for name in texts[0]] == [True, True, True, False, False]
     for name, text in texts[0].items():

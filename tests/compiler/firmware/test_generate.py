@@ -54,7 +54,7 @@ def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
 
 
 @pytest.mark.parametrize("platform", TARGETS)
-def test_the_same_request_gives_the_same_files_which_name_no_place_and_no_time(build: Build, platform: str) -> None:
+def test_generated_files_are_reproducible_without_paths_or_dates(build: Build, platform: str) -> None:
     files = classifier(build, platform)
     assert files == classifier(build, platform)
     for text in files.values():
@@ -98,7 +98,7 @@ def test_more_flash_than_the_part_has_is_refused(build: Build, platform: str) ->
         Firmware(build.tables, build.manifest, platform, flash=part.flash + 1).files()
 
 
-def test_where_any_part_will_do_none_is_chosen_for_flash_that_it_has_not(build: Build) -> None:
+def test_a_part_is_never_chosen_beyond_its_flash(build: Build) -> None:
     fit = Firmware(build.tables, build.manifest, "arduino", flash=1 << 20).fit
     assert fit.target.part == "atmega328p"
 
@@ -116,9 +116,7 @@ def test_too_little_flash_is_refused(build: Build, platform: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_build_too_large_for_an_uno_is_laid_out_for_what_holds_it(
-    make_tables: MakeTables, describe: Describe
-) -> None:
+def test_a_build_too_large_for_an_uno_gets_a_larger_part(make_tables: MakeTables, describe: Describe) -> None:
     tables = make_tables(classes=40, switches=40, joints=12, bins=30)
     build = Build(describe(tables), tables)
     assert Firmware(build.tables, build.manifest, "arduino").fit.target.part == "atmega2560"

@@ -131,7 +131,7 @@ def test_there_are_no_other_golden_files() -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_every_file_ends_with_one_newline_and_is_at_most_120_wide_without_trailing_blanks(case: str) -> None:
+def test_generated_files_have_tidy_lines_of_at_most_120_characters(case: str) -> None:
     for name, text in made(case).items():
         assert text.endswith("\n"), name
         assert not text.endswith("\n\n"), name

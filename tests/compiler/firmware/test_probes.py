@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.probes import Probes, extreme_frames, joined, random_frames, turns
+from thenar.compiler.firmware.probes import Probes, extreme_frames, random_frames, turns
 from thenar.runtime.tables import IntegerTables
 
 ALL_OPEN, ALL_CLOSED = (False,) * 5, (True,) * 5
@@ -25,7 +25,7 @@ def as_set(frames: Probes) -> set[tuple[tuple[bool, ...], tuple[int, ...]]]:
     return set(zip(map(tuple, frames.bits.tolist()), map(tuple, frames.codes.tolist()), strict=True))
 
 
-def test_the_codes_at_which_a_row_changes_are_both_sides_of_every_threshold_and_the_ends() -> None:
+def test_turning_codes_are_both_sides_of_thresholds_and_the_ends() -> None:
     assert turns(tables([3, 4, 90]), 0).tolist() == [0, 3, 4, 5, 90, 91, 255]
     assert turns(tables([0, 254]), 0).tolist() == [0, 1, 254, 255]
     assert turns(tables([]), 0).tolist() == [0, 255]
@@ -33,7 +33,7 @@ def test_the_codes_at_which_a_row_changes_are_both_sides_of_every_threshold_and_
     assert turns(tables([65535]), 0).tolist() == [0, 65535]
 
 
-def test_extreme_are_all_one_and_all_but_one_switch_and_every_code_of_every_joint_alone() -> None:
+def test_extreme_frames_isolate_every_switch_and_every_code() -> None:
     held = tables([3, 90], [7])
     frames = extreme_frames(held)
     found = as_set(frames)
@@ -50,7 +50,7 @@ def test_extreme_are_all_one_and_all_but_one_switch_and_every_code_of_every_join
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_random_frames_are_those_of_their_seed_and_meet_every_side_of_every_threshold(seed: int) -> None:
+def test_seeded_random_frames_meet_every_side_of_every_threshold(seed: int) -> None:
     held = tables([3, 90, 91], [200])
     frames = random_frames(held, 1000, seed)
     assert (frames.bits.shape, frames.codes.shape) == ((1000, 5), (1000, 2))
@@ -59,10 +59,3 @@ def test_random_frames_are_those_of_their_seed_and_meet_every_side_of_every_thre
     assert len(set(frames.codes[:, 0].tolist())) > 200
     assert {ALL_OPEN, ALL_CLOSED} <= set(map(tuple, frames.bits.tolist()))
     assert len(set(map(tuple, frames.bits.tolist()))) == 32
-
-
-def test_a_build_without_switches_or_without_joints_has_frames_too() -> None:
-    for held, shape in ((tables([3], switches=0), (0, 1)), (tables(), (5, 0))):
-        frames = joined(extreme_frames(held), random_frames(held, 10, 0))
-        assert (frames.bits.shape[1], frames.codes.shape[1]) == shape
-        assert len(frames) == len(extreme_frames(held)) + 10

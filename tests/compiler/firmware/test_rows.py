@@ -373,7 +373,7 @@ def test_the_number_of_a_row_begins_again_after_65535(named: Named, compiled: Ca
 
 
 @pytest.mark.parametrize("how", ["unplugged", "without power"])
-def test_a_chip_that_is_lost_leaves_rows_out_and_is_set_up_again(four: Running, how: str) -> None:
+def test_a_lost_chip_skips_rows_and_is_set_up_again(four: Running, how: str) -> None:
     world = four.world
     before = list(rows_in(four.run(100_000)))
     if how == "unplugged":
@@ -393,9 +393,7 @@ def test_a_chip_that_is_lost_leaves_rows_out_and_is_set_up_again(four: Running, 
 SECRETS = '#define SSID "lab"\n#define PASSWORD "secret"\n#define HOST "10.0.0.7"\n#define PORT 5253\n'
 
 
-def test_with_secrets_the_lines_are_datagrams_and_a_lost_network_is_joined_again(
-    named: Named, compiled: Callable[..., Path]
-) -> None:
+def test_with_secrets_rows_are_datagrams_and_networks_are_rejoined(named: Named, compiled: Callable[..., Path]) -> None:
     board = Board(pins={"a": 2}, analog={"i": A0})
     world = World(board, tick_us=50)
     world.set({"a"}, {"i": 700})
@@ -414,7 +412,7 @@ def test_with_secrets_the_lines_are_datagrams_and_a_lost_network_is_joined_again
     assert all((row.closed, row.readings) == ({0}, [700]) for row in rows)
 
 
-def test_every_board_has_a_sketch_of_its_elements_and_other_devices_keep_theirs(named: Named) -> None:
+def test_every_board_gets_a_sketch_of_its_own_elements(named: Named) -> None:
     second = '[[stream]]\nport = "/dev/ttyACM1"\nswitches = ["x", "y"]\n[stream.board]\npins = { x = "2", y = "3" }\n'
     glove = FOUR.toml + second + '[cyberglove]\nport = "/dev/ttyUSB0"\njoints = ["bent"' + ', ""' * 17 + "]\n"
     files = rows_files("hand", named(["y", "a", "d"], ["bent"], []), parse_harness(glove, "glove.toml"))

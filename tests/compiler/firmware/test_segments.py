@@ -104,9 +104,7 @@ def test_on_arms_cores_it_is_pythons_state_at_every_tick(runs: Any, cores: Any, 
         np.testing.assert_array_equal(runs.run_cortex(model, lanes, refused, LAG, cores[core].emulate).states, expected)
 
 
-def test_on_an_avr_a_tick_of_14_types_and_none_takes_the_cycles_and_the_memory_that_the_docs_say(
-    runs: Any, avr: None
-) -> None:
+def test_the_segment_decoder_takes_the_documented_avr_cycles_and_memory(runs: Any, avr: None) -> None:
     """Cycles of a simulated part are no times: they are the same on every machine."""
     for name in ("usual", "learnt", "each type its own", "no class none"):
         ram = 1050 if name == "learnt" else 468
@@ -124,7 +122,7 @@ def _learnt(tables: IntegerTables, describe: Callable[[IntegerTables], Manifest]
 
 
 @pytest.mark.parametrize("target", sorted(TARGETS))
-def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along(
+def test_firmware_of_builds_with_segment_costs_includes_the_decoder(
     make_tables: Callable[..., IntegerTables],
     describe: Callable[[IntegerTables], Manifest],
     avr: None,

@@ -79,7 +79,7 @@ def test_a_classifier_with_a_wrong_entry_fails_its_check(
     ("name", "right", "wrong"),
     [("thenar.c", "number / 8u]", "0u]"), ("thenar_hand.c", '"grasp 1\\000"', '"grasp 7\\000"')],
 )
-def test_a_wrong_bit_of_a_switch_and_a_wrong_name_fail_the_check(
+def test_a_wrong_switch_bit_or_name_fails_the_check(
     make: Make, make_tables: MakeTables, describe: Describe, name: str, right: str, wrong: str
 ) -> None:
     tables = make_tables()

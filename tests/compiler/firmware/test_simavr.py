@@ -1,4 +1,3 @@
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,18 +10,14 @@ from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.firmware import FirmwareError, simavr
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
-from thenar.compiler.firmware.probes import Predictions, Probes, random_frames
+from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.firmware_templates.rendering import file_text
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 from thenar.simulator import load_scene, simulate
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
-Probed = Callable[[IntegerTables, int], Probes]
 Compare = Callable[[Predictions, IntegerTables, Probes], None]
 
 SMALL, LARGE = TARGETS["avr328p"], TARGETS["avr2560"]
@@ -86,12 +81,6 @@ def one_switch() -> IntegerTables:
     )
 
 
-def answered(tables: IntegerTables, describe: Describe, layout: Layout, target: Target, frames: Probes) -> Predictions:
-    files = Library("test", describe(tables), layout).files
-    given = layout.frame_bytes(frames.bits, frames.codes)
-    return target.run(files, "test", layout, given)
-
-
 @BOTH
 def test_every_score_of_recordings_is_that_of_the_build(
     recorded: tuple[Build, GraspSet], same_as_python: Compare, target: Target
@@ -118,21 +107,6 @@ def test_stack_cycles_and_answers_are_those_of_the_function_alone(target: Target
     assert answers.scores.tolist() == [[0, -2], [1, -2]]
 
 
-def test_ten_thousand_frames_take_seconds(make_tables: MakeTables, describe: Describe) -> None:
-    tables = make_tables(seed=2, classes=14, switches=33, joints=16)
-    frames = random_frames(tables, 10_000, seed=3)
-    begun = children_s()
-    answered(tables, describe, Layout(tables), SMALL, frames)
-    print(f"{children_s() - begun:.1f} s")
-    assert children_s() - begun < 15
-
-
-def children_s() -> float:
-    """Return what programs have taken of the processor that this one has waited for."""
-    times = os.times()
-    return times.children_user + times.children_system
-
-
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
@@ -147,16 +121,6 @@ def test_files_that_are_no_such_classifier_are_an_error(changed: dict[str, str],
     layout = Layout(one_switch())
     with pytest.raises(FirmwareError, match=said):
         SMALL.run({**BY_HAND, **changed}, "test", layout, np.ones((1, 2), np.uint8))
-
-
-def test_frames_of_another_size_are_refused() -> None:
-    with pytest.raises(FirmwareError, match="this layout takes uint8"):
-        SMALL.run(BY_HAND, "test", Layout(one_switch()), np.zeros((1, 3), np.uint8))
-
-
-def test_no_frames_have_no_answers() -> None:
-    answers = SMALL.run(BY_HAND, "test", Layout(one_switch()), np.zeros((0, 2), np.uint8))
-    assert (answers.scores.shape, answers.stack) == ((0, 2), None)
 
 
 def test_what_is_missing_is_named_with_the_packages_that_bring_it(

@@ -14,23 +14,11 @@ NOWHERE = (("no-such-compiler", "nor-this-one"), "no-such-package")
 SHELL = (("no-such-shell", "sh"), "dash")
 
 
-def test_the_first_installed_of_several_programs_is_found() -> None:
-    assert Path(find(SHELL)).name == "sh"
-    assert lacking(SHELL) is None
-
-
 def test_what_is_missing_is_named_with_its_packages() -> None:
     wanted = "no-such-compiler or nor-this-one not found; Debian: apt-get install no-such-package"
     assert lacking(SHELL, NOWHERE) == wanted
     with pytest.raises(FirmwareError, match=f"^{wanted}$"):
         find(NOWHERE)
-
-
-def test_a_workshop_holds_its_files_and_is_gone_afterwards() -> None:
-    with workshop({"a.c": "int é;\n", "inner/b.bin": b"\x00\xff"}) as folder:
-        assert (folder / "a.c").read_bytes() == "int é;\n".encode()
-        assert (folder / "inner" / "b.bin").read_bytes() == b"\x00\xff"
-    assert not folder.exists()
 
 
 def test_a_workshop_that_cannot_be_written_is_an_error_that_says_where() -> None:
@@ -42,10 +30,6 @@ def test_where_no_folder_can_be_made_is_an_error(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
     with pytest.raises(FirmwareError, match="no temporary folder: No such file or directory"), workshop({}):
         pass
-
-
-def test_a_call_gives_what_was_printed_of_what_it_was_given(tmp_path: Path) -> None:
-    assert call(["sh", "-c", "pwd; cat"], tmp_path, b"given") == f"{tmp_path}\ngiven".encode()
 
 
 def test_a_failing_call_is_an_error_with_what_it_said(tmp_path: Path) -> None:

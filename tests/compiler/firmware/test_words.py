@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.words import check_name, comment, inputs_in_words, markdown, string
+from thenar.compiler.firmware.words import check_name, comment, markdown, string
 
 ANY_TEXT = st.text(max_size=60)
 
@@ -24,40 +24,16 @@ def test_any_other_name_is_refused(text: str) -> None:
         check_name(text)
 
 
-@pytest.mark.parametrize("name", ["", "Hand", "9", "_a", "../x", "left hand", "hänsel", "a" * 33, "a\n"])
-def test_names_are_not_rewritten_but_refused(name: str) -> None:
-    with pytest.raises(FirmwareError) as refused:
-        check_name(name)
-    assert str(refused.value).startswith(f"{name!r} cannot be the name: ")
-
-
-@pytest.mark.parametrize(
-    ("counts", "words"),
-    [
-        ((31, 0), "31 switches"),
-        ((0, 16), "16 joints"),
-        ((31, 16), "31 switches and 16 joints"),
-        ((1, 1), "1 switch and 1 joint"),
-    ],
-)
-def test_inputs_that_there_are_none_of_are_left_out(counts: tuple[int, int], words: str) -> None:
-    assert inputs_in_words(*counts) == words
-
-
 @given(ANY_TEXT)
-def test_a_comment_is_one_line_of_ascii_that_neither_ends_nor_opens_one(text: str) -> None:
+def test_a_comment_is_one_ascii_line_that_cannot_break_out(text: str) -> None:
     said = comment(text)
     assert said.isascii()
     assert said.isprintable()
     assert not any(mark in said for mark in ("*/", "/*", "??/"))
 
 
-def test_a_comment_escapes_what_is_not_ascii() -> None:
-    assert comment("Griff ü 手 🖐\n*/") == "Griff \\xfc \\u624b \\U0001f590\\x0a* /"
-
-
 @given(ANY_TEXT)
-def test_a_text_in_markdown_is_one_line_in_which_every_mark_is_escaped(text: str) -> None:
+def test_markdown_text_is_one_line_with_every_mark_escaped(text: str) -> None:
     said = markdown(text)
     assert said.isascii()
     assert said.isprintable()

@@ -15,12 +15,12 @@ from thenar.compiler.frontier.points import (
     Curve,
     DecisionKind,
     Frontier,
+    FrontierPoint,
     Latency,
-    Mark,
     PlacementChoice,
-    Point,
     PointSetting,
-    Time,
+    PointTime,
+    ReferencePoint,
     Tried,
     frontier_from_bytes,
     frontier_to_bytes,
@@ -141,9 +141,9 @@ def rate(mean: float, of: Of = "new subject") -> Rate:
     return Rate(of, "trials", (round(4200 * mean),), 4200, 3, mean, max(0.0, mean - half), min(1.0, mean + half))
 
 
-def _points() -> tuple[Point, ...]:
+def _points() -> tuple[FrontierPoint, ...]:
     points = [_point(number, *row) for number, row in enumerate(_POINTS, 1)]
-    costs: dict[str, Callable[[Point], float]] = {
+    costs: dict[str, Callable[[FrontierPoint], float]] = {
         "frame": lambda point: point.frame.us,
         "switches": lambda point: len(point.switches),
         "latency": lambda point: point.latency.mean_us,
@@ -156,7 +156,7 @@ def _points() -> tuple[Point, ...]:
     )
 
 
-def _beaten(point: Point, points: Sequence[Point], cost: Callable[[Point], float]) -> bool:
+def _beaten(point: FrontierPoint, points: Sequence[FrontierPoint], cost: Callable[[FrontierPoint], float]) -> bool:
     mine = (cost(point), -point.rate.mean)
     return any(
         cost(other) <= mine[0] and -other.rate.mean <= mine[1] and (cost(other), -other.rate.mean) != mine
@@ -180,12 +180,12 @@ def _point(
     mean: float,
     latency_us: float,
     p99_us: float,
-) -> Point:
+) -> FrontierPoint:
     transfer_us = 0.0 if inputs == "switches" else TRANSFER_US
     setting = PointSetting(
         PlacementChoice(method, parameter), inputs, rounds, width, decision, wiring, 1000 * clock_khz
     )
-    return Point(
+    return FrontierPoint(
         number=number,
         setting=setting,
         switches=tuple(SWITCHES[(41 * place + 3) % N_SWITCHES] for place in range(kept)),
@@ -193,10 +193,10 @@ def _point(
         luck=0.004,
         frames=None,
         other_rate=rate(mean + (1 - mean) / 4, "pooled"),
-        scan=Time(scan_us, "wire"),
-        transfer=Time(transfer_us, "wire"),
-        classify=Time(classify_us, "simulated" if number % 3 == 1 else "model"),
-        frame=Time(max(scan_us, transfer_us) + classify_us, "simulated" if number % 3 == 1 else "model"),
+        scan=PointTime(scan_us, "wire"),
+        transfer=PointTime(transfer_us, "wire"),
+        classify=PointTime(classify_us, "simulated" if number % 3 == 1 else "model"),
+        frame=PointTime(max(scan_us, transfer_us) + classify_us, "simulated" if number % 3 == 1 else "model"),
         latency=Latency(latency_us, p99_us, 0.012, 0.004),
         flash=1900 + 14 * (rounds + 12 * kept) + (2600 if inputs != "switches" else 0),
         ram=48 + 2 * kept,
@@ -222,10 +222,10 @@ def _sizes(first: int) -> tuple[int, ...]:
     return tuple(round(first * 1.7**step) for step in range(7))
 
 
-def _marks() -> tuple[Mark, ...]:
+def _marks() -> tuple[ReferencePoint, ...]:
     return (
-        Mark("all 160 switches", 160, rate(0.936), 2050.0, 8900.0),
-        Mark("paper, S = 13", 66, rate(0.932), 1420.0, 6600.0),
-        Mark("paper, S = 62", 35, rate(0.915), 905.0, 5200.0),
-        Mark("your build", 49, rate(0.927), 1105.0, 6000.0),
+        ReferencePoint("all 160 switches", 160, rate(0.936), 2050.0, 8900.0),
+        ReferencePoint("paper, S = 13", 66, rate(0.932), 1420.0, 6600.0),
+        ReferencePoint("paper, S = 62", 35, rate(0.915), 905.0, 5200.0),
+        ReferencePoint("your build", 49, rate(0.927), 1105.0, 6000.0),
     )

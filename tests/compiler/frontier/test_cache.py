@@ -15,10 +15,10 @@ import pytest
 from distributed import LocalCluster
 
 from thenar.compiler.cluster import ClusterError, dask_cluster
-from thenar.compiler.frontier.cache import Cache, Call, Store, StoreError, stored
+from thenar.compiler.frontier.cache import Cache, Store, StoreError, question, stored
 
 
-def question(number: int) -> bytes:
+def key(number: int) -> bytes:
     return b"question %d" % number
 
 
@@ -30,14 +30,14 @@ class Answer(msgspec.Struct, frozen=True):
 def filled(path: Path, count: int = 3) -> Path:
     with Store(path, "set") as store:
         for number in range(count):
-            store.put(question(number), Answer((number / 3,)))
+            store.put(key(number), Answer((number / 3,)))
     return path
 
 
 def kept(path: Path, count: int = 3) -> list[int]:
     """Return which of the questions of `filled` the store at `path` still answers, all of them rightly."""
     with Store(path, "set") as store:
-        answers = {number: store.get(question(number), Answer) for number in range(count)}
+        answers = {number: store.get(key(number), Answer) for number in range(count)}
     assert all(answer in (None, Answer((number / 3,))) for number, answer in answers.items())
     return [number for number, answer in answers.items() if answer is not None]
 
@@ -45,17 +45,17 @@ def kept(path: Path, count: int = 3) -> list[int]:
 def test_another_scope_of_question_is_another_question(tmp_path: Path) -> None:
     filled(tmp_path / "store", 1)
     with Store(tmp_path / "store", "other set") as store:
-        assert store.get(question(0), Answer) is None
-        store.put(question(0), Answer((9.0,)))
+        assert store.get(key(0), Answer) is None
+        store.put(key(0), Answer((9.0,)))
     assert kept(tmp_path / "store", 1) == [0]
 
 
-def test_an_answer_that_no_longer_reads_as_asked_is_to_be_found_again(tmp_path: Path) -> None:
+def test_a_stored_answer_of_another_type_is_computed_again(tmp_path: Path) -> None:
     filled(tmp_path / "store", 1)
     with Store(tmp_path / "store", "set") as store:
-        assert store.get(question(0), int) is None
-        store.put(question(5), Answer((math.nan,)))
-        assert store.get(question(5), Answer) is None
+        assert store.get(key(0), int) is None
+        store.put(key(5), Answer((math.nan,)))
+        assert store.get(key(5), Answer) is None
 
 
 def foreign_database() -> bytes:
@@ -99,14 +99,14 @@ def test_two_runs_do_not_have_it_at_once(tmp_path: Path) -> None:
 FULL_DISK = """
 import resource, signal, sys
 from pathlib import Path
-from tests.compiler.frontier.test_cache import Answer, question
+from tests.compiler.frontier.test_cache import Answer, key
 from thenar.compiler.frontier.cache import Store, StoreError
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 with Store(Path(sys.argv[1]), "set") as store:
     try:
         for number in range(10_000):
-            store.put(question(number), Answer((number / 3,)))
+            store.put(key(number), Answer((number / 3,)))
     except StoreError as reason:
         print(number, reason)
 """
@@ -126,12 +126,21 @@ class Found(msgspec.Struct, frozen=True):
     parts: tuple[int, ...]
 
 
-@stored(1, without=("notes",))
-def squared(number: int, notes: Path) -> Found:
+class Notes:
+    """A file that a result does not depend on."""
+
+    identity = ""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+
+@stored(1)
+def squared(number: int, notes: Notes) -> Found:
     """Leave a line in `notes` whenever it is done."""
     if number < 0:
         raise ValueError(f"{number} is negative")
-    with notes.open("a") as file:
+    with notes.path.open("a") as file:
         file.write(f"{number}\n")
     return Found(number**2 / 7, (number,))
 
@@ -141,8 +150,8 @@ def told_wrongly(number: int) -> str:
     return number  # type: ignore[return-value]
 
 
-def calls_in(folder: Path, numbers: list[int] | range) -> list[Call[Found]]:
-    return [squared.call(number, folder / "notes") for number in numbers]
+def calls_in(folder: Path, numbers: list[int] | range) -> list[tuple[int, Notes]]:
+    return [(number, Notes(folder / "notes")) for number in numbers]
 
 
 def done_in(folder: Path) -> list[int]:
@@ -154,9 +163,9 @@ def silent(_done: int, _total: int) -> None:
     pass
 
 
-def asked(path: Path, calls: list[Call[Found]], jobs: int = 1, cluster: str | None = None) -> list[Found]:
+def asked(path: Path, calls: list[tuple[int, Notes]], jobs: int = 1, cluster: str | None = None) -> list[Found]:
     with Store(path, "set") as store, dask_cluster(cluster):
-        return Cache(store, silent, jobs=jobs).ask(calls)
+        return Cache(store, silent, jobs=jobs).ask(squared, calls)
 
 
 def found_of(numbers: list[int] | range) -> list[Found]:
@@ -164,7 +173,7 @@ def found_of(numbers: list[int] | range) -> list[Found]:
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_every_answer_is_found_once_and_comes_in_the_order_of_the_calls(tmp_path: Path, jobs: int) -> None:
+def test_answers_are_computed_once_and_come_in_call_order(tmp_path: Path, jobs: int) -> None:
     assert asked(tmp_path / "store", calls_in(tmp_path, [3, 1, 3, 2]), jobs) == found_of([3, 1, 3, 2])
     assert done_in(tmp_path) == [1, 2, 3]
 
@@ -181,7 +190,7 @@ def test_work_for_a_cluster_is_not_done_here(tmp_path: Path) -> None:
         asked(tmp_path / "store", calls_in(tmp_path, [1]), cluster="")
 
 
-def test_what_is_stored_is_not_done_again_and_reads_as_what_was_found(tmp_path: Path) -> None:
+def test_stored_answers_are_reused_and_read_back_equal(tmp_path: Path) -> None:
     first = asked(tmp_path / "store", calls_in(tmp_path, range(5)))
     again = asked(tmp_path / "store", calls_in(tmp_path, range(7)))
     assert done_in(tmp_path) == list(range(7))
@@ -189,16 +198,16 @@ def test_what_is_stored_is_not_done_again_and_reads_as_what_was_found(tmp_path: 
 
 
 def test_what_was_found_before_an_error_is_kept(tmp_path: Path) -> None:
-    calls = [squared.call(1, tmp_path / "notes"), squared.call(-1, tmp_path / "notes")]
+    calls = calls_in(tmp_path, [1, -1])
     with pytest.raises(ValueError, match="-1 is negative"):
         asked(tmp_path / "store", calls)
     with Store(tmp_path / "store", "set") as store:
-        assert store.get(calls[0].question({}), Found) is not None
+        assert store.get(question(squared, calls[0], {}), Found) is not None
 
 
 def test_an_answer_that_json_would_change_is_refused_when_it_is_found(tmp_path: Path) -> None:
     with Store(tmp_path / "store", "set") as store, pytest.raises(TypeError, match="the result of told_wrongly is no"):
-        Cache(store, silent, jobs=1).ask([told_wrongly.call(1)])
+        Cache(store, silent, jobs=1).ask(told_wrongly, [(1,)])
 
 
 def test_every_round_has_the_same_weight(tmp_path: Path) -> None:
@@ -206,9 +215,9 @@ def test_every_round_has_the_same_weight(tmp_path: Path) -> None:
     asked(tmp_path / "store", calls_in(tmp_path, [2]))
     with Store(tmp_path / "store", "set") as store:
         cache = Cache(store, lambda done, total: told.append((done, total)), 3, jobs=1)
-        cache.ask(calls_in(tmp_path, range(4)))
-        cache.ask([])
-        cache.ask([squared.call(9, tmp_path / "notes")])
+        cache.ask(squared, calls_in(tmp_path, range(4)))
+        cache.ask(squared, [])
+        cache.ask(squared, calls_in(tmp_path, [9]))
     assert told == [(25, 300), (50, 300), (75, 300), (100, 300), (200, 300), (200, 300), (300, 300)]
 
 
@@ -224,14 +233,15 @@ def other_lengths(array: np.ndarray[Any, Any], name: str = "") -> int:
 
 def test_a_question_is_its_function_version_and_arguments_and_no_other() -> None:
     array = np.arange(6)
-    here = lengths.call(array).question({})
-    assert here == lengths.call(array=array.copy(), name="").question({})
+    here = question(lengths, (array,), {})
+    assert here == question(lengths, (array.copy(), ""), {})
     others = (array[::-1], array.astype(np.int32), array.reshape(2, 3), array[:5], array + (array == 5))
-    different = [lengths.call(other) for other in others]
-    different += [lengths.call(array, "x"), other_lengths.call(array)]
-    assert here not in {call.question({}) for call in different}
-    assert len({call.question({}) for call in different}) == len(different)
-    assert squared.call(1, Path("a")).question({}) == squared.call(1, Path("b")).question({})
+    different = [question(lengths, (other,), {}) for other in others]
+    different += [question(lengths, (array, "x"), {}), question(other_lengths, (array,), {})]
+    assert here not in different
+    assert len(set(different)) == len(different)
+    first, second = calls_in(Path("a"), [1]), calls_in(Path("b"), [1])
+    assert question(squared, first[0], {}) == question(squared, second[0], {})
 
 
 def run(folder: Path, numbers: range) -> None:
@@ -243,7 +253,7 @@ def run(folder: Path, numbers: range) -> None:
             signal.sigtimedwait([signal.SIGUSR1], 60)
 
     with Store(folder / "store", "set") as store:
-        Cache(store, told, jobs=2).ask([squared.call(number, folder / "notes") for number in numbers])
+        Cache(store, told, jobs=2).ask(squared, [(number, Notes(folder / "notes")) for number in numbers])
 
 
 RUN = """
@@ -266,7 +276,9 @@ def test_a_run_that_is_killed_goes_on_where_it_was(tmp_path: Path) -> None:
     again.mkdir()
     calls = calls_in(again, range(1000))
     with Store(tmp_path / "store", "set") as store:
-        known = {number for number, call in enumerate(calls) if store.get(call.question({}), Found) is not None}
+        known = {
+            number for number, call in enumerate(calls) if store.get(question(squared, call, {}), Found) is not None
+        }
     assert len(known) == 10
     assert asked(tmp_path / "store", calls) == found_of(range(1000))
     assert set(done_in(again)) == set(range(1000)) - known

@@ -9,13 +9,14 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.designs import Design, best_designs, designs, lucks, points_of
 from thenar.compiler.frontier.finalists import EvaluatedFinalist
 from thenar.compiler.frontier.latency import POLICIES
-from thenar.compiler.frontier.points import Latency, PlacementChoice, Time
+from thenar.compiler.frontier.points import Latency, PlacementChoice, PointTime
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Search, Shape
 from thenar.compiler.frontier.survey import Cuts, TrialAccuracy
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes, records_of
+from thenar.compiler.placement.elements import Element
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS, Training
 from thenar.drivers.cyberglove_protocol import SENSORS_18
@@ -46,27 +47,22 @@ def close_of(
     tables = PricedTables(TABLED, b"", Classified(classify_us, "model", 900, 30), wired, 1.25)
     choice = PlacementChoice("id3", float(switches))
     screened = Screened(
-        Candidate(choice, "switches" if switches else "joints"), tuple(range(switches)), judged(rate), classify_us
+        Candidate(choice, "switches" if switches else "joints"),
+        tuple(map(Element, range(switches))),
+        judged(rate),
+        classify_us,
     )
     return EvaluatedFinalist(screened, {}, {TABLED: judged(rate)}, {}, {}, (tables,), 2.0)
 
 
 def simulated(design: Design, us: float) -> Design:
-    return replace(design, measured=Time(us, "simulated"))
+    return replace(design, measured=PointTime(us, "simulated"))
 
 
 def test_joints_alone_have_one_design_and_wait_for_a_record() -> None:
     (design,) = designs(close_of(switches=0), records_of(SENSORS_18).of(18))
     assert (design.scan.us, design.wired, design.classify.us) == (0.0, None, 50.0)
     assert design.frame.us == pytest.approx(18 * 250 + 21 * 10 / 115_200 * 1e6 + 50.0)
-
-
-def test_compiling_is_choosing_training_and_making_the_tables() -> None:
-    design = next(designs(close_of()))
-    (point, *_) = points_of(
-        [design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), {design.judged: 0.0}, names, trained
-    )
-    assert point.compile_s == 3.25
 
 
 def test_luck_is_the_same_however_often_the_same_folds_are_repeated() -> None:
@@ -112,10 +108,10 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     assert fronts[10, "single"] == ("switches",)
     assert (20, "dwell") in fronts
     assert (10, "dwell") not in fronts
-    assert points[0].classify == Time(20.0, "simulated")
+    assert points[0].classify == PointTime(20.0, "simulated")
 
 
-def test_a_points_rate_and_the_lower_end_of_its_interval_are_less_its_luck() -> None:
+def test_luck_lowers_a_points_rate_and_its_intervals_lower_end() -> None:
     design = next(designs(close_of(20, 0.9)))
     waits = dict.fromkeys(((design, kind) for kind in POLICIES), WAIT)
     (point, *_) = points_of([design], waits, {design.judged: 0.25}, names, trained)
@@ -124,20 +120,6 @@ def test_a_points_rate_and_the_lower_end_of_its_interval_are_less_its_luck() -> 
         (found.mean - 0.25, found.low - 0.25, found.high)
     )
     assert (point.luck, point.rate.correct) == (0.25, found.correct)
-
-
-def test_a_decision_that_is_quicker_is_on_its_own_front() -> None:
-    one, other = (next(designs(close_of(n, rate))) for n, rate in ((20, 0.9), (10, 0.8)))
-    waits = {(design, kind): WAIT for design in (one, other) for kind in POLICIES}
-    waits[other, "sequential"] = replace_latency(WAIT, 10.0)
-    points = points_of([one, other], waits, {each.judged: 0.0 for each in (one, other)}, names, trained)
-    (found,) = (each for each in points if len(each.switches) == 10 and each.setting.decision == "sequential")
-    assert found.fronts == ("latency",)
-    assert found.latency.mean_us == 10.0
-
-
-def replace_latency(latency: Latency, mean_us: float) -> Latency:
-    return Latency(mean_us, latency.p99_us, latency.missed, latency.wrong)
 
 
 def test_a_point_says_its_trainer_and_every_setting_that_is_no_default() -> None:

@@ -1,11 +1,15 @@
+import numpy as np
 from msgspec.structs import replace
 
+from thenar.compiler.frontier.cache import question
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.price import price
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, Overhead
 from thenar.compiler.frontier.timing.wirings import wirings
+from thenar.compiler.placement.elements import Element
+from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.runtime.scanning.propose import propose_board, propose_harness
@@ -25,13 +29,16 @@ def test_whatever_times_depend_on_is_part_of_the_question(grasp_set: GraspSet) -
         Equipment(MODEL, wirings(None), Overhead("", call_us=1.0)),
         *(Equipment(MODEL, wirings(given), WIRE_ONLY) for given in (glove, slower, other, faster)),
     ]
-    names, rows = tuple(NAMES), Samples.of(grasp_set)
+    names, samples = tuple(NAMES), Samples.of(grasp_set)
+    kept = InputSelection.of(tuple(map(Element, range(3))), ())
     training = Search().training
-    asked = {price.call(rows, names, (0, 1, 2), (), training, each, False).question({}) for each in equipments}
+    asked = {
+        question(price, (samples, names, np.arange(9), kept, (), training, each, False), {}) for each in equipments
+    }
     assert len(asked) == len(equipments)
 
 
-def test_without_switches_no_wiring_is_wanted_and_one_without_a_place_does_not_fit() -> None:
+def test_switches_need_a_wiring_with_a_place_for_each() -> None:
     equipment = Equipment(MODEL, wirings(propose_harness(NAMES[:2])), WIRE_ONLY)
     assert equipment.fitting(()) == ()
     assert "as wired" in [wiring.name for wiring in equipment.fitting(NAMES[:2])]

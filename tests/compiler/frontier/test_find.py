@@ -18,10 +18,12 @@ from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.plots import pictures
-from thenar.compiler.frontier.points import Frontier, FrontierError, Point, frontier_from_bytes
+from thenar.compiler.frontier.points import Frontier, FrontierError, FrontierPoint, frontier_from_bytes
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
+from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.methods.base import METHODS
+from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.tables.collapse import collapse
@@ -84,7 +86,7 @@ def test_rows_in_which_nothing_is_held_change_no_rate(
     assert [(one.placement, one.rate) for one in found.tried] == [(one.placement, one.rate) for one in first[1].tried]
 
 
-def test_every_point_is_on_a_front_and_none_beats_those_of_its_own(first: tuple[Request, Frontier]) -> None:
+def test_every_point_lies_on_a_front_without_dominating_others(first: tuple[Request, Frontier]) -> None:
     points = first[1].points
     assert points
     assert all(point.fronts for point in points)
@@ -94,7 +96,7 @@ def test_every_point_is_on_a_front_and_none_beats_those_of_its_own(first: tuple[
         assert not any(price(a) < price(b) and chosen_by(a) >= chosen_by(b) for a in front for b in front)
 
 
-def chosen_by(point: Point) -> float:
+def chosen_by(point: FrontierPoint) -> float:
     """Return the rate before its correction."""
     return point.rate.mean + point.luck
 
@@ -108,7 +110,7 @@ def test_subjects_are_left_out_where_there_are_several(first: tuple[Request, Fro
     assert {point.rate.over for point in found.points} == {2}
 
 
-def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) -> int:
+def rows_recognised(grasp_set: GraspSet, point: FrontierPoint, train: Rows, test: Rows) -> int:
     """Choose, train and cut integers from some rows alone, and let the runtime answer the others."""
     setting, joints = point.setting, point.setting.inputs != "switches"
     labels = np.unique(grasp_set.labels, return_inverse=True)[1]
@@ -271,9 +273,7 @@ def test_an_unknown_baseline_is_told(tmp_path: Path, make_set: Make) -> None:
         found_of(asked(tmp_path, make_set(), baselines=("nonsense",)))
 
 
-def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_what_the_point_says(
-    tmp_path: Path, make_set: Make
-) -> None:
+def test_compile_makes_what_a_point_of_each_trainer_says(tmp_path: Path, make_set: Make) -> None:
     request = asked(tmp_path, make_set(subjects=2), methods=("id3",), baselines=(), trainer="auto", settings={})
     found = found_of(request)
     assert set(found.trainers) == {name for name, trainer in TRAINERS.items() if trainer.tried}
@@ -306,10 +306,11 @@ def test_settings_are_chosen_inside_the_training_rows(make_set: Make) -> None:
     samples = Samples.of(make_set(subjects=2))
     cuts, candidates = Cuts.of(samples, Search()), Search().alone("logit").candidates
     fold = cuts.screening[0]
-    found = choose_settings(samples, fold.train, (0, 1, 2), candidates, 1, True)
+    kept = InputSelection.of(tuple(map(Element, range(3))), (0, 1, 2))
+    found = choose_settings(samples, fold.train, kept, candidates, 1, True)
     shuffled = samples.labels.copy()
     shuffled[fold.test] = shuffled[fold.test][::-1]
-    assert choose_settings(replace_rows(samples, labels=shuffled), fold.train, (0, 1, 2), candidates, 1, True) == found
+    assert choose_settings(replace_rows(samples, labels=shuffled), fold.train, kept, candidates, 1, True) == found
 
 
 def with_sensors(grasp_set: GraspSet, sensors: int) -> GraspSet:
@@ -322,9 +323,7 @@ def with_sensors(grasp_set: GraspSet, sensors: int) -> GraspSet:
     return replace_rows(grasp_set, codes=codes, joints=joints)
 
 
-def test_points_may_read_some_of_the_joints_and_what_is_built_of_them_reads_these(
-    tmp_path: Path, make_set: Make
-) -> None:
+def test_builds_of_points_with_some_joints_read_these_joints(tmp_path: Path, make_set: Make) -> None:
     grasp_set = with_sensors(make_set(switches=3, subjects=2), 5)
     found = found_of(asked(tmp_path, grasp_set, finalists=6, baselines=(), methods=("elimination",)))
     fewer = [point for point in found.points if point.joints]

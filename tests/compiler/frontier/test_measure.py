@@ -13,7 +13,7 @@ from thenar.compiler.frontier.designs import Design
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.finalists import EvaluatedFinalist
 from thenar.compiler.frontier.measure import measured, unmeasured
-from thenar.compiler.frontier.points import PlacementChoice, Time
+from thenar.compiler.frontier.points import PlacementChoice, PointTime
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Shape
@@ -21,6 +21,7 @@ from thenar.compiler.frontier.survey import TrialAccuracy
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
 from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, ScanTimes
+from thenar.compiler.placement.elements import Element
 from thenar.runtime.tables import tables_to_bytes
 
 PYTHON = PythonCost(5.0, 0.1, 0.5, 0.1, 0.01, 0.01, 10.0)
@@ -32,10 +33,10 @@ def design_of(model: ClassifyModel) -> Design:
     wired = Wired("mcp23017", 400_000, scan)
     priced = PricedTables(Tabled(1, Shape(16)), tables_to_bytes(tables), model.cost(tables), (wired,), 1.0)
     judged = TrialAccuracy(Rate.counted((9,), 10, of="pooled"), np.arange(10), 1)
-    screened = Screened(Candidate(PlacementChoice("id3", 6.0), "switches"), tuple(range(6)), judged, 1.0)
+    screened = Screened(Candidate(PlacementChoice("id3", 6.0), "switches"), tuple(map(Element, range(6))), judged, 1.0)
     close = EvaluatedFinalist(screened, {}, {}, {}, {}, (priced,), 1.0)
     assert priced.classified is not None
-    return Design(close, priced, priced.classified, wired, Time(0.0, "wire"))
+    return Design(close, priced, priced.classified, wired, PointTime(0.0, "wire"))
 
 
 @pytest.mark.slow

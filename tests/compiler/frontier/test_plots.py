@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from thenar.compiler.frontier.plots import PICTURES, POINT_ID, pictures
-from thenar.compiler.frontier.points import Frontier, Mark, Point, Time
+from thenar.compiler.frontier.points import Frontier, FrontierPoint, PointTime, ReferencePoint
 from thenar.compiler.pictures import painting
 
 NASTY = r"$\left{<&> -- ü = ]]> 'x'"
@@ -23,7 +23,7 @@ def _texts(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.axes[0].texts]
 
 
-def _is_shown(point: Point, name: str) -> bool:
+def _is_shown(point: FrontierPoint, name: str) -> bool:
     """Return whether a picture has anything to say of a point."""
     return {
         "frontier": point.fronts != ("latency",),
@@ -53,7 +53,7 @@ def test_every_point_and_mark_is_named(examples: Any, name: str) -> None:
 
 
 def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:
-    mark = Mark(NASTY, 160, examples.rate(0.93), 2000.0, 8000.0)
+    mark = ReferencePoint(NASTY, 160, examples.rate(0.93), 2000.0, 8000.0)
     curves = examples.example_frontier().curves
     frontier = examples.example_frontier(
         source=NASTY,
@@ -67,7 +67,7 @@ def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:
         assert any(text.startswith(NASTY) for text in _texts(_drawn(frontier, name)))
 
 
-def test_a_cost_of_nothing_has_a_place_and_no_name_breaks_the_file(examples: Any) -> None:
+def test_zero_costs_and_strange_names_are_drawn(examples: Any) -> None:
     found, replace = examples.example_frontier(), msgspec.structs.replace
     first = replace(found.points[0], frame=replace(found.points[0].frame, us=0.0))
     mark = replace(found.marks[0], name="bell \x07 and no character \ufffe", frame_us=0.0)
@@ -108,10 +108,10 @@ def test_every_point_that_is_shown_has_a_marker_with_its_number(examples: Any) -
         assert {one for one in ids if one.startswith(POINT_ID)} == shown
 
 
-def test_a_frontier_whose_joints_take_an_unknown_time_says_so_on_the_axis(examples: Any) -> None:
+def test_the_axis_mentions_an_unknown_time_of_joints(examples: Any) -> None:
     found, replace = examples.example_frontier(), msgspec.structs.replace
     assert "left out" not in _drawn(found, "frontier").axes[0].get_xlabel()
-    points = tuple(replace(point, transfer=Time(0.0, "unknown")) for point in found.points)
+    points = tuple(replace(point, transfer=PointTime(0.0, "unknown")) for point in found.points)
     unknown = replace(found, points=points)
     assert "reading the joints is left out" in _drawn(unknown, "frontier").axes[0].get_xlabel()
     assert "left out" not in _drawn(unknown, "switches").axes[0].get_xlabel()

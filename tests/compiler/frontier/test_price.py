@@ -1,5 +1,7 @@
 """Tables that are priced: a finalist's are those of the build, byte for byte."""
 
+import numpy as np
+
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.price import Tabled, price
 from thenar.compiler.frontier.search import Shape
@@ -18,9 +20,9 @@ def test_a_finalist_is_priced_with_what_its_build_holds_for_lost_inputs(grasp_se
     samples, options = Samples.of(grasp_set), Recipe(rounds=20, table_bits=8)
     made = Recogniser.fit(samples, options)
     assert made.training is not None
-    names, columns = names_of(grasp_set, made.elements), made.selection.chosen.columns
+    names, rows = names_of(grasp_set, made.elements), np.arange(len(samples.labels))
     equipment = Equipment(ClassifyModel("avr328p"), wirings(None), WIRE_ONLY)
-    asked = samples, names, columns, (Tabled(20, Shape(options.width, options.table_bits)),), made.training
+    asked = samples, names, rows, made.selection, (Tabled(20, Shape(options.width, options.table_bits)),), made.training
     (close,) = price(*asked, equipment, True)
     (quick,) = price(*asked, equipment, False)
     assert close.content == tables_to_bytes(made.tables) != quick.content == tables_to_bytes(made.integers)

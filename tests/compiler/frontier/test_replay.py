@@ -116,7 +116,7 @@ def test_a_set_of_single_trials_is_composed_of_the_rows_given() -> None:
     assert "composed of 50 single trials" in replay.what
 
 
-def test_movements_that_are_not_among_the_rows_as_a_whole_are_left_out() -> None:
+def test_incomplete_movements_are_left_out_of_the_replay() -> None:
     grasp_set = whole_movements([0, 2, 1, 3])
     rows = np.concatenate([np.arange(FRAMES), np.arange(2 * FRAMES, 3 * FRAMES), np.arange(FRAMES + 1, 2 * FRAMES)])
     stream = flat(recorded(grasp_set, grasp_set.labels, rows))
@@ -136,7 +136,7 @@ def test_rows_are_a_period_apart_and_movements_out_of_step_with_it() -> None:
     assert np.diff(phases).max() < 800
 
 
-def test_rows_with_times_come_when_they_were_recorded_and_a_gap_between_movements_is_no_time() -> None:
+def test_timed_rows_keep_their_times_without_gaps_between_movements() -> None:
     grasp_set = whole_movements([0, 1, 2])
     random, rows = np.random.default_rng(1), np.arange(len(grasp_set))
     times_us = 6_000 * rows + random.integers(0, 900, len(rows)) + 10_000_000 * (rows // FRAMES)

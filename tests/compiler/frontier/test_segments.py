@@ -12,6 +12,8 @@ from thenar.compiler.frontier.price import Tabled
 from thenar.compiler.frontier.replay import replay_of
 from thenar.compiler.frontier.search import Shape
 from thenar.compiler.frontier.segments import MovementSamples
+from thenar.compiler.placement.elements import Element
+from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import Training
@@ -22,6 +24,7 @@ from thenar.runtime.segmenting.model import SegmentModel
 Make = Callable[..., GraspSet]
 BEFORE, HELD, AFTER = 20, 30, 10
 TABLED = Tabled(5, Shape(16))
+KEPT = InputSelection.of(tuple(map(Element, range(14))), (0, 1, 2))
 
 
 def movements(make_set: Make, subjects: int = 2) -> GraspSet:
@@ -45,7 +48,7 @@ def held_by(grasp_set: GraspSet, *subjects: str) -> np.ndarray:
     return np.flatnonzero(np.isin(held.subjects, subjects))
 
 
-def test_a_subject_who_is_left_out_has_no_part_in_what_is_learnt(make_set: Make) -> None:
+def test_a_left_out_subject_takes_no_part_in_learning(make_set: Make) -> None:
     grasp_set = movements(make_set)
     new = grasp_set.subjects == "S1"
     random = np.random.default_rng(1)
@@ -54,14 +57,14 @@ def test_a_subject_who_is_left_out_has_no_part_in_what_is_learnt(make_set: Make)
         switches=np.where(new[:, None], random.random(grasp_set.switches.shape) < 0.5, grasp_set.switches),
         codes=np.where(new[:, None], 7, grasp_set.codes).astype(np.uint16),
     )
-    columns, training = tuple(range(14)), Training.of(Recipe(rounds=5))
+    training = Training.of(Recipe(rounds=5))
     found = []
     for one in (grasp_set, changed):
         moving = MovementSamples.of(one, held_by(one, "S0"), seed=1)
         assert moving is not None
         assert sum(len(stream.rows) for stream in moving.streams) >= np.count_nonzero(~new)
         assert {stream.subject for stream in moving.streams} == {"S0"}
-        made, model = moving.segment_tables(columns, [TABLED], training)[TABLED]
+        made, model = moving.segment_tables(KEPT, [TABLED], training)[TABLED]
         found.append((made.switch_rows.tobytes(), made.scale, model))
     assert found[0] == found[1]
     model = found[0][2]
@@ -81,28 +84,26 @@ def test_no_stream_goes_over_a_movement_that_is_left_out(make_set: Make) -> None
 
 
 @pytest.mark.parametrize("change", [{"independent": True}, {"none": False}])
-def test_what_has_no_streams_or_never_says_that_nothing_is_held_teaches_nothing(
-    make_set: Make, change: dict[str, Any]
-) -> None:
+def test_sets_without_streams_or_none_teach_no_segments(make_set: Make, change: dict[str, Any]) -> None:
     grasp_set = make_set(rows=12) if "none" in change else replace(movements(make_set), **change)
     assert MovementSamples.of(grasp_set, np.arange(6), seed=1) is None
 
 
-def test_segments_alone_are_decided_at_learnt_costs_and_with_a_class_of_nothing_held(make_set: Make) -> None:
+def test_only_segments_use_learnt_costs_and_the_class_none(make_set: Make) -> None:
     grasp_set = movements(make_set)
-    held, columns, training = Samples.of(grasp_set.without_none()), tuple(range(14)), Training.of(Recipe(rounds=5))
+    held, training = Samples.of(grasp_set.without_none()), Training.of(Recipe(rounds=5))
     train, new = held_by(grasp_set, "S0"), np.flatnonzero(grasp_set.subjects == "S1")
     labels = np.where(grasp_set.is_none, -1, np.searchsorted(np.unique(grasp_set.labels), grasp_set.labels))
     replay = replay_of(grasp_set, labels, new, seed=1)
     paces = (Pace(TABLED, 3000.0),)
     moving = MovementSamples.of(grasp_set, train, seed=1)
     assert moving is not None
-    ((*others, segments),) = latencies(held, train, columns, replay, paces, training, moving)
-    ((*before, usual),) = latencies(held, train, columns, replay, paces, training)
+    ((*others, segments),) = latencies(held, train, KEPT, replay, paces, training, moving)
+    ((*before, usual),) = latencies(held, train, KEPT, replay, paces, training)
     assert others == before
-    made, model = moving.segment_tables(columns, [TABLED], training)[TABLED]
+    made, model = moving.segment_tables(KEPT, [TABLED], training)[TABLED]
     assert made.n_classes == held.n_classes + 1
-    assert segments == latency(made, columns, replay, 3000.0, model)
+    assert segments == latency(made, range(14), replay, 3000.0, model)
     assert segments != usual
     assert segments.missed == 0
     assert segments.wrong == 0

@@ -10,9 +10,12 @@ import pytest
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import EvaluationError
+from thenar.compiler.frontier.cache import question
 from thenar.compiler.frontier.search import SHAPES, Search
 from thenar.compiler.frontier.survey import Cuts, FoldHits, choose_path, fit_stages
+from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
@@ -21,6 +24,13 @@ from thenar.compiler.tables.quantise import quantise
 from thenar.runtime.scores import Scorer
 
 COLUMNS = (3, 0, 7, 9)
+
+
+def kept(columns: tuple[int, ...], joints: int = 0) -> InputSelection:
+    """Return the selection of these switches, and of the first joints."""
+    return InputSelection.of(tuple(map(Element, columns)), tuple(range(joints)))
+
+
 SEARCH = Search(methods=("id3",), baselines=(), repeats=2)
 
 
@@ -43,7 +53,8 @@ def counted(packed: bytes) -> int:
 
 
 def fit_of(samples: Samples, cuts: Cuts, stages: tuple[int, ...], columns: tuple[int, ...] = COLUMNS) -> FoldHits:
-    return fit_stages(samples, cuts.screening[0], columns, stages, stages, SHAPES, SEARCH.training)
+    selection = kept(columns, samples.codes.shape[1])
+    return fit_stages(samples, cuts.screening[0], selection, stages, stages, SHAPES, SEARCH.training)
 
 
 @pytest.mark.parametrize("inputs", ["both", "switches"])
@@ -60,12 +71,12 @@ def test_every_stage_is_as_if_trained_for_it_alone(grasp_set: GraspSet, cuts: Cu
 def test_tables_answer_as_they_will_when_deployed(samples: Samples, cuts: Cuts) -> None:
     fold, stages = cuts.screening[0], (2, 6)
     fit = fit_of(samples, cuts, stages)
-    X, kept = samples.kept(COLUMNS), len(COLUMNS)
-    bits, codes = X[:, :kept].astype(bool), X[:, kept:]
+    X, switches = samples.kept(COLUMNS), len(COLUMNS)
+    bits, codes = X[:, :switches].astype(bool), X[:, switches:]
     for stage, row in zip(stages, fit.tables, strict=True):
         stumps, _ = boost(X[fold.train], samples.labels[fold.train], 4, rounds=stage)
         for shape, correct in zip(SHAPES, row, strict=True):
-            scores = collapse(stumps, kept)
+            scores = collapse(stumps, switches)
             scorer = Scorer(quantise(scores, bits[fold.train], codes[fold.train], shape.width, shape.table_bits))
             lanes = [scorer.lanes(bits[test], codes[test]) for test in fold.test]
             answers = [lane.index(max(lane)) for lane in lanes]
@@ -84,9 +95,10 @@ def test_without_an_input_that_varies_the_most_frequent_type_is_answered(grasp_s
 
 def test_a_path_holds_the_placement_of_every_parameter(samples: Samples, cuts: Cuts) -> None:
     rows, prunes = cuts.screening[0].train, (0.0, 10.0, 40.0)
-    path = choose_path(samples, rows, "id3", prunes, None)
+    path = choose_path(samples, rows, "id3", prunes, True, None, None)
     X, y = samples.switches[rows], samples.labels[rows]
-    assert path.columns == tuple(grow_id3(X, y, min_samples=int(prune)).inputs for prune in prunes)
+    trees = [grow_id3(X, y, min_samples=int(prune)) for prune in prunes]
+    assert path.elements == tuple(tuple(map(Element, tree.inputs)) for tree in trees)
 
 
 def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -> None:
@@ -94,8 +106,8 @@ def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -
     several = (((0,) * 14, (1.0,)), ((0,) * 14, (2.0,)), (one, (1.0, 1.0)), (two, (1.0, 1.0)))
     costs = [None, *(PortCosts(*each) for each in several)]
     folds = [*cuts.screening, *cuts.others, cuts.everything]
-    asked = {choose_path.call(samples, folds[0].train, "id3", (0.0,), ports).question({}) for ports in costs}
-    asked |= {fit_stages.call(samples, fold, (0,), (1,), (), (), SEARCH.training).question({}) for fold in folds}
+    asked = {question(choose_path, (samples, folds[0].train, "id3", (0.0,), True, None, ports), {}) for ports in costs}
+    asked |= {question(fit_stages, (samples, fold, kept((0,)), (1,), (), (), SEARCH.training), {}) for fold in folds}
     assert len(asked) == len(costs) + len(folds)
 
 
@@ -105,7 +117,7 @@ def frames_of(grasp_set: GraspSet, each: int) -> GraspSet:
     return grasp_set.rows(rows)
 
 
-def test_nobody_left_out_is_trained_on_and_a_tenth_at_most_is_tested_of_many(make_set: Callable[..., GraspSet]) -> None:
+def test_left_out_subjects_are_untrained_and_grouped_into_ten_folds(make_set: Callable[..., GraspSet]) -> None:
     for subjects, folds in ((3, 3), (10, 10), (24, 10)):
         grasp_set = make_set(rows=480, subjects=subjects)
         cuts = cuts_of(grasp_set)
@@ -148,7 +160,10 @@ def test_a_trial_is_recognised_as_most_of_its_frames_are(make_set: Callable[...,
     grasp_set = replace(grasp_set, trials=np.arange(288) // 4 % 24 // 2, objects=np.array(["thing"] * 288))
     samples, cuts = Samples.of(grasp_set), cuts_of(grasp_set)
     assert len(cuts.people) < len(cuts.trials)
-    fits = {fold: fit_stages(samples, fold, COLUMNS, (3,), (3,), SHAPES, SEARCH.training) for fold in cuts.subjects}
+    fits = {
+        fold: fit_stages(samples, fold, kept(COLUMNS, samples.codes.shape[1]), (3,), (3,), SHAPES, SEARCH.training)
+        for fold in cuts.subjects
+    }
     right_trials, right_rows = 0, 0
     for fold in cuts.subjects:
         X = samples.kept(COLUMNS)

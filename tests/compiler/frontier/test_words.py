@@ -12,7 +12,7 @@ from thenar.compiler.frontier.words import COLUMNS, csv_bytes, featured, rates_o
 from thenar.compiler.text import text_of
 
 
-def test_it_says_how_many_switches_how_much_time_how_much_recognition_and_against_what(examples: Any) -> None:
+def test_the_summary_gives_switches_time_accuracy_and_reference_points(examples: Any) -> None:
     marks = examples.example_frontier().marks
     assert summary(examples.example_frontier(marks=(marks[0], marks[2]))) == (
         "Point 5: 33 of 160 switches, read and classified in 440 us on ATmega328P at 16 MHz, reach 92.9 [92.1, 93.7] % "
@@ -20,11 +20,6 @@ def test_it_says_how_many_switches_how_much_time_how_much_recognition_and_agains
         "switches (paper, S = 62). Cross-validation gave 93.3 %; 0.4 points are subtracted, because the best of many "
         "is picked by its luck, too."
     )
-
-
-def test_what_was_not_corrected_is_not_said_to_be(examples: Any) -> None:
-    points = tuple(msgspec.structs.replace(point, luck=0.0004) for point in examples.example_frontier().points)
-    assert "luck" not in summary(examples.example_frontier(points=points))
 
 
 def test_rates_are_named_by_what_they_are_of_and_their_unit(examples: Any) -> None:
@@ -37,20 +32,13 @@ def test_rates_are_named_by_what_they_are_of_and_their_unit(examples: Any) -> No
     assert list(rates_of(examples.example_frontier(subjects=1, by="pooled"))) == ["pooled"]
 
 
-def test_joints_are_told_too(examples: Any) -> None:
-    assert summary(examples.example_frontier(picked=8)).startswith(
-        "Point 8: 8 of 160 switches and 16 of 16 joints, read"
-    )
-    assert summary(examples.example_frontier(picked=7)).startswith("Point 7: 16 of 16 joints, read")
-
-
 def test_without_marks_and_without_points_it_is_still_a_summary(examples: Any) -> None:
     assert summary(examples.example_frontier(marks=())).endswith("by its luck, too.")
     none = examples.example_frontier(points=(), picked=None)
     assert summary(none) == "Of 184,320 combinations none is a point of the frontier."
 
 
-def test_where_nothing_is_picked_the_fastest_point_level_with_all_switches_is_spoken_of(examples: Any) -> None:
+def test_without_a_pick_the_fastest_equivalent_point_is_featured(examples: Any) -> None:
     frontier = examples.example_frontier(picked=None)
     point = featured(frontier)
     assert point is not None
@@ -143,11 +131,3 @@ def test_names_come_back_as_they_are(examples: Any, name: str) -> None:
     (names,) = csv.reader(io.StringIO(text_of(row["switches"]), newline=""), delimiter=";")
     assert names == [name, "s2"]
     assert not row["switches"].startswith("=")
-
-
-def test_one_subject_has_no_rate_of_new_ones(examples: Any) -> None:
-    points = examples.example_frontier().points
-    (row,) = _rows(
-        examples.example_frontier(points=(msgspec.structs.replace(points[0], other_rate=None),), picked=None)
-    )
-    assert (row["other_rate_of"], row["other_rate"], row["other_rate_low"], row["other_rate_high"]) == ("",) * 4

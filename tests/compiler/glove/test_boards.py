@@ -54,9 +54,7 @@ def column_of(netlist: "Netlist", switch: int, diodes: bool) -> str:
     return netlist.net_of(diode, netlist.pin_of(diode, "A"))
 
 
-def test_expanders_behind_a_board_are_wired_and_the_host_still_reads_the_board(
-    read_netlist: Reader, manifest_of: Manifests
-) -> None:
+def test_the_host_reads_the_board_in_front_of_expanders(read_netlist: Reader, manifest_of: Manifests) -> None:
     chip = ChipWiring(kind="mcp23017", address=0x21, pins={"GPA0": "a", "GPB0": "b"})
     harness = wired_by(BoardWiring(pins={"c": "4"}, chips=(chip,)))
     files = spec_files(manifest_of(NAMES), None, harness)

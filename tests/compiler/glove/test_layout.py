@@ -6,7 +6,6 @@ from math import dist
 
 import pytest
 
-from thenar.compiler.glove.layout import COLOURS, marked
 from thenar.compiler.glove.spec import SpecSummary, glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.runtime.manifest import Manifest
@@ -81,9 +80,3 @@ def test_a_large_bundle_has_several_connectors(manifest_of: Manifests) -> None:
         *(("J1", pin) for pin in range(1, 41)),
         *(("J2", pin) for pin in range(1, 22)),
     ]
-
-
-def test_a_colour_used_again_is_marked() -> None:
-    assert marked(COLOURS[0], 0) == "brown"
-    assert marked(COLOURS[0], 1) == "brown, 1 mark"
-    assert marked("black", 2) == "black, 2 marks"

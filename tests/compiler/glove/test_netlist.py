@@ -70,7 +70,7 @@ def test_every_kept_switch_reaches_one_input_and_the_scan_map_reads_it(
     assert glove_spec(manifest_of(names), None, harness, hand).scan == whole_scan(loaded, names)
 
 
-def test_a_proposed_glove_of_all_switches_is_wired_and_loads_and_is_read(
+def test_a_proposed_glove_of_all_switches_is_wired_and_read(
     read_netlist: Reader, manifest_of: Manifests, hand: HandShape, tmp_path: Path
 ) -> None:
     files = spec_files(manifest_of(hand.names), hand=hand)
@@ -83,9 +83,7 @@ def test_a_proposed_glove_of_all_switches_is_wired_and_loads_and_is_read(
     assert all(each["footprint"].count(":") == 1 for each in netlist.components.values())
 
 
-def test_a_chip_behind_a_mux_has_its_channels_wires_and_they_have_pull_ups(
-    read_netlist: Reader, manifest_of: Manifests
-) -> None:
+def test_chips_behind_a_mux_use_its_channels_wires_with_pull_ups(read_netlist: Reader, manifest_of: Manifests) -> None:
     near = ChipWiring(kind="pca9555", address=0x21, pins={"P00": "a"})
     far = ChipWiring(kind="mcp23017", address=0x20, mux=MuxChannel(address=0x71, channel=3), pins={"GPB2": "b"})
     harness = Harness(name="h", buses=(BusWiring(device="/dev/i2c-1", clock_hz=400_000, chips=(near, far)),))
@@ -169,9 +167,7 @@ def test_every_wire_of_the_list_is_on_the_net_of_its_switches(
         assert nets == {netlist.net_of(wire.connector, str(wire.pin))} == {wire.net}
 
 
-def test_a_sender_has_a_pin_for_every_kept_column_and_one_for_ground(
-    read_netlist: Reader, manifest_of: Manifests
-) -> None:
+def test_a_sender_has_pins_for_kept_columns_and_ground(read_netlist: Reader, manifest_of: Manifests) -> None:
     board = StreamWiring(port="/dev/ttyACM0", switches=("x", "b", "a"))
     harness = Harness(name="h", streams=(board,))
     netlist = read_netlist(spec_files(manifest_of(["a", "b"]), None, harness)["glove.net"])

@@ -86,7 +86,7 @@ def test_an_empty_set_and_equal_trials_are_not_dense() -> None:
 
 @pytest.mark.parametrize("joints", [0, 2])
 @pytest.mark.parametrize("noise", [0, 1, 4])
-def test_a_grasp_is_complete_from_the_last_switch_that_closes_to_the_first_that_opens(noise: int, joints: int) -> None:
+def test_a_grasp_is_complete_from_last_closing_to_first_opening(noise: int, joints: int) -> None:
     # In one of 250 movements, frames at an end of the hold are noisier than twice the median.
     for seed in range(100):
         switches, codes, complete, released = movement(np.random.default_rng(seed), noise=noise, joints=joints)
@@ -133,7 +133,7 @@ def test_another_object_trial_session_or_subject_begins_another_movement() -> No
     assert spans(replace(single, independent=True)) == []
 
 
-def test_rows_in_which_nothing_is_held_belong_to_their_movement_and_say_while_when_it_is_complete() -> None:
+def test_rows_of_none_belong_to_their_movement_and_bound_the_grasp() -> None:
     whole = recorded(3)
     frame = np.arange(len(whole)) % 100
     grasps = np.where((frame >= 42) & (frame < 77) & (frame != 50), whole.grasps, "none")

@@ -44,7 +44,7 @@ def demo(name: str, types: str, held_s: float = 1.0, bend: float = 30.0) -> Demo
 
 
 @given(STRINGS)
-def test_every_item_is_in_one_column_in_its_order_and_none_is_empty(strings: list[str]) -> None:
+def test_alignment_keeps_every_item_in_order_without_empty_columns(strings: list[str]) -> None:
     columns = aligned(strings)
     for number, string in enumerate(strings):
         assert [column[number] for column in columns if column[number] is not None] == list(range(len(string)))
@@ -67,7 +67,7 @@ def test_what_most_show_is_a_step_whatever_the_order_of_the_demonstrations(build
     assert [step.then for step in task.steps] == [("fist", "hook"), ("hook", "pinch"), ()]
 
 
-def test_a_step_has_medians_a_limit_a_preshape_and_what_often_follows_elsewhere(build: Path) -> None:
+def test_a_step_has_medians_limit_preshape_and_frequent_successors(build: Path) -> None:
     shown = [demo("1", "ph", 1.0, 10.0), demo("2", "ph", 3.0, 20.0), demo("3", "ph", 1.5, 60.0)]
     shape = Preshape("narrow", ("finger",), (1.0,), 0.5)
     graph = Transitions.of([("pinch", "fist")] * 3 + [("pinch", "hook")], ("pinch", "hook", "fist"))
@@ -84,7 +84,7 @@ def test_demonstrations_with_nothing_in_common_teach_nothing(build: Path) -> Non
         taught(Build.load(build), [demo("1", "p"), demo("2", "h"), demo("3", "f")], "t")
 
 
-def test_a_task_is_read_as_it_was_written_and_a_tree_has_an_action_a_step(build: Path, tmp_path: Path) -> None:
+def test_a_task_survives_its_file_and_each_step_is_an_action(build: Path, tmp_path: Path) -> None:
     task = taught(Build.load(build), [demo("1", "phf"), demo("2", "phf")], "pour <tea>")
     (tmp_path / "task.json").write_bytes(task_json(task))
     assert load_task(tmp_path / "task.json") == task == msgspec.json.decode(task_json(task), type=Task)
@@ -103,7 +103,7 @@ def test_a_task_is_read_as_it_was_written_and_a_tree_has_an_action_a_step(build:
         assert action.attrib["joints"] == "bend=30"
 
 
-def test_each_stream_of_a_set_is_a_demonstration_with_what_its_joints_read(
+def test_each_stream_is_a_demonstration_with_its_joint_values(
     build: Path, make_movements: Callable[..., GraspSet], tmp_path: Path
 ) -> None:
     grasp_set = make_movements("CD", 2, seed=5)

@@ -23,7 +23,7 @@ SEQUENCES = st.lists(st.lists(st.sampled_from(TYPES), max_size=12), max_size=6)
 
 
 @given(SEQUENCES)
-def test_every_change_is_counted_once_and_shares_are_of_a_types_own_changes(sequences: list[list[str]]) -> None:
+def test_changes_count_once_and_shares_are_per_type(sequences: list[list[str]]) -> None:
     found = Transitions.of(sequences, TYPES)
     assert found.counts.sum() == sum(max(len(each) - 1, 0) for each in sequences)
     sums = found.probabilities.sum(axis=1)
@@ -37,7 +37,7 @@ def test_every_change_is_counted_once_and_shares_are_of_a_types_own_changes(sequ
 
 
 @given(SEQUENCES, st.sampled_from([TYPES, MANY]))
-def test_each_change_is_an_arrow_within_the_picture_between_types_that_do_not_touch(
+def test_changes_are_arrows_between_separate_types_within_the_picture(
     sequences: list[list[str]], types: tuple[str, ...]
 ) -> None:
     found = Transitions.of(sequences, types)

@@ -97,7 +97,7 @@ def test_every_method_obeys(found: tuple[Limits, Bound], seed: int, m: int) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.installed])
-def test_a_limit_that_forbids_nothing_changes_nothing_and_one_that_does_is_obeyed(name: str) -> None:
+def test_limits_are_obeyed_and_idle_ones_change_nothing(name: str) -> None:
     samples, parameter = samples_of(5, 120), 3 if METHODS[name].by_number else 10
     free = Limits(names=NAMES, n_switches=3, taxels=9).on(ELEMENTS, PORTS)
     plain = choose(samples, name, parameter, PORTS)
@@ -124,7 +124,7 @@ def test_contradictions_are_refused_by_both_names(asked: dict[str, object], mess
         Limits(names=NAMES, n_switches=3, **{"places": PLACES, **asked}).on(ELEMENTS, PORTS)  # type: ignore[arg-type]
 
 
-def test_more_to_keep_than_there_is_room_for_and_a_budget_without_costs_are_refused() -> None:
+def test_too_many_forced_switches_and_budgets_without_costs_are_refused() -> None:
     limits = Limits(names=NAMES, n_switches=3, keep=("a", "b", "q"), budget_us=99.0)
     with pytest.raises(PlacementError, match="``keep_these`` names 3, ``keep`` allows 2"):
         choose(samples_of(1), "cmim", 2, PORTS, limits.on(ELEMENTS, PORTS))

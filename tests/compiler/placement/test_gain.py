@@ -5,11 +5,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from thenar.compiler.placement.exact import Counts
-from thenar.compiler.placement.gain import NodeCounts, best_position, compare_scores, entropy_bits, gain_bits
+from thenar.compiler.placement.gain import NodeCounts, best_position, compare_scores, gain_bits
 from thenar.stability.reference.information import compare_gains
 
 tables = arrays(np.int64, st.tuples(st.integers(1, 5), st.integers(2, 4)), elements=st.integers(0, 30))
-large_tables = arrays(np.int64, (3, 2), elements=st.integers(1, 10**9))
 
 
 def node_of(*inputs: Counts) -> NodeCounts:
@@ -19,13 +18,6 @@ def node_of(*inputs: Counts) -> NodeCounts:
     return NodeCounts(inputs[0].sum(axis=1), cells, starts)
 
 
-@given(tables.filter(np.any))
-def test_the_gain_is_the_fall_of_entropy(table: Counts) -> None:
-    n = table.sum()
-    left = sum(part.sum() / n * entropy_bits(part.tolist()) for part in table.T if part.any())
-    assert gain_bits(table) == pytest.approx(entropy_bits(table.sum(axis=1).tolist()) - left, abs=1e-12)
-
-
 @given(st.lists(st.integers(1, 50), min_size=1, max_size=4), st.lists(st.integers(1, 50), min_size=2, max_size=4))
 def test_an_independent_input_gains_exactly_nothing(classes: list[int], values: list[int]) -> None:
     table = np.outer(classes, values)
@@ -33,21 +25,6 @@ def test_an_independent_input_gains_exactly_nothing(classes: list[int], values: 
     if len(classes) > 1:
         table[0, 0] += 1
         assert gain_bits(table) > 0.0
-
-
-@given(large_tables, arrays(np.int64, (3, 1), elements=st.integers(0, 10**9)))
-def test_scores_of_large_counts_compare_as_the_reference_does(one: Counts, moved: Counts) -> None:
-    moved = np.minimum(moved, one[:, 1:])
-    other = one + np.hstack([moved, -moved])
-    assert compare_scores(one, other) == compare_gains(one.tolist(), other.tolist())
-    assert compare_scores(one, one[::-1]) == 0
-
-
-@given(large_tables, st.integers(-1, 1))
-def test_one_row_in_a_billion_decides(table: Counts, moved: int) -> None:
-    other = table.copy()
-    other[0] += (moved, -moved)
-    assert compare_scores(table, other) == compare_gains(table.tolist(), other.tolist())
 
 
 @pytest.mark.parametrize("m", [10**6, 10**9])
@@ -89,12 +66,8 @@ def test_gains_of_one_value_and_other_terms_go_to_the_lowest_number(
         assert best_position(node_of(*tables), np.array([1, 0])) == 1
 
 
-def test_nothing_is_best_where_nothing_varies() -> None:
-    assert best_position(node_of(np.array([[5, 0], [4, 0]]), np.array([[0, 5], [0, 4]])), np.array([0, 1])) is None
-
-
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_inputs_of_the_same_cells_are_told_apart_by_the_rows_of_their_values(order: tuple[int, int]) -> None:
+def test_rows_per_value_distinguish_inputs_of_equal_cells(order: tuple[int, int]) -> None:
     # Classes of 2 b + 1 and 2 d + 1 rows, parted (b + 1, b) by both inputs and (d + 1, d) or (d, d + 1): values of
     # b + d + 2 and b + d rows, or of b + d + 1 both, which says more, by less than a double can tell.
     b, d = 10**9, 7 * 10**8

@@ -86,7 +86,7 @@ def grasps(n: int, seed: int) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_scikit_learns_entropy_tree_is_the_same_on_bits_where_gains_do_not_tie(seed: int) -> None:
+def test_scikit_learns_entropy_tree_is_ours_where_gains_differ(seed: int) -> None:
     X, y = grasps(6000, seed)
     ours = grow_id3(X, y, min_samples=300)
     theirs = DecisionTreeClassifier(criterion="entropy", min_samples_split=300, random_state=0).fit(X, y).tree_
@@ -116,7 +116,7 @@ def test_exclusive_or_is_solved_and_said() -> None:
     assert "at 1 node no input gains anything alone" in tree.text()
 
 
-def test_a_mixed_leaf_answers_with_the_majority_and_a_tie_with_the_lowest_class() -> None:
+def test_a_mixed_leaf_predicts_the_majority_ties_the_lowest_class() -> None:
     X = np.array([[0]] * 3 + [[1]] * 4)
     tree = grow_id3(X, ["b", "a", "b", "c", "b", "b", "c"])
     assert tree.predict([[0], [1]]).tolist() == ["b", "b"]

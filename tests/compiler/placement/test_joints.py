@@ -34,7 +34,7 @@ def test_what_tells_most_beside_the_switches_goes_last() -> None:
     assert order == joint_order(hand())
 
 
-def test_so_many_are_kept_in_their_own_order_and_all_where_nothing_is_said() -> None:
+def test_the_requested_number_of_joints_or_all_are_kept() -> None:
     samples = hand()
     assert kept_joints(samples, None) == kept_joints(samples, 12) == tuple(range(12))
     assert kept_joints(samples, 2) == tuple(sorted(joint_order(samples)[:2]))

@@ -69,7 +69,7 @@ def test_a_switch_that_is_wired_to_nothing_is_named() -> None:
         port_costs(propose_harness(["index"]), ["index", "thumb"])
 
 
-def test_a_taxel_costs_its_conversion_on_the_converter_that_it_hangs_on_or_on_a_new_one() -> None:
+def test_a_taxel_costs_a_conversion_on_its_or_a_new_converter() -> None:
     """An ADS1115 takes 38 and 48 SCL periods at 400 kHz and 1317 us between them; an ADS7828 48."""
     chips = (
         ChipWiring(kind="ads1115", address=0x48, pins={"AIN0": "t0", "AIN3": "t1"}),

@@ -28,7 +28,7 @@ def backed_up(seed: int = 1, n: int = 400) -> Samples:
     return Samples(np.hstack([*copies, noise]), np.zeros((n, 0), np.uint16), labels, ("a", "b", "c", "d"))
 
 
-def test_each_input_is_lost_in_as_many_copies_and_every_row_keeps_all_others() -> None:
+def test_every_input_is_lost_in_equally_many_copies() -> None:
     random = np.random.default_rng(2)
     switches, codes = np.zeros((30, 4), bool), np.full((30, 2), 7, np.uint16)
     switches[:3], codes[:3] = True, 9
@@ -45,7 +45,7 @@ def test_each_input_is_lost_in_as_many_copies_and_every_row_keeps_all_others() -
     assert (samples.masked().inputs == rows.inputs).all()
 
 
-def test_a_share_of_the_switches_is_lost_and_what_is_in_their_place_occurs() -> None:
+def test_masked_training_loses_a_share_and_fills_recorded_values() -> None:
     samples = backed_up()
     lost = spread(samples, 0.2)
     assert 0.02 < (lost.switches != samples.switches).mean() < 0.2
@@ -78,7 +78,7 @@ def test_options_say_that_training_is_masked() -> None:
 
 
 @pytest.mark.slow
-def test_the_worst_lost_switch_costs_other_men_at_most_five_points_and_nothing_else_a_point(
+def test_robust_placement_bounds_what_the_worst_lost_switch_costs(
     tmp_path: Path,
 ) -> None:
     """The table of docs/how-to/choose-switches.md with fewer repetitions: every fault on every row of unseen men."""

@@ -86,7 +86,7 @@ def test_a_document_that_is_no_tree_is_refused(document: bytes) -> None:
         Tree.from_json(document)
 
 
-def test_leaves_that_no_input_parts_are_counted_and_said_and_pruned_ones_are_not() -> None:
+def test_unseparable_leaves_are_counted_but_pruned_ones_are_not() -> None:
     X, y = [[0], [0], [1], [1], [1]], ["a", "b", "a", "b", "a"]
     tree = grow_id3(X, y)
     assert tree.n_undecided == 2

@@ -14,7 +14,7 @@ def test_numpy_reads_what_is_packed() -> None:
         assert arrays["header"].tobytes() == b"{}"
 
 
-def test_the_same_content_gives_the_same_bytes_at_any_time_and_order_of_memory() -> None:
+def test_equal_content_gives_equal_bytes_at_any_time() -> None:
     array = np.arange(6).reshape(2, 3)
     assert pack(b"{}", {"a": array}) == pack(b"{}", {"a": np.asfortranarray(array)})
     with zipfile.ZipFile(io.BytesIO(pack(b"{}", {"a": array}))) as members:
@@ -40,7 +40,7 @@ def test_a_compressed_member_is_refused_before_it_is_unpacked() -> None:
         unpack(with_members(zipfile.ZIP_DEFLATED, header=npy(np.zeros(10**6, np.uint8))))
 
 
-def test_a_member_that_claims_more_than_it_holds_is_refused_before_it_is_allocated() -> None:
+def test_overstated_members_are_refused_before_allocation() -> None:
     lie = npy(np.zeros(8, np.uint8)).replace(b"(8,), }" + b" " * 12, b"(8000000000000,), }")
     assert b"8000000000000" in lie
     with pytest.raises(SealError, match="not plain numbers of its shape"):

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.recordings.cells import bits, codes, integers, names, numbers
+from thenar.compiler.recordings.cells import bits, integers, names, numbers
 
 WORDS = ["1.5", " 2 ", "-3e2", "", "?", "NA", "nan", "NaN", "inf", "-inf", "1_000", "x", "0x1"]
 
@@ -36,12 +36,6 @@ def test_a_cell_reads_the_same_in_any_column(words: list[str]) -> None:
         assert alone.values[0] == together.values[row] or np.isnan(alone.values[0])
 
 
-def test_an_array_of_numbers_reads_as_it_is() -> None:
-    parsed = numbers(np.array([1.0, np.nan, np.inf]))
-    assert parsed.missing.tolist() == [False, True, False]
-    assert parsed.wrong.tolist() == [False, False, True]
-
-
 @pytest.mark.parametrize("word", ["0", "1", "0.0", "1.0", "true", "false", "TRUE", " False "])
 def test_a_switch_is_zero_or_one_in_these_spellings(word: str) -> None:
     parsed = bits([word, "?"])
@@ -62,25 +56,13 @@ def test_a_trial_is_a_whole_number() -> None:
     assert parsed.wrong.tolist() == [False, False, False, True, True, True, False, True]
 
 
-def test_a_code_is_a_whole_number_of_sixteen_bits() -> None:
-    assert codes(["0", "65535", "-1", "65536", "1.5", ""]).wrong.tolist() == [False, False, True, True, True, False]
-
-
-def test_names_lose_their_outer_blanks_and_whole_numbers_their_point() -> None:
-    assert names([" a b ", "", "?"]).values.tolist() == ["a b", "", "?"]
-    assert names([" a b ", "", "?", "NA"]).missing.tolist() == [False, True, True, False]
-    parsed = names(np.array([3.0, 0.5, np.nan]))
-    assert parsed.values.tolist() == ["3", "0.5", ""]
-    assert parsed.missing.tolist() == [False, False, True]
-
-
 def test_a_name_with_a_control_character_is_wrong_wherever_it_stands() -> None:
     cells = ["a\0", "\0", "a\nb", "fine", "", "?"]
     assert names(cells).wrong.tolist() == [True, True, True, False, False, False]
     assert names(cells).missing.tolist() == [False, False, False, False, True, True]
 
 
-def test_a_number_is_a_name_unless_it_is_none_and_zero_has_one_name() -> None:
+def test_finite_numbers_are_names_and_zero_has_one_name() -> None:
     parsed = names(np.array([3.0, -0.0, 0.0, np.inf, -np.inf, np.nan, 0.5]))
     assert parsed.values[[0, 1, 2, 6]].tolist() == ["3", "0", "0", "0.5"]
     assert parsed.wrong.tolist() == [False, False, False, True, True, False, False]

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.recordings.coding import code_joint, sound_grid
-from thenar.compiler.recordings.columns import Calibration, JointColumns
+from thenar.compiler.recordings.columns import CalibrationPoints, JointColumns
 from thenar.compiler.recordings.errors import RecordingError, TableError
 
 ANGLES = st.lists(st.floats(-400, 400), min_size=1, max_size=20)
@@ -29,7 +29,7 @@ def test_no_value_moves_by_more_than_half_the_grid(angles: list[float], grid: fl
 
 
 @given(ANGLES)
-def test_the_grid_starts_on_a_multiple_of_itself_at_or_below_the_least_value(angles: list[float]) -> None:
+def test_the_grid_starts_at_a_multiple_below_the_least_value(angles: list[float]) -> None:
     values = np.array(angles)
     codes, joint, _ = code_joint("j", JointColumns(("j",), grid=0.5), values, rows(values))
     assert joint.value_a <= values.min() < joint.value_a + 0.5
@@ -46,7 +46,7 @@ def test_codes_are_taken_as_they_are() -> None:
 
 
 def test_values_are_coded_by_a_calibration_when_there_is_one() -> None:
-    entry = JointColumns(("j",), calibration=Calibration(100, 0.0, 200, -90.0))
+    entry = JointColumns(("j",), calibration=CalibrationPoints(100, 0.0, 200, -90.0))
     codes, _, cost = code_joint("j", entry, np.array([0.0, -45.2, -90.0]), np.arange(3))
     assert codes.tolist() == [100, 150, 200]
     assert cost.largest_error == pytest.approx(0.2)
@@ -58,7 +58,7 @@ def test_values_are_coded_by_a_calibration_when_there_is_one() -> None:
     [
         (JointColumns(("j",), grid=0.001), "take a coarser grid"),
         (JointColumns(("j",), origin=1.0), "check origin and calibration"),
-        (JointColumns(("j",), calibration=Calibration(0, 10.0, 1, 11.0)), "check origin and calibration"),
+        (JointColumns(("j",), calibration=CalibrationPoints(0, 10.0, 1, 11.0)), "check origin and calibration"),
     ],
 )
 def test_values_beyond_the_codes_are_refused_with_their_rows(entry: JointColumns, advice: str) -> None:

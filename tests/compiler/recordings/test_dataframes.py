@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 
-from thenar.compiler import Columns, GraspSet, Joint, from_dataframe, to_dataframe
+from thenar.compiler import ColumnRoles, GraspSet, Joint, from_dataframe, to_dataframe
 from thenar.compiler.recordings.columns import JointColumns
 from thenar.compiler.recordings.errors import ColumnsError, RecordingError, TableError
 
@@ -68,7 +68,7 @@ def test_any_types_of_a_users_frame_are_read() -> None:
         },
         index=[10, 20, 30],
     )
-    columns = Columns(
+    columns = ColumnRoles(
         label="what",
         subject="who",
         trial="n",

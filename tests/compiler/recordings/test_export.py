@@ -43,7 +43,7 @@ def test_a_csv_holds_values_or_codes(small: GraspSet) -> None:
     assert to_csv(small, codes=True).splitlines()[1] == "PoS,A,mug,0,0,0,1,1,1,7"
 
 
-def test_no_cell_of_a_csv_is_a_formula_and_numbers_stay_as_they_are(small: GraspSet) -> None:
+def test_csv_cells_are_never_formulas_and_numbers_stay(small: GraspSet) -> None:
     types = own(["=cmd|' /C calc'!A0", "@SUM(1)", "-1+1"])
     odd = replace(
         small,

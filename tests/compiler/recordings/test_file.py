@@ -55,7 +55,7 @@ def refusal(data: bytes, folder: Path) -> str:
     return str(refused.value)
 
 
-def test_a_file_that_is_cut_altered_foreign_or_newer_is_refused_with_the_reason(good: bytes, tmp_path: Path) -> None:
+def test_cut_altered_foreign_or_newer_files_are_refused_with_reason(good: bytes, tmp_path: Path) -> None:
     payload = unseal(good, KIND, VERSION, "good")[1]
     for data, reason in (
         (good[:-1], "is truncated"),

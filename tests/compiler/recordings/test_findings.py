@@ -7,7 +7,7 @@ from hypothesis import given, settings
 
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.summary import (
-    Finding,
+    Oddity,
     constant_columns,
     disagreeing,
     duplicate_columns,
@@ -17,7 +17,7 @@ from thenar.compiler.recordings.summary import (
 from thenar.compiler.recordings.taxonomy import own
 
 
-def by_kind(grasp_set: GraspSet) -> dict[str, Finding]:
+def by_kind(grasp_set: GraspSet) -> dict[str, Oddity]:
     return {finding.kind: finding for finding in find_oddities(grasp_set, np.arange(10, 10 + len(grasp_set)))}
 
 

@@ -153,7 +153,7 @@ def test_matlab_7_3_is_refused_with_what_to_save_instead(tmp_path: Path) -> None
         ("exec sleep 600", "its reader took longer than 0 s: save it as CSV"),
     ],
 )
-def test_a_reader_that_crashes_or_never_ends_ends_no_more_than_the_import(
+def test_a_crashing_or_endless_reader_ends_only_the_import(
     script: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     program = tmp_path / "program"

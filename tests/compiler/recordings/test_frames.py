@@ -112,9 +112,7 @@ def test_what_never_varies_and_what_is_hardly_there_says_nothing() -> None:
 
 
 @pytest.mark.parametrize("wrong", [False, True])
-def test_ten_times_the_rows_are_the_same_calls_on_ten_times_the_memory(
-    calls: Measure, peak_bytes: Measure, wrong: bool
-) -> None:
+def test_ten_times_the_rows_make_no_more_calls(calls: Measure, peak_bytes: Measure, wrong: bool) -> None:
     few, many = (make(trials=trials, frames=10, types=10, subjects=1, n_switches=160) for trials in (20, 200))
     if wrong:
         few, many = misnamed(few, "row"), misnamed(many, "row")
@@ -131,7 +129,7 @@ def test_the_refusal_names_both_remedies_and_the_claim_silences_it() -> None:
     check_trials(replace(wrong, independent=True), EvaluationError)
 
 
-def test_the_public_sets_of_one_row_a_trial_are_not_taken_for_frames(icub_table: Path, aml_table: Path) -> None:
+def test_public_sets_of_single_rows_are_not_taken_for_frames(icub_table: Path, aml_table: Path) -> None:
     # The iCub's touches have 230 single grasps; AML's rows are medians of a recording each, as their READMEs say.
     assert looks_like_frames(import_file(icub_table, COLUMNS / "icub.toml")[0]) is None
     assert looks_like_frames(import_file(aml_table, COLUMNS / "aml.toml")[0]) is None

@@ -120,7 +120,7 @@ def test_taxels_are_columns_beside_the_switches(small: GraspSet) -> None:
 
 @given(data=st.data())
 @settings(deadline=None)
-def test_a_trial_is_a_subject_a_type_an_object_a_session_and_a_number(
+def test_a_trial_is_subject_type_object_session_and_number(
     data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]
 ) -> None:
     grasp_set = data.draw(grasp_sets)
@@ -134,7 +134,7 @@ def test_a_trial_is_a_subject_a_type_an_object_a_session_and_a_number(
     assert grasp_set.trial_ids.tolist() == list(expected)
 
 
-def test_a_file_has_format_2_only_where_sessions_taxels_or_the_claim_need_it(small: GraspSet, tmp_path: Path) -> None:
+def test_format_2_is_written_only_where_needed(small: GraspSet, tmp_path: Path) -> None:
     formats = []
     pads = {"taxels": PADS, "taxel_columns": (PAD,)}
     changes: list[dict[str, Any]] = [{}, {"sessions": np.array(["1"] * 5 + ["2"])}, {"independent": True}, pads]

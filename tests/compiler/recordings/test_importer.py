@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.recordings.columns import Calibration, Columns, JointColumns, TaxelColumns
+from thenar.compiler.recordings.columns import CalibrationPoints, ColumnRoles, JointColumns, TaxelColumns
 from thenar.compiler.recordings.errors import ColumnsError, TableError
 from thenar.compiler.recordings.export import export
 from thenar.compiler.recordings.graspset import GraspSet
@@ -23,7 +23,7 @@ def table(*labels: str) -> Table:
 
 def test_a_taxonomy_of_ones_own_is_the_labels_sorted() -> None:
     grasp_set, report = import_table(
-        table("mug", "ball", "mug", "ball"), Columns("g", joints=JOINTS, frames="independent")
+        table("mug", "ball", "mug", "ball"), ColumnRoles("g", joints=JOINTS, frames="independent")
     )
     assert grasp_set.taxonomy.types == ("ball", "mug")
     assert grasp_set.labels.tolist() == [1, 0, 1, 0]
@@ -31,18 +31,18 @@ def test_a_taxonomy_of_ones_own_is_the_labels_sorted() -> None:
 
 
 def test_a_list_of_names_is_a_taxonomy_in_its_order() -> None:
-    columns = Columns("g", joints=JOINTS, taxonomy=("mug", "can", "ball"))
+    columns = ColumnRoles("g", joints=JOINTS, taxonomy=("mug", "can", "ball"))
     assert import_table(table("MUG", "ball"), columns)[0].labels.tolist() == [0, 2]
 
 
 def test_labels_of_a_published_taxonomy_may_be_names_abbreviations_and_numbers() -> None:
-    columns = Columns("g", joints=JOINTS, taxonomy="kamakura14", labels={"the strong one": "PoS"})
+    columns = ColumnRoles("g", joints=JOINTS, taxonomy="kamakura14", labels={"the strong one": "PoS"})
     labels = ["pos", "2", "Lateral_grip", "the strong one"]
     assert import_table(table(*labels), columns)[0].grasps.tolist() == ["PoS", "PoH", "Lat", "PoS"]
 
 
-def test_all_unknown_labels_are_named_at_once_and_the_first_answered_with_the_nearest() -> None:
-    columns = Columns("g", joints=JOINTS, taxonomy="kamakura14", frames="independent")
+def test_all_unknown_labels_are_named_at_once_with_suggestions() -> None:
+    columns = ColumnRoles("g", joints=JOINTS, taxonomy="kamakura14", frames="independent")
     with pytest.raises(TableError) as refused:
         import_table(table("PoS", "PoX", "PoX", "PoH", "mug"), columns)
     said = str(refused.value)
@@ -56,7 +56,7 @@ def test_all_unknown_labels_are_named_at_once_and_the_first_answered_with_the_ne
 
 
 def test_rows_that_may_be_frames_of_one_trial_are_asked_about() -> None:
-    columns = Columns("g", joints=JOINTS)
+    columns = ColumnRoles("g", joints=JOINTS)
     with pytest.raises(ColumnsError, match=r"2 rows share .* \(`trial = \.\.\.`, .* \(`frames = \"independent\"`\)"):
         import_table(table("a", "b", "a"), columns)
     grasp_set, report = import_table(table("a", "b", "a"), replace(columns, frames="independent"))
@@ -76,7 +76,7 @@ def frames(**cells: Any) -> tuple[GraspSet, ImportReport]:
         "j": ["3", "1", "2", "5", "7", "9"],
     }
     settings: Any = {"joints": (JointColumns(("j",), codes=True),), **keys}
-    columns = Columns("g", trial="rep", switches=("s",), **settings)
+    columns = ColumnRoles("g", trial="rep", switches=("s",), **settings)
     return import_table(Table("t.csv", rows | cells, np.arange(2, 8)), columns)
 
 
@@ -113,7 +113,7 @@ def test_a_trial_begins_where_time_starts_anew() -> None:
     table = Table(
         "t.csv", {"g": ["a"] * 5 + ["b"], "t": ["0", "2", "0", "2", "0", "2"], "s": ["0", "1"] * 3}, np.arange(6)
     )
-    columns = Columns("g", time="t", frames="restart", switches=("s",))
+    columns = ColumnRoles("g", time="t", frames="restart", switches=("s",))
     assert import_table(table, columns)[0].trial_ids.tolist() == [0, 0, 1, 1, 2, 3]
 
 
@@ -127,7 +127,7 @@ def test_missing_cells_are_kept_filled_from_their_trial_and_it_is_said() -> None
     )
 
 
-def test_a_row_without_a_label_or_trial_is_not_kept_and_the_loss_is_counted() -> None:
+def test_rows_without_label_or_trial_are_dropped_and_counted() -> None:
     grasp_set, report = frames(missing="keep", g=["a", "a", "a", "b", "", "a"], rep=["1", "1", "1", "", "1", "2"])
     assert grasp_set.codes[:, 0].tolist() == [3, 1, 2, 9]
     assert report.warnings[0].message == (
@@ -162,16 +162,16 @@ def test_columns_whose_threshold_is_learnt_are_kept_as_codes(tmp_path: Path) -> 
 
 def test_a_label_and_a_trial_may_be_spread_over_columns() -> None:
     rows = {"o": ["mug", "mug", "can"], "a": ["lift", "pour", "lift"], "side": ["l", "l", "r"], "n": ["0", "1", "0"]}
-    columns = Columns(("o", "a"), trial=("side", "n"), switches=("s",))
+    columns = ColumnRoles(("o", "a"), trial=("side", "n"), switches=("s",))
     grasp_set, _ = import_table(Table("t.csv", {**rows, "s": ["0", "1", "0"]}, np.arange(3)), columns)
     assert grasp_set.taxonomy.types == ("can lift", "mug lift", "mug pour")
     assert grasp_set.trials.tolist() == [1, 2, 3]
 
 
-def test_radians_on_a_grid_of_half_a_degree_are_a_warning_with_a_grid_that_keeps_them() -> None:
+def test_a_coarse_grid_of_radians_warns_with_a_better_one() -> None:
     values = np.random.default_rng(1).permutation(np.linspace(0, 1.4, 60))
     rows: dict[str, Column] = {"g": ["a", "b"] * 30, "j": values}
-    columns = Columns("g", joints=(JointColumns(("j",), "rad"),), frames="independent")
+    columns = ColumnRoles("g", joints=(JointColumns(("j",), "rad"),), frames="independent")
     (coarse, *_) = import_table(Table("t.csv", rows, np.arange(60)), columns)[1].warnings
     assert coarse.kind == "coarse grids"
     assert "j 4 of 60 (grid = 0.001 keeps them)" in coarse.message
@@ -181,11 +181,11 @@ def test_radians_on_a_grid_of_half_a_degree_are_a_warning_with_a_grid_that_keeps
 
 def test_an_unknown_taxonomy_is_refused() -> None:
     with pytest.raises(ColumnsError, match="taxonomy: no taxonomy is called 'feix'"):
-        import_table(table("a", "b"), Columns("g", joints=JOINTS, taxonomy="feix"))
+        import_table(table("a", "b"), ColumnRoles("g", joints=JOINTS, taxonomy="feix"))
 
 
 def test_oddities_are_warnings_with_the_users_rows() -> None:
-    columns = Columns("g", subject="who", switches=("s",))
+    columns = ColumnRoles("g", subject="who", switches=("s",))
     rows = {"g": ["a", "b", "a", "b"], "who": ["x", "x", "y", "y"], "s": ["0", "1", "0", "1"]}
     _, report = import_table(Table("t.csv", rows, np.array([2, 3, 5, 6])), columns)
     (finding,) = report.warnings
@@ -213,7 +213,7 @@ def test_counts_of_a_converter_keep_its_range_and_their_calibration(tmp_path: Pa
     """The ends of the range are the two points, in counts or in newtons; a written set reads back as the same."""
     pads = {"p1": ["0", "90", "1000", "5", "95", "7"], "p2": ["0", "4", "6", "1023", "0", "41"]}
     plain = TaxelColumns(("p1",), bits=10)
-    newtons = TaxelColumns(("p2",), unit="N", bits=10, calibration=Calibration(23, 0.0, 523, 10.0))
+    newtons = TaxelColumns(("p2",), unit="N", bits=10, calibration=CalibrationPoints(23, 0.0, 523, 10.0))
     grasp_set, report = frames(taxels=(plain, newtons), **pads)
     one, two = grasp_set.taxel_columns
     assert (one.code_a, one.value_a, one.code_b, one.value_b) == (0, 0.0, 1023, 1023.0)

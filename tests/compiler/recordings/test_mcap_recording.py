@@ -231,7 +231,7 @@ def test_switches_alone_and_a_glove_alone_are_sets_too(write: Write, bare: Sessi
     assert grasp_set.joint_names == bare.sensors[:2]
 
 
-def test_a_cut_recording_is_imported_up_to_its_last_whole_message_and_told(write: Write) -> None:
+def test_a_cut_recording_is_imported_up_to_its_last_whole_message(write: Write) -> None:
     path = write()
     size = path.stat().st_size
     end = path.read_bytes().rindex(b'"accepted"')
@@ -296,7 +296,7 @@ def test_taxels_are_imported_with_their_calibration(tmp_path: Path) -> None:
     assert grasp_set.taxel_columns == (Joint("p", "counts", 0, 0.0, 1, 1.0), Joint("q", "counts", 0, 0.0, 1, 1.0))
 
 
-def test_a_trial_of_a_taxel_that_was_not_read_is_left_out_and_told(tmp_path: Path) -> None:
+def test_trials_with_unread_taxels_are_left_out_and_reported(tmp_path: Path) -> None:
     path = pressed(tmp_path / "a.mcap", ANALOG, (120, 800), (120, None), None)
     grasp_set, report = import_recordings([path])
     assert grasp_set.trials.tolist() == [1]

@@ -147,7 +147,7 @@ def test_what_was_undone_is_left_out_of_a_stream(tmp_path: Path) -> None:
     assert all(time > last[trial] for time, trial in zip(times.tolist(), trials.tolist(), strict=True))
 
 
-def test_of_a_collection_without_the_empty_hand_only_what_is_held_is_known(tmp_path: Path) -> None:
+def test_without_the_empty_hand_only_held_rows_are_known(tmp_path: Path) -> None:
     with Recorder(tmp_path / "a.mcap", replace(SESSION, collection=replace(COLLECTION, tasks=GRASPS))) as recorder:
         Wearer(recorder).collect()
     grasp_set, report = import_recordings([recorder.path], stream=True)

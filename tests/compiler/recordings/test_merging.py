@@ -63,7 +63,7 @@ def test_columns_may_come_in_another_order(small: GraspSet) -> None:
 
 @pytest.mark.parametrize(("first", "second"), [(0, 40), (40, 0), (3, 3)])
 @pytest.mark.parametrize("step", [0.1, -0.5])
-def test_codes_on_one_grid_with_another_origin_are_shifted_and_mean_what_they_did(
+def test_merging_shifts_codes_of_another_origin_without_changing_values(
     small: GraspSet, first: int, second: int, step: float
 ) -> None:
     def imported(origin: int, subject: str) -> GraspSet:
@@ -223,9 +223,7 @@ def test_files_have_safe_names_and_hold_their_part(small: GraspSet, tmp_path: Pa
     assert all(GraspSet.load(path).subjects.tolist() == [name] for name, path in files.items())
 
 
-def test_other_files_stay_and_files_of_the_same_name_are_only_replaced_on_request(
-    small: GraspSet, tmp_path: Path
-) -> None:
+def test_splitting_replaces_files_only_on_request(small: GraspSet, tmp_path: Path) -> None:
     folder = tmp_path / "out"
     folder.mkdir()
     (folder / "notes.txt").write_text("mine")

@@ -23,7 +23,7 @@ def test_a_set_of_switches_of_joints_or_of_both_is_drawn(small: GraspSet, switch
     assert draw(parts(small, switches, joints), "png").startswith(b"\x89PNG")
 
 
-def test_an_svg_names_grasp_types_and_joints_and_is_the_same_every_time(small: GraspSet) -> None:
+def test_the_svg_names_types_and_joints_and_is_reproducible(small: GraspSet) -> None:
     picture = draw(small, "svg")
     assert picture == draw(small, "svg")
     for words in ("PoS", "Tip", "palm copy", "wrist", "6 trials of 6 frames"):

@@ -12,27 +12,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.recordings.columns import Columns, TextFormat, read_columns
+from thenar.compiler.recordings.columns import ColumnRoles, TextFormat, read_columns
 from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
 from thenar.compiler.recordings.inputs import listed
-from thenar.compiler.recordings.propose import Proposal, propose, propose_file
+from thenar.compiler.recordings.propose import ColumnProposal, propose, propose_file
 from thenar.compiler.recordings.table import Column, Table
 from thenar.drivers.errors import ThenarError
 
 
-def roles(proposal: Proposal) -> dict[str, str]:
+def roles(proposal: ColumnProposal) -> dict[str, str]:
     """Return role by column."""
     return {name: role.role for role in proposal.roles for name in role.columns}
 
 
-def looked_at(**columns: Column) -> Proposal:
+def looked_at(**columns: Column) -> ColumnProposal:
     rows = len(next(iter(columns.values())))
     return propose(Table("t.csv", columns, np.arange(2, rows + 2)))
 
 
-def imported(path: Path, folder: Path) -> tuple[Proposal, GraspSet, ImportReport]:
+def imported(path: Path, folder: Path) -> tuple[ColumnProposal, GraspSet, ImportReport]:
     """Import a table as it is found to be; what is found is also what its columns.toml says."""
     table, proposal = propose_file(path)
     (folder / "columns.toml").write_text(proposal.toml(), encoding="utf-8")
@@ -252,7 +252,7 @@ def test_any_table_is_proposed_for_or_refused(columns: list[tuple[str, str, str,
     table = Table("t.csv", cells, np.arange(3))
     with suppress(ThenarError):
         proposal = propose(table, TextFormat(";"))
-        assert isinstance(proposal.columns, Columns)
+        assert isinstance(proposal.columns, ColumnRoles)
         if not proposal.lacks:
             assert len(import_table(table, proposal.columns)[0]) <= 3
 

@@ -75,7 +75,7 @@ def test_a_letter_far_down_decides_on_the_encoding(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("byte", range(0x80, 0x100))
-def test_a_table_that_is_not_utf8_is_windows_1252_where_python_decodes_it_so(byte: int, tmp_path: Path) -> None:
+def test_non_utf8_tables_are_windows_1252_if_python_agrees(byte: int, tmp_path: Path) -> None:
     content = b"g,s\nx" + bytes([byte]) + b",1\n"
     (tmp_path / "t.csv").write_bytes(content)
     try:
@@ -100,7 +100,7 @@ def test_a_hostile_sample_is_looked_at_quickly(
 @pytest.mark.parametrize(
     "content", [b"", b"\n\n", b"x" * 200_000, b"\x81\x8d\xff\n\x00,1\n", codecs.BOM_UTF16_LE + b"a"]
 )
-def test_what_is_hardly_a_table_is_looked_at_quickly_and_refused_by_the_reader(content: bytes, tmp_path: Path) -> None:
+def test_near_tables_are_sniffed_quickly_and_refused_by_the_reader(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     path.write_bytes(content)
     with pytest.raises(TableError):

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from thenar.compiler.movements.streams import frames_are_dense, movements_of
-from thenar.compiler.recordings.columns import Columns, JointColumns
+from thenar.compiler.recordings.columns import ColumnRoles, JointColumns
 from thenar.compiler.recordings.errors import ColumnsError, TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
-from thenar.compiler.recordings.propose import Proposal, propose, propose_file
+from thenar.compiler.recordings.propose import ColumnProposal, propose, propose_file
 from thenar.compiler.recordings.table import Column, Table
 from thenar.compiler.recordings.trials import unit_of_time
 
@@ -67,7 +67,7 @@ def written(made: Made, folder: Path) -> Path:
     return folder / "stream.csv"
 
 
-def imported(made: Made, folder: Path) -> tuple[Proposal, GraspSet, ImportReport]:
+def imported(made: Made, folder: Path) -> tuple[ColumnProposal, GraspSet, ImportReport]:
     table, proposal = propose_file(written(made, folder))
     return proposal, *import_table(table, proposal.columns)
 
@@ -151,7 +151,7 @@ def test_objects_of_the_rest_may_be_empty(tmp_path: Path) -> None:
 def test_what_a_columns_toml_says_of_none_is_enough(time: str | None, tmp_path: Path) -> None:
     made = stream("Resting")
     table = propose_file(written(made, tmp_path))[0]
-    columns = Columns(
+    columns = ColumnRoles(
         "label", subject="subject", time=time, none="resting", joints=(JointColumns(("sensor_*",), codes=True),)
     )
     grasp_set, report = import_table(table, columns)
@@ -163,7 +163,7 @@ def test_what_a_columns_toml_says_of_none_is_enough(time: str | None, tmp_path: 
 def test_rows_of_none_that_lie_in_no_runs_say_nothing_of_trials() -> None:
     table = Table("t.csv", {"g": ["a", "none"] * 9, "s": ["0", "1"] * 9}, np.arange(18))
     with pytest.raises(ColumnsError, match="18 rows share subject"):
-        import_table(table, Columns("g", switches=("s",)))
+        import_table(table, ColumnRoles("g", switches=("s",)))
 
 
 def test_recordings_that_follow_each_other_are_apart_where_time_begins_anew() -> None:
@@ -202,7 +202,7 @@ def test_labels_that_mean_that_nothing_is_held_are_told_by_their_words(
 
 def test_labels_that_nothing_means_are_told_of() -> None:
     table = Table("t.csv", {"g": ["a", "b"], "s": ["0", "1"]}, np.arange(2))
-    _, report = import_table(table, Columns("g", switches=("s",), none=("b", "idle")))
+    _, report = import_table(table, ColumnRoles("g", switches=("s",), none=("b", "idle")))
     assert (report.rests, report.grasp_types) == (1, 1)
     assert [finding.message for finding in report.warnings if finding.kind == "unused aliases"] == [
         "1 entries of [labels] and `none` occur in no row: idle"
@@ -213,10 +213,10 @@ def test_a_taxonomy_that_lists_none_takes_it_for_a_type() -> None:
     table = Table("t.csv", {"g": ["a", "none"], "s": ["0", "1"]}, np.arange(2))
     taxonomies: list[Any] = [("a", "none"), {"lab": ("a", "none")}]
     for taxonomy in taxonomies:
-        grasp_set, report = import_table(table, Columns("g", switches=("s",), taxonomy=taxonomy))
+        grasp_set, report = import_table(table, ColumnRoles("g", switches=("s",), taxonomy=taxonomy))
         assert (report.rests, report.grasp_types, grasp_set.labels.tolist()) == (0, 2, [0, 1])
-    assert import_table(table, Columns("g", switches=("s",)))[0].labels.tolist() == [0, 1]
-    assert import_table(table, Columns("g", switches=("s",)))[1].rests == 1
+    assert import_table(table, ColumnRoles("g", switches=("s",)))[0].labels.tolist() == [0, 1]
+    assert import_table(table, ColumnRoles("g", switches=("s",)))[1].rests == 1
 
 
 @pytest.mark.parametrize(
@@ -233,7 +233,7 @@ def test_a_taxonomy_that_lists_none_takes_it_for_a_type() -> None:
         ("time", 0, None),
     ],
 )
-def test_the_unit_of_a_time_is_told_by_its_name_or_its_steps(name: str, step: float, unit: str | None) -> None:
+def test_a_times_unit_follows_from_its_name_or_steps(name: str, step: float, unit: str | None) -> None:
     assert unit_of_time(name, np.tile(step * np.arange(20.0), 2)) == unit
 
 
@@ -252,20 +252,20 @@ def test_dates_are_times(tmp_path: Path) -> None:
 def test_what_is_no_time_is_named(wrong: str) -> None:
     table = Table("t.csv", {"g": ["a", "b"], "t": ["2024-03-01 10:00:00", wrong], "s": ["0", "1"]}, np.arange(2))
     with pytest.raises(TableError, match="not finite numbers, or dates with times: 2 cells"):
-        import_table(table, Columns("g", time="t", switches=("s",)))
+        import_table(table, ColumnRoles("g", time="t", switches=("s",)))
 
 
 def test_times_of_no_known_unit_order_frames_and_are_not_kept() -> None:
     columns = {"g": ["a", "a", "b"], "n": ["1", "1", "1"], "s": ["0", "1", "0"]}
     table = Table("t.csv", columns | {"frame": ["2", "1", "3"]}, np.arange(3))
-    grasp_set, report = import_table(table, Columns("g", trial="n", time="frame", switches=("s",)))
+    grasp_set, report = import_table(table, ColumnRoles("g", trial="n", time="frame", switches=("s",)))
     assert grasp_set.switches[:, 0].tolist() == [True, False, False]
     assert grasp_set.times_us.size == 0
     assert report.notes == (
         "frame orders frames, but does not say when they were recorded: its unit is not known (`time_unit`)",
     )
     grasp_set, report = import_table(
-        table, Columns("g", trial="n", time="frame", time_unit="ms", switches=("s",), reduce="middle")
+        table, ColumnRoles("g", trial="n", time="frame", time_unit="ms", switches=("s",), reduce="middle")
     )
     assert grasp_set.times_us.tolist() == [1000, 3000]
 
@@ -273,4 +273,4 @@ def test_times_of_no_known_unit_order_frames_and_are_not_kept() -> None:
 def test_a_time_that_is_none_is_refused() -> None:
     table = Table("t.csv", {"g": ["a", "b"], "t": ["1e300", "0"], "s": ["0", "1"]}, np.arange(2))
     with pytest.raises(TableError, match=r"column 't' holds times of more than 100,000 years"):
-        import_table(table, Columns("g", time="t", time_unit="s", switches=("s",)))
+        import_table(table, ColumnRoles("g", time="t", time_unit="s", switches=("s",)))

@@ -5,17 +5,17 @@ import numpy as np
 from hypothesis import given, settings
 
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.summary import Count, JointRange, contacts, summarise
+from thenar.compiler.recordings.summary import FrameCount, JointRange, contacts, summarise
 
 
 def test_a_set_is_counted(small: GraspSet) -> None:
     summary = summarise(small)
     assert (summary.frames, summary.taxonomy, summary.fingerprint) == (6, "kamakura14", small.fingerprint())
-    assert summary.grasps == (Count("PoS", 2), Count("PoH", 2), Count("Tip", 2))
+    assert summary.grasps == (FrameCount("PoS", 2), FrameCount("PoH", 2), FrameCount("Tip", 2))
     assert len(summary.absent) == 11
     assert summary.balance == 1.0
-    assert summary.subjects == (Count("A", 4), Count("B", 2))
-    assert summary.objects == (Count("mug", 6),)
+    assert summary.subjects == (FrameCount("A", 4), FrameCount("B", 2))
+    assert summary.objects == (FrameCount("mug", 6),)
     assert [(use.name, round(use.closed, 3)) for use in summary.switches] == [
         ("dead", 0.0),
         ("thumb", 0.5),
@@ -32,7 +32,7 @@ def test_a_set_is_counted(small: GraspSet) -> None:
 def test_counts_add_up_for_any_set(data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]) -> None:
     grasp_set = data.draw(grasp_sets)
     summary = summarise(grasp_set)
-    for counts in ((*summary.grasps, Count("none", summary.none)), summary.subjects, summary.objects):
+    for counts in ((*summary.grasps, FrameCount("none", summary.none)), summary.subjects, summary.objects):
         assert sum(count.frames for count in counts) == len(grasp_set)
     assert len(summary.grasps) + len(summary.absent) == len(grasp_set.taxonomy.types)
     assert (summary.balance > 0) == (summary.none < len(grasp_set))
@@ -48,29 +48,26 @@ def test_rows_in_which_nothing_is_held_count_apart_and_clash_with_none(small: Gr
     found = replace(small, grasps=np.where(nothing, "none", small.grasps), times_us=10_000 * np.arange(6))
     summary = summarise(found)
     assert (summary.frames, summary.none, summary.movements, summary.seconds) == (6, 3, 6, 0.03)
-    assert summary.grasps == (Count("PoS", 2), Count("Tip", 1))
+    assert summary.grasps == (FrameCount("PoS", 2), FrameCount("Tip", 1))
     assert (summary.balance, len(summary.absent)) == (0.5, 12)
     kinds = {finding.kind: finding for finding in summary.warnings}
     assert "contradictory frames" not in kinds
     assert kinds["frames shared by subjects"].rows == (1, 4)
     assert kinds["grasp types that a subject lacks"].message == "subject A has no Tip"
-    assert summary.separability == summarise(found.without_none()).separability
 
 
 def test_a_set_without_rows_has_a_summary(small: GraspSet) -> None:
     summary = summarise(small.rows([]))
-    assert (summary.frames, summary.grasps, summary.balance, summary.separability) == (0, (), 0.0, ())
+    assert (summary.frames, summary.grasps, summary.balance) == (0, (), 0.0)
     assert {(joint.least, joint.largest, joint.codes) for joint in summary.joints} == {(None, None, 0)}
 
 
-def test_taxels_have_ranges_and_a_separability_and_are_touched_above_their_noise(small: GraspSet) -> None:
+def test_taxels_have_ranges_and_are_touched_above_their_noise(small: GraspSet) -> None:
     pads = np.array([[0, 2], [900, 0], [12, 3], [1000, 1], [3, 0], [880, 2]], np.uint16)
     columns = tuple(Joint(name, "N", 0, 0.0, 1000, 1.0) for name in ("pad", "idle"))
     with_pads = replace(small, taxels=pads, taxel_columns=columns)
     summary = summarise(with_pads)
     assert summary.taxels == (JointRange("pad", "N", 0.0, 1.0, 6), JointRange("idle", "N", 0.0, 0.003, 4))
-    assert [each.inputs for each in summary.separability] == ["switches", "taxels", "joints", "all"]
-    assert summary.separability[1].distinct_frames == 6
     touched = contacts(with_pads)
     assert (touched[:, : len(small.switch_names)] == small.switches).all()
     assert touched[:, -2:].tolist() == [[False, False], [True, False]] * 3

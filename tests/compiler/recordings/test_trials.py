@@ -4,16 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from thenar.compiler.recordings.trials import Frames, fill, groups, in_time, natural_key, numbered, otsu, restarts
+from thenar.compiler.recordings.trials import fill, groups, numbered, otsu, restarts
 
 IDS = hnp.arrays(np.intp, st.integers(1, 30), elements=st.integers(0, 4))
-
-
-@given(st.lists(st.integers(0, 10**6)))
-def test_numbers_in_texts_are_sorted_as_numbers(numbers: list[int]) -> None:
-    texts = [f"Trial {number} - Copy" for number in numbers]
-    assert sorted(texts, key=natural_key) == [f"Trial {number} - Copy" for number in sorted(numbers)]
-    assert sorted(["b1", "a10", "1" * 5000, "A2", ""], key=natural_key) == ["", "1" * 5000, "A2", "a10", "b1"]
 
 
 @given(IDS, st.data())
@@ -28,11 +21,6 @@ def test_rows_get_one_number_exactly_where_all_columns_are_equal(first: np.ndarr
     assert numbers.tolist() == [order.index(pair) + 1 for pair in pairs]
 
 
-def test_a_trial_begins_with_another_person_and_where_the_clock_starts_again() -> None:
-    ids, time = np.array([0, 0, 0, 1, 1, 1, 0]), np.array([5, 6, 6, 7, 8, 1, 2.0])
-    assert restarts(ids, time).tolist() == [1, 1, 1, 2, 2, 3, 4]
-
-
 @given(st.lists(st.integers(10, 40), min_size=4, max_size=8), st.integers(0, 2**32 - 1))
 def test_a_clock_that_repeats_or_jitters_starts_no_trial(sizes: list[int], seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -45,20 +33,7 @@ def test_a_clock_that_repeats_or_jitters_starts_no_trial(sizes: list[int], seed:
 
 
 @given(IDS, st.data())
-def test_frames_are_ordered_within_the_places_of_their_trial(ids: np.ndarray, data: st.DataObject) -> None:
-    time = data.draw(hnp.arrays(np.float64, len(ids), elements=st.integers(0, 5)))
-    order = in_time(ids, time)
-    assert sorted(order) == list(range(len(ids)))
-    assert (ids[order] == ids).all()
-    for trial in set(ids.tolist()):
-        rows = order[ids == trial].tolist()
-        assert rows == sorted(rows, key=lambda row: (time[row], row))
-
-
-@given(IDS, st.data())
-def test_a_gap_is_filled_from_the_nearest_frame_of_its_trial_else_with_the_median(
-    ids: np.ndarray, data: st.DataObject
-) -> None:
+def test_gaps_are_filled_from_the_trial_else_with_the_median(ids: np.ndarray, data: st.DataObject) -> None:
     values = data.draw(hnp.arrays(np.int64, len(ids), elements=st.integers(0, 9)))
     missing = data.draw(hnp.arrays(np.bool_, len(ids)).filter(lambda mask: not mask.all()))
     expected, strange = values.copy(), 0
@@ -71,17 +46,6 @@ def test_a_gap_is_filled_from_the_nearest_frame_of_its_trial_else_with_the_media
         expected[row] = present[(len(present) - 1) // 2] if near is None else values[near]
     assert fill(values, missing, ids) == strange
     assert values.tolist() == expected.tolist()
-
-
-@given(IDS, st.data())
-def test_frames_are_reduced_as_one_by_one(ids: np.ndarray, data: st.DataObject) -> None:
-    values = data.draw(hnp.arrays(np.int64, len(ids), elements=st.integers(0, 9)))
-    rows = [np.flatnonzero(ids == trial) for trial in set(ids.tolist())]
-    rows.sort(key=lambda frames: int(frames[(len(frames) - 1) // 2]))
-    frames = Frames(ids)
-    assert frames.middle.tolist() == [each[(len(each) - 1) // 2] for each in rows]
-    assert frames.median(values).tolist() == [sorted(values[each])[(len(each) - 1) // 2] for each in rows]
-    assert frames.any(values > 5).tolist() == [bool((values[each] > 5).any()) for each in rows]
 
 
 @given(hnp.arrays(np.float64, st.integers(2, 40), elements=st.integers(-50, 50)))

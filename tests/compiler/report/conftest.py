@@ -85,9 +85,8 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
     return ReportContent(
         manifest=made.manifest,
         tables=made.tables,
-        tables_bytes=made.tables_bytes,
-        rounds=made.recogniser.rounds,
-        firmware=made.firmware,
+        facts=made.facts,
+        warnings=made.warnings,
         tree=tree,
         confusion=made.confusion,
         study=evaluate(grasp_set, asked, jobs=1),

@@ -130,7 +130,7 @@ def test_a_click_on_a_point_shows_its_switches_on_the_hand(opened: Reader, front
     assert command == "thenar compile kamakura.grasps -o build/ --from frontier/frontier.json --point 2"
 
 
-def test_the_mouse_over_a_point_tells_what_it_is_and_marks_its_row(opened: Reader) -> None:
+def test_hovering_over_a_point_describes_it_and_marks_its_row(opened: Reader) -> None:
     marker = opened.marker("by-frontier", 2)
     assert opened.script("return arguments[0].querySelector('title').textContent", marker).startswith("Point 2: 10 swi")  # type: ignore[attr-defined]
     ActionChains(opened.driver).move_to_element(marker.find_element(By.CSS_SELECTOR, ".target")).perform()

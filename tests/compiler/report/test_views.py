@@ -15,13 +15,13 @@ from thenar.compiler.report.content import ReportContent
 from thenar.compiler.report.frontier import frontier_view
 from thenar.compiler.report.hand import hand_picture
 from thenar.compiler.report.results import confusion_view
-from thenar.compiler.report.sections import kept_table, no_tree, placement_sentences, scan_sentences, scan_table
+from thenar.compiler.report.sections import kept_table, no_tree, placement_sentences, scan_table
 from thenar.compiler.report.tree import MOST_NODES, tree_view
 from thenar.compiler.text import DASH
 
 
 @given(arrays(np.intp, (4, 4), elements=st.integers(0, 50)))
-def test_a_confusion_matrix_shows_every_count_and_shades_it_by_its_share_of_the_row(counts: np.ndarray) -> None:
+def test_a_confusion_matrix_shows_counts_shaded_by_share_of_row(counts: np.ndarray) -> None:
     view = confusion_view("title", ("a", "b", "c", "d"), counts)
     for number, ((_, cells, total, _), line) in enumerate(zip(view.rows, counts.tolist(), strict=True)):
         assert [0 if shown == "·" else int(shown) for shown, _ in cells] == line
@@ -59,7 +59,7 @@ def test_the_list_of_a_tree_closes_what_it_opens(seed: int, inputs: int, rows: i
     assert len(view.nodes) + sum(node.below for node in view.nodes) == len(tree.nodes)
 
 
-def test_a_large_tree_is_shown_as_far_as_one_can_see_and_says_so() -> None:
+def test_a_large_tree_is_cut_and_says_so() -> None:
     random = np.random.default_rng(3)
     tree = grow_id3(random.random((3000, 30)) < 0.5, random.integers(0, 5, 3000))
     view = tree_view(tree, tuple(f"x{number}" for number in range(30)), tuple("abcde"))
@@ -118,7 +118,7 @@ def test_a_point_that_misses_every_grasp_has_no_latency_to_show(frontier: Fronti
     assert 'data-point="1"' not in by_latency.drawing
 
 
-def test_the_section_names_the_machine_of_its_times_and_calls_a_guess_one(frontier: Frontier) -> None:
+def test_the_section_names_its_machine_and_labels_guesses(frontier: Frontier) -> None:
     view = frontier_view(frontier, frontier.fingerprint, None)
     assert any(f"times on {frontier.machine}." in note for note in view.notes)
     assert "guess" not in repr(view)
@@ -151,4 +151,4 @@ def test_every_kept_switch_is_read_in_one_transaction(bare: ReportContent) -> No
     assert table is not None
     read = [name for row in table.rows for name in row[table.columns.index("Switches")].split(", ")]
     assert sorted(read) == sorted(bare.switch_names)
-    assert any("CyberGlove" in sentence for sentence in scan_sentences(bare))
+    assert any(fact.label == "CyberGlove" for fact in bare.facts)

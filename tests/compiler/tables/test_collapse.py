@@ -96,7 +96,7 @@ def test_contributions_at_one_threshold_are_added_in_the_order_of_the_rounds() -
     assert collapse(stumps, 0).joint_rows[0].tobytes() == by_threshold[1].tobytes()
 
 
-def test_what_a_stump_adds_is_what_centring_makes_of_its_answer_alone_to_the_last_bit() -> None:
+def test_a_stump_adds_exactly_its_centred_answer() -> None:
     random = np.random.default_rng(3)
     values = np.concatenate([random.normal(0, 2, 40), [0.0, -0.0, 5e-324, -5e-324, 3.0, -3.0]])
     for n_classes, shrinkage in ((2, 1.0), (3, 0.1), (33, 1.0)):

@@ -35,7 +35,7 @@ def test_a_change_of_class_within_the_safe_margin_is_allowed(sound: Comparison) 
     assert sound.changed.tolist() == [2]
 
 
-def test_nothing_holds_if_tables_stray_beyond_their_bounds_or_a_safe_row_changes_class(sound: Comparison) -> None:
+def test_a_comparison_fails_beyond_bounds_or_on_changed_safe_rows(sound: Comparison) -> None:
     assert not replace(sound, collapse_difference=1.1e-12).holds
     assert not replace(sound, integer_difference=5.0 + 2e-9).holds
     assert replace(sound, integer_difference=5.0 + 1e-9).holds

@@ -100,7 +100,7 @@ def test_every_fault_is_counted_as_the_runtime_scores_it(
             assert count == recognised([scorer.lanes(*each) for each in zip(stuck, asked, strict=True)], labels, trials)
 
 
-def test_the_worst_of_each_kind_is_the_first_of_several_with_the_names_of_its_inputs() -> None:
+def test_the_worst_fault_of_each_kind_names_its_inputs() -> None:
     random = np.random.default_rng(3)
     tables = tables_of(random, 3, 3, 1, slope=False)
     bits, codes = random.random((40, 3)) < 0.5, random.integers(0, 32, (40, 1)).astype(np.uint16)

@@ -58,7 +58,7 @@ def test_a_bin_that_no_code_falls_into_is_in_no_frame() -> None:
     assert (found.total, found.codes.tolist()) == (3, [0])
 
 
-def test_a_bin_is_shown_by_its_lowest_code_up_to_the_highest_there_is() -> None:
+def test_a_bin_is_shown_by_its_lowest_existing_code() -> None:
     silent = whole_numbers(0, 2, 0, (3,), 0)
     for bin_, code in enumerate((0, 10, 65535)):
         rows = np.zeros((3, 2), np.int16)

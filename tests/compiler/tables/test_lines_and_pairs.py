@@ -146,7 +146,7 @@ def test_of_all_codes_none_loses_more_and_the_witness_as_much(kind: str, seed: i
 
 @settings(deadline=None)
 @given(seed=seeds)
-def test_the_runtime_adds_up_what_arrays_add_up_and_nothing_of_what_is_lost(seed: int) -> None:
+def test_the_runtime_sums_as_arrays_do_without_lost_inputs(seed: int) -> None:
     tables, bits, codes = with_lines(seed)
     integers = quantise(tables, bits, codes)
     scorer, scores = Scorer(integers), integer_scores(integers, bits, codes)
@@ -197,7 +197,7 @@ def test_rows_of_a_byte_are_upper_halves_of_steps_and_no_coarser(seed: int) -> N
 
 
 @given(seed=seeds)
-def test_of_upper_halves_the_bias_takes_back_what_rounding_takes_in_the_mean(seed: int) -> None:
+def test_the_bias_compensates_the_mean_rounding_of_upper_halves(seed: int) -> None:
     tables, bits, codes = with_lines(seed)
     if not tables.lines:
         return
@@ -227,7 +227,7 @@ JOINTS = 5
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds)
-def test_a_missing_joint_adds_its_mean_and_is_code_0_to_its_pair(seed: int) -> None:
+def test_a_missing_joint_adds_its_mean_and_gives_pairs_code_0(seed: int) -> None:
     tables, bits, codes = with_pairs(seed)
     integers = quantise(tables, bits, codes)
     scorer, scores = Scorer(integers), integer_scores(integers, bits, codes)

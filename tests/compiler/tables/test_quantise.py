@@ -62,7 +62,7 @@ def spans_by_counting(integers: IntegerTables, group_size: int) -> list[int]:
 
 
 @given(seed=seeds, shape=shapes)
-def test_every_look_up_of_up_to_five_switches_or_of_a_joint_fits_a_byte(
+def test_every_lookup_of_five_switches_or_a_joint_fits_a_byte(
     make_stumps: MakeStumps, make_rows: MakeRows, seed: int, shape: tuple[int, int]
 ) -> None:
     switches, joints = shape
@@ -220,7 +220,7 @@ def test_a_threshold_is_dropped_only_between_equal_rows(make_rows: MakeRows, row
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_mean_of_equal_rows_is_that_row_though_floating_point_rounds_it_past_the_limit(sign: int) -> None:
+def test_the_mean_of_equal_rows_is_exactly_that_row(sign: int) -> None:
     random = np.random.default_rng(4)
     tried = 0
     for n, row in zip(random.integers(3, 60, 500).tolist(), random.uniform(0.5, 4.0, 500).tolist(), strict=True):

@@ -101,9 +101,7 @@ def _switches(bias: list[float], rows: list[list[float]], steps: list[int], whol
 
 
 @pytest.mark.parametrize(("leader", "safe"), [(0, "0"), (1, "3/4")])
-def test_a_competitor_of_the_lower_number_wins_ties_and_the_other_must_be_better_by_a_step(
-    leader: int, safe: str
-) -> None:
+def test_ties_go_to_the_lower_number_others_need_a_step(leader: int, safe: str) -> None:
     bias = [0.0, 0.0]
     bias[leader] = 0.375  # at 2 steps a unit, 3/4 of a step, of which nothing is left
     rounding = _switches(bias, [], [0, 0], [])
@@ -141,7 +139,7 @@ def test_scores_down_to_the_smallest_doubles_are_compared_exactly() -> None:
 
 
 @pytest.mark.parametrize(("bin_", "code"), [(0, 0), (1, 1), (2, 65535)])
-def test_the_first_code_and_the_last_may_have_a_bin_of_their_own(bin_: int, code: int) -> None:
+def test_the_first_and_last_code_may_have_single_bins(bin_: int, code: int) -> None:
     rows = np.zeros((3, 2))
     rows[bin_, 0] = 0.25
     steps, none = (np.array([0, 65534], np.uint16),), np.zeros((0, 2), np.int16)
@@ -158,7 +156,7 @@ _alike = st.sampled_from([0, 1, -1, 2**150, 2**150 + 1, 2**150 - 1, -(2**150), 2
 
 @settings(max_examples=150)
 @given(data=st.data(), classes=st.integers(2, 6), numbers=st.sampled_from([_long, _alike, st.integers(-9, 9)]))
-def test_the_worst_pair_is_the_first_of_the_worst_however_many_bits_part_it_from_the_next(
+def test_the_worst_pair_is_found_exactly_and_first_on_ties(
     data: st.DataObject, classes: int, numbers: st.SearchStrategy[int]
 ) -> None:
     choices = data.draw(st.lists(st.integers(1, 3), min_size=1, max_size=4))

@@ -97,9 +97,7 @@ def test_logitboost_is_the_classifier(grasp_set: GraspSet) -> None:
     assert seen == [(1, 3), (2, 3), (3, 3)]
 
 
-def test_stages_are_the_models_of_fewer_rounds_and_the_same_for_all_where_there_are_none(
-    constant: Constant, grasp_set: GraspSet
-) -> None:
+def test_stages_are_models_of_fewer_rounds_where_rounds_exist(constant: Constant, grasp_set: GraspSet) -> None:
     samples, rounds = Samples.of(grasp_set), (2, 7, 3)
     for number, stage in zip(rounds, Training.of(Recipe(max_bins=5)).stages(samples, rounds), strict=True):
         alone = Training.of(Recipe(max_bins=5, rounds=number)).train(samples)

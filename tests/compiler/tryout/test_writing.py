@@ -27,7 +27,7 @@ def build(make_set: Make, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_pages_policy_names_its_script_and_its_style_and_allows_no_request(build: Path) -> None:
+def test_the_pages_policy_allows_only_its_script_and_style(build: Path) -> None:
     page = (build / "try.html").read_text()
     (policy,) = re.findall(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
     (script,) = re.findall(r'<script type="module">(.*?)</script>', page, re.DOTALL)
@@ -52,7 +52,7 @@ def test_the_page_holds_the_very_tables_and_rows_of_every_type(build: Path) -> N
     assert '<a href="try.html">' in (build / "report.html").read_text()
 
 
-def test_the_page_says_what_its_first_state_is_and_whether_the_build_knows_an_empty_hand(
+def test_the_page_states_its_first_frame_and_empty_hand_knowledge(
     build: Path, make_set: Make, with_none: Callable[[GraspSet], GraspSet], tmp_path: Path
 ) -> None:
     page, warning = (build / "try.html").read_text(), "This build was trained without an empty hand"
@@ -62,7 +62,7 @@ def test_the_page_says_what_its_first_state_is_and_whether_the_build_knows_an_em
     assert warning not in (tmp_path / "none" / "try.html").read_text()
 
 
-def test_rows_are_fewer_where_there_is_no_room_and_a_page_that_is_too_large_is_none(
+def test_large_pages_hold_fewer_rows_or_are_omitted(
     make_set: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     size = len((_compiled(make_set, tmp_path / "whole") / "try.html").read_bytes())

@@ -9,7 +9,6 @@ from thenar.drivers.cyberglove_protocol import (
     Record,
     RecordDecoder,
     RecordFault,
-    period_words,
     query,
     setting,
     shortest_us,
@@ -19,7 +18,6 @@ from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.serial_line import SerialLine
 
 SOON_S = 10.0
-VALUES = bytes(range(60, 78))
 
 
 @pytest.fixture
@@ -42,11 +40,6 @@ def records(client: SerialLine, count: int, decoder: RecordDecoder | None = None
     return found
 
 
-def asked_for(client: SerialLine, rate_hz: float | None) -> None:
-    words = b"".join(word.to_bytes(2, "big") for word in period_words(rate_hz))
-    Dialogue(client).ask(setting("T", words))
-
-
 def test_it_streams_no_faster_than_box_and_line_allow(line: PtyLine, client: SerialLine) -> None:
     with EmulatedCyberGlove(line):
         began = monotonic()
@@ -55,24 +48,6 @@ def test_it_streams_no_faster_than_box_and_line_allow(line: PtyLine, client: Ser
         # Half a byte's time of grace is the line's.
         assert monotonic() - began >= 50 * shortest_us(18, 115_200) / 1e6 - 1e-4
     assert {record.fault for record in found} == {None}
-
-
-def test_it_streams_at_the_period_that_it_is_told(line: PtyLine, client: SerialLine) -> None:
-    with EmulatedCyberGlove(line):
-        asked_for(client, 100)
-        began = monotonic()
-        client.write(b"S")
-        found = records(client, 20)
-        assert monotonic() - began >= 19 / 100
-    assert {record.fault for record in found} == {None}
-
-
-def test_asked_for_more_than_it_can_it_says_so_in_every_record(line: PtyLine, client: SerialLine) -> None:
-    with EmulatedCyberGlove(line) as glove:
-        glove.set(VALUES)
-        asked_for(client, 200)
-        client.write(b"S")
-        assert records(client, 3)[:3] == [Record(VALUES, fault="too fast")] * 3
 
 
 def test_what_is_done_to_the_glove_shows_in_its_records(line: PtyLine, client: SerialLine) -> None:

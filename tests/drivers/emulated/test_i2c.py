@@ -143,6 +143,6 @@ def test_a_chip_that_cannot_be_emulated_is_refused_by_name() -> None:
 
 
 @pytest.mark.usefixtures("umockdev", "hostile_folder")
-def test_no_module_of_the_current_folder_runs_in_the_server_of_the_buses() -> None:
+def test_the_bus_server_imports_no_module_of_the_current_folder() -> None:
     with EmulatedI2c([EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,))]) as emulated:
         assert emulated.counters(0).transfers == 0

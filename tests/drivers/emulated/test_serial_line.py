@@ -27,9 +27,7 @@ def drained(outgoing: Outgoing, now: float) -> bytes:
 
 
 @given(GAPS, st.integers(1, 50))
-def test_a_byte_arrives_when_the_line_has_had_the_time_for_it_and_no_wake_up_shifts_the_schedule(
-    messages: list[tuple[int, int]], every: int
-) -> None:
+def test_bytes_arrive_on_the_lines_schedule_whatever_wakes_up(messages: list[tuple[int, int]], every: int) -> None:
     """Times in milliseconds, a byte taking one; whoever looks, how often, makes no difference."""
     outgoing, queued, free, ends = Outgoing(BYTE_S, 10_000), 0, 0, []
     for gap, length in messages:
@@ -56,15 +54,6 @@ def test_of_what_waits_the_oldest_goes_whole_when_there_is_too_much(messages: li
     assert newest
     assert len(kept) <= most or len(newest) == 1
     assert not outgoing.dropped or sum(map(len, sent[outgoing.dropped - 1 :])) > most
-
-
-def test_it_says_when_the_next_bytes_are_in() -> None:
-    outgoing = Outgoing(BYTE_S, 100)
-    assert outgoing.next_at(10) is None
-    outgoing.put(1.0, b"x" * 15)
-    assert outgoing.next_at(10) == pytest.approx(1.010)
-    outgoing.take(10)
-    assert outgoing.next_at(10) == pytest.approx(1.015)
 
 
 def test_damage_changes_what_goes_out_and_how_long_it_takes() -> None:
@@ -138,14 +127,6 @@ def test_what_the_client_says_is_heard_as_late_as_from_a_wire(link: Path) -> Non
         assert heard.get(timeout=60) - began >= 0.1
 
 
-def test_without_pace_bytes_take_no_time_of_their_own(link: Path) -> None:
-    with PtyLine(link, 300, paced=False) as line, opened(link) as port:
-        began = monotonic()
-        line.send(b"x" * 3000)
-        assert len(port.read(3000)) == 3000
-        assert monotonic() - began < 60  # at 300 baud: 100 s
-
-
 def test_an_unplugged_port_dies_under_its_client_and_its_link_is_gone(line: PtyLine, link: Path) -> None:
     with opened(link) as port:
         line.unplug()
@@ -208,13 +189,6 @@ def test_it_may_be_unplugged_and_replugged_from_what_receives(line: PtyLine, lin
     with opened(link) as port:
         line.send(b"again")
         assert port.read(5) == b"again"
-
-
-def test_a_client_that_closes_leaves_the_port_to_the_next(line: PtyLine, link: Path) -> None:
-    for _ in range(3):
-        with opened(link) as port:
-            line.send(b"here")
-            assert port.read(4) == b"here"
 
 
 def test_with_nobody_listening_nothing_blocks_and_the_oldest_is_dropped_whole(link: Path) -> None:

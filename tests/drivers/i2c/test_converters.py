@@ -123,7 +123,7 @@ PLACES: dict[str, list[Place]] = {
 
 
 @pytest.mark.parametrize("places", PLACES.values(), ids=PLACES)
-def test_a_scan_takes_as_long_as_the_plan_counts_and_gives_every_code(
+def test_a_scan_takes_the_planned_time_and_gives_every_code(
     monkeypatch: pytest.MonkeyPatch, places: list[Place]
 ) -> None:
     @settings(deadline=None, max_examples=25)

@@ -34,7 +34,7 @@ class DeadNode(Node):
 
 
 @pytest.mark.parametrize("code", [errno.EREMOTEIO, errno.ENXIO, errno.EIO, errno.ETIMEDOUT])
-def test_an_adapter_that_is_gone_is_noticed_whatever_it_says_of_its_chips(code: int) -> None:
+def test_a_gone_adapter_is_noticed_whatever_its_errno(code: int) -> None:
     node = DeadNode(code)
     chips = [PlacedChip(node.device, CHIPS["mcp23017"], address, frozenset(), None) for address in (0x20, 0x21)]
     keeper = ChipSupervisor(node, chips, check_every_s=1.0)
@@ -113,7 +113,7 @@ def test_every_reading_gives_the_pins_whatever_the_chip_was_left_with(
 
 @pytest.mark.parametrize(("said", "there"), PAIRS)
 @given(levels=levels)
-def test_a_chip_that_is_another_is_found_out_unless_all_its_pins_are_low(said: str, there: str, levels: int) -> None:
+def test_another_chip_is_found_out_unless_all_pins_are_low(said: str, there: str, levels: int) -> None:
     """Low pins read as driven low: where they all are, nobody could tell a chip without registers from others."""
     address = address_of(said, there)
     whole = (1 << len(CHIPS[there].pins)) - 1
@@ -142,20 +142,12 @@ def test_what_is_nothing_known_is_called_so() -> None:
     assert identify_chip(WireNode("pcf8574", 0x21), 0x20) == "something unknown"
 
 
-def test_a_chip_left_in_bank_1_by_a_crash_is_brought_back_to_bank_0() -> None:
-    node = node_with("mcp23017", 0x20, 0x2A15)
-    node.station.device.poke(0x0A, 0xA0)  # BANK and SEQOP
-    node.station.device.poke(0x00, 0x00)
-    set_up(node, CHIPS["mcp23017"], 0x20, inputs("mcp23017"))
-    assert node.query(Query(0x20, b"\x12", 2)) == bytes((0x15, 0x2A))
-
-
 CONVERTERS = [kind for kind in CHIPS if kind not in expanders()]
 
 
 @pytest.mark.parametrize("kind", CONVERTERS)
 @given(channel=st.integers(0, 3), code=st.integers(0, 0xFFFF), leftovers=leftovers)
-def test_every_conversion_gives_the_code_of_its_channel_whatever_the_chip_was_left_with(
+def test_conversions_give_their_channels_code_whatever_was_left(
     kind: str, channel: int, code: int, leftovers: list[tuple[int, int]]
 ) -> None:
     chip, address = CHIPS[kind], address_of(kind)
@@ -176,7 +168,7 @@ def test_every_conversion_gives_the_code_of_its_channel_whatever_the_chip_was_le
         assert chip.code(answer) == (min(code, (1 << chip.bits) - 1) if number == channel else 0)
 
 
-def test_a_conversion_is_not_there_before_its_time_and_another_waits_for_it() -> None:
+def test_a_conversion_takes_its_time_and_delays_the_next() -> None:
     chip, node, now = CHIPS["ads1115"], WireNode("ads1115", 0x48), [0.0]
     node.station.device.clock = lambda: now[0]  # type: ignore[attr-defined]
     node.station.device.levels = 1000 | 2000 << 16
@@ -192,7 +184,7 @@ def test_a_conversion_is_not_there_before_its_time_and_another_waits_for_it() ->
 
 
 @pytest.mark.parametrize("kind", CHIPS)
-def test_a_reset_shows_in_what_is_watched_of_every_chip_that_a_reset_harms(kind: str) -> None:
+def test_a_harmful_reset_shows_in_the_watched_registers(kind: str) -> None:
     chip, address = CHIPS[kind], address_of(kind)
     node = node_with(kind, address, 0xFFFFFF)
     set_up(node, chip, address, inputs(kind))
@@ -205,7 +197,7 @@ def test_a_reset_shows_in_what_is_watched_of_every_chip_that_a_reset_harms(kind:
     assert not watch.holds(read_back(node, chip, address, watch))
 
 
-def test_only_used_pins_of_an_mcp23017_are_pulled_up_and_the_two_that_are_no_inputs() -> None:
+def test_an_mcp23017_pulls_up_used_pins_and_its_outputs() -> None:
     node = node_with("mcp23017", 0x20, 0xFFFF)
     set_up(node, CHIPS["mcp23017"], 0x20, frozenset({0, 9}))
     assert node.query(Query(0x20, b"\x0c", 2)) == bytes((0x81, 0x82))

@@ -75,7 +75,7 @@ def test_any_bytes_are_answered_by_as_many(sent: bytes) -> None:
 
 
 @pytest.mark.parametrize("kind", SPI_CHIPS)
-def test_every_chip_has_each_of_its_pins_once_and_can_be_powered_and_reached(kind: str) -> None:
+def test_every_converters_package_has_its_pins_supply_and_bus(kind: str) -> None:
     pins = SPI_CHIPS[kind].package.pins
     wired = (*SPI_CHIPS[kind].pins, "CS", "DIN", "DOUT", "CLK", "AGND", "DGND", "VREF", "VDD")
     assert all(pins.count(name) == 1 for name in wired)
@@ -139,7 +139,7 @@ def test_a_device_that_goes_is_told_and_opened_again(rig: Rig) -> None:
     assert "does not work: there is no such device" in str(rig.read(DEVICES[0], "mcp3208", [1]))
 
 
-def test_a_path_that_is_no_device_is_refused_and_one_that_is_missing_is_told() -> None:
+def test_wrong_and_missing_device_paths_are_refused() -> None:
     chip = SPI_CHIPS["mcp3208"]
     with pytest.raises(SettingError, match="is not the path of a device"):
         SpiDevice("socket://x:1", chip, 1)

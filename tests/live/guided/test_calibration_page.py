@@ -66,7 +66,7 @@ def test_all_poses_make_the_calibration_that_the_terminal_makes(
     assert page.faults() == []
 
 
-def test_saturated_and_dead_sensors_are_told_and_nothing_is_written_by_who_leaves(
+def test_bad_sensors_are_reported_and_leaving_writes_nothing(
     calibrate: Callable[..., Command], wearer: Wearer, browser: Browser, tmp_path: Path
 ) -> None:
     (tmp_path / "anna.toml").write_text("old")

@@ -59,7 +59,7 @@ def test_what_cannot_be_read_is_missed_and_comes_back(run: MakeRun, outage: Outa
 
 
 @pytest.mark.parametrize("address", [PCA9555, MCP23008])
-def test_a_chip_that_is_back_right_after_it_was_looked_for_is_found(run: MakeRun, address: int) -> None:
+def test_a_chip_back_right_after_a_search_is_found(run: MakeRun, address: int) -> None:
     """The worst moment to come back."""
     running = run("both", "glove", "bus")
     scene, client, i2c = running.scene, running.start(), running.bench.i2c
@@ -165,9 +165,7 @@ def test_a_refused_batch_is_read_otherwise_and_nothing_is_missed(run: MakeRun, c
 @pytest.mark.parametrize(
     ("chip", "kind", "other"), [(STRAIGHT, "pca9555", "mcp23017"), (BEHIND, "mcp23008", "pca9555")]
 )
-def test_a_wrong_chip_is_not_believed_and_the_right_one_is_when_it_is_back(
-    run: MakeRun, chip: int, kind: str, other: str
-) -> None:
+def test_a_wrong_chip_is_not_believed_the_right_one_is(run: MakeRun, chip: int, kind: str, other: str) -> None:
     running = run("both", "glove", "bus")
     scene, client, i2c = running.scene, running.start(), running.bench.i2c
     scene.settled(0)
@@ -203,7 +201,7 @@ def test_a_mux_that_forgets_its_channel_gives_no_wrong_answer(run: MakeRun, cont
 
 
 @pytest.mark.parametrize("chip", [0, STRAIGHT, BEHIND, FIFTH])
-def test_a_chip_that_lost_its_supply_for_a_moment_gives_no_wrong_answer(run: MakeRun, chip: int) -> None:
+def test_a_brief_loss_of_supply_gives_no_wrong_answer(run: MakeRun, chip: int) -> None:
     """Without its pull-ups it would read open switches as closed."""
     running = run("both", "glove", "bus")
     scene, client, i2c = running.scene, running.start(), running.bench.i2c

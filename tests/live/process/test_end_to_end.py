@@ -30,7 +30,7 @@ PLAYED_US = 1_000_000
     [("switches", ("bus",)), ("both", ("glove", "bus")), ("both", ("glove", "board", "bus"))],
     ids=["bus", "glove and bus", "all"],
 )
-def test_what_is_recognised_is_the_offline_classification_frame_by_frame_and_replays_the_same(
+def test_live_and_replayed_answers_are_the_offline_classification(
     run: MakeRun, tmp_path: Path, inputs: str, parts: tuple[str, ...]
 ) -> None:
     running = run(inputs, *parts)

@@ -55,7 +55,7 @@ def test_signals_end_a_run_whose_devices_are_all_gone(run: MakeRun) -> None:
     assert client.end(signal.SIGTERM) == 0
 
 
-def test_a_killed_run_leaves_its_recording_and_a_new_one_works_at_once(run: MakeRun, tmp_path: Path) -> None:
+def test_a_killed_run_leaves_its_recording_and_free_devices(run: MakeRun, tmp_path: Path) -> None:
     running, path = run("both", "glove", "board", "bus"), tmp_path / "run.mcap"
     scene = running.scene
     client = running.start("--record", path)

@@ -27,7 +27,7 @@ def test_an_unplugged_port_is_missed_and_found_again(run: MakeRun, outage: Outag
     assert running.device({"cyberglove": "stream", "stream": "cyberglove"}[kind]).opened == 1
 
 
-def test_a_record_that_stays_away_is_late_for_the_grace_before_its_joints_are_lost(run: MakeRun) -> None:
+def test_a_missing_record_is_late_for_the_grace_then_lost(run: MakeRun) -> None:
     running = run("both", "glove", "board")
     grasps, joints = running.scene.grasps, running.scene.truth.joint_names
     running.scene.well(0)
@@ -76,9 +76,7 @@ def test_a_run_that_begins_without_a_device_finds_it_when_it_comes(run: MakeRun,
 
 
 @pytest.mark.parametrize("mode", ["stream", "poll"])
-def test_a_glove_that_is_pulled_from_its_box_gives_no_answer_until_it_is_back(
-    run: MakeRun, outage: Outage, mode: str
-) -> None:
+def test_a_glove_pulled_from_its_box_gives_no_answers(run: MakeRun, outage: Outage, mode: str) -> None:
     """Its records go on, with 'eg' at their ends."""
     running = run("both", "glove", "board", glove=f'mode = "{mode}"')
     glove = running.bench.glove

@@ -34,7 +34,7 @@ def test_what_is_recognised_is_the_offline_classification_frame_by_frame(
     assert scene.check() >= len(rows)
 
 
-def test_a_grasp_that_rests_on_all_devices_comes_with_the_health_of_all(run: MakeRun) -> None:
+def test_a_grasp_comes_with_the_health_of_all_devices(run: MakeRun) -> None:
     health = run("both", "glove", "board").first_health
     assert [device.connected for device in health.devices] == [True, True]
 

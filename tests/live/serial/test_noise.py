@@ -58,7 +58,7 @@ def drop(_random: Random, message: bytes) -> bytes:
 
 @pytest.mark.parametrize("line", [GLOVE, BOARD], ids=["glove", "board"])
 @pytest.mark.parametrize("damage", [cut, insert, flip, flood, drop])
-def test_damaged_bytes_give_no_wrong_answer_and_are_over_when_the_cable_is_mended(
+def test_damaged_bytes_give_no_wrong_answer_and_cease_with_repair(
     run: MakeRun, line: int, damage: Callable[[Random, bytes], bytes]
 ) -> None:
     """One message in three is damaged, while rows change; a flipped byte of the glove alone may go unnoticed, for its
@@ -104,7 +104,7 @@ def test_a_run_opens_its_devices_through_noise(run: MakeRun) -> None:
 
 
 @pytest.mark.parametrize("mode", ["stream", "poll"])
-def test_a_glove_that_is_asked_for_too_much_is_well_at_the_rate_that_it_can(run: MakeRun, mode: str) -> None:
+def test_a_glove_asked_for_too_much_runs_at_its_rate(run: MakeRun, mode: str) -> None:
     """Its records end in 'es': they are measurements all the same, and none of them is taken for late."""
     running = run("both", "glove", "board", glove=f'mode = "{mode}"\nrate_hz = 1000')
     scene = running.scene

@@ -57,9 +57,7 @@ def test_the_page_shows_what_is_published(run: Callable[[], Any], browser: Any) 
     browser.wait(lambda: browser.texts("#wrong li") == ["nothing"])
 
 
-def test_a_run_that_has_stopped_is_old_also_for_a_page_that_is_opened_later(
-    run: Callable[[], Any], browser: Any
-) -> None:
+def test_a_stopped_run_is_old_for_later_pages_too(run: Callable[[], Any], browser: Any) -> None:
     running = run()
     browser.open(running.page.server.url)
     answer = shown(browser, running.scene, 0)
@@ -222,7 +220,7 @@ def test_what_cannot_be_is_said_beside_the_buttons(run: Callable[[], Any], brows
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1400, 400])
-def test_in_every_light_and_width_it_fits_and_axe_finds_no_serious_fault(
+def test_the_page_fits_every_scheme_and_width_without_axe_faults(
     run: Callable[[], Any], browser: Any, scheme: str, width: int
 ) -> None:
     running = run()

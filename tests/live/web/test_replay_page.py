@@ -167,7 +167,7 @@ def test_a_recording_that_is_cut_shows_what_there_is_and_says_so(
     assert browser.axe() == []
 
 
-def test_without_its_build_answers_and_labels_are_shown_and_what_is_missing_is_said(
+def test_without_its_build_a_recording_shows_answers_and_labels(
     recording: tuple[Path, dict[int, tuple[int, int]]], browser: Any, show: Callable[..., Any]
 ) -> None:
     recorded = Recorded(recording[0])

@@ -116,9 +116,7 @@ def test_a_slow_source_is_old_after_three_of_its_periods(page: Callable[..., Run
         assert run.old == (number == 0 or age_s > 300)
 
 
-def test_devices_that_are_lost_are_named_and_only_what_is_read_is_counted(
-    page: Callable[..., Run], browser: Any
-) -> None:
+def test_lost_devices_are_named_and_only_readable_switches_counted(page: Callable[..., Run], browser: Any) -> None:
     run = page()
     run.health(("glove", True), ("stream", True))
     connected = ("glove: connected", "2 of 3 switches closed: a, b")
@@ -165,7 +163,7 @@ def test_a_past_that_ends_a_little_after_the_moment_is_kept(page: Callable[..., 
     browser.wait(lambda: len(browser.texts("#segments li")) == 5)
 
 
-def test_a_wrong_prediction_of_a_recording_is_marked_by_a_sign_and_in_words(browser: Any) -> None:
+def test_a_recordings_wrong_predictions_are_marked_by_sign_and_words(browser: Any) -> None:
     state = {"first_us": 0, "last_us": 9_000_000, "playing": False, "speed": 1.0, "share": 1.0, "faults": []}
     predictions = [(0, "none"), (1_000_000, "Add"), (2_000_000, "unknown"), (5_000_000, "PoS")]
     truth = [(500_000, 3_000_000, "Add"), (4_000_000, 8_000_000, "Add")]

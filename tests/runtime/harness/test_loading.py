@@ -40,11 +40,11 @@ def test_every_table_of_the_file_arrives(load: Load, full_text: str, tmp_path: P
     assert harness.switches == ("s001", "s014", "s020", "s021", "s030", "s100", "s102")
 
 
-def test_an_empty_file_is_a_glove_with_nothing_on_it_named_after_the_file(load: Load) -> None:
+def test_an_empty_file_is_an_empty_glove_of_its_name(load: Load) -> None:
     assert load("") == Harness(name="glove")
 
 
-def test_text_that_was_kept_elsewhere_is_read_likewise_its_calibration_as_it_stands(full_text: str) -> None:
+def test_stored_text_is_read_with_its_calibration_path_unchanged(full_text: str) -> None:
     glove = parse_harness(full_text, "a.mcap").cyberglove
     assert glove is not None
     assert glove.calibration == "anna.toml"
@@ -131,7 +131,7 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ("[bus]", "line 1: bus: must be a list, not a table"),
     ],
 )
-def test_what_is_wrong_with_a_line_or_bus_is_told_with_its_place(load: Load, text: str, message: str) -> None:
+def test_faults_of_lines_and_buses_name_their_place(load: Load, text: str, message: str) -> None:
     assert message in complaint(load, text)
 
 

@@ -106,7 +106,7 @@ def test_what_was_measured_is_written_and_all_else_is_kept(tmp_path: Path, rest:
 
 
 @pytest.mark.parametrize("text", ['cyberglove = { port = "/dev/x" }\n', 'cyberglove.port = "/dev/x"\n', 'name = "a"\n'])
-def test_a_file_in_which_there_is_no_place_for_it_stays_and_what_to_write_is_said(tmp_path: Path, text: str) -> None:
+def test_a_file_without_room_stays_and_the_text_is_shown(tmp_path: Path, text: str) -> None:
     path = tmp_path / "glove.toml"
     path.write_text(text)
     with pytest.raises(HarnessError, match="write `record_us = 6400` there"):

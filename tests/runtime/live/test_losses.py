@@ -116,9 +116,7 @@ def played(build: Build, policy: Policy, sequences: int, seed: int) -> Player:
 
 
 @pytest.mark.parametrize("name", POLICIES)
-def test_no_ok_line_is_contradicted_by_its_own_frame_or_rests_on_frames_with_lost_inputs(
-    make_build: MakeBuild, name: str
-) -> None:
+def test_ok_lines_rest_on_whole_frames_that_agree(make_build: MakeBuild, name: str) -> None:
     player = played(make_build(), POLICIES[name], sequences=2 * ROWS, seed=1)
     assert player.ok > ROWS
     assert player.changing > ROWS / 4
@@ -138,7 +136,7 @@ def test_in_a_hundred_thousand_sequences_there_is_no_wrong_ok_line(make_build: M
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("error_rate", [None, 0.05])
-def test_a_hand_held_still_keeps_its_grasp_in_every_ok_line_while_all_switches_are_lost_and_found(
+def test_a_still_hands_ok_lines_keep_its_grasp_through_losses(
     make_build: MakeBuild, seed: int, error_rate: float | None
 ) -> None:
     """150 ms of whole frames, 100 ms without switches, and whole frames again, of every state of the switches."""

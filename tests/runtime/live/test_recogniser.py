@@ -22,7 +22,6 @@ Arrival = tuple[int, SwitchFrame | None, GloveFrame | None]
 
 SWITCHES, JOINTS = 6, 3
 SWITCH_PERIOD, GLOVE_PERIOD = 1000, 700
-NAMES = tuple(f"s{number}" for number in range(SWITCHES))
 SENSORS = ("j2", "other", "j0", "j1")
 GRACE = 2200
 AT_ONCE = Policy(lead=0, dwell_us=0, hold_us=0, grace_us=GRACE)
@@ -133,37 +132,6 @@ def as_dict(grasp: LiveGrasp) -> dict[str, Any]:
     return {name: getattr(grasp, name) for name in grasp.__struct_fields__}
 
 
-@pytest.mark.parametrize("silent", ["switches", "glove"])
-@pytest.mark.parametrize("policy", [AT_ONCE, Policy(max_lost=1.0)])
-def test_a_device_that_falls_silent_degrades_the_answer_within_two_of_its_periods(
-    make_build: MakeBuild, silent: str, policy: Policy
-) -> None:
-    """A device delivers at every period until one moment; the other goes on."""
-    live, last = recognizer(make_build(), policy), 20 * 7000
-    period = {"switches": SWITCH_PERIOD, "glove": GLOVE_PERIOD}
-    for now in range(0, last + 5000, 100):
-        there = {name: now % period[name] == 0 and (now <= last or name != silent) for name in period}
-        switches = SwitchFrame(now, 5) if there["switches"] else None
-        found = live.step(now, 0, switches, GloveFrame(now, b"\x05\x06\x07\x08") if there["glove"] else None).grasp
-        assert (found.health == "ok") == (now <= last + 2 * period[silent])
-
-
-def test_nothing_is_known_before_the_first_frame_nor_after_the_last(make_build: MakeBuild) -> None:
-    live = recognizer(make_build(), Policy(max_lost=1.0))
-    first = live.step(0, 0, None, None).grasp
-    assert (first.grasp, first.candidate, first.health, first.probability, first.margin) == (
-        UNKNOWN,
-        UNKNOWN,
-        "unknown",
-        0,
-        0,
-    )
-    assert (first.switch_age_us, first.glove_age_us, first.latency_us) == (None, None, 0)
-    assert live.step(1, 0, SwitchFrame(1, 3), None).grasp.health == "degraded"
-    gone = live.step(2002, 0, None, None).grasp
-    assert (gone.grasp, gone.health, gone.switch_age_us, gone.latency_us) == (UNKNOWN, "unknown", 2001, 2001)
-
-
 @pytest.mark.parametrize(("switches", "joints"), [(0, 3), (6, 0)])
 def test_a_device_that_the_build_does_not_use_is_not_missed(make_build: MakeBuild, switches: int, joints: int) -> None:
     live = recognizer(make_build(switches=switches, joints=joints))
@@ -178,12 +146,6 @@ def test_a_glove_that_the_harness_does_not_have_is_lost_for_good(make_build: Mak
     live = LiveRecognizer(make_build(), switch_period_us=1000, policy=Policy(max_lost=1.0))
     found = live.step(0, 0, SwitchFrame(0, 3), GloveFrame(0, b"")).grasp
     assert (found.health, found.lost, found.glove_age_us) == ("degraded", ("j0", "j1", "j2"), None)
-
-
-def test_a_glove_that_is_not_plugged_into_its_box_is_lost(make_build: MakeBuild) -> None:
-    live = recognizer(make_build(), Policy(max_lost=1.0))
-    for status, health in [(0x81, "ok"), (0x80, "degraded"), (None, "ok")]:
-        assert live.step(0, 0, SwitchFrame(0, 3), GloveFrame(0, b"\x05\x06\x07\x08", status)).grasp.health == health
 
 
 def test_what_does_not_fit_is_refused_with_our_own_errors(make_build: MakeBuild) -> None:
@@ -220,7 +182,7 @@ def test_a_segment_has_the_probability_of_its_type_in_this_frame(make_build: Mak
 @pytest.mark.parametrize(
     ("period_us", "grace_us", "until_us"), [(10_000, None, 60_000), (30_000, None, 120_000), (10_000, 25_000, 25_000)]
 )
-def test_a_late_record_serves_degraded_with_its_age_until_the_grace_is_over(
+def test_a_late_record_serves_degraded_until_the_grace_ends(
     make_build: MakeBuild, period_us: int, grace_us: int | None, until_us: int
 ) -> None:
     """Joints hold all the weight, so without them the answer is unknown. A late record displaces no answer."""
@@ -277,14 +239,3 @@ def test_a_sequential_test_answers_once_it_has_decided(make_build: MakeBuild) ->
         assert found.health == ("changing" if found.grasp == UNKNOWN else "ok")
     assert answers[0] == UNKNOWN
     assert answers[-1] == found.candidate
-
-
-def test_a_replay_gives_the_same_answers(make_build: MakeBuild) -> None:
-    random = np.random.default_rng(5)
-    calls = [
-        (now, SwitchFrame(now, int(random.integers(64))), GloveFrame(now, random.bytes(4)))
-        for now in range(0, 9000, 300)
-    ]
-    first, second = (recognizer(make_build(), Policy()) for _ in range(2))
-    for now, switches, glove in calls:
-        assert first.step(now, 0, switches, glove).grasp == second.step(now, 0, switches, glove).grasp

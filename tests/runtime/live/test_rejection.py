@@ -59,7 +59,7 @@ def lasting(live: LiveRecognizer, closed: int, ms: int, begin_us: int, lost: int
 
 
 @given(closed=masks)
-def test_what_is_refused_is_none_and_all_else_is_as_the_tables_say(make_build: MakeBuild, closed: int) -> None:
+def test_refused_frames_are_none_others_as_the_tables_say(make_build: MakeBuild, closed: int) -> None:
     plain = make_build(joints=0)
     build = refusing(plain)
     found = recognizer(build).step(0, 0, SwitchFrame(0, closed), None).grasp

@@ -1,15 +1,11 @@
 """The stated error rate, beside the rate that simulation finds; and what correlated frames do to it."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from thenar.runtime.live.decision import Ranking, SequentialTest
-from thenar.runtime.tables import IntegerTables
-
-MakeTables = Callable[..., IntegerTables]
 
 SCALE = 200.0
 FOREVER = 10**12
@@ -66,15 +62,6 @@ def test_frames_that_repeat_themselves_are_not_evidence_and_spacing_leaves_them_
     assert spaced <= 0.02 + 3 * math.sqrt(0.02 * 0.98 / 800)
 
 
-def test_a_lower_error_rate_takes_more_frames() -> None:
-    def frames(error_rate: float) -> float:
-        random = np.random.default_rng(3)
-        rows = [scores(random, 0, 4, 0.7, 400) for _ in range(100)]
-        return float(np.mean([run(SequentialTest(4, SCALE, error_rate, FOREVER), row)[1] for row in rows]))
-
-    assert frames(0.2) < frames(0.02) < frames(0.002)
-
-
 def test_it_decides_at_the_threshold_and_not_one_step_below() -> None:
     threshold = math.ceil(SCALE * math.log(2 / 0.1))
     assert SequentialTest(3, SCALE, 0.1, FOREVER).threshold == threshold
@@ -129,18 +116,18 @@ def follow(frames: list[tuple[int, tuple[int, int], bool]]) -> list[int | None]:
     return [test.update(time_us, Ranking(scores), whole=whole) for time_us, scores, whole in frames]
 
 
-def test_frames_with_lost_inputs_end_no_test_while_an_answer_of_whole_frames_holds() -> None:
+def test_degraded_frames_end_no_test_during_a_whole_answer() -> None:
     whole = [(0, FOR_0, True), (10, FOR_0, True)]
     lost = [(time_us, FOR_1, False) for time_us in (20, 110, 111, 112)]
     assert follow(whole + lost) == [None, 0, 0, 0, None, 1]
 
 
-def test_frames_with_lost_inputs_are_left_aside_while_a_test_of_whole_frames_is_under_way() -> None:
+def test_degraded_frames_are_ignored_during_tests_of_whole_frames() -> None:
     frames = [(0, FOR_0, True), (10, FOR_1, False), (20, FOR_1, False), (30, FOR_0, True)]
     assert follow(frames) == [None, None, None, 0]
 
 
-def test_a_test_of_whole_frames_that_takes_too_long_makes_room_for_frames_with_lost_inputs() -> None:
+def test_an_expired_test_of_whole_frames_admits_degraded_ones() -> None:
     frames = [(0, FOR_0, True), (100, FOR_1, False), (101, FOR_1, False), (102, FOR_1, False)]
     assert follow(frames) == [None, None, None, 1]
 

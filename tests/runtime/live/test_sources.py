@@ -13,7 +13,7 @@ from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.live import sources as module
 from thenar.runtime.live.recogniser import LiveRecognizer
-from thenar.runtime.live.sources import RETRY_S, DeviceThread, FrameBuffer
+from thenar.runtime.live.sources import DeviceThread, FrameBuffer
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import LiveGrasp
 
@@ -91,9 +91,7 @@ def test_of_more_frames_than_are_kept_the_newest_are() -> None:
     assert arrivals.overflowed == 5000 - 4096
 
 
-def test_parts_that_fall_silent_are_lost_though_nothing_came_and_are_so_once(
-    make_build: MakeBuild, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_silent_parts_are_lost_once_without_any_arrival(make_build: MakeBuild, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two boards at 1 kHz under a recogniser that waits 20 ms: one falls silent, then the other."""
     clock, live = [50_000], switches_only(make_build, 10_000)
     monkeypatch.setattr(module, "now_us", lambda: clock[0])
@@ -116,9 +114,7 @@ def test_parts_that_fall_silent_are_lost_though_nothing_came_and_are_so_once(
         assert (gone.health, len(gone.lost), gone.candidate) == ("unknown", 6, "unknown")
 
 
-def test_a_part_that_falls_silent_later_than_another_one_read_is_lost_at_once(
-    make_build: MakeBuild, joined: Joined
-) -> None:
+def test_a_part_silent_after_another_is_lost_at_once(make_build: MakeBuild, joined: Joined) -> None:
     """The joined frame is then older than the one before it, but for the time of the part that is lost."""
     live = switches_only(make_build, 10_000)
     frames = [(49_000, 1, SwitchFrame(49_000, 0b011000), 20_000), (50_000, 0, SwitchFrame(50_000, 0b101), 2000)]
@@ -177,24 +173,14 @@ def test_the_gloves_record_is_a_measurement_until_it_expires(monkeypatch: pytest
         assert (taken.glove, taken.measured) == (record, measured)
 
 
-def test_nothing_is_joined_before_the_first_frame(joined: Joined) -> None:
-    assert joined(5, [LOW, HIGH], [], 0) is None
-
-
 def test_a_part_alone_that_owns_everything_is_handed_on_as_it_is(joined: Joined) -> None:
     frame = SwitchFrame(5, 0b01, 0b10, GloveFrame(3, b"x"))
     assert joined(2, [LOW], [(6, 0, frame, LONGEST_US)], 6) is frame
 
 
-def test_parts_are_joined_at_the_time_of_the_newest(joined: Joined) -> None:
-    first, second = SwitchFrame(100, 0b0001), SwitchFrame(90, 0b1000, lost=0b0100)
-    both = joined(5, [LOW, HIGH], [(100, 0, first, LONGEST_US), (100, 1, second, LONGEST_US)], 200)
-    assert both == SwitchFrame(100, 0b1001, lost=0b0100 | NOBODYS)
-
-
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.tuples(times, times), st.tuples(limits, limits), times)
-def test_what_a_part_owns_is_lost_as_soon_as_its_frame_has_expired(
+def test_a_parts_inputs_are_lost_when_its_frame_expires(
     joined: Joined, read_us: tuple[int, int], longest_us: tuple[int, int], later_us: int
 ) -> None:
     """All of it when all have; and the time never falls, or whoever takes the frames would keep the one before."""
@@ -208,7 +194,7 @@ def test_what_a_part_owns_is_lost_as_soon_as_its_frame_has_expired(
     assert joined(5, [LOW, HIGH], frames, now) == SwitchFrame(max(read_us), 0b0001 * low | 0b1000 * high, lost)
 
 
-def test_a_frame_from_the_future_expires_as_if_it_were_of_the_moment_at_which_it_came(joined: Joined) -> None:
+def test_a_frame_from_the_future_expires_from_its_arrival(joined: Joined) -> None:
     frames = [(100, 0, SwitchFrame(10**9, 0b01), LONGEST_US)]
     for now, lost in ((100 + LONGEST_US, 0), (101 + LONGEST_US, LOW)):
         found = joined(2, [LOW], frames, now)
@@ -281,7 +267,7 @@ def test_every_sample_is_taken_in_order(kept: Kept) -> None:
     assert kept.next_change() == (True, "")
 
 
-def test_a_device_that_is_lost_is_closed_and_opened_again_and_both_are_told(kept: Kept) -> None:
+def test_a_lost_device_is_closed_and_reopened_and_reported(kept: Kept) -> None:
     kept.device.openings.put(None)
     assert kept.next_change() == (True, "")
     kept.device.samples.put(DeviceError("the cable is out"))
@@ -321,9 +307,7 @@ def test_what_a_device_could_do_before_is_tried_again(kept: Kept) -> None:
     assert kept.keeper.failure is None
 
 
-def test_a_fault_of_the_program_shows_with_its_trace_is_counted_and_leaves_no_dead_thread(
-    kept: Kept, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_program_fault_is_traced_counted_and_survived(kept: Kept, caplog: pytest.LogCaptureFixture) -> None:
     kept.device.openings.put(None)
     assert kept.next_change() == (True, "")
     for _ in range(3):  # one amid reading, two while it is opened again
@@ -347,7 +331,3 @@ def test_a_fault_after_each_opening_is_logged_once(kept: Kept, caplog: pytest.Lo
         assert kept.next_change() == (False, "ZeroDivisionError: oops")
     assert kept.keeper.state.faults == 3
     assert len([record for record in caplog.records if record.exc_info]) == 1
-
-
-def test_retries_leave_time_to_recover_within_a_second() -> None:
-    assert RETRY_S <= 0.25

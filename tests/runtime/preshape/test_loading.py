@@ -193,7 +193,7 @@ def test_a_table_without_grasp_types_or_joints_is_refused(own: Path) -> None:
         load_preshapes(own)
 
 
-def test_a_name_that_is_neither_a_table_nor_a_file_is_told_what_there_is(tmp_path: Path) -> None:
+def test_an_unknown_preshape_table_is_answered_with_the_known_ones(tmp_path: Path) -> None:
     with pytest.raises(PreshapeError, match="did you mean 'barrett_bh8'"):
         load_preshapes("barret_bh8")
     with pytest.raises(PreshapeError, match="cannot be read"):

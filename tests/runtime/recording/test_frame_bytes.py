@@ -36,7 +36,7 @@ def test_gloves_come_back_as_they_were(data: st.DataObject, sensors: int) -> Non
     assert glove_frame(frame.time_us, glove_bytes(frame, sensors), sensors) == frame
 
 
-def test_an_open_switch_is_0_a_closed_one_1_and_more_is_not_known() -> None:
+def test_switches_are_0_open_1_closed_and_2_unknown() -> None:
     assert list(switch_bytes(SwitchFrame(0, 0b1010, lost=0b1100), 4, 0)) == [0, 1, 2, 3]
 
 

@@ -74,7 +74,7 @@ def test_from_any_moment_all_that_follows_is_read_and_not_much_before(path: Path
         assert found[0][0] > min(moment, entries[-1][0]) - 500_000 or found == entries
 
 
-def test_a_scan_for_what_was_recognised_decodes_a_few_of_it_and_all_labels(path: Path, calls: Calls) -> None:
+def test_an_overview_decodes_all_labels_and_few_recognitions(path: Path, calls: Calls) -> None:
     found = [entry for _, entry in Index(path).scan(100_000)]
     kinds = [sum(isinstance(entry, kind) for entry in found) for kind in (SwitchFrame, GloveFrame, LiveGrasp, Label)]
     assert kinds == [0, 0, 4 * FRAMES // 100, FRAMES // 250]
@@ -82,9 +82,7 @@ def test_a_scan_for_what_was_recognised_decodes_a_few_of_it_and_all_labels(path:
     assert sampled < every / 2
 
 
-def test_what_is_read_at_the_end_of_a_long_recording_is_no_more_than_of_a_short_one(
-    tmp_path: Path, session: Session, calls: Calls
-) -> None:
+def test_seeking_reads_no_more_of_longer_recordings(tmp_path: Path, session: Session, calls: Calls) -> None:
     cost = []
     for frames_ in (1000, 8000):
         index = Index(record(tmp_path / f"{frames_}.mcap", session, frames_))
@@ -118,7 +116,7 @@ def test_sessions_that_follow_each_other_are_read_by_their_own_clocks(tmp_path: 
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.999])
-def test_of_a_recording_that_is_cut_what_is_whole_is_read_and_the_rest_named(path: Path, share: float) -> None:
+def test_a_cut_recording_is_read_where_whole_and_named(path: Path, share: float) -> None:
     os.truncate(path, int(share * path.stat().st_size))
     index, entries = Index(path), frames(whole(path))
     assert frames(list(index.scan())) == entries
@@ -128,7 +126,7 @@ def test_of_a_recording_that_is_cut_what_is_whole_is_read_and_the_rest_named(pat
     assert list(index.since(entries[-1][0]))[-1] == entries[-1]
 
 
-def test_of_a_recording_that_is_damaged_all_before_is_read_and_the_place_named(path: Path) -> None:
+def test_a_damaged_recording_is_read_up_to_the_named_place(path: Path) -> None:
     entries, data = frames(whole(path)), bytearray(path.read_bytes())
     place = data.index(b'"number":1000,')
     data[place : place + 8] = b'"nomber"'

@@ -20,7 +20,7 @@ from thenar.runtime.errors import McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.guide import read_journal
-from thenar.runtime.recording.layout import CHANNELS, LARGEST_RECORD, MAGIC
+from thenar.runtime.recording.layout import LARGEST_RECORD, MAGIC
 from thenar.runtime.recording.reader import OTHER_RECORDS, Reader
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
@@ -44,9 +44,7 @@ def ends_of_records(data: bytes) -> list[int]:
     return ends
 
 
-def test_a_file_that_is_cut_at_any_byte_gives_what_is_whole_and_says_what_is_cut(
-    recording: Path, tmp_path: Path, entries: list[Entry]
-) -> None:
+def test_a_file_cut_at_any_byte_gives_its_whole_entries(recording: Path, tmp_path: Path, entries: list[Entry]) -> None:
     data = recording.read_bytes()
     ends = ends_of_records(data)
     # Those of the messages on channels that are entries of their own, in order.
@@ -73,9 +71,7 @@ def test_a_file_that_is_cut_at_any_byte_gives_what_is_whole_and_says_what_is_cut
         assert not reader.altered
 
 
-def test_the_rest_of_a_file_that_a_power_cut_filled_with_zeros_is_left_out(
-    recording: Path, entries: list[Entry]
-) -> None:
+def test_zeros_after_a_power_cut_are_left_out(recording: Path, entries: list[Entry]) -> None:
     data = recording.read_bytes()
     end = data.rindex(DATA_END)
     recording.write_bytes(data[:end] + bytes(4096))
@@ -263,7 +259,7 @@ def test_what_other_programs_made_of_a_recording_is_read(
     assert not list(reader.faults())
 
 
-def test_a_chunk_of_another_program_that_does_not_match_its_checksum_is_told(recording: Path, tmp_path: Path) -> None:
+def test_a_foreign_chunk_with_a_wrong_checksum_is_reported(recording: Path, tmp_path: Path) -> None:
     path = tmp_path / "copy.mcap"
     copied(recording, path, compression=CompressionType.NONE, chunk_size=1 << 20)
     data = path.read_bytes()
@@ -373,7 +369,3 @@ def test_a_file_may_grow_while_it_is_read(recording: Path, entries: list[Entry])
     with recording.open("ab") as file:
         file.write(b"more")
     assert [entry for entry in reader if not isinstance(entry, Session)] == entries
-
-
-def test_every_channel_is_named_as_ros_names_topics() -> None:
-    assert all(topic.startswith("/thenar/") and topic.islower() for topic, _ in CHANNELS.values())

@@ -109,9 +109,7 @@ def test_a_message_is_in_the_file_as_soon_as_it_is_recorded(tmp_path: Path, sess
             assert frames_of(recorder.path)[-1] == frame
 
 
-def test_the_file_is_in_the_order_of_its_log_times_whatever_order_frames_come_in(
-    tmp_path: Path, session: Session
-) -> None:
+def test_the_file_is_ordered_by_log_time(tmp_path: Path, session: Session) -> None:
     start = now_us()
     with Recorder(tmp_path / "a.mcap", session) as recorder:
         for late in (50, 20, 70, 0, 70):
@@ -376,9 +374,7 @@ def test_a_killed_process_has_recorded_all_that_it_said_it_had(tmp_path: Path, a
     assert len(found) >= said
 
 
-def test_a_recording_without_taxels_has_no_topic_for_them_and_one_with_them_goes_on(
-    tmp_path: Path, session: Session
-) -> None:
+def test_taxels_have_a_topic_only_where_they_are_recorded(tmp_path: Path, session: Session) -> None:
     def topics(path: Path) -> dict[str, int]:
         with path.open("rb") as file:
             summary = make_reader(file, validate_crcs=True).get_summary()

@@ -21,7 +21,7 @@ from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.preshape import Preshape
-from thenar.runtime.published import UNKNOWN, HealthReport, LiveGrasp
+from thenar.runtime.published import HealthReport, LiveGrasp
 from thenar.runtime.sinks import JointAngles, Sink, SinkError, open_sink
 from thenar.runtime.task import Progress
 
@@ -235,9 +235,7 @@ def test_a_node_that_comes_late_has_the_newest_at_once(
     assert len(heard["preshape"]) == 1
 
 
-def test_a_node_that_comes_late_has_the_step_of_the_task_as_it_is_now(
-    sink: Sink, listen: Listen, make_grasp: MakeGrasp
-) -> None:
+def test_a_late_node_gets_the_tasks_current_step(sink: Sink, listen: Listen, make_grasp: MakeGrasp) -> None:
     sink.publish(replace(make_grasp(), unix_us=1_700_000_000_123_456), None, None)
     sink.task(Progress(0, 3, expected=("cup",)))
     sink.task(Progress(2, 3, "pen", ("rod", "cup"), "skipped", "skipped: cup"))
@@ -295,11 +293,6 @@ def test_every_change_is_heard(sink: Sink, listen: Listen, again: MakeGrasp) -> 
         said = listener.hear("topic", "segment")
         heard.append(next(int(p["value"]) for p in said["message"]["status"][0]["values"] if p["key"] == "segment"))
     assert heard[heard.index(1) :] == list(range(1, 9))
-
-
-def test_unknown_is_published_as_such(sink: Sink, listen: Listen, again: MakeGrasp) -> None:
-    heard = listen().hear("topic", "grasp", lambda: sink.publish(again(UNKNOWN), None, None))
-    assert heard["message"] == {"data": "unknown"}
 
 
 def test_how_the_glove_fares_is_published_as_json(sink: Sink, listen: Listen, health: HealthReport) -> None:

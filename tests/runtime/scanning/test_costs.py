@@ -25,42 +25,12 @@ def costs_of(*places: tuple[int, int] | None) -> tuple[Costs, Harness]:
     return Costs(whole_scan(harness, harness.switches).ports, harness), harness
 
 
-def test_ports_straight_on_the_bus_are_units_of_their_own_and_cost_their_reading() -> None:
-    costs, _ = costs_of(None, None)
-    assert costs.units == (((0,),), ((1,),))
-    assert [costs.after(read, port) for read, port in ((0, 0), (1, 1), (0, 1))] == [READ] * 3
-
-
-def test_one_channel_alone_needs_no_selection_and_binds_nothing() -> None:
-    costs, _ = costs_of((0x70, 3), None, (0x70, 3))
-    assert costs.units == (((0,),), ((1,),), ((2,),))
-    assert costs.after(0, 0) == READ
-
-
-def test_the_first_port_behind_a_channel_pays_for_its_selection_and_the_next_do_not() -> None:
-    costs, _ = costs_of((0x70, 1), (0x70, 2), (0x70, 1))
-    assert costs.units == (((0, 2),), ((1,),))
-    assert costs.after(0, 0) == READ + WRITE
-    assert costs.after(0b010, 0) == READ + WRITE
-    assert costs.after(0b001, 2) == READ
-    assert costs.after(0b001, 1) == READ + WRITE
-
-
-def test_of_two_muxes_each_stays_together_and_its_first_port_pays_for_leaving_the_other() -> None:
+def test_a_muxs_first_port_pays_for_leaving_the_other_mux() -> None:
     costs, _ = costs_of((0x70, 1), (0x71, 1), (0x70, 2))
     assert costs.units == (((0,), (2,)), ((1,),))
     assert costs.after(0, 0) == READ + 2 * WRITE
     assert costs.after(0b001, 2) == READ + WRITE
     assert costs.after(0b001, 1) == READ + 2 * WRITE
-
-
-def test_a_unit_costs_its_ports_and_the_writes_that_it_alone_needs() -> None:
-    costs, _ = costs_of((0x70, 1), (0x71, 1), (0x70, 2), (0x70, 2))
-    (first, second) = costs.units
-    assert costs.of(first) == 3 * READ + 3 * WRITE  # mux 0x70 and two channels
-    assert costs.of((2, 3)) == 2 * READ + WRITE
-    assert costs.of(3) == READ
-    assert costs.of(second) == READ + 2 * WRITE
 
 
 @pytest.mark.parametrize("places", [((0x70, 1), None, (0x70, 2)), ((0x70, 1), (0x71, 1), (0x70, 2), (0x71, 0))])

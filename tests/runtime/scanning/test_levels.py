@@ -43,7 +43,7 @@ names = st.one_of(
 
 @settings(deadline=None)
 @given(kept=st.lists(names, unique=True, max_size=25))
-def test_all_levels_of_a_taxel_are_one_conversion_and_every_kept_name_is_read_once(kept: list[str]) -> None:
+def test_a_taxels_levels_share_one_conversion(kept: list[str]) -> None:
     scan = plan_scan(kept, MIXED)
     check_switches(scan, len(kept))
     check_harness(scan, MIXED, kept)
@@ -70,7 +70,7 @@ def test_with_every_taxel_those_without_levels_are_converted_too() -> None:
     ]
 
 
-def test_a_name_that_looks_like_a_level_and_is_a_switch_of_the_wiring_is_one() -> None:
+def test_a_wired_switch_named_like_a_level_is_a_switch() -> None:
     harness = glove(ChipWiring(kind="mcp23017", address=0x20, pins={"GPA0": "t0>7"}), ads1115(0, "t0"))
     scan = whole_scan(harness, ["t0>7", "t0>8"])
     assert [(port.switches, port.levels) for port in scan.ports] == [(((0, 0),), ()), ((), ((8, 1),))]

@@ -88,9 +88,7 @@ def test_a_map_goes_with_the_wiring_that_it_was_made_for(eight_chips: EightChips
         {"switches": ((0, 1), (1, 0))},
     ],
 )
-def test_a_port_that_the_wiring_does_not_have_is_refused_whoever_sealed_the_map(
-    eight_chips: EightChips, change: dict[str, object]
-) -> None:
+def test_a_missing_port_is_refused_whoever_sealed_the_map(eight_chips: EightChips, change: dict[str, object]) -> None:
     harness = eight_chips(2)
     scan = plan_scan(names_of(28), harness)
     for number in range(len(scan.ports)):
@@ -99,7 +97,7 @@ def test_a_port_that_the_wiring_does_not_have_is_refused_whoever_sealed_the_map(
             check_harness(replace(scan, ports=tuple(ports)), harness, names_of(28))
 
 
-def test_a_column_that_the_stream_does_not_have_is_refused_whoever_sealed_the_map() -> None:
+def test_a_missing_column_is_refused_whoever_sealed_the_map() -> None:
     board = propose_board(names_of(3))
     scan = plan_scan(names_of(3), board)
     check_harness(scan, board, names_of(3))

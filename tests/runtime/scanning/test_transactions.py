@@ -66,9 +66,7 @@ def test_no_set_of_readings_is_smaller_or_as_small_and_shorter(harnesses: Harnes
         ("tca6424a", [0, 16], ["012"]),
     ],
 )
-def test_a_port_without_a_wanted_switch_is_left_alone_where_that_costs_no_transaction(
-    kind: str, pins: list[int], readings: list[str]
-) -> None:
+def test_unwanted_ports_are_left_alone_at_no_extra_transaction(kind: str, pins: list[int], readings: list[str]) -> None:
     chip = CHIPS[kind]
     assert [reading.name for reading in cover(chip, pins)] == readings
 

@@ -81,7 +81,7 @@ def _best(model: SegmentModel, costs: NDArray[np.int64]) -> tuple[int, tuple[int
 
 
 @given(_streams())
-def test_a_stream_is_segmented_at_the_least_cost_and_ties_are_broken_as_documented(
+def test_segmentation_has_the_least_cost_with_documented_ties(
     stream: tuple[SegmentModel, NDArray[np.int64], NDArray[np.bool_]],
 ) -> None:
     model, lanes, refused = stream
@@ -105,7 +105,7 @@ def test_of_the_cheapest_segmentations_of_tiny_streams_the_documented_one_wins()
 
 
 @given(_streams(), st.integers(0, 9))
-def test_live_each_tick_is_answered_as_the_best_path_to_the_newest_tick_has_it(
+def test_live_ticks_follow_the_best_path_to_the_newest(
     stream: tuple[SegmentModel, NDArray[np.int64], NDArray[np.bool_]], lag: int
 ) -> None:
     model, lanes, refused = stream
@@ -124,7 +124,7 @@ def test_live_each_tick_is_answered_as_the_best_path_to_the_newest_tick_has_it(
 
 
 @given(_streams(longest=7), st.integers(0, 3))
-def test_a_lag_as_long_as_the_stream_gives_the_segmentation_of_the_whole(
+def test_a_lag_as_long_as_the_stream_segments_the_whole(
     stream: tuple[SegmentModel, NDArray[np.int64], NDArray[np.bool_]], more: int
 ) -> None:
     model, lanes, refused = stream

@@ -57,15 +57,13 @@ def segment(state: Any, number: int, label: int, start: int) -> Segment:
 
 
 @given(stream=streams, lag=st.integers(0, 8))
-def test_at_every_tick_it_is_that_of_the_cheapest_path_to_the_tick(stream: list[Any], lag: int) -> None:
+def test_the_live_segment_is_the_cheapest_paths(stream: list[Any], lag: int) -> None:
     live = segments(lag)
     assert [live.update(FIRST_US + TICK * tick, row) for tick, row in enumerate(stream)] == expected(stream, lag)
 
 
 @given(updates=st.lists(st.tuples(st.integers(0, 45_000), rows), min_size=1, max_size=30), lag=st.integers(0, 4))
-def test_a_tick_takes_the_first_update_at_it_or_after_and_those_it_missed_the_update_before(
-    updates: list[tuple[int, Any]], lag: int
-) -> None:
+def test_ticks_take_the_next_update_missed_ones_the_last(updates: list[tuple[int, Any]], lag: int) -> None:
     live, now, taken = segments(lag), FIRST_US, [updates[0][1]]
     live.update(now, updates[0][1])
     for (_, before), (wait, row) in pairwise(updates):
@@ -87,7 +85,7 @@ def run(live: LiveSegments, now: int, stream: Sequence[Any]) -> tuple[int, Segme
 
 
 @pytest.mark.parametrize("silent", [True, False])
-def test_a_segment_outlasts_what_cannot_be_read_for_a_grace_and_no_longer(silent: bool) -> None:
+def test_a_segment_outlasts_unread_frames_for_a_grace_only(silent: bool) -> None:
     live = segments(3)
     now, begun = run(live, 0, [*EMPTY, *HELD])
     assert (begun.state, begun.number, begun.type) == ("held", 1, "cup")
@@ -110,7 +108,7 @@ def test_a_segment_that_only_formed_is_not_counted_when_it_ends_unread() -> None
     assert live.update(now + GRACE_US + 1, None) == Segment(number=0)
 
 
-def test_ticks_that_were_not_read_are_no_evidence_and_no_time_of_a_segment() -> None:
+def test_unread_ticks_are_neither_evidence_nor_segment_time() -> None:
     live, away = segments(2), 300_000
     now, _ = run(live, 0, EMPTY)
     live.update(now + 1, None)

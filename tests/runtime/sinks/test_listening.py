@@ -31,7 +31,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "grasps"
 
 
-def test_the_socket_of_a_killed_process_is_replaced_and_that_of_a_living_one_is_not(path: Path) -> None:
+def test_only_a_dead_processs_socket_is_replaced(path: Path) -> None:
     command = [sys.executable, "-c", SERVER, str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as server:
         assert server.stdout is not None

@@ -4,8 +4,6 @@ import contextlib
 import os
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from thenar.runtime.sinks.jsonl import Outlet, patient_writer
 
@@ -23,24 +21,6 @@ class Reader:
             raise BlockingIOError
         self.got += data[:took]
         return min(took, len(data))
-
-
-@given(st.lists(st.integers(0, 12), max_size=60), st.lists(st.integers(0, 20), max_size=30))
-def test_a_reader_sees_whole_lines_only(takes: list[int], lengths: list[int]) -> None:
-    reader = Reader(takes)
-    outlet = Outlet(reader.write)
-    lines = [f"{number}:{'x' * length}\n".encode() for number, length in enumerate(lengths)]
-    sent = [line for line in lines if outlet.send(line)]
-    reader.takes = [100] * 2
-    outlet.send(b"")
-    assert reader.got == b"".join(sent)
-
-
-def test_a_reader_that_keeps_up_gets_every_line() -> None:
-    reader = Reader([100] * 50)
-    outlet = Outlet(reader.write)
-    assert all(outlet.send(b"line\n") for _ in range(50))
-    assert reader.got == b"line\n" * 50
 
 
 def test_a_line_that_nothing_was_taken_of_is_lost_rather_than_late() -> None:

@@ -12,9 +12,8 @@ from msgspec.structs import replace
 
 from thenar.runtime.build import Build
 from thenar.runtime.live.recogniser import Moment
-from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import HealthReport, LiveGrasp
-from thenar.runtime.sinks import DetailLine, HealthLine, JointAngles, Line, SocketLines
+from thenar.runtime.sinks import DetailLine, HealthLine, Line, SocketLines
 from thenar.runtime.sinks.sockets import HANGING_S, MAX_OF_ONE, MAX_READERS, open_tcp, open_unix
 
 MakeGrasp = Callable[..., LiveGrasp]
@@ -93,15 +92,6 @@ def test_every_reader_gets_every_frame_from_when_it_came(
         assert [reader.number() for reader in readers[: number + 1]] == [number] * (number + 1)
     assert sink.report().readers == 6
     assert sink.report().sent == 2 + 3 + 4 + 5 + 6
-
-
-def test_a_line_holds_the_preshape_and_the_angles(
-    sink: SocketLines, connect: Connect, make_grasp: MakeGrasp, preshape: Preshape, angles: JointAngles
-) -> None:
-    reader = connect()
-    sink.publish(make_grasp(), preshape, angles)
-    line = json.decode(reader.lines.readline(), type=Line)
-    assert (line.preshape, line.angles) == (preshape, angles)
 
 
 def test_readers_hear_how_the_glove_fares(
@@ -301,7 +291,7 @@ def test_closing_ends_every_reader_and_may_be_done_twice(
 
 
 @pytest.mark.parametrize("detail", [False, True])
-def test_details_follow_their_grasps_for_those_who_asked_and_a_hundred_times_a_second(
+def test_requested_details_follow_grasps_100_times_a_second(
     make_build: Callable[..., Build], make_grasp: MakeGrasp, tmp_path: Path, detail: bool
 ) -> None:
     build = make_build()

@@ -34,7 +34,7 @@ def first(device: GloveDevice) -> GloveFrame:
     return next(frame for frame in frames if frame is not None)
 
 
-def test_a_frame_has_a_place_for_every_sensor_and_zeros_where_nothing_was_asked_for(line: PtyLine) -> None:
+def test_a_frame_has_every_sensor_unrequested_ones_zero(line: PtyLine) -> None:
     with EmulatedCyberGlove(line) as emulated:
         emulated.set(VALUES)
         device = opened(line)
@@ -54,7 +54,7 @@ def test_a_box_without_a_mask_delivers_all_and_is_in_trouble(line: PtyLine) -> N
 
 
 @pytest.mark.parametrize(("mask", "record"), [(True, False), (False, False), (True, True)])
-def test_a_run_reads_what_its_build_has_a_use_for_and_all_where_it_records(
+def test_a_run_reads_the_builds_joints_or_all_when_recording(
     line: PtyLine, make_build: Callable[..., Build], tmp_path: Path, mask: bool, record: bool
 ) -> None:
     build = make_build(switches=0)

@@ -85,13 +85,13 @@ def test_a_port_without_an_answer_is_lost_and_the_other_is_not(bench: Bench) -> 
     assert not bench.slept
 
 
-def test_a_bus_on_which_nobody_answers_is_not_asked_in_a_busy_loop(bench: Bench) -> None:
+def test_a_dead_bus_is_not_polled_in_a_busy_loop(bench: Bench) -> None:
     bench.answers = [[None, None]]
     assert frame(device(OFF)).lost == 0b111_111
     assert bench.slept
 
 
-def test_what_was_read_before_a_chip_held_the_bus_up_is_no_news(bench: Bench) -> None:
+def test_readings_before_a_stalled_bus_are_not_new(bench: Bench) -> None:
     bench.takes_us = 1_000_000
     bench.answers = [[HIGH & ~0b001, None]]
     assert frame(device(OFF)) == SwitchFrame(bench.now, 0, lost=0b111_111)
@@ -136,7 +136,7 @@ def test_levels_are_closed_above_their_codes_and_the_codes_go_along(
     assert frame(measuring(OFF)) == SwitchFrame(bench.now, closed, taxels=codes)
 
 
-def test_the_levels_of_a_conversion_that_failed_are_lost_and_its_code_is_none(bench: Bench) -> None:
+def test_a_failed_conversion_loses_its_levels_and_code(bench: Bench) -> None:
     made = measuring(OFF)
     bench.answers = [[HIGH & ~1, 500, None], [HIGH, None, None]]
     assert frame(made) == SwitchFrame(bench.now, 0b0110, lost=0b1001, taxels=(500, None))

@@ -133,7 +133,7 @@ def test_columns_by_name_in_any_order_and_by_a_header(play: Play) -> None:
         assert frames[0] == whole
 
 
-def test_a_sender_that_names_its_columns_is_read_by_name_or_not_at_all(play: Play) -> None:
+def test_named_columns_are_read_by_name_or_not_at_all(play: Play) -> None:
     source, frames = play([(0, b"ms,thumb,spare,idx,pad,flex,bend\n1,1,7,1023,0,0,0\n")])
     assert frames[0] == SwitchFrame(0, 0b0100, 0b0001, GloveFrame(0, b"\x01\x80"), (0,))
     assert source.trouble() == "its rows lack index: name columns in glove.toml as it does"
@@ -170,7 +170,7 @@ def test_a_clock_that_runs_wrong_makes_no_row_old(play: Play, slow: float) -> No
     assert len(times) == 1000
 
 
-def test_a_row_without_its_clock_is_left_out_and_one_without_a_sensor_is_not(play: Play) -> None:
+def test_rows_need_their_clock_but_not_every_sensor(play: Play) -> None:
     chunks = (b"1,1,0,0,0,0,0\n", b"nan,1,0,0,0,0,0\nms,thumb\n7,1\n", b'{"ms": 11, "thumb": 1}\n')
     last = b'{"ms": 11, "thumb": 1, "pad": 3, "flex": 7, "index": 0}\n'
     source, frames = play([(10_000, chunk) for chunk in (*chunks, last)])
@@ -387,7 +387,7 @@ def test_joints_come_from_one_device() -> None:
         parse_harness(GLOVE + '[cyberglove]\nport = "y"\n', "glove.toml")
 
 
-def test_a_harness_is_written_as_it_was_read_and_its_ranges_are_part_of_its_wiring() -> None:
+def test_a_harness_survives_its_file_and_ranges_are_wiring() -> None:
     harness = parse_harness(GLOVE, "glove.toml")
     assert parse_harness(harness_to_toml(harness), "glove.toml") == harness
     assert parse_harness(GLOVE.replace('"x"', '"tcp://h:1"'), "glove.toml").fingerprint == harness.fingerprint

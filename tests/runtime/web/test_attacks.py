@@ -120,7 +120,7 @@ def test_names_of_this_machine_are_known_also_behind_a_tunnel(serve: Callable[..
     assert serve().ask("/", Host=host).status == 200
 
 
-def test_a_page_for_others_is_known_by_digits_and_by_this_machines_name(serve: Callable[..., Any]) -> None:
+def test_a_public_page_accepts_addresses_and_this_machines_name(serve: Callable[..., Any]) -> None:
     client = serve(address="0.0.0.0:0", token=guard.new_token())
     names = ("10.0.0.1:8080", "[fe80::1]", socket.gethostname(), EVIL, f"10.0.0.1.{EVIL}")
     told = [client.server._guard.knows_host(name) for name in names]

@@ -110,7 +110,7 @@ def test_a_browser_that_comes_late_gets_all_and_presses_at_its_step(page: GuideP
     assert (guide.stage.value, guide.step) == ("countdown", found["guide"]["step"] + 1)
 
 
-def test_a_new_stage_is_told_at_once_and_a_hand_that_moves_twenty_times_a_second(
+def test_stages_are_sent_at_once_movements_20_times_a_second(
     page: GuidePage, guide: Guide, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     published: list[Any] = []

@@ -27,7 +27,7 @@ def test_what_is_no_press_is_refused(asked: dict[str, object]) -> None:
     assert list(presses.due(lambda: 1)) == []
 
 
-def test_a_key_counts_at_the_step_that_it_was_meant_for_and_once() -> None:
+def test_a_key_counts_once_at_its_own_step() -> None:
     """Two browsers press at once: after the first the step is another."""
     presses, steps = Presses(Key), [7]
     for name, meant in (("accept", 7), ("accept", 7), ("undo", 8), ("undo", 8), ("quit", 6)):

@@ -42,7 +42,7 @@ def test_fingers_thin_towards_their_tips() -> None:
     assert (np.diff(RADII, axis=1) < 0.0).all()
 
 
-def test_the_middle_finger_is_the_longest_and_reaches_the_length_of_the_hand() -> None:
+def test_the_longest_middle_finger_reaches_the_hands_length() -> None:
     reach = BASES[1:, 0] + SEGMENTS[1:].sum(axis=1)
     assert reach.argmax() == 1
     # A straight middle finger ends a hand: within a fingertip's half thickness.

@@ -31,7 +31,7 @@ def digit_of(capsule: int) -> int:
 
 
 @given(ANGLES, BENDS)
-def test_a_joint_turns_the_skin_beyond_it_about_its_axis_and_moves_no_other(angles: np.ndarray, joint: int) -> None:
+def test_a_joint_turns_only_the_skin_beyond_it(angles: np.ndarray, joint: int) -> None:
     digit, number = divmod(joint, 4)
     skeleton = HAND.skeleton(angles[:, None])
     step = STEP * np.eye(20)[:, [joint]]

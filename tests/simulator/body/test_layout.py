@@ -46,7 +46,7 @@ def test_every_contact_stands_out_of_the_skin_by_its_height(size: Size) -> None:
     assert (places[:, 0] >= 0.0).all()
 
 
-def test_switches_lie_on_the_palm_side_and_the_sides_never_on_the_back() -> None:
+def test_switches_lie_on_palm_and_sides_never_the_back() -> None:
     places, _ = own_axes(Hand(Size(185.0, 83.0)))
     assert (places[:, 2] < 0.0).all()
 

@@ -33,7 +33,7 @@ def test_a_rotation_is_scipys(vector: np.ndarray) -> None:
 
 
 @given(VECTORS)
-def test_a_rotation_vector_comes_back_from_its_matrix_up_to_half_a_turn(vector: np.ndarray) -> None:
+def test_rotation_vectors_survive_their_matrices_up_to_half_a_turn(vector: np.ndarray) -> None:
     back = rotation_vector(rotation(vector[:, None]))[:, 0]
     # Half a turn one way is half a turn the other way.
     other = back - 2 * np.pi * back / max(float(np.linalg.norm(back)), 1e-300)
@@ -67,7 +67,7 @@ def test_outward_turns_as_scipy_does(vector: np.ndarray, place: np.ndarray, poin
 
 
 @given(VECTORS, PLACES, VECTORS, PLACES)
-def test_a_moved_pose_is_shifted_and_turned_about_the_axes_of_the_hand(
+def test_poses_shift_and_turn_about_the_hands_axes(
     vector: np.ndarray, place: np.ndarray, turn: np.ndarray, shift: np.ndarray
 ) -> None:
     moved = pose_of(place, vector).moved(np.concatenate([shift, turn])[:, None])
@@ -77,7 +77,7 @@ def test_a_moved_pose_is_shifted_and_turned_about_the_axes_of_the_hand(
 
 
 @given(VECTORS, PLACES, arrays(np.float64, (4, 3, 1), elements=st.floats(-100.0, 100.0)))
-def test_distance_from_an_object_does_not_depend_on_where_hand_and_object_are_together(
+def test_distance_ignores_common_motion_of_hand_and_object(
     vector: np.ndarray, place: np.ndarray, points: np.ndarray
 ) -> None:
     pose = pose_of(place, vector)

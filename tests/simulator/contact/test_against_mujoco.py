@@ -13,7 +13,7 @@ from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.hand import CAPSULES, LIMITS_DEG, Hand, Size
 from thenar.simulator.contact.balance import SolverCase
 from thenar.simulator.contact.model import Load
-from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
+from thenar.simulator.effects.contact_quasistatic import Quasistatic
 
 THRESHOLD_N = 1.0
 
@@ -57,7 +57,7 @@ def test_two_programs_agree_on_one_grasp_better_than_one_program_on_two(
     for condition in planned["kamakura"]:
         case = make_case(condition, n=2)
         loads.append(Load(condition, np.degrees(case.angles.T), case.numbers.T, case.grip_n))
-    ours, theirs = Quasistatic(Parameters()).solve(loads), [oracle.solve(load) for load in loads]
+    ours, theirs = Quasistatic().solve(loads), [oracle.solve(load) for load in loads]
     assert np.concatenate([each.settled for each in theirs]).mean() > 0.9
     settled = [one.settled.all() and other.settled.all() for one, other in zip(ours, theirs, strict=True)]
     on, again = (

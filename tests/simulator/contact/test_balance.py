@@ -47,14 +47,14 @@ def test_some_skin_is_pressed_and_dragged(balance: Balance) -> None:
     assert (np.linalg.norm(balance.dragged, axis=1)[balance.presses > 0.1] > 0.01).any()
 
 
-def test_the_object_bears_its_weight_and_the_opposite_of_what_the_skin_feels(balance: Balance) -> None:
+def test_the_object_bears_weight_and_opposite_contact_forces(balance: Balance) -> None:
     skin_feels = sum(balance.forces[sphere] for sphere in range(50))
     shift = balance.pose.position - balance.command.pose.position
     expected = balance.command.weight - skin_feels - HOLD_N_PER_MM * shift
     assert balance.on_object[:3] == pytest.approx(expected, abs=1e-9)
 
 
-def test_moments_on_the_object_are_those_of_the_same_forces_where_they_touch(balance: Balance) -> None:
+def test_the_objects_moments_are_those_of_its_contact_forces(balance: Balance) -> None:
     touch = balance.levers + balance.pose.position
     about = sum(np.cross(touch[s] - balance.pose.position, -balance.forces[s], axis=0) for s in range(50))
     held = balance.on_object[3:] - about

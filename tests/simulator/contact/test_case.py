@@ -32,7 +32,7 @@ def test_the_stiffness_of_skin_is_the_derivative_of_its_force(skin: Skin, sunk: 
 
 
 @given(SKINS, st.floats(0.0, 10.0))
-def test_deep_skin_is_a_plain_spring_that_begins_half_way_through_the_soft(skin: Skin, deeper: float) -> None:
+def test_deep_skin_is_a_spring_from_half_the_soft_depth(skin: Skin, deeper: float) -> None:
     force, stiffness = skin.press(np.array([skin.soft_mm + deeper]))
     assert stiffness[0] == pytest.approx(skin.press_n_per_mm)
     assert force[0] == pytest.approx(skin.press_n_per_mm * (deeper + skin.soft_mm / 2))

@@ -105,9 +105,7 @@ def test_a_hand_that_is_not_given_the_steps_is_marked(every: list[tuple[SolverCa
             assert not rest.settled.any()
 
 
-def test_steps_in_parts_are_counted_by_the_part_and_given_as_many_more(
-    every: list[tuple[SolverCase, Rest]], skin: Skin
-) -> None:
+def test_partial_steps_are_counted_and_allowed_as_many_more(every: list[tuple[SolverCase, Rest]], skin: Skin) -> None:
     cases = [case for case, _ in every][:8]
     for rest in close(cases, skin, 2, SolverSettings(parts=3)):
         assert (rest.steps[~rest.settled] == 6).all()
@@ -127,7 +125,7 @@ def test_a_stricter_rest_is_reached_and_leaves_less(every: list[tuple[SolverCase
         assert (np.abs(rest.residual_n - held)[rest.settled] < strict.rest_n).all()
 
 
-def test_an_object_that_overlaps_the_whole_hand_is_marked_and_not_made_up(
+def test_an_object_overlapping_the_whole_hand_is_marked(
     by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
 ) -> None:
     huge = replace(by_grasp["Tip"], thing=replace(by_grasp["Tip"].thing, shape=Sphere(1500.0), mass_kg=5.0))

@@ -46,7 +46,7 @@ def test_within_a_capsule_force_is_in_proportion_to_depth(case: tuple[np.ndarray
 
 
 @given(st.sampled_from((5e-324, 1e-310, 1e-300)), st.sampled_from((5e-324, 1.0, 1e300)))
-def test_depths_too_small_to_divide_a_force_by_share_it_all_the_same(depth: float, force: float) -> None:
+def test_tiny_depths_share_the_force(depth: float, force: float) -> None:
     depths = np.full((N_SWITCHES, 1), -1.0)
     depths[:2] = depth
     forces = np.zeros((len(CAPSULES), 1))

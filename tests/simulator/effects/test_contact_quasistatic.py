@@ -8,8 +8,9 @@ import pytest
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.shapes import Pose
+from thenar.simulator.contact.balance import Skin
 from thenar.simulator.contact.model import Contact, ContactModel, Load
-from thenar.simulator.effects.contact_quasistatic import Parameters, model
+from thenar.simulator.effects.contact_quasistatic import MEMBER, USUAL_SKIN, Quasistatic, model
 from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import sessions
@@ -32,7 +33,7 @@ def conditions() -> list[Condition]:
 
 @pytest.fixture(scope="module")
 def default(make_setting: Callable[..., SceneSetting]) -> ContactModel:
-    return model(Parameters(), make_setting())
+    return model(make_setting())
 
 
 def load(condition: Condition, n: int = 3, seed: int = 1) -> Load:
@@ -104,7 +105,7 @@ def test_a_switch_that_reaches_further_feels_more(
 ) -> None:
     told = [load(condition) for condition in conditions]
     lost = [
-        sum(contact.between_n.sum() for contact in model(Parameters(reach_mm=reach), make_setting()).solve(told))
+        sum(contact.between_n.sum() for contact in model(make_setting(), reach_mm=reach).solve(told))
         for reach in (0.0, 1.0, 3.0)
     ]
     assert lost[0] > lost[1] > lost[2]
@@ -113,7 +114,7 @@ def test_a_switch_that_reaches_further_feels_more(
 def test_what_does_not_come_to_rest_is_marked(
     conditions: list[Condition], make_setting: Callable[..., SceneSetting]
 ) -> None:
-    (contact,) = model(Parameters(most_steps=1), make_setting()).solve([load(conditions[0])])
+    (contact,) = model(make_setting(), most_steps=1).solve([load(conditions[0])])
     assert not contact.settled.any()
     assert contact.steps == 3
 
@@ -121,15 +122,14 @@ def test_what_does_not_come_to_rest_is_marked(
 @pytest.mark.parametrize("press_n_per_mm", [5e-324, 1000.0])
 @pytest.mark.parametrize("soft_mm", [5e-324, 5.0])
 @pytest.mark.parametrize("drag_n_per_mm", [5e-324, 1000.0])
-def test_skins_at_the_ends_of_what_may_be_asked_for_come_to_numbers(
+def test_skins_at_the_limits_give_finite_results(
     conditions: list[Condition],
-    make_setting: Callable[..., SceneSetting],
     press_n_per_mm: float,
     soft_mm: float,
     drag_n_per_mm: float,
 ) -> None:
-    skin = Parameters(press_n_per_mm=press_n_per_mm, soft_mm=soft_mm, drag_n_per_mm=drag_n_per_mm)
-    for contact in model(skin, make_setting()).solve([load(condition, 1) for condition in conditions[:3]]):
+    skin = Skin(press_n_per_mm, soft_mm, drag_n_per_mm, USUAL_SKIN.friction)
+    for contact in Quasistatic(skin).solve([load(condition, 1) for condition in conditions[:3]]):
         assert all(np.isfinite(getattr(contact, field)).all() for field in FIELDS)
 
 
@@ -138,4 +138,4 @@ def test_skins_at_the_ends_of_what_may_be_asked_for_come_to_numbers(
 )
 def test_impossible_parameters_are_refused(given: dict[str, float]) -> None:
     with pytest.raises(msgspec.ValidationError):
-        msgspec.convert(given, Parameters)
+        msgspec.convert(given, MEMBER.parameters())

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.contact.model import Contact, Load
-from thenar.simulator.effects.contact_ramp import Parameters, prepare
+from thenar.simulator.effects.contact_ramp import prepare
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.ramp import NEVER, crossings
@@ -48,7 +48,7 @@ def ramped(make_batch: Callable, make_draw: Callable, make_setting: Callable) ->
         batch.on_us = np.where(closed, 0, NEVER)
         batch.off_us = np.where(closed, LETS_GO_US, NEVER) if release_us else np.full_like(batch.on_us, NEVER)
         setting = make_setting(timed=True, hold_us=HOLD_US, release_us=release_us)
-        prepare(Parameters(rise_ms=100.0, levels=levels), setting, model)([batch], [make_draw("contact.ramp", batch)])
+        prepare(setting, model, rise_ms=100.0, levels=levels)([batch], [make_draw("contact.ramp", batch)])
         return batch
 
     return make
@@ -59,7 +59,7 @@ def test_what_was_solved_on_the_way_is_counted(
 ) -> None:
     """Two hands at four levels below the full grip, three steps each."""
     batch, draw = ramped(Press(lambda grip: grip)), make_draw("contact.ramp", make_batch(range(2)))
-    prepare(Parameters(levels=5), make_setting(), Press(lambda grip: grip))([batch], [draw])
+    prepare(make_setting(), Press(lambda grip: grip), levels=5)([batch], [draw])
     assert draw.draws.counts == {"grips solved": 8, "solver steps": 24}
 
 
@@ -140,6 +140,6 @@ def test_what_is_closed_from_the_first_level_on_closes_at_once() -> None:
     assert (on.tolist(), off.tolist()) == ([[0]], [[1500]])
 
 
-def test_a_grip_that_is_not_full_when_the_row_is_read_is_refused(make_setting: Callable) -> None:
+def test_a_row_read_before_the_full_grip_is_refused(make_setting: Callable) -> None:
     with pytest.raises(SceneError, match=r"contact\.ramp: .* rise_ms = 300 is longer than recording\.hold_ms = 250"):
-        prepare(Parameters(rise_ms=300.0), make_setting(hold_us=250_000), Press(lambda grip: grip))
+        prepare(make_setting(hold_us=250_000), Press(lambda grip: grip), rise_ms=300.0)

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.simulator.effects.frame_jitter import Parameters, prepare
+from thenar.simulator.effects.frame_jitter import MEMBER, prepare
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting, frame_times
 
@@ -16,7 +16,7 @@ def jittered(
 ) -> np.ndarray:
     batch = make_batch(rows)
     batch.frame_us = np.tile(frame_times(setting), (len(batch), 1))
-    prepare(Parameters(sd_us=sd_us), setting)(batch, make_draw("frame.jitter", batch))
+    prepare(setting, sd_us=sd_us)(batch, make_draw("frame.jitter", batch))
     return batch.frame_us
 
 
@@ -38,4 +38,4 @@ def test_frames_stray_as_much_as_said(make_batch: MakeBatch, make_draw: Callable
 @pytest.mark.parametrize("sd_us", [0.0, -1.0, 2e6])
 def test_impossible_spreads_are_refused(sd_us: float) -> None:
     with pytest.raises(msgspec.ValidationError, match="sd_us"):
-        msgspec.convert({"sd_us": sd_us}, Parameters)
+        msgspec.convert({"sd_us": sd_us}, MEMBER.parameters())

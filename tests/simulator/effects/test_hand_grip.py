@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from thenar.simulator.effects.hand_grip import MEMBER, Parameters, prepare
+from thenar.simulator.effects.hand_grip import MEMBER, prepare
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
@@ -15,7 +15,7 @@ def test_grip_is_lognormal_about_what_was_planned(
 ) -> None:
     batch = make_batch(range(4000))
     batch.grip_n = np.full(4000, 12.0)
-    prepare(Parameters(log_sd=0.25), make_setting())(batch, make_draw(MEMBER.name, batch))
+    prepare(make_setting(), log_sd=0.25)(batch, make_draw(MEMBER.name, batch))
     logs = np.log(batch.grip_n / 12.0)
     # Four standard errors: 0.25 / sqrt(4000), and over sqrt(2) for the sd.
     assert abs(logs.mean()) < 4 * 0.004

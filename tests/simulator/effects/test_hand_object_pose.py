@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from thenar.simulator.effects.hand_object_pose import MEMBER, Parameters, prepare, turned
+from thenar.simulator.effects.hand_object_pose import MEMBER, prepare, turned
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
@@ -19,9 +19,7 @@ DIRECTIONS = arrays(np.float64, (3, 3), elements=st.floats(-1.0, 1.0))
 
 
 @given(vectors=VECTORS, directions=DIRECTIONS, size=st.floats(0.0, 0.05))
-def test_a_small_turn_is_the_rotation_about_the_hands_axes_up_to_its_square(
-    vectors: np.ndarray, directions: np.ndarray, size: float
-) -> None:
+def test_a_small_turn_is_linear_in_the_hands_axes(vectors: np.ndarray, directions: np.ndarray, size: float) -> None:
     turns = size * directions
     got = Rotation.from_rotvec(turned(vectors, turns))
     truth = Rotation.from_rotvec(turns) * Rotation.from_rotvec(vectors)
@@ -45,7 +43,7 @@ def test_places_and_turns_vary_as_much_as_is_asked(
     batch = make_batch(range(2000))
     held = batch.condition.held.pose
     batch.pose = np.tile(held, (2000, 1))
-    prepare(Parameters(sd_mm=2.0, sd_deg=3.0), make_setting())(batch, make_draw(MEMBER.name, batch))
+    prepare(make_setting(), sd_mm=2.0, sd_deg=3.0)(batch, make_draw(MEMBER.name, batch))
     # Four standard errors are 4 / sqrt(2000) = 9 % of the sd for the mean, 4 / sqrt(4000) = 6.4 % for the sd itself.
     off = batch.pose[:, :3] - held[:3]
     assert np.abs(off.mean(axis=0)).max() < 0.09 * 2.0
@@ -58,9 +56,9 @@ def test_places_and_turns_vary_as_much_as_is_asked(
 def test_either_can_be_left_out(
     make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., SceneSetting]
 ) -> None:
-    for parameters, still in ((Parameters(sd_mm=0.0), slice(0, 3)), (Parameters(sd_deg=0.0), slice(3, 6))):
+    for parameters, still in (({"sd_mm": 0.0}, slice(0, 3)), ({"sd_deg": 0.0}, slice(3, 6))):
         batch = make_batch()
         before = batch.pose = np.tile(batch.condition.held.pose, (4, 1))
-        prepare(parameters, make_setting())(batch, make_draw(MEMBER.name, batch))
+        prepare(make_setting(), **parameters)(batch, make_draw(MEMBER.name, batch))
         np.testing.assert_array_equal(batch.pose[:, still], before[:, still])
         assert (batch.pose != before).any()

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.body.hand import LIMITS_DEG
-from thenar.simulator.effects.hand_posture import MEMBER, Parameters, prepare
+from thenar.simulator.effects.hand_posture import MEMBER, prepare
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
@@ -18,7 +18,7 @@ def shifted(
 ) -> Batch:
     batch = make_batch(range(n))
     batch.posture_deg = np.tile(batch.condition.held.posture_deg, (n, 1))
-    prepare(Parameters(sd_deg=sd_deg), setting)(batch, draw(MEMBER.name, batch))
+    prepare(setting, sd_deg=sd_deg)(batch, draw(MEMBER.name, batch))
     return batch
 
 

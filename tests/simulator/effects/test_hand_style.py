@@ -7,7 +7,7 @@ import pytest
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.hand import LIMITS_DEG
-from thenar.simulator.effects.hand_style import MEMBER, Parameters, prepare
+from thenar.simulator.effects.hand_style import MEMBER, prepare
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
@@ -27,11 +27,11 @@ def style(
     """Return a function of subject, grasp, thing that returns how far posture is off (n, 20) and grip's factor (n,)."""
 
     def run(
-        subject: str, grasp: str, thing: str = "bar", parameters: Parameters | None = None
+        subject: str, grasp: str, thing: str = "bar", parameters: dict[str, float] | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         batch = make_batch(range(2), make_condition(subject, grasp, thing))
         batch.posture_deg, batch.grip_n = np.tile(MIDDLE, (2, 1)), np.full(2, 10.0)
-        prepare(parameters or Parameters(), make_setting())(batch, make_draw(MEMBER.name, batch))
+        prepare(make_setting(), **(parameters or {}))(batch, make_draw(MEMBER.name, batch))
         return batch.posture_deg - MIDDLE, batch.grip_n / 10.0
 
     return run
@@ -45,23 +45,23 @@ def test_a_style_is_the_same_in_every_repetition_and_with_every_object(style: St
     assert np.abs(posture).min() > 0.0
 
 
-def test_a_type_is_held_in_a_way_of_its_own_and_gripped_as_all_others(style: Styler) -> None:
+def test_each_type_has_its_own_habit_but_common_grip(style: Styler) -> None:
     (one, grip), (other, same) = style("A", "PoS"), style("A", "Lat")
     assert (one != other).all()
     assert grip.tolist() == same.tolist()
 
 
-def test_without_habits_all_types_are_off_alike_and_without_the_rest_only_habits_are_left(style: Styler) -> None:
-    for_all = Parameters(habit_sd_deg=0.0)
+def test_habits_are_per_type_and_the_rest_common(style: Styler) -> None:
+    for_all = {"habit_sd_deg": 0.0}
     np.testing.assert_array_equal(style("A", "PoS", "bar", for_all)[0], style("A", "Lat", "bar", for_all)[0])
-    habits = Parameters(sd_deg=0.0, log_sd=0.0)
+    habits = {"sd_deg": 0.0, "log_sd": 0.0}
     posture, grip = style("A", "PoS", "bar", habits)
     assert (posture != 0.0).all()
     assert grip.tolist() == [1.0, 1.0]
 
 
 def test_subjects_differ_as_much_as_is_asked(style: Styler) -> None:
-    parameters = Parameters(sd_deg=1.0, habit_sd_deg=2.0, log_sd=0.2)
+    parameters = {"sd_deg": 1.0, "habit_sd_deg": 2.0, "log_sd": 0.2}
     styles = [style(f"subject {number}", "PoS", "bar", parameters) for number in range(300)]
     off, logs = np.stack([s[0][0] for s in styles]), np.log([s[1][0] for s in styles])
     # 6000 angles of sd sqrt(1 + 4), 300 grips; four standard errors of an sd are 4 sd / sqrt(2 n).
@@ -70,6 +70,6 @@ def test_subjects_differ_as_much_as_is_asked(style: Styler) -> None:
 
 
 def test_no_joint_leaves_its_range(style: Styler) -> None:
-    posture, _ = style("A", "PoS", "bar", Parameters(sd_deg=45.0, habit_sd_deg=45.0))
+    posture, _ = style("A", "PoS", "bar", {"sd_deg": 45.0, "habit_sd_deg": 45.0})
     assert (posture + MIDDLE >= LIMITS_DEG[:, 0] - 1e-9).all()
     assert (posture + MIDDLE <= LIMITS_DEG[:, 1] + 1e-9).all()

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from thenar.simulator.body.cyberglove import sensors_deg
 from thenar.simulator.body.hand import DOF, LIMITS_DEG
-from thenar.simulator.effects.hand_transition import Parameters, path, prepare
+from thenar.simulator.effects.hand_transition import path, prepare
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting
@@ -79,7 +79,7 @@ def moved(
     batch.previous_deg, batch.posture_deg = every[batch.repetitions, 0], every[batch.repetitions, 1]
     batch.frame_us = frame_us
     batch.sensors_deg = settled = np.repeat(sensors_deg(batch.posture_deg)[:, None], frame_us.shape[1], axis=1)
-    prepare(Parameters(), setting)(batch, make_draw("hand.transition", batch))
+    prepare(setting)(batch, make_draw("hand.transition", batch))
     return batch, settled
 
 
@@ -97,4 +97,4 @@ def test_sensors_move_before_contact_and_only_then(
 
 def test_a_scene_without_time_before_contact_is_refused(make_setting: Callable) -> None:
     with pytest.raises(SceneError, match=r"hand\.transition: there is no frame before contact.*lead_ms"):
-        prepare(Parameters(), make_setting(timed=True, first_us=0))
+        prepare(make_setting(timed=True, first_us=0))

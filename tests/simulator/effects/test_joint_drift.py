@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thenar.simulator.body.condition import Condition
-from thenar.simulator.effects.joint_drift import MEMBER, Parameters, prepare
+from thenar.simulator.effects.joint_drift import MEMBER, prepare
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
@@ -27,9 +27,7 @@ def drift(
         batch = make_batch(range(len(trials)), make_condition(subject))
         batch.trials = np.array(trials)
         batch.sensors_deg = np.zeros((len(trials), 2, 18))
-        prepare(Parameters(deg_per_session=deg_per_session), make_setting(session_trials=100))(
-            batch, make_draw(MEMBER.name, batch)
-        )
+        prepare(make_setting(session_trials=100), deg_per_session=deg_per_session)(batch, make_draw(MEMBER.name, batch))
         return batch.sensors_deg
 
     return run
@@ -43,7 +41,7 @@ def test_it_begins_at_nought_and_goes_on_in_a_straight_line(drift: Drift) -> Non
     np.testing.assert_array_equal(added[:, 0], added[:, 1])
 
 
-def test_every_sensor_of_every_subject_drifts_its_own_way_as_far_as_is_asked(drift: Drift) -> None:
+def test_every_subjects_sensors_drift_independently_by_the_requested_amount(drift: Drift) -> None:
     ends = np.stack([drift(f"subject {number}", [100], deg_per_session=8.0)[0, 0] for number in range(200)])
     # 3600 drifts: four standard errors of mean and sd.
     assert abs(ends.mean()) < 4 * 8.0 / 3600**0.5

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from thenar.simulator.effects.joint_noise import MEMBER, Parameters, prepare
+from thenar.simulator.effects.joint_noise import MEMBER, prepare
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting, frame_times
 from thenar.simulator.streams import Draw
@@ -22,7 +22,7 @@ def noise(
     def run(n: int, timed: bool, sd_deg: float, trial_sd_deg: float = 0.0) -> np.ndarray:
         batch, setting = make_batch(range(n)), make_setting(timed=timed)
         batch.sensors_deg = np.full((n, len(frame_times(setting)), 18), 50.0)
-        prepare(Parameters(sd_deg=sd_deg, trial_sd_deg=trial_sd_deg), setting)(batch, make_draw(MEMBER.name, batch))
+        prepare(setting, sd_deg=sd_deg, trial_sd_deg=trial_sd_deg)(batch, make_draw(MEMBER.name, batch))
         return batch.sensors_deg - 50.0
 
     return run

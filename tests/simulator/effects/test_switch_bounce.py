@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.effects.switch_bounce import Parameters, prepare
+from thenar.simulator.effects.switch_bounce import prepare
 from thenar.simulator.pipeline.ramp import NEVER
 
 if TYPE_CHECKING:
@@ -20,7 +20,10 @@ def bounced(make_batch: Callable, make_draw: Callable, make_setting: Callable) -
     """Return a function of the times read (n, F), parameters and first repetition: bits without and with bouncing."""
 
     def make(
-        read_us: np.ndarray, parameters: Parameters | None = None, first: int = 0, delay_us: np.ndarray | None = None
+        read_us: np.ndarray,
+        parameters: dict[str, float] | None = None,
+        first: int = 0,
+        delay_us: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         n = len(read_us)
         batch: Batch = make_batch(range(first, first + n))
@@ -30,7 +33,7 @@ def bounced(make_batch: Callable, make_draw: Callable, make_setting: Callable) -
         batch.off_us = np.tile([OFF_US, NEVER, NEVER, NEVER], (n, 1))
         at = read_us[:, :, None] + (0 if delay_us is None else delay_us)
         batch.bits = rest = (batch.on_us[:, None] <= at) & (at < batch.off_us[:, None])
-        prepare(parameters or Parameters(), make_setting(timed=True))(batch, make_draw("switch.bounce", batch))
+        prepare(make_setting(timed=True), **(parameters or {}))(batch, make_draw("switch.bounce", batch))
         return rest, batch.bits
 
     return make
@@ -71,16 +74,16 @@ def test_bursts_are_of_any_length_up_to_the_limit(bounced: Callable) -> None:
 
 
 def test_the_limits_are_those_of_the_scene(bounced: Callable) -> None:
-    rest, bits = bounced(finely(OFF_US, OFF_US + 30_000), Parameters(on_ms=0.0, off_ms=20.0))
+    rest, bits = bounced(finely(OFF_US, OFF_US + 30_000), {"on_ms": 0.0, "off_ms": 20.0})
     wrong = np.flatnonzero((rest != bits).any(axis=(0, 2)))
     assert 15_000 < 10 * wrong.max() < 20_000
-    rest, bits = bounced(finely(ON_US, ON_US + 3000), Parameters(on_ms=0.0))
+    rest, bits = bounced(finely(ON_US, ON_US + 3000), {"on_ms": 0.0})
     assert np.array_equal(rest, bits)
 
 
-def test_a_switch_that_opens_while_it_still_chatters_is_open_from_then_on(bounced: Callable) -> None:
+def test_a_switch_opening_during_chatter_stays_open(bounced: Callable) -> None:
     """The first switch opens 80 ms after it closed, in the midst of bursts of up to a second."""
-    rest, bits = bounced(finely(ON_US, OFF_US + 50_000), Parameters(on_ms=1000.0, off_ms=0.0))
+    rest, bits = bounced(finely(ON_US, OFF_US + 50_000), {"on_ms": 1000.0, "off_ms": 0.0})
     opened = (OFF_US - ON_US) // 10
     assert (rest[:, :opened, 0] != bits[:, :opened, 0]).any()
     assert not bits[:, opened:, 0].any()

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.effects import port_dead, switch_stuck_closed, switch_stuck_open
-from thenar.simulator.effects.switch_ghosting import Parameters, joined, prepare
+from thenar.simulator.effects.switch_ghosting import joined, prepare
 from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import SceneGlove
 
@@ -42,7 +41,7 @@ def test_every_frame_is_a_matrix_of_its_own(
     batch = make_batch(range(shape[0]))
     batch.bits = bits = np.random.default_rng(2).random(shape) < 0.1
     draw = make_draw("switch.ghosting", batch)
-    prepare(Parameters(), make_setting())(batch, draw)
+    prepare(make_setting())(batch, draw)
     assert batch.bits.shape == shape
     for place in np.ndindex(*shape[:2]):
         assert np.array_equal(batch.bits[place], searched(bits[place]))
@@ -53,13 +52,13 @@ def test_every_frame_is_a_matrix_of_its_own(
     ("others", "reads"),
     [
         ([], []),
-        ([("switch.stuck_closed", switch_stuck_closed.Parameters(switches=(18, 23, 82)))], [18, 23, 82, 87]),
+        ([("switch.stuck_closed", {"switches": (18, 23, 82)})], [18, 23, 82, 87]),
         # What is stuck open reads closed by way of the others; a dead port reads open, but its wires still join.
         (
             [
-                ("switch.stuck_open", switch_stuck_open.Parameters(switches=(87,))),
-                ("switch.stuck_closed", switch_stuck_closed.Parameters(switches=(18, 23, 82))),
-                ("port.dead", port_dead.Parameters(ports=(1,))),
+                ("switch.stuck_open", {"switches": (87,)}),
+                ("switch.stuck_closed", {"switches": (18, 23, 82)}),
+                ("port.dead", {"ports": (1,)}),
             ],
             [82, 87],
         ),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.body.condition import Condition
-from thenar.simulator.effects.switch_threshold import LEAST_N, MEMBER, Parameters, prepare
+from thenar.simulator.effects.switch_threshold import LEAST_N, MEMBER, prepare
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.streams import Draw
@@ -28,7 +28,7 @@ def thresholds(
     def run(subject: str, sd_n: float) -> np.ndarray:
         batch = make_batch(range(1), make_condition(subject))
         batch.thresholds_n = np.ones(160)
-        prepare(Parameters(sd_n=sd_n), make_setting())(batch, make_draw(MEMBER.name, batch))
+        prepare(make_setting(), sd_n=sd_n)(batch, make_draw(MEMBER.name, batch))
         return batch.thresholds_n
 
     return run

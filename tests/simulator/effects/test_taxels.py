@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS, SceneSetting
+from thenar.simulator.pipeline.glove import TaxelConverter
 from thenar.simulator.streams import Draw
 
 FRAMES, PADS = 5, 40
@@ -44,13 +45,13 @@ def acted(
         frames = {"timed": True, "first_us": 0, "hold_us": 10_000 * (newtons.shape[1] - 1), "release_us": 0}
         setting = make_setting(taxels=tuple(range(newtons.shape[2])), **frames)
         given: Any = parameters
-        effect.prepare(effect.parameters(**given), setting)(batch, make_draw(name, batch))
+        effect.prepare(setting, **given)(batch, make_draw(name, batch))
         return batch.taxels if batch.taxels is not None else batch.taxels_n
 
     return run
 
 
-def test_every_pad_of_the_glove_has_a_gain_of_its_own_whoever_wears_it(acted: Acted) -> None:
+def test_every_pad_has_its_own_gain_for_all_wearers(acted: Acted) -> None:
     found = acted("taxel.gain", np.full((2, 1, 1600), 2.0), log_sd=0.06)
     logs = np.log(found[0, 0] / 2.0)
     assert abs(logs.mean()) < 4 * 0.06 / 40
@@ -66,9 +67,7 @@ def test_a_pad_reads_nothing_below_what_actuates_it_and_its_force_above(acted: A
 
 
 @given(newtons=FORCES, share=st.floats(0.0, 1.0))
-def test_hysteresis_lies_between_the_force_and_a_share_more_and_is_the_force_while_it_rises(
-    acted: Acted, newtons: np.ndarray, share: float
-) -> None:
+def test_hysteresis_exceeds_only_falling_forces_by_a_share(acted: Acted, newtons: np.ndarray, share: float) -> None:
     found = acted("taxel.hysteresis", newtons, share=share)
     assert (found >= newtons).all()
     assert (found <= (1.0 + share) * newtons).all()
@@ -108,7 +107,7 @@ def test_crosstalk_is_what_kirchhoff_says_of_a_driven_row(acted: Acted, newtons:
         np.testing.assert_allclose(found[:, :, row : row + 16], shared * 10_000.0, rtol=1e-9, atol=1e-12)
 
 
-def test_noise_is_as_large_as_is_asked_in_a_repetition_and_in_a_frame(acted: Acted) -> None:
+def test_noise_has_the_requested_size_per_repetition_and_frame(acted: Acted) -> None:
     newtons = np.full((200, FRAMES, PADS), 2.0)
     gains = np.log(acted("taxel.noise", newtons, trial_log_sd=0.02, sd_n=0.0) / 2.0)
     assert (gains == gains[:, :1]).all()
@@ -122,9 +121,7 @@ def test_noise_is_as_large_as_is_asked_in_a_repetition_and_in_a_frame(acted: Act
 def test_counts_are_the_nearest_and_end_where_the_converter_does(acted: Acted, newtons: np.ndarray, bits: int) -> None:
     codes = acted("taxel.adc", newtons, bits=bits, full_n=10.0)
     count_n = 10.0 / 2**bits
-    given: Any = {"bits": bits, "full_n": 10.0}
-    converter: Any = EFFECTS["taxel.adc"].parameters(**given)
-    values = converter.column("pad").value(codes)
+    values = TaxelConverter(bits, 10.0).column("pad").value(codes)
     inside = (newtons >= 0.0) & (newtons <= 10.0 - count_n)
     assert (np.abs(values - newtons)[inside] <= count_n / 2 * (1 + 1e-9)).all()
     assert (codes[newtons < 0.0] == 0).all()

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.simulator.effects.wire_lost_bytes import Parameters, arrives, prepare
+from thenar.simulator.effects.wire_lost_bytes import MEMBER, arrives, prepare
 from thenar.simulator.pipeline.batch import Batch, SerialTraffic
 from thenar.simulator.pipeline.effect import SceneSetting
 
@@ -23,7 +23,7 @@ def through(
     zeros = np.zeros((len(batch), *shape), dtype=np.uint8)
     batch.traffic = SerialTraffic(zeros, zeros.astype(np.int64), np.ones(zeros.shape, dtype=np.bool_), 26)
     before = batch.traffic
-    prepare(Parameters(rate=rate), setting)(batch, make_draw("wire.lost_bytes", batch))
+    prepare(setting, rate=rate)(batch, make_draw("wire.lost_bytes", batch))
     assert batch.traffic.data is before.data
     assert before.arrives.all()
     return batch.traffic.arrives
@@ -44,11 +44,11 @@ def test_what_was_lost_before_stays_lost(make_batch: MakeBatch, make_draw: Calla
     batch = make_batch(range(2))
     data = np.zeros((2, 1, 46), dtype=np.uint8)
     batch.traffic = SerialTraffic(data, data.astype(np.int64), np.zeros(data.shape, dtype=np.bool_), 26)
-    prepare(Parameters(), make_setting())(batch, make_draw("wire.lost_bytes", batch))
+    prepare(make_setting())(batch, make_draw("wire.lost_bytes", batch))
     assert not batch.traffic.arrives.any()
 
 
 @pytest.mark.parametrize("rate", [0.0, 1.0, -0.1])
 def test_impossible_rates_are_refused(rate: float) -> None:
     with pytest.raises(msgspec.ValidationError, match="rate"):
-        msgspec.convert({"rate": rate}, Parameters)
+        msgspec.convert({"rate": rate}, MEMBER.parameters())

@@ -57,9 +57,7 @@ def test_no_two_switches_overlap(glove: HandShape) -> None:
 
 
 @pytest.mark.parametrize("digit", DIGITS)
-def test_the_whole_circle_of_a_switch_lies_in_its_digit_on_a_strip_beside_it_or_in_the_palm(
-    glove: HandShape, digit: int
-) -> None:
+def test_a_switchs_circle_lies_wholly_within_its_part(glove: HandShape, digit: int) -> None:
     ray = rays()[digit]
     for switch in np.flatnonzero(glove.parts == digit):
         place, side = glove.places[switch], glove.sides[switch]

@@ -5,14 +5,12 @@ from thenar.compiler.evaluation.ablation import Ablation
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.study import evaluate
 from thenar.simulator import load_scene, simulate
-from thenar.simulator.effects import joint_noise
-from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.pipeline.ablation import ablate
 from thenar.simulator.scenes.scene import ListedEffect, Scene
 
 KEPT = ("hand.posture", "joint.noise")
 # So much noise that it matters to joints, and to nothing else.
-NOISE = ListedEffect("joint.noise", joint_noise.Parameters(sd_deg=40.0))
+NOISE = ListedEffect("joint.noise", (("sd_deg", 40.0),))
 
 
 def scene_of(repetitions: int, subjects: int = 1) -> Scene:
@@ -72,7 +70,7 @@ def test_a_change_is_what_the_rate_of_the_same_inputs_gained(ablation: Ablation)
         assert one.change.mean == pytest.approx(one.rate.mean - before.rate.mean)
 
 
-def test_a_scene_of_every_frame_is_judged_by_the_frames_that_are_read_out() -> None:
+def test_ablation_judges_only_the_frames_read_out() -> None:
     scene = scene_of(4)
     every = msgspec.structs.replace(scene, recording=msgspec.structs.replace(scene.recording, rows="all"))
     found = ablate(msgspec.structs.replace(every, effects=()), jobs=1)
@@ -93,5 +91,5 @@ def test_too_few_repetitions_to_cross_validate_are_refused_with_the_reason() -> 
 
 
 def test_the_contact_model_that_every_scene_needs_is_not_removed() -> None:
-    listed = msgspec.structs.replace(scene_of(4), effects=(ListedEffect("contact.quasistatic", Parameters()),))
+    listed = msgspec.structs.replace(scene_of(4), effects=(ListedEffect("contact.quasistatic"),))
     assert [variant.without for variant in ablate(listed, jobs=1).variants] == [None]

@@ -45,7 +45,7 @@ def test_draws_are_counted_a_grasp() -> None:
     assert (drawn["hand.grip"], drawn["hand.posture"], drawn["glove.sample"]) == (1.0, 20.0, 0.0)
 
 
-def test_a_scene_with_an_object_that_no_hand_can_hold_cannot_be_explained() -> None:
+def test_a_scene_with_an_unholdable_object_cannot_be_explained() -> None:
     (bead,) = (item for item in QUICK.objects if item.name == "bead")
     large = msgspec.structs.replace(bead, shape=msgspec.structs.replace(bead.shape, diameter_mm=190.0))
     with pytest.raises(PlanError, match="cannot hold 'bead' with grasp type 'Tip'"):

@@ -12,7 +12,7 @@ PERIODS = st.integers(1_000, 30_000)
 TIMES = st.integers(0, 200_000)
 
 
-def test_without_time_there_is_the_frame_that_is_read_out_and_no_other(
+def test_without_time_only_the_read_frame_exists(
     make_setting: Callable[..., SceneSetting],
 ) -> None:
     setting = make_setting(timed=False)
@@ -22,7 +22,7 @@ def test_without_time_there_is_the_frame_that_is_read_out_and_no_other(
 
 
 @given(period=PERIODS, lead=TIMES, hold=TIMES, release=TIMES)
-def test_frames_are_a_period_apart_between_the_ends_and_one_is_at_the_end_of_holding(
+def test_frames_are_a_period_apart_and_one_ends_holding(
     make_setting: Callable[..., SceneSetting], period: int, lead: int, hold: int, release: int
 ) -> None:
     setting = make_setting(timed=True, period_us=period, first_us=-lead, hold_us=hold, release_us=release)
@@ -34,7 +34,7 @@ def test_frames_are_a_period_apart_between_the_ends_and_one_is_at_the_end_of_hol
 
 
 @given(period=PERIODS, lead=TIMES, hold=TIMES, release=TIMES)
-def test_every_frame_draws_a_row_of_its_own_and_the_one_read_out_the_first(
+def test_frames_draw_separate_rows_the_read_one_first(
     make_setting: Callable[..., SceneSetting], period: int, lead: int, hold: int, release: int
 ) -> None:
     setting = make_setting(timed=True, period_us=period, first_us=-lead, hold_us=hold, release_us=release)

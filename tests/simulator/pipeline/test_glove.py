@@ -30,7 +30,7 @@ def take(make_draw: DrawMaker) -> Callable[..., None]:
         draw = make_draw(name, batch)
         effect = steps[name]
         assert effect.prepare is not None
-        effect.prepare(effect.parameters(), setting)(batch, draw)
+        effect.prepare(setting)(batch, draw)
         assert not draw.draws.counts
 
     return run
@@ -50,7 +50,7 @@ def test_recall_takes_what_was_planned_for_every_repetition(
 
 
 @given(forces=FORCES, released=st.booleans())
-def test_a_switch_closes_above_its_threshold_at_once_and_opens_once_its_row_was_read(
+def test_switches_close_above_threshold_and_open_after_the_row(
     take: Callable[..., None], make_batch: BatchMaker, make_setting: SettingMaker, forces: np.ndarray, released: bool
 ) -> None:
     batch, setting = make_batch(range(2)), make_setting(threshold_n=1.0, release_us=40_000 if released else 0)
@@ -66,7 +66,7 @@ def test_a_switch_closes_above_its_threshold_at_once_and_opens_once_its_row_was_
 
 
 @pytest.mark.parametrize("timed", [False, True])
-def test_frames_are_those_of_the_setting_and_sensors_feel_the_same_in_each(
+def test_frames_are_those_configured_with_equal_sensing(
     take: Callable[..., None], make_batch: BatchMaker, make_setting: SettingMaker, timed: bool
 ) -> None:
     batch, setting = make_batch(range(3)), make_setting(timed=timed)
@@ -117,7 +117,7 @@ def test_a_bit_is_read_between_closing_and_opening_when_its_turn_comes(
         assert batch.bits[row, frame, switch] == (on[row, switch] <= at < off[row, switch])
 
 
-def test_the_row_that_is_read_out_is_held_and_the_last_frames_are_not(
+def test_the_read_row_is_held_the_last_frames_are_not(
     take: Callable[..., None], make_batch: BatchMaker, make_setting: SettingMaker
 ) -> None:
     batch, setting = make_batch(range(1)), make_setting(timed=True)

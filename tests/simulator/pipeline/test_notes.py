@@ -39,7 +39,7 @@ def test_residuals_are_those_of_settled_repetitions(make_batch: Callable[..., Ba
     assert "nan N" in found.unsettled[0].why
 
 
-def test_frames_that_did_not_arrive_are_counted_and_repetitions_of_which_none_did_are_told(
+def test_missing_frames_and_empty_repetitions_are_reported(
     make_batch: Callable[..., Batch],
 ) -> None:
     batch = went_through(make_batch())

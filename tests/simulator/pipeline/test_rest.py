@@ -15,7 +15,6 @@ from thenar.runtime import Build
 from thenar.runtime.published import NONE
 from thenar.simulator.body.cyberglove import USED, sensors_deg
 from thenar.simulator.body.hand import LIMITS_DEG, RESTS_DEG
-from thenar.simulator.effects import hand_posture, hand_style, joint_noise
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.ablation import ablate
 from thenar.simulator.pipeline.batch import Batch
@@ -29,8 +28,8 @@ BatchMaker = Callable[..., Batch]
 
 MOVING = Recording(lead_ms=30.0, hold_ms=250.0, release_ms=40.0, rows="all", rest=True, rest_ms=50.0)
 VARIED = [
-    ("hand.style", hand_style.Parameters(sd_deg=2.0, habit_sd_deg=3.0)),
-    ("hand.posture", hand_posture.Parameters(sd_deg=1.5)),
+    ("hand.style", {"sd_deg": 2.0, "habit_sd_deg": 3.0}),
+    ("hand.posture", {"sd_deg": 1.5}),
 ]
 
 
@@ -63,7 +62,7 @@ def test_the_hand_goes_to_its_rest_as_it_came_and_stays(
     np.testing.assert_array_equal(after[:, 2:], np.tile(open_deg, (3, 6, 1)))
 
 
-def test_rests_vary_as_postures_do_and_that_after_a_trial_is_that_before_the_next(
+def test_rests_vary_and_join_consecutive_trials(
     make_scene: SceneMaker, make_batch: BatchMaker, make_condition: Callable[..., Any]
 ) -> None:
     scene = make_scene([*VARIED, "hand.transition"], recording=MOVING)
@@ -111,7 +110,7 @@ def test_a_rest_changes_no_draw_of_any_other_frame(name: str) -> None:
     assert (np.diff(rested.times_us[rested.subjects == "A"]) >= 0).all()
 
 
-def test_the_whole_of_a_movement_is_one_movement_and_none_outside_the_hold() -> None:
+def test_a_movement_is_one_and_none_outside_the_hold() -> None:
     made = whole("continuous-rest")
     frames = np.arange(len(made)) % 181
     assert made.is_none[(frames < 30) | (frames > 101)].all()
@@ -129,9 +128,8 @@ def test_a_flat_hand_reads_nought_and_closes_nothing() -> None:
     flat = made.rows(np.arange(len(made)) % 181 >= 131)
     angles = np.column_stack([joint.value(flat.codes[:, n]) for n, joint in enumerate(flat.joints)])
     away = angles.mean(axis=0) - sensors_deg(np.zeros(20))[:USED]
-    noise = dict(load_scene("continuous").effects)["joint.noise"]
-    assert isinstance(noise, joint_noise.Parameters)
-    assert np.abs(away).max() < noise.trial_sd_deg
+    noise = dict(dict(load_scene("continuous").effects)["joint.noise"])
+    assert np.abs(away).max() < noise["trial_sd_deg"]
     assert not flat.switches.any()
     assert flat.is_none.all()
 

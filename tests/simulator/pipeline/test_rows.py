@@ -81,7 +81,7 @@ SUBJECTS = np.array([0, 0, 1])
 
 @settings(max_examples=30, deadline=None)
 @given(size=st.integers(1, 6), order=st.randoms(use_true_random=False), every_frame=st.booleans())
-def test_rows_are_the_same_however_they_are_cut_and_in_whichever_order_they_come(
+def test_rows_do_not_depend_on_blocks_or_order(
     size: int,
     order: Random,
     every_frame: bool,
@@ -137,7 +137,7 @@ def test_a_clock_never_goes_back_and_begins_at_nought(
         assert (np.diff(clock) >= 0).all()
 
 
-def test_a_grasp_is_held_until_nothing_is_pressed_as_it_was_when_the_first_switch_closed(
+def test_a_grasp_is_held_until_its_first_pressure_ends(
     make_batch: Callable[..., Batch],
 ) -> None:
     batch = make_batch(range(3))

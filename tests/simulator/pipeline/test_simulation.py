@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from thenar.simulator import load_scene, simulate
-from thenar.simulator.effects import wire_lost_bytes
-from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.report import SimulationReport
 from thenar.simulator.pipeline.simulation import Simulation, sessions
@@ -25,7 +23,7 @@ def scene_of(name: str, repetitions: int, types: tuple[str, ...] = (), **changes
 
 def hasty(scene: Scene, most_steps: int) -> Scene:
     """Return a scene whose contact model gives up early."""
-    listed = ListedEffect("contact.quasistatic", Parameters(most_steps=most_steps))
+    listed = ListedEffect("contact.quasistatic", (("most_steps", most_steps),))
     return msgspec.structs.replace(scene, effects=(*scene.effects, listed))
 
 
@@ -55,7 +53,7 @@ def test_any_number_of_processes_and_any_blocks_give_the_same_bytes(
 
 
 @pytest.mark.parametrize("name", ["faulty-glove", "continuous"])
-def test_scenes_in_time_and_on_the_wire_do_not_depend_on_blocks_either(name: str) -> None:
+def test_timed_and_wired_scenes_do_not_depend_on_blocks(name: str) -> None:
     scene = scene_of(name, 3, ("PoH",))
     whole = simulate(scene, jobs=1)
     for block in (1, 2):
@@ -93,7 +91,7 @@ def grasps_of(found: Simulation) -> list[tuple[str, str, str, bytes, bytes]]:
     return sorted((*who, bits.tobytes(), codes.tobytes()) for who, bits, codes in rows)
 
 
-def test_more_grasps_of_the_same_hands_are_those_that_a_longer_scene_adds(quick: Simulation) -> None:
+def test_more_grasps_are_those_a_longer_scene_adds(quick: Simulation) -> None:
     fresh = simulate(QUICK.varied(more=5), jobs=1, keep_unsettled=True)
     longer = simulate(QUICK.varied(11), jobs=1, keep_unsettled=True)
     assert grasps_of(longer) == sorted(grasps_of(quick) + grasps_of(fresh))
@@ -171,7 +169,7 @@ def test_every_frame_is_a_row_when_the_scene_says_so() -> None:
     assert [each.switches_mean for each in made.report.grasps] == [each.switches_mean for each in last.report.grasps]
 
 
-def test_what_did_not_settle_is_left_out_and_named_unless_it_is_to_be_kept() -> None:
+def test_unsettled_grasps_are_left_out_unless_requested() -> None:
     scene = hasty(QUICK, 12)
     left_out, kept = simulate(scene, jobs=1), simulate(scene, jobs=1, keep_unsettled=True)
     unsettled = left_out.report.unsettled
@@ -206,8 +204,8 @@ def test_a_scene_in_which_nothing_settles_is_an_error() -> None:
         simulate(hasty(QUICK, 1), jobs=1)
 
 
-def test_a_scene_of_which_no_byte_arrives_says_so_and_blames_no_hand() -> None:
-    lossy = ListedEffect("wire.lost_bytes", wire_lost_bytes.Parameters(rate=0.999))
+def test_a_scene_without_arriving_bytes_blames_no_hand() -> None:
+    lossy = ListedEffect("wire.lost_bytes", (("rate", 0.999),))
     scene = msgspec.structs.replace(QUICK, effects=(*QUICK.effects, lossy))
     with pytest.raises(SceneError, match="of the first, no frame arrived whole"):
         simulate(scene, jobs=1)

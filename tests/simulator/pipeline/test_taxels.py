@@ -32,7 +32,7 @@ def run(make_scene: Callable[..., Scene], make_batch: Callable[..., Batch]) -> C
     return make
 
 
-def test_without_effects_a_count_is_a_thousandth_of_a_newton_of_the_contact_models_force(
+def test_without_effects_counts_are_the_contact_force_in_millinewtons(
     run: Callable[..., Batch],
 ) -> None:
     batch = run()
@@ -49,7 +49,7 @@ def test_taxels_feel_nothing_before_contact_and_after_release(run: Callable[...,
     assert not batch.taxels_n[:, ~held].any()
 
 
-def test_with_a_ramp_a_taxel_passes_a_switchs_threshold_when_the_switch_closes_and_opens(
+def test_ramped_taxels_pass_thresholds_when_switches_change(
     run: Callable[..., Batch],
 ) -> None:
     recording = Recording(rows="all", rate_hz=1000.0, lead_ms=10.0, hold_ms=250.0, release_ms=220.0)
@@ -62,7 +62,7 @@ def test_with_a_ramp_a_taxel_passes_a_switchs_threshold_when_the_switch_closes_a
     assert not batch.taxels_n[:, -1].any()
 
 
-def test_only_the_places_that_are_named_are_taxels_and_the_others_stay_switches(
+def test_only_named_places_are_taxels(
     make_scene: Callable[..., Scene],
 ) -> None:
     scene = load_scene("quick").varied(repetitions=2, subjects=["A"])
@@ -78,7 +78,7 @@ def test_only_the_places_that_are_named_are_taxels_and_the_others_stay_switches(
     assert {taxel.unit for taxel in mixed.taxel_columns} == {"N"}
 
 
-def test_the_shipped_scene_has_counts_of_12_bits_in_newtons_of_the_same_grasps() -> None:
+def test_the_shipped_taxel_scene_has_12_bit_counts_in_newtons() -> None:
     bits = simulate(load_scene("kamakura").varied(repetitions=2, subjects=["A"]), 1)
     pads = simulate(load_scene("kamakura-analog").varied(repetitions=2, subjects=["A"]), 1)
     assert pads.report.unsettled == bits.report.unsettled
@@ -125,7 +125,7 @@ def test_counts_go_over_the_boards_line_and_come_through_where_nothing_happens(
 
 
 def test_counts_that_are_lost_leave_those_of_the_frame_before(make_scene: Any, make_batch: Any) -> None:
-    effects = ["contact.ramp", ("wire.lost_bytes", EFFECTS["wire.lost_bytes"].parameters(**LOSES))]
+    effects = ["contact.ramp", ("wire.lost_bytes", LOSES)]
     recording = Recording(rows="all", rate_hz=20.0, hold_ms=500.0)
     found = []
     for listed in (effects[:1], effects):

@@ -23,7 +23,7 @@ FRAMES, ROW_BYTES, RECORD_BYTES = 5, 5 + 6 + 11 + 40 + 3 + 2, 20
 
 def prepared(effect: Effect, setting: SceneSetting) -> Step:
     assert effect.prepare is not None
-    return effect.prepare(effect.parameters(), setting)
+    return effect.prepare(setting)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def test_more_than_256_frames_still_match(make_sent: Callable, receive: Callable
     assert np.array_equal(batch.bits, bits)
 
 
-def test_bytes_take_ten_bits_each_and_wait_for_the_scan_and_the_glove(make_sent: Callable) -> None:
+def test_bytes_take_ten_bits_after_scan_and_glove(make_sent: Callable) -> None:
     batch = make_sent(every_10_ms(1), delay_us=np.full(160, 1500))
     at_us = batch.traffic.at_us[0]
     assert at_us.shape == (FRAMES, ROW_BYTES + RECORD_BYTES)
@@ -150,9 +150,7 @@ def test_a_record_in_which_the_glove_complains_is_not_taken(make_sent: Callable,
     assert np.array_equal(batch.raw[0, 2], raw[0, 0])
 
 
-def test_before_the_first_frame_there_is_no_contact_and_the_first_joints_that_come(
-    make_sent: Callable, receive: Callable
-) -> None:
+def test_before_the_first_frame_nothing_touches(make_sent: Callable, receive: Callable) -> None:
     batch = make_sent(every_10_ms(1))
     raw = batch.raw
     lose(batch, (0, 0, 3), (0, 0, ROW_BYTES + 3), (0, 1, ROW_BYTES + 3))
@@ -177,9 +175,7 @@ def test_a_repetition_to_which_a_line_brings_nothing_is_not_settled(
 
 
 @given(st.integers(0, 2**32))
-def test_whatever_arrives_is_a_frame_that_was_sent_and_never_a_later_one(
-    make_sent: Callable, receive: Callable, seed: int
-) -> None:
+def test_arriving_frames_were_sent_and_never_later(make_sent: Callable, receive: Callable, seed: int) -> None:
     """Lost bytes that the checksum does not show are of the number or the clock: the switches have all digits."""
     batch, random = make_sent(every_10_ms()), np.random.default_rng(seed)
     bits = batch.bits

@@ -70,7 +70,7 @@ def test_shares_of_a_shipped_posture_sum_to_one_as_rounded(entry: Entry) -> None
 
 
 @pytest.mark.parametrize(("taxonomy", "entry"), SHIPPED, ids=NAMES)
-def test_a_shipped_posture_presses_with_the_pads_and_the_grip_of_its_types_table(taxonomy: str, entry: Entry) -> None:
+def test_shipped_postures_press_with_their_tables_pads_and_grip(taxonomy: str, entry: Entry) -> None:
     prehension = shipped_prehensions(taxonomy)[entry.grasp]
     hand = average_hand(188.0)
     assert list(entry.spheres) == [pad_sphere(hand, pad) for pad in prehension.pads]
@@ -84,7 +84,7 @@ def test_the_turns_of_neighbouring_lengths_are_near_each_other(entry: Entry) -> 
 
 
 @pytest.mark.parametrize("entry", [entry for _, entry in SHIPPED if "lid" in entry.object])
-def test_the_axis_of_a_lid_points_out_of_the_palm_as_its_table_says(entry: Entry) -> None:
+def test_a_lids_axis_points_out_of_the_palm(entry: Entry) -> None:
     for held in entry.held:
         axis = Pose.of(np.array(held.pose)[:, None]).rotation[:, 0, 0]
         assert abs(axis[2]) > 0.6
@@ -127,7 +127,7 @@ def test_of_two_ways_to_hold_a_thing_all_lengths_take_the_better() -> None:
         assert np.abs(np.subtract(low.posture_deg, high.posture_deg)).max() < 6.0
 
 
-def test_a_lid_that_lies_near_half_a_turn_turns_little_from_hand_to_hand() -> None:
+def test_a_lid_near_half_a_turn_varies_little_between_hands() -> None:
     # As a rotation vector, a little beyond half a turn is nearly half a turn the other way.
     held = PlannedGrasp(np.zeros(20), np.zeros(6), (), 10.0)
     poses = [np.array([0.0, 0.0, 0.0, turn, 0.0, 0.0]) for turn in (3.0, 3.1, 3.2 - 2 * np.pi, 3.3 - 2 * np.pi)]

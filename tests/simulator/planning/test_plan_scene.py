@@ -185,7 +185,7 @@ def test_the_result_does_not_depend_on_the_number_of_jobs(make_scene: MakeScene)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_the_first_object_that_cannot_be_held_is_told_and_the_others_named(make_scene: MakeScene, jobs: int) -> None:
+def test_unholdable_objects_are_named_and_the_first_explained(make_scene: MakeScene, jobs: int) -> None:
     with pytest.raises(PlanError) as refusal:
         postures_of(make_scene(objects=(PEA, MELON, BALL, MOON), subjects=(hand(160.0),)), jobs)
     assert str(refusal.value).startswith("a hand of 165 mm cannot hold 'melon' with grasp type 'CMF': ")
@@ -222,7 +222,7 @@ def test_lengths_go_as_far_as_the_hands_of_the_scene(
         assert postures.held(subject.hand(), "Tip", PEA.thing()).pads
 
 
-def test_a_known_object_is_planned_again_for_a_hand_beyond_its_lengths_and_not_within(make_scene: MakeScene) -> None:
+def test_known_objects_are_replanned_only_beyond_their_hand_lengths(make_scene: MakeScene) -> None:
     far = make_scene(objects=(BEAD,), subjects=(hand(188.0), hand(238.0)))
     entry, known = (postures.entry("Tip", BEAD.thing()) for postures in (postures_of(far, 1), SHIPPED))
     assert entry is not None

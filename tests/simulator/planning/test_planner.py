@@ -22,7 +22,7 @@ def pinched() -> Plan:
     return plan(HAND, "Tip", TYPES["Tip"], BEAD)
 
 
-def test_the_pads_of_a_pinch_touch_from_two_sides_and_nothing_else_does(pinched: Plan) -> None:
+def test_only_a_pinchs_pads_touch_from_two_sides(pinched: Plan) -> None:
     held = pinched.held
     assert [pad.sphere for pad in held.pads] == [pad_sphere(HAND, pad) for pad in TYPES["Tip"].pads]
     # A ball needs no shape: how far its middle is from the middles of the skin's spheres.
@@ -44,7 +44,7 @@ def test_shares_grip_and_down_belong_to_the_type(pinched: Plan) -> None:
     assert plan(HAND, "Tip", down, BEAD, pinched.held).held.down == pytest.approx([0.0, 0.0, -1.0])
 
 
-def test_from_a_near_posture_a_hand_of_nearly_the_same_size_takes_a_near_one(pinched: Plan) -> None:
+def test_hands_of_similar_size_take_similar_postures(pinched: Plan) -> None:
     near = plan(Hand(Size(190.0, 85.0)), "Tip", TYPES["Tip"], BEAD, pinched.held)
     assert np.abs(near.held.posture_deg - pinched.held.posture_deg).max() < 1.0
     assert np.abs(near.held.pose - pinched.held.pose)[:3].max() < 2.0
@@ -86,9 +86,7 @@ NOT_HELD: list[tuple[str, Shape, str]] = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("grasp", "shape", "wrong"), NOT_HELD, ids=[f"{g} {type(s).__name__}" for g, s, _ in NOT_HELD])
-def test_an_object_that_no_hand_can_hold_is_refused_with_what_is_wrong_and_what_to_do(
-    grasp: str, shape: Shape, wrong: str
-) -> None:
+def test_an_unholdable_object_is_refused_with_reason_and_advice(grasp: str, shape: Shape, wrong: str) -> None:
     with pytest.raises(PlanError) as refusal:
         plan(HAND, grasp, TYPES[grasp], Thing("monster", shape, 0.1))
     words = str(refusal.value)

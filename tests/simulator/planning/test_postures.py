@@ -33,7 +33,7 @@ def numbers(one: PlannedGrasp) -> np.ndarray:
 
 
 @given(st.sampled_from(ENTRIES), st.data())
-def test_at_a_planned_length_a_posture_is_the_planned_one_to_the_last_bit(entry: Entry, data: st.DataObject) -> None:
+def test_at_a_planned_length_the_posture_is_exactly_planned(entry: Entry, data: st.DataObject) -> None:
     planned = data.draw(st.sampled_from(entry.held))
     assert numbers(held(entry, planned.length_mm)).tolist() == [*planned.posture_deg, *planned.pose, *planned.shares]
 
@@ -56,9 +56,7 @@ def test_between_two_lengths_it_lies_between_theirs_by_plain_arithmetic(entry: E
     st.floats(-0.01, 0.01),
     st.floats(-0.01, 0.01),
 )
-def test_between_two_poses_of_half_a_turn_lies_half_a_turn_whichever_way_round_each_came(
-    axis: tuple[float, ...], more: float, less: float
-) -> None:
+def test_interpolation_keeps_half_turns_of_either_sign(axis: tuple[float, ...], more: float, less: float) -> None:
     unit = np.array(axis) / np.linalg.norm(axis)
     low, high, *others = PIN.held
     turns = [replace(one, pose=(*one.pose[:3], *turn.tolist())) for one, turn in
@@ -72,9 +70,7 @@ def test_between_two_poses_of_half_a_turn_lies_half_a_turn_whichever_way_round_e
 @given(*[st.tuples(*[st.floats(-3.0, 3.0)] * 3)] * 2)
 @example((-2.64, 0.0, 0.0), (0.5, 0.0, 0.0))
 @example((3.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-def test_at_a_planned_length_things_are_turned_as_planned_whatever_the_length_before(
-    before: tuple[float, ...], planned: tuple[float, ...]
-) -> None:
+def test_planned_lengths_turn_objects_as_planned(before: tuple[float, ...], planned: tuple[float, ...]) -> None:
     low, high, *others = PIN.held
     turned = [replace(one, pose=(*one.pose[:3], *turn)) for one, turn in ((low, before), (high, planned))]
     got = held(replace(PIN, held=(*turned, *others)), high.length_mm).pose[3:]
@@ -117,7 +113,7 @@ def test_another_name_or_mass_finds_the_posture_of_the_same_shape() -> None:
     assert SHIPPED["kamakura14"].entry("Tip", Thing("needle", PIN.shape, 3.0)) == PIN
 
 
-def test_of_two_entries_for_one_type_and_shape_the_later_counts_and_is_kept() -> None:
+def test_of_two_entries_for_one_grasp_the_later_counts() -> None:
     stronger = msgspec.structs.replace(PIN, grip_n=99.0)
     postures = Postures("kamakura14", (*SHIPPED["kamakura14"].entries, stronger))
     assert len(postures.entries) == len(SHIPPED["kamakura14"].entries)

@@ -37,7 +37,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 @pytest.mark.parametrize("taxonomy", ["kamakura14", "cutkosky16"])
-def test_every_type_of_a_shipped_taxonomy_has_a_table_and_nothing_else_has(taxonomy: str) -> None:
+def test_exactly_the_shipped_taxonomies_types_have_tables(taxonomy: str) -> None:
     assert set(shipped_prehensions(taxonomy)) == set(published(taxonomy).types)
 
 
@@ -57,7 +57,7 @@ def test_a_type_is_read_with_its_defaults(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("capsule", CAPSULES)
-def test_spheres_count_from_1_and_a_bare_segment_means_its_tip_or_its_middle(capsule: str) -> None:
+def test_spheres_count_from_1_bare_segments_mean_tip_or_middle(capsule: str) -> None:
     spheres = np.flatnonzero(HAND.sphere_capsules == CAPSULES.index(capsule)).tolist()
     assert [pad_sphere(HAND, f"{capsule}.{number + 1}") for number in range(len(spheres))] == spheres
     usual = spheres[-1] if capsule.endswith("distal") else spheres[len(spheres) // 2]
@@ -65,7 +65,7 @@ def test_spheres_count_from_1_and_a_bare_segment_means_its_tip_or_its_middle(cap
 
 
 @given(st.one_of(st.text(), st.from_regex(r"(thumb|index|palm)_(distal|heel)\.?\d*:?\w*", fullmatch=True)))
-def test_whatever_a_pad_is_called_it_is_skin_of_the_hand_or_refused(pad: str) -> None:
+def test_a_pads_name_is_skin_of_the_hand_or_refused(pad: str) -> None:
     try:
         sphere, side = pad_sphere(HAND, pad), pad_side(pad)
     except ValueError:

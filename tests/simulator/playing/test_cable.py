@@ -24,7 +24,7 @@ def test_a_scene_without_wire_effects_has_no_bad_cable() -> None:
 
 def test_bytes_are_lost_at_the_scenes_rate(faulty: Scene) -> None:
     scene = only(faulty, "wire.lost_bytes")
-    rate = next(each.parameters.rate for each in scene.effects if each.name == "wire.lost_bytes")  # type: ignore[attr-defined]
+    rate = next(dict(each.parameters)["rate"] for each in scene.effects if each.name == "wire.lost_bytes")
     cable = cable_of(scene, 0)
     assert cable is not None
     lost = len(MESSAGE) - len(cable(MESSAGE))
@@ -33,7 +33,7 @@ def test_bytes_are_lost_at_the_scenes_rate(faulty: Scene) -> None:
 
 def test_one_bit_of_a_damaged_byte_is_turned_at_the_scenes_rate(faulty: Scene) -> None:
     scene = only(faulty, "wire.damaged_bytes")
-    rate = next(each.parameters.rate for each in scene.effects if each.name == "wire.damaged_bytes")  # type: ignore[attr-defined]
+    rate = next(dict(each.parameters)["rate"] for each in scene.effects if each.name == "wire.damaged_bytes")
     cable = cable_of(scene, 0)
     assert cable is not None
     turned = [a ^ b for a, b in zip(MESSAGE, cable(MESSAGE), strict=True) if a != b]

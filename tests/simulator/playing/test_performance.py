@@ -47,7 +47,7 @@ def test_a_scene_is_played_as_it_is_simulated(rows: str, subject: str) -> None:
     assert played.period_us == (60_000 if rows == "last" else 10_000)
 
 
-def test_a_scene_that_moves_the_hand_plays_rests_for_as_long_as_is_said() -> None:
+def test_a_moving_scene_plays_rests_of_the_stated_length() -> None:
     scene = load_scene("continuous")
     objects = tuple(item for item in scene.objects if item.grasp in ("PoS", "Tip"))
     scene = msgspec.structs.replace(scene, repetitions=1, objects=objects)
@@ -74,7 +74,7 @@ def test_single_grasps_are_played_with_a_straight_hand_between_them(period_us: i
     assert (rested.sensors.reshape(*shape, 18)[:, 1:] == resting(rested.calibration)).all()
 
 
-def test_a_set_of_whole_movements_rests_after_each_and_not_among_its_rows() -> None:
+def test_whole_movements_rest_after_each_not_within() -> None:
     grasp_set = simulate(small("all"), 1).grasp_set
     played = of_set(grasp_set, 10_000, rest_us=30_000)
     lengths = np.bincount(grasp_set.movement_ids)

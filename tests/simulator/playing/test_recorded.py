@@ -22,7 +22,7 @@ def raw(first: int) -> bytes:
     return bytes([first] * 18)
 
 
-def test_the_newest_frames_are_played_every_period_from_when_both_devices_were_read(tmp_path: Path) -> None:
+def test_playing_starts_once_both_devices_were_read(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with Recorder(path, session()) as recorder:
         recorder.switches(SwitchFrame(0, 0b001))

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from thenar.simulator.effects import joint_noise
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.pipeline.scene_file import load_catalogue, load_scene
@@ -81,8 +80,8 @@ def test_everything_that_is_said_is_kept(scene: Load, tmp_path: Path) -> None:
 def test_effects_come_by_their_rank_with_their_parameters(scene: Load) -> None:
     found = scene(LEAST + "[effects.joint.noise]\nsd_deg = 3\n[effects.hand.grip]\n[effects.joint.drift]\n").effects
     assert [name for name, _ in found] == ["hand.grip", "joint.noise", "joint.drift"]
-    assert found[0].parameters == EFFECTS["hand.grip"].parameters()
-    assert found[1].parameters == joint_noise.Parameters(sd_deg=3.0)
+    assert found[0].parameters == (("log_sd", 0.25),)
+    assert found[1].parameters == (("sd_deg", 3.0), ("trial_sd_deg", 0.0))
 
 
 @pytest.mark.parametrize(
@@ -94,7 +93,7 @@ def test_effects_come_by_their_rank_with_their_parameters(scene: Load) -> None:
     ],
 )
 def test_an_effect_may_be_spelled_in_every_way_of_toml(scene: Load, text: str) -> None:
-    assert scene(LEAST + text).effects == (("joint.noise", joint_noise.Parameters(sd_deg=3.0)),)
+    assert scene(LEAST + text).effects == (("joint.noise", (("sd_deg", 3.0), ("trial_sd_deg", 0.0))),)
 
 
 def test_every_effect_may_be_listed_without_parameters(scene: Load) -> None:
@@ -174,7 +173,7 @@ def test_a_wrong_key_is_named_with_its_line(complaint: Callable[[str], str], old
         ("[effects]\njoint = 3", "line 10: effects.joint: must be a table, not 3"),
         ("[effects.joint.noise]\nsd_rad = 2", "line 10: effects.joint.noise.sd_rad: angles are in degrees: sd_deg"),
         ("[effects.joint.noise]\nsd_deg = -2", "line 10: effects.joint.noise.sd_deg: must be at least 0, not -2"),
-        ("[effects.port.dead]\nports = [1]\ncount = 1", "line 9: effects.port.dead: say which `ports` are dead or"),
+        ("[effects.port.dead]\nports = [1]\ncount = 1", "line 9: effects.port.dead: give `ports` or `count`, not both"),
         ("[effects.port.dead]\nports = 1", "line 10: effects.port.dead.ports: must be a list, not 1"),
         ("[effects.hand.grip]\nafter = ['hand.style']", "line 10: effects.hand.grip.after: this key is unknown"),
     ],

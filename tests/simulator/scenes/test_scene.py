@@ -74,7 +74,7 @@ def test_a_session_has_the_trials_of_one_subject(make_scene: MakeScene) -> None:
         ("all", [], True, False),
     ],
 )
-def test_frames_and_bytes_are_there_if_the_rows_or_an_effect_want_them(
+def test_frames_and_bytes_exist_if_rows_or_effects_need_them(
     make_scene: MakeScene, rows: str, effects: list[str], timed: bool, on_wire: bool
 ) -> None:
     scene = make_scene(recording=Recording(rows=rows))  # type: ignore[arg-type]
@@ -82,7 +82,7 @@ def test_frames_and_bytes_are_there_if_the_rows_or_an_effect_want_them(
     assert (setting.timed, setting.on_wire) == (timed, on_wire)
 
 
-def test_a_hand_has_the_size_of_its_subject_and_a_thing_the_mass_of_its_object_in_kilograms() -> None:
+def test_hands_have_subjects_sizes_and_objects_masses_in_kilograms() -> None:
     size = Subject(name="A", hand_length_mm=188.0, hand_breadth_mm=84.0).hand().size
     assert (size.length_mm, size.breadth_mm) == (188.0, 84.0)
     thing = objects(["Tip"])[0].thing()

@@ -42,7 +42,7 @@ TABLES: dict[str, dict[str, set[int]]] = {
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_pins_are_all_that_are_free_and_analog_ones_are_those_of_adc1(name: str) -> None:
+def test_example_pins_are_free_and_analog_ones_on_adc1(name: str) -> None:
     part, table = PARTS[name], TABLES[name]
     free = table["there"] - table["special"] - table.get("doubtful", set())
     assert len({*part.digital, *part.analog}) == len(part.digital) + len(part.analog)

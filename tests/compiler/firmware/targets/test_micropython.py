@@ -161,7 +161,7 @@ for tick in range({ticks}):
 """
 
 
-def test_a_segmenter_says_its_newest_state_and_whether_it_is_of_the_segment_that_is_known(
+def test_a_segmenter_gives_its_newest_state_and_same_segment_flag(
     make_tables: MakeTables, describe: Describe, tmp_path: Path
 ) -> None:
     tables = make_tables(**SHAPES["small"])

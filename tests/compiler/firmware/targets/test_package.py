@@ -132,9 +132,7 @@ def test_every_board_s_compiler_takes_its_package_through_the_sdk_s_cmake(
 
 
 @pytest.mark.slow
-def test_the_package_builds_by_itself_tests_itself_and_is_found_where_it_is_installed(
-    tool: Tool, written: Written, tmp_path: Path
-) -> None:
+def test_the_package_builds_tests_itself_and_installs(tool: Tool, written: Written, tmp_path: Path) -> None:
     cmake = tool("cmake")
     out = built(cmake, written("generic"), f"-DCMAKE_C_FLAGS={STRICT}")
     assert "100% tests passed" in run(tool("ctest"), "--test-dir", out)

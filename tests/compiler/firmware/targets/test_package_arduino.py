@@ -137,33 +137,10 @@ def first_line(simavr: str, elf: Path, part: str) -> str:
     [{"switches": 12, "joints": 6}, {"switches": 2, "joints": 7}, {"switches": 40, "joints": 17, "bins": 3}],
     ids=["switches", "joints", "both"],
 )
-def test_an_example_for_more_inputs_than_the_board_has_reads_them_by_other_parts(
+def test_inputs_beyond_the_boards_pins_are_read_by_other_parts(
     make_tables: MakeTables, library: Library, sketch: Sketch, inputs: dict[str, int]
 ) -> None:
     sketch(library(Layout(make_tables(**inputs))), "uno")
-
-
-def test_an_example_for_more_inputs_than_multiplexers_bring_says_so(
-    make_tables: MakeTables, library: Library, sketch: Sketch
-) -> None:
-    made = library(Layout(make_tables(switches=2, joints=97, bins=3)))
-    with pytest.raises(
-        AssertionError, match=r"#error .this board has too few analog inputs, even for one to each multi"
-    ):
-        sketch(made, "uno")
-
-
-@pytest.mark.parametrize(
-    "inputs", [{"switches": 0}, {"joints": 0, "switches": 17}], ids=["joints_only", "switches_only"]
-)
-def test_a_build_without_switches_or_without_joints_has_an_example_too(
-    make_tables: MakeTables, library: Library, sketch: Sketch, inputs: dict[str, int]
-) -> None:
-    sketch(library(Layout(make_tables(**inputs))), "uno")
-
-
-def test_a_mega_takes_33_switches_and_16_joints(make_tables: MakeTables, library: Library, sketch: Sketch) -> None:
-    sketch(library(Layout(make_tables(classes=14, switches=33, joints=16))), "mega")
 
 
 def test_it_refuses_readings_of_which_nothing_is_known(

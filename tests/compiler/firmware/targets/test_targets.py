@@ -12,7 +12,7 @@ from thenar.runtime.tables import IntegerTables
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_every_target_says_what_it_is_and_what_to_do_with_its_folder(name: str) -> None:
+def test_every_target_describes_itself_and_its_folder(name: str) -> None:
     target = TARGETS[name]
     assert (target.name, bool(target.help), bool(target.part)) == (name, True, True)
     assert "{folder}" in target.next_step
@@ -25,11 +25,6 @@ def test_every_target_says_what_it_is_and_what_to_do_with_its_folder(name: str) 
 def test_the_page_on_firmware_names_every_target() -> None:
     page = (Path(__file__).parents[4] / "docs" / "how-to" / "firmware.md").read_text()
     assert [name for name in TARGETS if f"`{name}`" not in page] == []
-
-
-def test_an_atmega328p_has_32_kib_of_flash_and_2_of_ram() -> None:
-    uno = TARGETS["avr328p"]
-    assert (uno.part, uno.flash, uno.ram, uno.clock_hz) == ("atmega328p", 32768, 2048, 16_000_000)
 
 
 def test_what_is_verified_and_what_is_timed_is_read_off_the_targets() -> None:

@@ -32,7 +32,7 @@ def test_cycles_of_an_avr_are_foretold_within_ten_percent() -> None:
         assert fit.cost.cycles == pytest.approx(steps_of(fit), rel=0.1)
 
 
-def test_without_its_tools_a_target_is_not_simulated_and_it_is_said_what_is_missing(
+def test_a_target_without_tools_names_what_is_missing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("PATH", "/nowhere")

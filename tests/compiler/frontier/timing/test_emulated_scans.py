@@ -159,7 +159,7 @@ def umockdev(tool: Callable[[str], str]) -> None:
 
 
 @pytest.mark.usefixtures("umockdev")
-def test_the_arithmetic_is_that_of_an_emulated_bus_to_the_last_period_of_scl() -> None:
+def test_scan_times_are_those_of_an_emulated_bus_to_one_period() -> None:
     errors = scan_errors(replace(two_muxes(), streams=propose_board(["key"]).streams))
     # Five sizes of nine sorts of new gloves; the one at 1 MHz has no room for the largest.
     assert len(errors) == 1 + 5 * 9 - 1

@@ -2,17 +2,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware.targets import timed
-from thenar.compiler.frontier.points import Time
+from thenar.compiler.frontier.points import PointTime
 from thenar.compiler.frontier.timing.scan_times import (
     Overhead,
     ScanTimes,
-    measured_call_us,
-    overhead_of,
     records_of,
     scan_times,
 )
-from thenar.compiler.frontier.timing.wirings import BOARD, Wiring
+from thenar.compiler.frontier.timing.wirings import BOARD, WiringOption
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring
@@ -22,7 +19,7 @@ from thenar.runtime.scanning.timing import row_us, scan_us
 
 CALL = Overhead("a call", call_us=7.0)
 wired = st.builds(
-    Wiring, st.sampled_from(["mcp23017", "pca9555", "tca6424a", "pcf8575"]), st.sampled_from([100_000, 400_000])
+    WiringOption, st.sampled_from(["mcp23017", "pca9555", "tca6424a", "pcf8575"]), st.sampled_from([100_000, 400_000])
 )
 
 
@@ -31,7 +28,7 @@ def names_of(count: int) -> list[str]:
 
 
 @given(st.integers(1, 140), wired)
-def test_a_scan_takes_what_the_runtime_predicts_with_a_system_call_a_transaction(switches: int, wiring: Wiring) -> None:
+def test_scan_time_is_the_runtimes_prediction_with_a_call_per_transaction(switches: int, wiring: WiringOption) -> None:
     names = names_of(switches)
     times = scan_times(names, wiring, CALL)
     harness = wiring.harness_of(names)
@@ -41,19 +38,19 @@ def test_a_scan_takes_what_the_runtime_predicts_with_a_system_call_a_transaction
 
 
 @pytest.mark.parametrize(("switches", "baud", "hz"), [(33, 115_200, 200), (33, 1_000_000, 200), (200, 115_200, 149)])
-def test_a_board_sends_two_hundred_rows_a_second_or_what_its_line_allows(switches: int, baud: int, hz: int) -> None:
-    times = scan_times(names_of(switches), Wiring(BOARD, baud))
+def test_a_board_sends_200_rows_a_second_if_its_line_allows(switches: int, baud: int, hz: int) -> None:
+    times = scan_times(names_of(switches), WiringOption(BOARD, baud))
     assert times == ScanTimes(float(round(1e6 / hz)), 1, 0, "wire")
     assert times.us >= row_us(switches, 0, baud)
 
 
 def test_without_switches_there_is_nothing_to_read() -> None:
-    none = scan_times((), Wiring("mcp23017", 400_000))
+    none = scan_times((), WiringOption("mcp23017", 400_000))
     assert none == ScanTimes(0.0, 0, 0, "wire")
 
 
 def test_a_switch_without_a_place_is_an_error() -> None:
-    wiring = Wiring("as wired", 400_000, propose_harness(["s0"]))
+    wiring = WiringOption("as wired", 400_000, propose_harness(["s0"]))
     with pytest.raises(HarnessError, match="s1"):
         scan_times(names_of(2), wiring)
 
@@ -67,18 +64,12 @@ def test_a_record_is_the_vendors_formula_of_the_sensors_that_are_read(joints: tu
     assert found.how == "formula"
 
 
-def test_eighteen_sensors_take_six_milliseconds_of_which_the_wire_has_less_than_two() -> None:
-    assert round(records_of(SENSORS_18).of(18).us) == 6323
-    wire = records_of(SENSORS_18, wire_only=True).of(18)
-    assert (round(wire.us), wire.how) == (1823, "wire")
-
-
-def test_joints_of_ones_own_take_what_the_user_says_and_else_an_unknown_time() -> None:
-    assert records_of(["bend_1", "thumb_mpj"]).of(2) == Time(0.0, "unknown")
-    assert records_of(["bend_1", "bend_2"], 650.0).of(2) == Time(650.0, "given")
-    assert records_of(["bend_1", "bend_2"], 650.0).of(1) == Time(325.0, "given")
+def test_custom_joints_take_the_given_time_or_an_unknown_one() -> None:
+    assert records_of(["bend_1", "thumb_mpj"]).of(2) == PointTime(0.0, "unknown")
+    assert records_of(["bend_1", "bend_2"], 650.0).of(2) == PointTime(650.0, "given")
+    assert records_of(["bend_1", "bend_2"], 650.0).of(1) == PointTime(325.0, "given")
     assert records_of(SENSORS_18, 650.0).of(18).us == pytest.approx(650.0)
-    assert records_of([]).of(0) == records_of([], 650.0).of(0) == records_of(SENSORS_18).of(0) == Time(0.0, "wire")
+    assert records_of([]).of(0) == records_of([], 650.0).of(0) == records_of(SENSORS_18).of(0) == PointTime(0.0, "wire")
 
 
 def test_a_cyberglove_may_be_wired_under_other_names() -> None:
@@ -94,7 +85,7 @@ def test_a_glove_that_was_measured_takes_that_and_fewer_sensors_in_proportion() 
     assert records.how == "measured"
 
 
-def test_a_glove_is_as_fast_as_its_line_and_no_faster_than_it_is_asked() -> None:
+def test_a_gloves_rate_is_limited_by_line_and_request() -> None:
     slow = records_of(SENSORS_18, None, GloveWiring(port="/dev/x", baud=38_400))
     assert slow.of(18).us == pytest.approx(18 * 250.0 + 21 * 10e6 / 38_400)
     asked = records_of(SENSORS_18, None, GloveWiring(port="/dev/x", rate_hz=100.0))
@@ -103,14 +94,3 @@ def test_a_glove_is_as_fast_as_its_line_and_no_faster_than_it_is_asked() -> None
 
 def test_a_firmware_that_sets_no_mask_waits_for_all_sensors() -> None:
     assert records_of(SENSORS_18[:4], masked=False).of(4) == records_of(SENSORS_18).of(18)
-
-
-@pytest.mark.parametrize("target", timed())
-def test_every_target_says_the_overhead_of_its_scans(target: str) -> None:
-    overhead = overhead_of(target)
-    assert len(overhead.what) > 20
-    assert (overhead.call_us > 0) == (not target.startswith(("avr", "cortex", "rv32")))
-
-
-def test_a_system_call_is_timed() -> None:
-    assert 0.05 < measured_call_us() < 1000.0

@@ -50,7 +50,7 @@ def test_a_parameter_is_one_of_two() -> None:
 
 
 @pytest.mark.parametrize("name", BY_NUMBER)
-def test_as_many_switches_as_asked_for_at_most_and_only_those_that_vary(name: str) -> None:
+def test_methods_keep_at_most_the_requested_varying_switches(name: str) -> None:
     choose = METHODS[name].chooser(learning(), PortCosts(tuple(i // 4 for i in range(14)), (30.0, 40.0, 30.0, 40.0)))
     for most in (0, 1, 2, 5, 14, 40):
         kept = choose(most)

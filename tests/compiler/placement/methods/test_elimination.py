@@ -1,7 +1,5 @@
 """What elimination keeps of sets whose best placement is known, and that it hangs on nothing else."""
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -16,7 +14,6 @@ from thenar.compiler.placement.methods.elimination import (
     elimination_order,
     removal_rises,
     sampled,
-    sums_of_logs,
     thermometer,
 )
 from thenar.compiler.placement.ports import PortCosts
@@ -60,7 +57,7 @@ def test_every_switch_that_varies_is_in_the_order_once() -> None:
     assert sorted(order) == [column for column in range(22) if column not in (3, 9)]
 
 
-def test_of_two_equal_switches_one_goes_before_any_that_is_needed_and_it_is_the_lower_number() -> None:
+def test_one_of_two_equal_switches_goes_first() -> None:
     labels = np.arange(120) % 4
     low, high = (labels & 1).astype(bool), (labels >> 1).astype(bool)
     assert elimination_order(learning_of(np.stack([low, low, high, high], axis=1), labels))[:2] in ((1, 3), (3, 1))
@@ -96,12 +93,6 @@ def test_of_switches_as_good_those_whose_ports_are_needed_anyway_stay() -> None:
     learning = learning_of(np.stack([low, high, low_again], axis=1), labels)
     assert set(elimination_order(learning)[:2]) == {0, 1}
     assert set(elimination_order(learning, PortCosts((0, 1, 1), (50.0, 50.0)))[:2]) == {1, 2}
-
-
-@pytest.mark.parametrize("columns", [0, 1])
-def test_nothing_that_varies_leaves_nothing_to_order(columns: int) -> None:
-    learning = learning_of(np.ones((6, columns), np.bool_), np.arange(6) % 2)
-    assert elimination_order(learning) == ()
 
 
 def noisy(seed: int, joints: int, switches: int = 11) -> Samples:
@@ -140,9 +131,7 @@ def plainly(learning: Samples) -> Columns:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "joints", "switches"), [(0, 0, 9), (1, 0, 9), (2, 2, 9), (3, 1, 25)])
-def test_what_goes_is_what_raises_the_loss_least_when_its_mean_takes_its_place(
-    seed: int, joints: int, switches: int
-) -> None:
+def test_elimination_removes_the_switch_whose_mean_raises_loss_least(seed: int, joints: int, switches: int) -> None:
     learning = noisy(seed, joints, switches)
     assert boosted_elimination_order(learning) == plainly(learning)
 
@@ -164,12 +153,6 @@ def test_boosted_what_the_joints_tell_no_switch_needs_to() -> None:
     assert boosted_elimination_order(learning_of(switches, labels, codes)) == (1, 0)
 
 
-@pytest.mark.parametrize("columns", [0, 1])
-def test_boosted_nothing_that_varies_leaves_nothing_to_order(columns: int) -> None:
-    learning = learning_of(np.ones((6, columns), np.bool_), np.arange(6) % 2)
-    assert boosted_elimination_order(learning) == ()
-
-
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 9))
 def test_a_joint_becomes_bits_that_rise_one_after_another(seed: int, n: int, highest: int) -> None:
     codes = np.random.default_rng(seed).integers(0, highest + 1, (n, 2)).astype(np.uint16)
@@ -180,11 +163,6 @@ def test_a_joint_becomes_bits_that_rise_one_after_another(seed: int, n: int, hig
         assert len(np.unique(bits, axis=0)) == len(bits)
         higher = column[:, np.newaxis] >= column
         assert (bits[:, :, np.newaxis] >= bits[:, np.newaxis, :])[:, higher].all()
-
-
-def test_bins_hold_rows_as_evenly_as_can_be() -> None:
-    bits = thermometer(np.arange(80, dtype=np.uint16)[:, np.newaxis])
-    assert np.diff(bits.sum(axis=1)).tolist() == [-10] * (BINS - 2)
 
 
 def test_a_sample_keeps_the_shares_of_the_classes_and_the_order() -> None:
@@ -201,7 +179,7 @@ def loss(scores: Floats, labels: npt.NDArray[np.intp]) -> float:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 30), st.integers(1, 5), st.integers(1, 4))
-def test_a_rise_is_that_of_the_loss_with_the_mean_row_in_place(seed: int, n: int, s: int, classes: int) -> None:
+def test_a_removals_rise_is_the_loss_with_the_mean_row(seed: int, n: int, s: int, classes: int) -> None:
     random = np.random.default_rng(seed)
     bits, rows = random.random((s, n)) < 0.5, random.normal(0, 2, (s, classes))
     labels, scores = random.integers(0, classes, n), random.normal(0, 3, (n, classes))
@@ -210,10 +188,3 @@ def test_a_rise_is_that_of_the_loss_with_the_mean_row_in_place(seed: int, n: int
     for bit, row, rise in zip(bits, rows, rises, strict=True):
         without = scores - np.outer(bit, row) + bit.mean() * row
         np.testing.assert_allclose(rise, loss(without, labels) - loss(scores, labels), rtol=1e-9, atol=1e-8)
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 1500))
-def test_logarithms_of_products_are_sums_of_logarithms(seed: int, n: int) -> None:
-    factors = np.exp(np.random.default_rng(seed).normal(0, 20, (n, 3)))
-    expected = [math.fsum(map(math.log, column)) for column in factors.T]
-    np.testing.assert_allclose(sums_of_logs(factors), expected, rtol=1e-12, atol=1e-9)

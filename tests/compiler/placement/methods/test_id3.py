@@ -123,7 +123,7 @@ def test_switches_are_found_as_defined(drawn: tuple[Bits, Labels, PortCosts]) ->
 
 
 @given(data(), st.integers(0, 20))
-def test_where_all_cost_alike_every_s_of_the_papers_tree_is_a_beginning(drawn: tuple[Bits, Labels], s: int) -> None:
+def test_at_equal_costs_every_pruned_tree_begins_the_order(drawn: tuple[Bits, Labels], s: int) -> None:
     X, y = drawn
     order = order_of(X, y, PortCosts((0,) * X.shape[1], (0.0,)))
     pruned = grow_id3(X, y, min_samples=s).inputs
