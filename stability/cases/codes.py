@@ -4,7 +4,6 @@ import csv
 import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal
@@ -12,7 +11,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.boosting.binning import midpoints
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.recordings.columns import ColumnRoles, JointColumns
 from thenar.compiler.recordings.errors import TableError
@@ -23,16 +21,6 @@ from thenar.compiler.tables.collapse import collapse
 from thenar.runtime.tables import HIGHEST_CODE
 
 from ..finding import Case, Finding, Worst
-
-# Neighbouring doubles, subnormal ones, both zeros, and ends at which a sum of two overflows.
-HARD_DOUBLES = sorted(
-    {
-        *(sign * x for sign in (-1, 1) for x in (5e-324, 1e-323, 2.2e-308, 1e-9, 1.0, 1e12, 8.9e307, 1.7e308)),
-        *(math.nextafter(x, math.inf) for x in (5e-324, 1.0, 1e12, 1.7e308, -1.7e308)),
-        *(1.0 + n * 1e-9 for n in range(1, 4)),
-        0.0,
-    }
-)
 
 # Values and their coding grids: half a step from two codes, a billionth apart, far from zero, next to the finest grid
 # allowed, subnormal, zeros, infinite binary fractions, huge and tiny.
@@ -67,26 +55,10 @@ EVERY_CODE = np.arange(HIGHEST_CODE + 1)
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Split neighbouring values, evaluate every code with stumps and tables, and import hard values."""
-    yield _midpoints(200 if full else 20)
+    """Evaluate every code with stumps and tables, and import hard values."""
     yield _every_code(60 if full else 6)
     yield from _coded()
     yield _refused()
-
-
-def _midpoints(draws: int) -> Finding:
-    """A threshold between neighbours separates them, at most half an ulp from their middle: one rounding."""
-    off = Worst("thresholds between neighbouring doubles", "fractions", 0.5, "ulp")
-    random = np.random.default_rng(4)
-    lists = [np.array(HARD_DOUBLES)]
-    lists += [np.unique(random.standard_normal(50) * 10.0 ** random.integers(-320, 300, 50)) for _ in range(draws)]
-    for values in lists:
-        found_between = zip(pairwise(values.tolist()), midpoints(values).tolist(), strict=True)
-        for (low, high), found in found_between:
-            middle = (Fraction(low) + Fraction(high)) / 2
-            error = abs(Fraction(found) - middle) / Fraction(math.ulp(float(middle)))
-            off.see(float(error) if low <= found < high else math.inf, f"between {low!r} and {high!r}")
-    return off.finding()
 
 
 def hard_codes(seed: int) -> tuple[NDArray[np.uint16], NDArray[np.intp]]:

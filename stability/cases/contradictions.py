@@ -7,17 +7,16 @@ to them up to rounding. The case `separable` explains when the loss falls on the
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 
-from ..checks.class_rounds import see_round
 from ..checks.rounds import entropy_left, idle_loss, loss_rounding, moments, resting_error, rise_rounding
 from ..finding import REFERENCE, Case, Finding, Worst
-from ..inputs.hard_data import HardSet, contradictory, imbalanced, noisy, repeated
-from ..reference.boosting import mean_loss
+from ..inputs.hard_data import HardSet, contradictory, imbalanced, noisy
 from ..reference.numbers import distance
 
 CASE = Case(
@@ -27,10 +26,9 @@ CASE = Case(
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield errors of the limit on contradictory frames, and the effects of repetition and noise."""
+    """Yield errors of the limit on contradictory frames, and the effects of noise."""
     yield from _rest(frames(full), 2_000 if full else 120)
     yield _ties()
-    yield _repetition((10**4, 10**6) if full else (10**4,))
     yield from _noise(1_000 if full else 40)
 
 
@@ -79,23 +77,8 @@ def _ties() -> Finding:
     return worst.finding()
 
 
-def _repetition(ratios: tuple[int, ...]) -> Finding:
-    """Rows repeated as often as their weight converge to the same shares."""
-    worst = Worst("P with repeated rows", "shares of the counts", 1.0, "x rounding")
-    for ratio in ratios:
-        hard = repeated(imbalanced(ratio))
-        stumps, _ = boost(hard.X, hard.labels, 2, rounds=60)
-        frames = imbalanced(ratio)
-        *_, last = moments(frames, stumps)
-        worst.see(resting_error(frames, last), hard.name, len(hard.labels))
-    return worst.finding()
-
-
 def _noise(rounds: int) -> Iterator[Finding]:
-    """Sets of 16 frames with 0 to 60 % random labels: rounds, losses, and the fall of the loss where it is required."""
-    chosen = Worst("stumps chosen under label noise", REFERENCE, 1.0, "x rounding")
-    outputs = Worst("outputs of branches under label noise", REFERENCE, 1.0, "x rounding")
-    losses = Worst("losses under label noise", REFERENCE, 1.0, "x rounding")
+    """Sets of 16 frames with 0 to 60 % random labels: losses, and the fall of the loss where it is required."""
     below = Worst("losses below the remaining entropy", REFERENCE, 0.0, "rounds")
     rises = Worst("rise of the loss where it must fall", "convexity", 1.0, "x rounding")
     for hard, shrinkage in noisy_sets():
@@ -103,18 +86,11 @@ def _noise(rounds: int) -> Iterator[Finding]:
         least = float(entropy_left(hard))
         above = least - loss_rounding(hard.n_classes, least)
         below.see(float(sum(loss < above for loss in falling)), hard.name, len(falling))
-        before = None
-        for number, moment in enumerate(moments(hard, stumps)):
-            at = f"{hard.name}, round {number}"
-            if number % (rounds // 2) == 1:
-                see_round(hard, stumps, number, moment.scores, 3.0, chosen, outputs)
-                truth = mean_loss(moment.scores.T.tolist(), hard.labels.tolist())
-                losses.see(distance(moment.loss, truth) / loss_rounding(hard.n_classes, float(truth)), at)
-            if before is not None and shrinkage * (hard.n_classes - 1) <= 1:
-                rise = max(0.0, moment.loss - before.loss)
-                rises.see(rise / rise_rounding(hard.n_classes, before, moment), at)
-            before = moment
-    yield from (worst.finding() for worst in (chosen, outputs, losses, below, rises))
+        if shrinkage * (hard.n_classes - 1) <= 1:
+            for number, (before, after) in enumerate(pairwise(moments(hard, stumps)), 1):
+                rise = max(0.0, after.loss - before.loss)
+                rises.see(rise / rise_rounding(hard.n_classes, before, after), f"{hard.name}, round {number}")
+    yield from (worst.finding() for worst in (below, rises))
 
 
 def noisy_sets() -> Iterator[tuple[HardSet, float]]:

@@ -2,12 +2,12 @@
 
 Exact invariances: the order of rows, constant and copied columns, order-preserving recoding of codes, weights times a
 power of two, two swapped classes; and for ID3, which compares gains exactly, all of these except ties. Three or more
-renumbered classes are summed in another order, and three times the rows are summed on another grid: then scores change
-by rounding. Ties go to the lowest number, so that two trainings with renumbered columns may diverge, but only at stumps
-that explain equally much.
+renumbered classes are summed in another order, three times the rows are summed on another grid, and of equal stumps in
+renumbered columns another one has the lowest number: such trainings may diverge, but each round must be right for the
+original set, too.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,20 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import TIE, Stumps
-from thenar.compiler.elementary import Floats
+from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
-from thenar.compiler.tables.collapse import ScoreTables, collapse
+from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
 from thenar.compiler.tables.standing_in import fit_lost
-from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
+from thenar.runtime.tables import HIGHEST_CODE
 
-from ..checks.class_rounds import ClassRound, Step, branches, class_rounds, grown, step_of
-from ..checks.rounds import counted
-from ..finding import Case, Finding, Worst
+from ..checks.class_rounds import see_round
+from ..checks.rounds import counted, moments
+from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import HardSet, contradictory, intervals, noisy, separable, words
-from ..reference.numbers import precisely
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,41 +118,25 @@ def columns_reversed(hard: HardSet) -> Change:
 ROUNDS = 30
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Learnt:
-    """The result of `learn`."""
+def numbers(change: Change) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Train all models on the changed set; yield name and array of all parameters except thresholds.
 
-    tree: Tree
-    stumps: Stumps
-    losses: tuple[float, ...]
-    tables: ScoreTables
-    integers: IntegerTables
-
-
-def learn(hard: HardSet, rounds: int = ROUNDS) -> Learnt:
-    """Train all models on `hard`. ID3 does not use weights."""
-    stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
+    Inputs and classes have the original numbers. A stump or node of any other input has number -1. ID3 does not use
+    weights.
+    """
+    hard, inputs, order = change.hard, change.inputs, list(change.classes)
+    stumps, losses = boost(hard.X, hard.labels, hard.n_classes, rounds=ROUNDS, weights=hard.weights)
     tables = collapse(stumps, hard.n_switches)
     integers = fit_lost(quantise(tables, hard.bits, hard.codes), hard.bits, hard.codes, hard.labels)
-    return Learnt(grow_id3(hard.X, hard.labels), stumps, falling, tables, integers)
-
-
-def numbers(learnt: Learnt, inputs: Sequence[int], classes: Sequence[int]) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield name and array of all trained parameters except thresholds, with inputs and classes in the given numbering.
-
-    A stump or node of any other input has number -1.
-    """
+    tree = grow_id3(hard.X, hard.labels)
     place = {column: number for number, column in enumerate(inputs)}
-    tables, integers, order = learnt.tables, learnt.integers, list(classes)
-    n_switches = len(tables.switch_rows)
-    switches = [column for column in inputs if column < n_switches]
-    joints = [column - n_switches for column in inputs if column >= n_switches]
-    columns = np.vectorize(lambda column: place.get(column, -1), otypes=[np.intp])(learnt.stumps.columns)
-    yield "columns", columns[:, order]
-    yield "outputs", learnt.stumps.values[:, order]
-    yield "losses", np.array(learnt.losses)
-    yield "tree", np.array([place.get(-1 if node.input is None else node.input, -1) for node in learnt.tree.nodes])
-    yield "counts", _counts(learnt.tree, order)
+    switches = [column for column in inputs if column < hard.n_switches]
+    joints = [column - hard.n_switches for column in inputs if column >= hard.n_switches]
+    yield "columns", renumbered(stumps, change).columns
+    yield "outputs", stumps.values[:, order]
+    yield "losses", np.array(losses)
+    yield "tree", np.array([place.get(-1 if node.input is None else node.input, -1) for node in tree.nodes])
+    yield "counts", _counts(tree, order)
     yield "bias", tables.bias[order]
     yield "switch rows", tables.switch_rows[switches][:, order]
     yield "joint rows", _stacked([tables.joint_rows[joint][:, order] for joint in joints], tables.bias)
@@ -176,86 +158,7 @@ def _stacked(rows: list[NDArray[Any]], like: NDArray[Any]) -> NDArray[Any]:
     return np.concatenate([np.zeros((0, like.size), like.dtype), *rows])
 
 
-Z_MAX = 3.0
 SAME = "training on the original set"
-
-
-class Followed:
-    """A training on an unweighted set whose rounds are computed at 60 digits once, on demand.
-
-    All changes of the set are compared with the same numbers.
-    """
-
-    def __init__(self, hard: HardSet, rounds: int) -> None:
-        self.hard = hard
-        self.stumps = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds)[0]
-        self.scores = list(self.stumps.staged_scores(hard.X))
-        self._given: dict[int, list[ClassRound]] = {}
-        self._steps: dict[int, Step] = {}
-
-    def given(self, number: int) -> list[ClassRound]:
-        """Return the targets of the stumps of round `number`, from 0."""
-        if number not in self._given:
-            F = self.scores[number - 1] if number else np.zeros((len(self.hard.X), self.hard.n_classes))
-            self._given[number] = class_rounds(F.tolist(), self.hard.labels.tolist(), Z_MAX)
-        return self._given[number]
-
-    def step(self, number: int, largest: float) -> Step:
-        """Return the step of round `number`; |F| <= largest."""
-        if number not in self._steps:
-            places = zip(self.stumps.columns[number].tolist(), self.stumps.thresholds[number].tolist(), strict=True)
-            parts = [branches(self.hard.X[:, column], threshold) for column, threshold in places]
-            labels = self.hard.labels.tolist()
-            self._steps[number] = step_of(self.given(number), parts, labels, self.stumps.shrinkage, Z_MAX)
-        return self._steps[number].on_scores_of(largest)
-
-
-class Partings:
-    """Collects differences of scores and predictions between two trainings while their stumps are equal, and the
-    difference in explained variation where their stumps first differ.
-
-    After they have diverged at a tie no invariance holds: stumps that explain equally much are not the same stumps.
-    """
-
-    def __init__(self) -> None:
-        self._apart = Worst("scores, renumbered or repeated, while stumps agree", SAME, 1.0, "x growth")
-        self._winners = Worst("winners, except ties, while stumps agree", SAME, 0.0, "rows")
-        self._diverged = Worst("variation explained by two stumps that first differ", "60 digits", 1.0, "x rounding")
-
-    def findings(self) -> Iterator[Finding]:
-        """Yield the findings."""
-        return (worst.finding() for worst in (self._apart, self._winners, self._diverged))
-
-    def see(self, training: Followed, change: Change) -> None:
-        """Train on the other set without weights, and follow the rounds until the end or until the two diverge."""
-        one, hard, of = training.stumps, training.hard, change.hard
-        other = renumbered(boost(of.X, of.labels, of.n_classes, rounds=one.n_rounds)[0], change)
-        alike: list[tuple[Floats, Floats]] = []
-        for number, both in enumerate(zip(training.scores, other.staged_scores(hard.X), strict=True)):
-            at = f"{hard.name}, {change.name}, round {number + 1}"
-            if self._see_stumps(training, number, other, change, at):
-                break
-            alike.append(both)
-            self._winners.see(_predicted_otherwise(*both), at, len(hard.X))
-        self._see_scores(training, change, alike)
-
-    def _see_scores(self, training: Followed, change: Change, alike: Sequence[tuple[Floats, Floats]]) -> None:
-        """Compare the scores after rounds 1, 2, 4, 8 and so on, and after the last round whose stumps agree."""
-        steps = [training.step(number, float(np.abs(both).max())) for number, both in enumerate(alike)]
-        for number, (one, other) in enumerate(alike, 1):
-            if number & (number - 1) == 0 or number == len(alike):
-                at = f"{training.hard.name}, {change.name}, round {number}"
-                self._apart.see(float((np.abs(one - other).ravel() / (2 * grown(steps[:number]))).max()), at)
-
-    def _see_stumps(self, training: Followed, number: int, other: Stumps, change: Change, at: str) -> bool:
-        """Return whether the stumps of round `number` differ; if so, record the difference in explained variation."""
-        both = (training.stumps, other)
-        places = [list(zip(of.columns[number].tolist(), of.thresholds[number].tolist(), strict=True)) for of in both]
-        for k, (first, second) in enumerate(zip(*places, strict=True)):
-            if first != second:
-                given = training.given(number)[k]
-                self._diverged.see(_doubt(training.hard, given, (first, second), len(change.hard.labels)), at)
-        return places[0] != places[1]
 
 
 def renumbered(other: Stumps, change: Change) -> Stumps:
@@ -265,23 +168,6 @@ def renumbered(other: Stumps, change: Change) -> Stumps:
     order = list(change.classes)
     columns = place[other.columns[:, order]]
     return Stumps(len(change.inputs), columns, other.thresholds[:, order], other.values[:, order], other.shrinkage)
-
-
-@precisely()
-def _doubt(hard: HardSet, given: ClassRound, places: Sequence[tuple[int, float]], rows: int) -> float:
-    """Return the difference of two stumps in explained variation, as a share of the tolerance of training.
-
-    `rows` is the number of rows of the larger set, on which the rounding of its grid depends.
-    """
-    one, other = (given.explained(hard.X, *place) for place in places)
-    return float(abs(one - other) / given.doubt(Z_MAX, rows / len(given.weights)))
-
-
-def _predicted_otherwise(one: Floats, other: Floats) -> int:
-    """Return the number of rows of scores (n, K) with different winners, except for ties in either."""
-    rows, first, second = np.arange(len(one)), one.argmax(axis=1), other.argmax(axis=1)
-    leads = one[rows, first] - one[rows, second], other[rows, second] - other[rows, first]
-    return int(np.count_nonzero(np.minimum(*leads) > TIE))
 
 
 CASE = Case(
@@ -331,21 +217,17 @@ def hard_sets(draws: int) -> Iterator[HardSet]:
 
 def _exact(sets: list[HardSet]) -> Iterator[Finding]:
     """Yield, change by change, the number of trained arrays that differ in any bit."""
-    before = {hard: learn(hard) for hard in dict.fromkeys(sets)}
+    before = {hard: list(numbers(_same("unchanged", hard, hard))) for hard in dict.fromkeys(sets)}
     for name, change_of in _EXACT.items():
         rng = np.random.default_rng(1)
         worst = Worst(f"{name}: all trained parameters", SAME, 0.0, "arrays")
         for hard in sets:
-            if change_of is not classes_permuted or hard.n_classes == 2:
-                _see_exact(before[hard], change_of(hard, rng), worst)
+            if change_of is classes_permuted and hard.n_classes > 2:
+                continue
+            change = change_of(hard, rng)
+            for (part, one), (_, other) in zip(before[hard], numbers(change), strict=True):
+                worst.see(float(not np.array_equal(one, other)), f"{hard.name}, {change.name}: {part}")
         yield worst.finding()
-
-
-def _see_exact(learnt: Learnt, change: Change, worst: Worst) -> None:
-    inputs, classes = range(learnt.stumps.n_inputs), range(learnt.stumps.n_classes)
-    new = numbers(learn(change.hard), change.inputs, change.classes)
-    for (name, before), (_, after) in zip(numbers(learnt, inputs, classes), new, strict=True):
-        worst.see(float(not np.array_equal(before, after)), f"{change.hard.name}, {change.name}: {name}")
 
 
 def _tree(sets: list[HardSet]) -> Iterator[Finding]:
@@ -372,16 +254,24 @@ def _asked(hard: HardSet) -> list[tuple[int | None, tuple[int, ...]]]:
 
 
 def _near(sets: list[HardSet], rounds: int) -> Iterator[Finding]:
-    """Yield the changes by rounding, the reasons of divergence, and differing predictions until then."""
-    rng, partings = np.random.default_rng(3), Partings()
-    trainings = {hard: Followed(unweighted(hard), rounds) for hard in dict.fromkeys(sets)}
-    for training in map(trainings.__getitem__, sets):
-        hard = training.hard
+    """Check that each round is right for the original set, given its scores before: stumps explain as much as the best.
+
+    Sums of three copies are on a grid that is three times as coarse, with three times the rows.
+    """
+    rng = np.random.default_rng(3)
+    chosen = Worst("stumps chosen, renumbered or repeated", REFERENCE, 3.0, "x rounding")
+    outputs = Worst("outputs of branches, renumbered or repeated", REFERENCE, 1.0, "x rounding")
+    for hard in map(unweighted, sets):
         for change in (
             classes_permuted(hard, rng),
             rows_several_times(hard, 2),
             rows_several_times(hard, 3),
             columns_reversed(hard),
         ):
-            partings.see(training, change)
-    yield from partings.findings()
+            of = change.hard
+            stumps = renumbered(boost(of.X, of.labels, of.n_classes, rounds=rounds)[0], change)
+            named = replace(hard, name=f"{hard.name}, {change.name}")
+            for number, moment in enumerate(moments(named, stumps)):
+                if number < rounds and number & (number + 1) == 0:
+                    see_round(named, stumps, number, moment.scores, 3.0, chosen, outputs)
+    yield from (chosen.finding(), outputs.finding())

@@ -67,11 +67,6 @@ def rise_rounding(n_classes: int, before: Moment, after: Moment, z_max: float = 
     return rounded + held + blind
 
 
-def mean_score(scores: Floats) -> float:
-    """Return the largest |mean over the classes| of scores F (K, n)."""
-    return max(abs(math.fsum(row)) for row in scores.T.tolist()) / len(scores)
-
-
 Counts = dict[tuple[int, ...], list[int]]
 
 

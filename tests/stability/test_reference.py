@@ -1,10 +1,8 @@
-"""The reference itself, against closed forms, whole numbers, fractions, scipy and Weka's recorded answers."""
+"""The reference itself, against closed forms, whole numbers, fractions and scipy."""
 
-import json
 import math
 from fractions import Fraction
 from itertools import combinations, pairwise, product
-from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -17,7 +15,6 @@ from scipy import special, stats
 
 from thenar.stability.reference.boosting import (
     best_splits,
-    boost_rounds,
     exp,
     explained,
     log,
@@ -165,36 +162,6 @@ def test_the_best_split_leaves_the_least_residual(
 def _neighbours(x: list[float]) -> list[tuple[float, float]]:
     values = sorted({v for v in x if not math.isnan(v)})
     return list(pairwise(values))
-
-
-def test_two_separable_classes_follow_their_recursion() -> None:
-    # Uncapped, a member's z is 1/P and the other class's mirror image: F grows by (1 + e^-2F)/2 a round.
-    training = boost_rounds([[0.0], [1.0], [1.0]], [0, 1, 1], 2, 12)
-    losses, F = [mean_loss([[0, 0]] * 3, [0, 1, 1]), *(each.loss for each in training)], training[-1].scores
-    with precisely():
-        f, truth = mpf(0), [mpmath.log(2)]
-        for _ in range(12):
-            f += (1 + mpmath.exp(-2 * f)) / 2
-            truth.append(mpmath.log1p(mpmath.exp(-2 * f)))
-        assert all(near(a, b) for a, b in zip(losses, truth, strict=True))
-        assert near(F[0][0], f)
-        assert near(F[1][0], -f)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["twoclass", "missing", "dupfeat"])
-def test_ten_rounds_are_wekas(weka_data: Path, name: str) -> None:
-    arrays = np.load(weka_data / "open" / f"{name}.npz")
-    n_classes = json.loads((weka_data / "open" / f"{name}.json").read_text())["J"]
-    rows = arrays["train_idx"]
-    columns: list[np.ndarray] = []
-    for column, n_values in zip(arrays["X"][rows].T, arrays["nominal"], strict=True):
-        # Of a nominal column of more than two values Weka tries the splits "is it v?", one after the other.
-        values = range(n_values) if n_values > 2 else ()
-        columns += [np.where(np.isnan(column), np.nan, column != value) for value in values] or [column]
-    F = boost_rounds(np.column_stack(columns).tolist(), arrays["y"][rows].tolist(), n_classes, 10)[-1].scores
-    got = np.array([[float(p) for p in softmax(row)] for row in F])
-    assert np.abs(got - arrays["default/I10/half/P_train"]).max() < 1e-9
 
 
 @given(st.lists(st.tuples(DOUBLES, DOUBLES), min_size=1, max_size=5))

@@ -23,6 +23,7 @@ from thenar.compiler.evaluation.folds import Fold, weka_folds
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.placement import gain
 from thenar.compiler.placement.cooccurrence import Cooccurrence
+from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.tables import collapse, quantise
 from thenar.runtime.build import Build, Recognition
 from thenar.runtime.scores import Scorer
@@ -134,7 +135,6 @@ def spoil_stumpfits(patch: Patch) -> None:
     patch.setattr(stumpfits, "midpoints", lambda values: values[1:])
     patch.setattr(stumpfits, "fit_stumps", off)
     patch.setattr(stumpfits, "Targets", one_row_turned)
-    patch.setattr(stumpfits, "boost", heavier_row)
 
 
 def nearer_zero(integers: IntegerTables) -> IntegerTables:
@@ -144,16 +144,15 @@ def nearer_zero(integers: IntegerTables) -> IntegerTables:
 
 
 def spoil_scoretables(patch: Patch) -> None:
-    balance, collapsed, quantised = quantise.balance, collapse.collapse, quantise.quantise
+    balance, quantised = quantise.balance, quantise.quantise
 
     def lost_bits(tables: collapse.ScoreTables) -> collapse.ScoreTables:
         single = tuple(rows.astype(np.float32).astype(np.float64) for rows in balance(tables).joint_rows)
         return replace(balance(tables), joint_rows=single)
 
     def off(of: stumps.Stumps, n_switches: int) -> collapse.ScoreTables:
-        tables = collapsed(of, n_switches)
-        later = tuple(np.minimum(codes, 65533) + np.uint16(1) for codes in tables.thresholds)
-        return replace(tables, bias=tables.bias * (1 + 2.0**-40), thresholds=later)
+        tables = later(of, n_switches)
+        return replace(tables, bias=tables.bias * (1 + 2.0**-40))
 
     patch.setattr(stumps, "centred", lambda answers, shrinkage: answers * shrinkage)
     patch.setattr(scoretables, "collapse", off)
@@ -180,8 +179,14 @@ def spoil_degenerate(patch: Patch) -> None:
 
 
 def spoil_columns(patch: Patch) -> None:
-    patch.setattr(columns, "best_position", best_in_floats)
-    patch.setattr(columns, "compare_scores", lambda a, b: int(np.sign(float_score(a) - float_score(b))))
+    patch.setattr(columns, "grow_id3", lambda X, labels: grow_id3(X, np.roll(labels, 1)))
+
+
+def later(of: stumps.Stumps, n_switches: int) -> collapse.ScoreTables:
+    """Return the tables of an ensemble with all thresholds one code too high."""
+    tables = collapse.collapse(of, n_switches)
+    codes = tuple(np.minimum(codes, 65533) + np.uint16(1) for codes in tables.thresholds)
+    return replace(tables, thresholds=codes)
 
 
 class OneTooMuch(Scorer):
@@ -252,16 +257,16 @@ SPOILED: dict[str, tuple[Callable[[Patch], None], tuple[str, ...]]] = {
     "targets": (spoil_targets, EVERY),
     "stumpfits": (spoil_stumpfits, EVERY),
     "scoretables": (spoil_scoretables, EVERY),
-    "invariances": (lambda patch: patch.setattr(invariances, "boost", heavier_row), ("rows in another order",)),
+    "invariances": (
+        lambda patch: patch.setattr(invariances, "boost", heavier_row),
+        ("rows in another order", "stumps chosen", "outputs of branches"),
+    ),
     "separable": (lambda patch: patch.setattr(separable, "boost", heavier_row), ("reported losses",)),
     "logits": (spoil_logits, ("largest derivative at", "largest derivative with pairs", "solutions changed by")),
     "degenerate": (spoil_degenerate, ("first outputs",)),
-    "columns": (spoil_columns, ("wrong comparisons of two gains", "wrong choices between gains")),
-    "codes": (lambda patch: patch.setattr(codes, "midpoints", lambda values: values[1:]), ("thresholds between",)),
-    "contradictions": (
-        lambda patch: patch.setattr(contradictions, "boost", heavier_row),
-        ("final P", "P with repeated rows"),
-    ),
+    "columns": (spoil_columns, ("decisions of ID3", "frames of an XOR")),
+    "codes": (lambda patch: patch.setattr(codes, "collapse", later), ("codes on different sides",)),
+    "contradictions": (lambda patch: patch.setattr(contradictions, "boost", heavier_row), ("final P",)),
     "weights": (lambda patch: patch.setattr(weights, "boost", heavier_row), ("stumps chosen", "outputs of branches")),
     "quantisation": (lambda patch: patch.setattr(quantisation, "Scorer", OneTooMuch), ("worst frame", "largest loss")),
     "missing": (spoil_missing, ("frames reported as degraded", "outputs that depend on the value of a lost input")),
