@@ -24,8 +24,6 @@ with optional():
     from threadpoolctl import threadpool_info
 
 SCENE = "quick"  # 160 switches, 16 joints, 14 grasp types, two hands
-SMALL = 3, 20, 2  # repetitions, rounds, folds: about half a second
-LARGE = 12, 100, 4  # the defaults of the shipped scene and `thenar compile`
 
 
 class Built(msgspec.Struct, frozen=True):
@@ -45,11 +43,11 @@ class Built(msgspec.Struct, frozen=True):
     plain: str
 
 
-def build(*, large: bool) -> Built:
+def build() -> Built:
     """Simulate a set, compile it, and return the digests of the files. Warnings are errors."""
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
         warnings.simplefilter("error")
-        files = _files(Path(folder), *(LARGE if large else SMALL))
+        files = _files(Path(folder))
     simd = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     return Built(
         python=platform.python_version(),
@@ -64,12 +62,13 @@ def build(*, large: bool) -> Built:
     )
 
 
-def _files(folder: Path, repetitions: int, rounds: int, folds: int) -> tuple[tuple[str, str], ...]:
-    scene = msgspec.structs.replace(load_scene(SCENE), repetitions=repetitions)
+def _files(folder: Path) -> tuple[tuple[str, str], ...]:
+    # Small: about half a second.
+    scene = msgspec.structs.replace(load_scene(SCENE), repetitions=3)
     found = simulate(scene, jobs=1).grasp_set
     recorded = folder / "set.grasps"
     found.save(recorded)
-    made = compile_build(found, folder / "build", rounds=rounds, folds=folds).folder
+    made = compile_build(found, folder / "build", rounds=20, folds=2).folder
     files = recorded, *(made / name for name in (MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME))
     return tuple((file.name, _digest(file.read_bytes())) for file in files)
 
@@ -86,4 +85,4 @@ def _digest(data: bytes) -> str:
 
 
 if __name__ == "__main__":
-    sys.stdout.buffer.write(msgspec.json.encode(build(large="--large" in sys.argv[1:])))
+    sys.stdout.buffer.write(msgspec.json.encode(build()))
