@@ -215,8 +215,6 @@ def weka_lines(weka: Comparison | NotRun) -> tuple[str, ...]:
         f"{_apart(weka.weka_itself, 'Weka with the two exp() settings of the JVM')}; {changed}",
         _apart(weka.ours_processor, "thenar and Weka with the processor's exp(), the default"),
         _apart(weka.ours_java, "thenar and Weka with Java's portable exp()"),
-        f"thenar trained on the rows in {weka.shuffles} other orders: "
-        + (f"at most {figure(weka.our_shuffled)}" if weka.our_shuffled else "the same bits"),
     )
 
 

@@ -35,11 +35,6 @@ class Lost(NamedTuple):
     codes: Codes
     scores: NDArray[np.int64]
 
-    @property
-    def inputs(self) -> Bits:
-        """Switches, then joints."""
-        return np.concatenate([self.switches, self.joints])
-
 
 def findings(full: bool) -> Iterator[Finding]:
     """Lose every subset of joints and of ports, of 8 and of 16 switches, in recorded and in the furthest frames."""
@@ -133,9 +128,10 @@ def _reported(small: SmallBuild, cases: list[Lost]) -> Iterator[Finding]:
     build, grasps = small.build, small.build.grasps
     for case in cases:
         lost = case.switches, case.joints
+        any_lost = any(part.any() for part in lost)
         for bits, codes, scores in zip(case.bits, case.codes, case.scores.tolist(), strict=True):
             found = build.recognise(bits, codes, *lost)
-            right = found.degraded == bool(case.inputs.any()) and found.grasp == grasps[first_best(scores)]
+            right = found.degraded == any_lost and found.grasp == grasps[first_best(scores)]
             degraded.see(float(not right), case.name)
             other = bits ^ case.switches, np.where(case.joints, HIGHEST_CODE - codes, codes)
             unread.see(float(build.recognise(*other, *lost) != found), case.name)

@@ -1,22 +1,36 @@
 """Other numbers of threads, processors, Pythons and numpys.
 
-Every setting is a separate process, since libraries read it once on loading. They do change numbers: each finding gives
+Files must be equal on every platform: a simulated set, and the build compiled from it. Every setting is a separate
+process of this module as a program, since libraries read it once on loading. They do change numbers: each finding gives
 the number of its settings in which numpy's or Python's exp or matrix products gave other bits than here.
 """
 
+import hashlib
+import math
 import os
 import platform
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import msgspec
+import numpy as np
 
-from ..checks.built_bytes import Built
+from thenar.compiler.artifact.compile import compile_build
+from thenar.drivers.extras import optional
+from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import simulate
+
 from ..finding import Case, Finding, Worst
 from ..pythons import made
+
+with optional():
+    from threadpoolctl import threadpool_info
 
 CASE = Case(
     title="The platform",
@@ -39,6 +53,64 @@ _X86_KERNELS = ("Nehalem", "Sandybridge", "Haswell", "SkylakeX")
 _ARM_KERNELS = ("ARMV8",)
 # glibc's exp, log, sin and pow have variants for fused multiply-add and AVX2; without them the plain variants run.
 _PLAIN_LIBM = "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4"
+
+
+class Built(msgspec.Struct, frozen=True):
+    """The results of a process.
+
+    python, numpy  their versions             kernels  the BLAS libraries' kernels and threads: "Haswell x2"
+    simd           numpy's instruction sets above its baseline that are in use
+    files          (name, SHA-256) of each file made
+    plain          SHA-256 of plain exp and matrix products there, which a build must not depend on
+    """
+
+    python: str
+    numpy: str
+    kernels: tuple[str, ...]
+    simd: tuple[str, ...]
+    files: tuple[tuple[str, str], ...]
+    plain: str
+
+
+def build() -> Built:
+    """Simulate a set, compile it, and return the digests of the files. Warnings are errors."""
+    with warnings.catch_warnings(), TemporaryDirectory() as folder:
+        warnings.simplefilter("error")
+        files = _files(Path(folder))
+    simd = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    return Built(
+        python=platform.python_version(),
+        numpy=np.__version__,
+        # scikit-learn also loads OpenMP's threads, which have no kernels.
+        kernels=tuple(
+            f"{blas['architecture']} x{blas['num_threads']}" for blas in threadpool_info() if blas["user_api"] == "blas"
+        ),
+        simd=tuple(simd),
+        files=files,
+        plain=_digest(_plain()),
+    )
+
+
+def _files(folder: Path) -> tuple[tuple[str, str], ...]:
+    # 160 switches, 16 joints, 14 grasp types, two hands: about half a second.
+    scene = msgspec.structs.replace(load_scene("quick"), repetitions=3)
+    found = simulate(scene, jobs=1).grasp_set
+    recorded = folder / "set.grasps"
+    found.save(recorded)
+    made = compile_build(found, folder / "build", rounds=20, folds=2).folder
+    files = recorded, *(made / name for name in (MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME))
+    return tuple((file.name, _digest(file.read_bytes())) for file in files)
+
+
+def _plain() -> bytes:
+    """Return processor-dependent results of numpy, the BLAS and libm: a matrix product, and exp by two methods."""
+    numbers = (np.arange(300 * 500) % 99_991 / 33_331.0).reshape(300, 500)
+    products = numbers @ numbers.T / 10_000
+    return np.exp(products).tobytes() + np.array([math.exp(number) for number in numbers.flat]).tobytes()
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
 
 
 class Setting(NamedTuple):
@@ -127,9 +199,13 @@ def plainest(built: Built) -> Setting:
 def run(setting: Setting) -> Built | str:
     """Build in a process of this setting; return the digests, or how the process failed."""
     environment = {name: value for name, value in os.environ.items() if name not in _OURS} | dict(setting.environment)
-    command = [str(setting.python), "-P", "-m", "thenar.stability.checks.built_bytes"]
+    command = [str(setting.python), "-P", "-m", __name__]
     ran = subprocess.run(command, env=environment, capture_output=True, check=False)
     if ran.returncode:
         words = ran.stderr.decode(errors="replace").strip().rpartition("\n")[2]
         return f"{setting.python} ended with {ran.returncode} {words}".strip()
     return msgspec.json.decode(ran.stdout, type=Built)
+
+
+if __name__ == "__main__":
+    sys.stdout.buffer.write(msgspec.json.encode(build()))

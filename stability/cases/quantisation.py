@@ -1,6 +1,5 @@
 """Quantisation of scores to integers of 4 to 16 bits, in the worst possible frame."""
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import permutations, product
@@ -11,14 +10,12 @@ from mpmath import mpf
 from thenar.compiler.tables.collapse import ScoreTables
 from thenar.compiler.tables.compare import float_slack
 from thenar.compiler.tables.furthest import furthest
-from thenar.compiler.tables.quantise import balance
 from thenar.compiler.tables.worstcase import Rounding
 from thenar.runtime.errors import BuildError
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import (
     LIMIT,
     MAX_CLASSES,
-    MAX_JOINTS,
     MAX_SWITCHES,
     IntegerTables,
     tables_from_bytes,
@@ -33,15 +30,12 @@ from ..inputs.hard_tables import (
     every_frame,
     first_best,
     half_a_step_off,
-    largest_sum,
     quantised,
-    rows_of,
     sized,
-    whole_numbers,
 )
 from ..inputs.small_sets import small_build, small_set
 from ..reference.numbers import precisely, ratio
-from ..reference.tables import steps, table_scores
+from ..reference.tables import table_scores
 
 
 class BothWays:
@@ -138,77 +132,6 @@ def _refuses(make: Callable[[], IntegerTables]) -> bool:
     return False
 
 
-def largest(full: bool) -> Finding:
-    """Compare the scores of the largest tables with 64-bit sums."""
-    worst = Worst("scores by the largest tables that fit in a file", "sums of 64 bits", 0, "scores")
-    random = np.random.default_rng(7)
-    sizes: list[tuple[int, int, tuple[int, ...]]] = [
-        (2, MAX_SWITCHES, ()),
-        (2, 0, (65536,)),
-        (MAX_CLASSES, 0, (31,) * 250),
-        (2, MAX_SWITCHES, (6,) * MAX_JOINTS),
-    ]
-    if full:
-        sizes.append((MAX_CLASSES, MAX_SWITCHES - 1, ()))
-    for classes, switches, bins in sizes:
-        tables = tables_from_bytes(tables_to_bytes(_filled(whole_numbers(7, classes, switches, bins, 6))))
-        bits = random.random(switches) < 0.5
-        codes = random.integers(0, 65536, len(bins)).astype(np.uint16)
-        rows = [tables.bias.astype(np.int64), tables.switch_rows[bits].sum(axis=0, dtype=np.int64)]
-        joints = zip(tables.thresholds, tables.joint_rows, codes, strict=True)
-        rows += [steps[np.searchsorted(thresholds, code)].astype(np.int64) for thresholds, steps, code in joints]
-        scores = np.array(Scorer(tables).lanes(bits, codes)) - LANE_OFFSET
-        differ = int(np.count_nonzero(scores != np.sum(rows, axis=0))) + int(tables.bound != LIMIT)
-        worst.see(differ, f"{classes} classes, {switches} switches, {sum(bins)} bins", classes)
-    return worst.finding()
-
-
-def _filled(tables: IntegerTables) -> IntegerTables:
-    """Return the tables with a bias for which the furthest of all sums is 32767."""
-    silent = replace(tables, bias=0 * tables.bias)
-    found = furthest(silent)
-    bias = tables.bias * 0
-    bias[found.grasp] = np.sign(found.total) * (LIMIT - abs(found.total))
-    return replace(tables, bias=bias)
-
-
-# Products of a row and the scale are doubles with a relative error of 2^-53, so the scale at which one passes half a
-# step has the same error, at most one unit in its last place; the next double adds another.
-_BOUND = 2
-
-
-def finest_scales(seeds: range) -> Finding:
-    """Compare the compiler's scale with the finest, for similar classes and for one that dominates by up to 10^12."""
-    worst = Worst("scale, one class up to 10^12 times the others", "bisection in exact arithmetic", _BOUND, "ulp")
-    for seed in seeds:
-        for width, factor in ((4, 1.0), (16, 1.0), (8, 1e3), (16, 1e-3), (16, 1e6), (16, 1e12)):
-            tables = dominated(seed, 3, 4, (5, 3), factor)
-            worst.see(_error(tables, width), f"draw {seed}, {width} bits, times {factor:g}")
-        worst.see(_error(drawn(seed, 2, 1, ()), 16), f"draw {seed}, 2 classes, 1 switch")
-    return worst.finding()
-
-
-def _error(tables: ScoreTables, width: int) -> float:
-    got, limit = quantised("", tables, width).integers.scale, 2 ** (width - 1) - 1
-    finest = _finest(balance(tables), limit)
-    return abs(got - finest) / math.ulp(finest)
-
-
-def _finest(tables: ScoreTables, limit: int) -> float:
-    """Return the largest scale at which sums of rows, rounded half to even from exact products, stay within limit."""
-    inputs = rows_of(tables)
-    fits, too_fine = 0.0, 1.0
-    while _furthest(inputs, too_fine) <= limit:
-        fits, too_fine = too_fine, 2 * too_fine
-    while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
-        fits, too_fine = (middle, too_fine) if _furthest(inputs, middle) <= limit else (fits, middle)
-    return fits
-
-
-def _furthest(inputs: list[list[list[float]]], scale: float) -> float:
-    return largest_sum([[[steps(value, scale) for value in row] for row in rows] for rows in inputs])
-
-
 CASE = Case(
     title="Integers of 4 to 16 bits",
     danger="rounding changes a score more than guaranteed, or a sum overflows",
@@ -226,9 +149,7 @@ def findings(full: bool) -> Iterator[Finding]:
     yield from _all_frames(range(12 if full else 2))
     yield _leads(seeds)
     yield _half_steps(full)
-    yield finest_scales(seeds if full else seeds[:2])
     yield from edges(full)
-    yield largest(full)
 
 
 def _witnesses(seeds: range) -> Finding:

@@ -1,4 +1,4 @@
-"""Intervals at rates 0 and 1, classes with fewer rows than folds, subjects that lack a class."""
+"""Intervals at rates 0 and 1, of repeats, and over clusters."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -6,7 +6,6 @@ from itertools import product
 import numpy as np
 from mpmath import mpf
 
-from thenar.compiler.evaluation.folds import Fold, weka_folds
 from thenar.compiler.evaluation.populations import Scheme
 from thenar.compiler.evaluation.rates import ALIKE, UNITS, WEIGHT, Rate, clustered
 from thenar.compiler.recordings.graspset import GraspSet
@@ -33,8 +32,8 @@ def lopsided() -> dict[str, tuple[GraspSet, Scheme]]:
 
 
 CASE = Case(
-    title="Rates and folds at their ends",
-    danger="an interval leaves 0 to 1 or has no width, or a row is tested twice, never, or by its own training",
+    title="Rates at their ends",
+    danger="an interval leaves 0 to 1, has no width, or is too narrow for trials that are alike",
 )
 
 # Wilson's ends are (centre -+ reach) / shrink, where neither centre nor reach exceeds shrink, so that their errors
@@ -48,11 +47,10 @@ _TOTALS = (1, 2, 3, 5, 12, 33, 100, 999, 65536, 10**6, 10**9, 10**12)
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Compare intervals with 60 digits, and check the rules for all folds."""
+    """Compare intervals with 60 digits."""
     yield from _wilson(range(1, 150) if full else range(1, 40))
     yield from _repeated(4 if full else 3)
     yield from _clusters(3000 if full else 300)
-    yield from _folds(400 if full else 60)
 
 
 def _wilson(totals: range) -> Iterator[Finding]:
@@ -142,28 +140,3 @@ def _over_clusters(recognised: list[int], sizes: list[int], unit: Unit) -> Inter
         effect = (weight * found + misses * max(effect, found)) / (weight + misses)
     n, z = total / effect, student_quantile(k - 1, mpf("0.975"))
     return wilson_of(p, z**2 / n)
-
-
-def _folds(draws: int) -> Iterator[Finding]:
-    """Classes of one or more rows: each row is tested once and trained on otherwise; each class is spread evenly."""
-    lost = Worst("rows not tested exactly once, or trained and tested in one fold", "the rule itself", 0, "rows")
-    uneven = Worst("classes with two rows more in one fold than in another", "the rule itself", 0, "classes")
-    random = np.random.default_rng(11)
-    for draw in range(draws):
-        labels = np.repeat(np.arange(6), random.integers(1, [1 + 1, 2, 3, 9, 20, 60]))
-        labels = labels[random.permutation(len(labels))]
-        n_folds = int(random.integers(2, min(len(labels), 12) + 1))
-        folds = weka_folds(labels, n_folds, draw)
-        what = f"draw {draw}: {np.bincount(labels).tolist()} in {n_folds}"
-        lost.see(_misused(folds, len(labels)), what, tried=len(labels))
-        shares = np.array([np.bincount(labels[fold.test], minlength=6) for fold in folds])
-        uneven.see(int((np.ptp(shares, axis=0) > 1).sum()), what, tried=6)
-    yield lost.finding()
-    yield uneven.finding()
-
-
-def _misused(folds: list[Fold], rows: int) -> int:
-    tested = np.bincount(np.concatenate([fold.test for fold in folds]), minlength=rows)
-    both = sum(len(np.intersect1d(fold.train, fold.test)) for fold in folds)
-    left = sum(rows - len(np.union1d(fold.train, fold.test)) for fold in folds)
-    return int((tested != 1).sum()) + both + left

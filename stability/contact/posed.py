@@ -5,7 +5,7 @@ each of numpy's additions and multiplications rounds to 60 digits.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -18,7 +18,6 @@ from thenar.simulator.contact.balance import HOLD_N_PER_MM, HOLD_NMM_PER_RAD, LI
 from thenar.simulator.contact.model import GRAVITY, STIFFNESS
 from thenar.simulator.contact.settle import Rest
 
-from ..checks.roundings import ROUNDING
 from ..reference.numbers import precisely
 
 Vector = NDArray[Any]  # (3,) of mpf
@@ -67,29 +66,20 @@ def _rounded(sides: Vector) -> tuple[mpf, Vector]:
     return sides[nearest], exactly(np.arange(len(sides)) == nearest)
 
 
-class Touch(NamedTuple):
-    """A sphere of skin, in hand axes.
+def touches_of(case: SolverCase, centres: Matrix, frame: Matrix, position: Vector) -> tuple[Vector, Matrix, Matrix]:
+    """Return the depths (50,) of all spheres of skin in an object at `frame` and `position`, its normals, and points.
 
-    The distance of its centre from the object, its own depth in it, the object's outward normal, the point of contact.
+    Normals (50, 3) point outwards; points (50, 3) are those of contact, or for a sphere off the surface the nearest
+    of its skin. The spheres' centres are (50, 3).
     """
-
-    distance: mpf
-    sunk: mpf
-    normal: Vector
-    point: Vector
-
-
-def touches_of(case: SolverCase, centres: Matrix, frame: Matrix, position: Vector) -> list[Touch]:
-    """Return all spheres of skin, from their centres (50, 3), for an object at `frame` and `position`.
-
-    A sphere off the surface has the nearest point of its skin instead of a point of contact.
-    """
-    touches = []
+    depths, normals, points = [], [], []
     for centre, radius in zip(centres, map(mpf, case.condition.hand.sphere_radii.tolist()), strict=True):
         distance, out = surface(case.condition.thing.shape, frame.T @ (centre - position))
         normal = frame @ out
-        touches.append(Touch(distance, radius - distance, normal, centre - normal * min(distance, radius)))
-    return touches
+        depths.append(radius - distance)
+        normals.append(normal)
+        points.append(centre - normal * min(distance, radius))
+    return np.array(depths), np.array(normals), np.array(points)
 
 
 def press(skin: Skin, sunk: mpf) -> mpf:
@@ -99,44 +89,17 @@ def press(skin: Skin, sunk: mpf) -> mpf:
 
 
 @precisely()
-def _place_error_mm(case: SolverCase) -> mpf:
-    """Bound the error of a sphere's distance from the object.
+def residuals(case: SolverCase, rest: Rest, skin: Skin) -> tuple[float, float, float]:
+    """Return force and moment on the object, including its soft hold, and the largest moment on any joint.
 
-    Each of a finger's four turns takes sine and cosine of 2 roundings, and rounds two products and their sum: 7.4
-    roundings of a frame by the sum of squares of its elements, which later turns keep. The thumb has two more products
-    of 9: 48 roundings of a direction, 2 more with its length, on all of the digit's length. The transformation to
-    the object's axes and to its surface adds 10 of the sum of position and size.
+    They are those of the only repetition, with friction as returned, and all else from angles and pose.
     """
-    hand, shape = case.condition.hand, case.condition.thing.shape
-    digit = float(hand.size.segments_mm().sum(axis=1).max())
-    far = hand.size.length_mm + float(np.abs(case.numbers[:3]).sum()) + sum(shape.extent_mm())
-    return ROUNDING * (50 * mpf(digit) + 10 * mpf(far))
-
-
-class Left(NamedTuple):
-    """The residuals of a case at rest.
-
-    force_n, moment_nmm   on the object, including its soft hold
-    joints_nmm            the largest on any joint
-    outside               number of spheres on which friction leaves its cone, twice the slip limit, or the surface
-    """
-
-    force_n: float
-    moment_nmm: float
-    joints_nmm: float
-    outside: int
-
-
-@precisely()
-def left_of(case: SolverCase, rest: Rest, skin: Skin) -> Left:
-    """Return the residuals of the only repetition, with friction as returned, and all else from angles and pose."""
     hand, condition = case.condition.hand, case.condition
     skeleton = hand.skeleton(rest.angles)
     frame, position = exactly(rest.pose.rotation[..., 0]), exactly(rest.pose.position[:, 0])
-    touches = touches_of(case, exactly(hand.spheres(skeleton)[..., 0]), frame, position)
-    drags = exactly(rest.drags[..., 0])
-    normals, points = (np.array([getattr(touch, part) for touch in touches]) for part in ("normal", "point"))
-    forces = drags + normals * np.array([press(skin, touch.sunk) for touch in touches])[:, None]
+    depths, normals, points = touches_of(case, exactly(hand.spheres(skeleton)[..., 0]), frame, position)
+    pressed = np.array([press(skin, depth) for depth in depths])
+    forces = exactly(rest.drags[..., 0]) + normals * pressed[:, None]
     loaded = mpf(condition.thing.mass_kg) * mpf(GRAVITY) * exactly(condition.held.down) - forces.sum(axis=0)
     force = loaded - mpf(HOLD_N_PER_MM) * (position - exactly(case.numbers[:3, 0]))
     initial = exactly(rotation(case.numbers[3:])[..., 0])
@@ -149,25 +112,7 @@ def left_of(case: SolverCase, rest: Rest, skin: Skin) -> Left:
     over = np.maximum(now - high, mpf(0)) + np.minimum(now - low, mpf(0))
     torques = _grip(case, initial) + _moments(skeleton, points, forces)
     torques -= exactly(STIFFNESS) * (now - start) + mpf(LIMIT_NMM_PER_RAD) * over
-    returned = exactly(rest.presses[:, 0])
-    return Left(
-        force_n=float(length(force)),
-        moment_nmm=float(length(moment)),
-        joints_nmm=float(abs(torques).max()),
-        outside=sum(_is_outside(case, skin, *each) for each in zip(touches, returned, drags, strict=True)),
-    )
-
-
-def _is_outside(case: SolverCase, skin: Skin, touch: Touch, pressed: mpf, drag: Vector) -> bool:
-    """Return whether friction is outside its limits by more than rounding.
-
-    Limit, length, root, quotient and products round 8 times in all; a normal rotates by its position's error over its
-    distance from the object, which is checked from 1 mm on.
-    """
-    size = length(drag)
-    slips = size > 2 * mpf(skin.friction) * pressed * (1 + 8 * ROUNDING)
-    off = touch.distance
-    return bool(slips or (off > 1 and abs(drag @ touch.normal) > size * (_place_error_mm(case) / off + 8 * ROUNDING)))
+    return float(length(force)), float(length(moment)), float(abs(torques).max())
 
 
 def _grip(case: SolverCase, frame: Matrix) -> Vector:
@@ -175,10 +120,10 @@ def _grip(case: SolverCase, frame: Matrix) -> Vector:
     hand, grip = case.condition.hand, mpf(float(case.grip_n[0]))
     skeleton = hand.skeleton(case.angles)
     centres = exactly(hand.spheres(skeleton)[..., 0])
-    touches = touches_of(case, centres, frame, exactly(case.numbers[:3, 0]))
+    _, normals, _ = touches_of(case, centres, frame, exactly(case.numbers[:3, 0]))
     pushes = exactly(np.zeros(centres.shape))
     for pad in case.condition.held.pads:
-        pushes[pad.sphere] -= touches[pad.sphere].normal * mpf(pad.share) * grip
+        pushes[pad.sphere] -= normals[pad.sphere] * mpf(pad.share) * grip
     return _moments(skeleton, centres, pushes)
 
 

@@ -1,25 +1,19 @@
 """Results for hard grasps in the contact model."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
-from math import fsum
 
 import numpy as np
 
-from thenar.simulator.body.layout import SwitchPlaces, murakami160
-from thenar.simulator.body.shapes import Pose
 from thenar.simulator.contact.balance import USUAL, Skin
 from thenar.simulator.contact.model import Contact, Load
 from thenar.simulator.contact.settle import close
 from thenar.simulator.effects.contact_quasistatic import MOST_STEPS, USUAL_SKIN, Quasistatic
 
 from ..finding import REFERENCE, Finding, Worst
-from .grasps import BAR, HAND, Grasp, case_of, hard, held, otherwise
-from .posed import left_of
+from .grasps import Grasp, case_of, hard, otherwise
+from .posed import residuals
 
 RULE = "the rule itself"
-# On any one segment of the glove.
-MOST_SWITCHES = max(Counter(patch.capsule for patch in murakami160()).values())
 _STATE = ("posture_deg", "pose", "forces_n", "capsules_n", "between_n")
 _FIELDS = (*_STATE, "residual_n", "residual_nmm")
 SKIN = USUAL_SKIN
@@ -40,7 +34,6 @@ def findings(full: bool) -> Iterator[Finding]:
     grasps = list(hard(full))
     yield _numbers(grasps)
     yield _nothing()
-    yield _on_the_surface(full)
     yield from _balanced(grasps[:: 1 if full else 4])
 
 
@@ -83,28 +76,6 @@ def _nothing() -> Finding:
     return wrong.finding()
 
 
-def _on_the_surface(full: bool) -> Finding:
-    """Compare the forces on switches with those on segments if the glove's reach equals a switch's distance, or almost.
-
-    With k switches on a segment the sum of depths rounds k - 1 times, each quotient and product once: k + 1 roundings
-    of the force.
-    """
-    check = "quasistatic: switches exactly on the surface"
-    lost = Worst(check, "exact sums", MOST_SWITCHES + 1.0, "x 2^-53 of the force")
-    grasp = held()
-    (rest,) = Quasistatic().solve([grasp.load])
-    switches = SwitchPlaces(HAND, murakami160())
-    tops = switches.tops(HAND.skeleton(rest.posture_deg.T * (np.pi / 180.0)))
-    gaps = Pose.of(rest.pose.T).distance(BAR, tops)[0][:, 0]
-    near = np.flatnonzero((gaps > 0.0) & (gaps < 4.0) & (rest.capsules_n[0, switches.capsules] > 0.0))
-    for switch in near[:: 1 if full else 8].tolist():
-        for reach_mm in (float(gaps[switch]), float(np.nextafter(gaps[switch], 9.0))):
-            (found,) = Quasistatic(reach_mm=reach_mm).solve([grasp.load])
-            borne = fsum([*found.forces_n[0].tolist(), float(found.between_n[0]), *(-found.capsules_n[0]).tolist()])
-            lost.see(abs(borne) / fsum(found.capsules_n[0].tolist()) * 2.0**53, switches.layout[switch].name)
-    return lost.finding()
-
-
 def _balanced(grasps: Sequence[Grasp]) -> Iterator[Finding]:
     """Check the balance of forces at 60 digits for every grasp that quasistatic reports as settled.
 
@@ -114,18 +85,14 @@ def _balanced(grasps: Sequence[Grasp]) -> Iterator[Finding]:
     forces = Worst("quasistatic at rest: force on the object", REFERENCE, USUAL.rest_n * (1 + 1e-6), "N")
     moments = Worst("quasistatic at rest: moment on the object", REFERENCE, USUAL.rest_nmm * (1 + 1e-6), "N mm")
     joints = Worst("quasistatic at rest: moment on a joint", REFERENCE, USUAL.rest_nmm * (1 + 1e-6), "N mm")
-    cones = Worst("quasistatic: friction outside its cone", REFERENCE, 0.0, "spheres of skin")
     for name, load in grasps:
         case = case_of(load)
         (rest,) = close([case], SKIN, MOST_STEPS)
         if not rest.settled[0] or not _has_directions(load):
             continue
-        left = left_of(case, rest, SKIN)
-        forces.see(left.force_n, name)
-        moments.see(left.moment_nmm, name)
-        joints.see(left.joints_nmm, name)
-        cones.see(float(left.outside), name)
-    yield from (worst.finding() for worst in (forces, moments, joints, cones))
+        for worst, residual in zip((forces, moments, joints), residuals(case, rest, SKIN), strict=True):
+            worst.see(residual, name)
+    yield from (worst.finding() for worst in (forces, moments, joints))
 
 
 def _has_directions(load: Load) -> bool:
