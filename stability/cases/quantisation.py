@@ -7,7 +7,6 @@ from itertools import permutations, product
 import numpy as np
 from mpmath import mpf
 
-from thenar.compiler.tables.collapse import ScoreTables
 from thenar.compiler.tables.compare import float_slack
 from thenar.compiler.tables.furthest import furthest
 from thenar.compiler.tables.worstcase import Rounding
@@ -38,23 +37,14 @@ from ..reference.numbers import precisely, ratio
 from ..reference.tables import table_scores
 
 
-class BothWays:
-    """Tables and their integers, prepared for one frame after another."""
-
-    def __init__(self, tables: ScoreTables, integers: IntegerTables) -> None:
-        self._scorer, self._scale = Scorer(integers), integers.scale
-        self._rows = (
-            tables.bias.tolist(),
-            tables.switch_rows.tolist(),
-            [thresholds.tolist() for thresholds in tables.thresholds],
-            [rows.tolist() for rows in tables.joint_rows],
-        )
-
-    @precisely()
-    def run(self, bits: Sequence[bool], codes: Sequence[int]) -> tuple[list[mpf], list[int]]:
-        """Return the frame's scores (K,) in steps: exact, and from the integer tables."""
-        exact = [score * self._scale for score in table_scores(*self._rows, bits, codes)]
-        return exact, [lane - LANE_OFFSET for lane in self._scorer.lanes(bits, codes)]
+@precisely()
+def both_scores(case: Quantised, bits: Sequence[bool], codes: Sequence[int]) -> tuple[list[mpf], list[int]]:
+    """Return the frame's scores (K,) in steps: exact, and from the integer tables."""
+    tables = case.tables
+    thresholds, joints = ([part.tolist() for part in parts] for parts in (tables.thresholds, tables.joint_rows))
+    scores = table_scores(tables.bias.tolist(), tables.switch_rows.tolist(), thresholds, joints, bits, codes)
+    deployed = [lane - LANE_OFFSET for lane in Scorer(case.integers).lanes(bits, codes)]
+    return [score * case.integers.scale for score in scores], deployed
 
 
 @precisely()
@@ -158,10 +148,10 @@ def _witnesses(seeds: range) -> Finding:
     worst = Worst("worst frame of every pair of classes", "60 digits and the scorer, in that frame", 0, "steps")
     small = small_build(small_set(7, rows=200, switches=24, joints=3, types=6, noise=0.15), rounds=40)
     for case in (Quantised("a compiled build", small.tables, small.build.tables), *_tables(seeds)):
-        rounding, both = Rounding(case.tables, case.integers), BothWays(case.tables, case.integers)
+        rounding = Rounding(case.tables, case.integers)
         for leader, other in permutations(range(case.integers.n_classes), 2):
             frame = rounding.worst(leader, other)
-            exact, deployed = both.run(frame.bits.tolist(), frame.codes.tolist())
+            exact, deployed = both_scores(case, frame.bits.tolist(), frame.codes.tolist())
             with precisely():
                 error = float(abs(lost(exact, deployed, leader, other) - ratio(frame.loss)))
             worst.see(error, f"{case.name}, classes {leader} and {other}")
@@ -177,8 +167,8 @@ def _all_frames(seeds: range) -> Iterator[Finding]:
     )
     for case in _small(seeds):
         rounding, pairs = Rounding(case.tables, case.integers), list(permutations(range(case.integers.n_classes), 2))
-        both, safe = BothWays(case.tables, case.integers), ratio(rounding.safe_margin())
-        runs = [both.run(*frame) for frame in every_frame(case.tables)]
+        safe = ratio(rounding.safe_margin())
+        runs = [both_scores(case, *frame) for frame in every_frame(case.tables)]
         with precisely():
             for pair in pairs:
                 found = max(lost(exact, deployed, *pair) for exact, deployed in runs)
