@@ -9,15 +9,19 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 
+import mpmath
 import numpy as np
+from mpmath import mpf
 
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 
-from ..checks.rounds import entropy_left, idle_loss, loss_rounding, moments, resting_error, rise_rounding
+from ..checks.roundings import ROUNDING, share_error
+from ..checks.rounds import Moment, counted, loss_rounding, moments, rise_rounding
 from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import HardSet, contradictory, imbalanced, noisy
-from ..reference.numbers import distance
+from ..reference.information import entropy_bits
+from ..reference.numbers import distance, precisely
 
 CASE = Case(
     title="Contradictions",
@@ -58,6 +62,46 @@ def _rest(sets: Iterator[HardSet], rounds: int) -> Iterator[Finding]:
         allowed = loss_rounding(hard.n_classes, float(least)) + idle_loss(hard, last)
         losses.see(distance(falling[-1], least) / allowed, hard.name)
     yield from (shares.finding(), losses.finding())
+
+
+@precisely()
+def entropy_left(hard: HardSet) -> mpf:
+    """Return the entropy of the class given the frame, in nats: the least possible mean loss of scores of frames."""
+    counts = list(counted(hard).values())
+    total = sum(map(sum, counts))
+    return mpmath.fsum(sum(row) * entropy_bits(row) for row in counts) / total * mpmath.log(2)
+
+
+@precisely()
+def resting_error(hard: HardSet, last: Moment) -> float:
+    """Return the error of shares P against those of the counts, as a share of the rounding bound after convergence.
+
+    Boosting converges to sum u (Y - P) = 0. There 1 - P is off by 2^-54, the resolution of P, and the products round.
+    P cannot be more accurate than the scores' last places allow: two scores, each rounded, each at most one place off;
+    nor than its own rounding. Each class that a frame lacks may keep the weight of `unsettled`.
+    """
+    errors, counts, idle = [], counted(hard), unsettled(last)
+    for row, F, got in zip(hard.X.tolist(), last.scores.T.tolist(), last.shares.T.tolist(), strict=True):
+        own = counts[tuple(row)]
+        for k, P in enumerate(got):
+            truth = mpf(own[k]) / sum(own)
+            allowed = ROUNDING * (1 + truth * (4 + 4 * max(map(abs, F)))) + share_error(F, k, truth)
+            errors.append(abs(P - truth) / (allowed + own.count(0) * idle * hard.scale / sum(own)))
+    return float(max(errors))
+
+
+def unsettled(last: Moment) -> float:
+    """Return the most weight that a frame can keep: below a share of 2^-38 of its class's, its branch counts as empty.
+
+    Then it follows the mean of all rows, which is constant once they have converged, and learns nothing more itself.
+    """
+    return 2.0**-38 * float(last.weights.sum(axis=1).max())
+
+
+def idle_loss(hard: HardSet, last: Moment) -> float:
+    """Return the largest remaining loss of frames of a single class, in which each of K classes keeps `unsettled`."""
+    lacking = sum(row.count(0) for row in counted(hard).values())
+    return lacking * unsettled(last) / float(hard.scaled_weights.sum())
 
 
 def _ties() -> Finding:
