@@ -1,25 +1,14 @@
 """Quantisation of scores to integers of 4 to 16 bits, in the worst possible frame."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from itertools import permutations, product
+from collections.abc import Iterator, Sequence
+from itertools import permutations
 
-import numpy as np
 from mpmath import mpf
 
 from thenar.compiler.tables.compare import float_slack
-from thenar.compiler.tables.furthest import furthest
 from thenar.compiler.tables.worstcase import Rounding
-from thenar.runtime.errors import BuildError
 from thenar.runtime.scores import LANE_OFFSET, Scorer
-from thenar.runtime.tables import (
-    LIMIT,
-    MAX_CLASSES,
-    MAX_SWITCHES,
-    IntegerTables,
-    tables_from_bytes,
-    tables_to_bytes,
-)
+from thenar.runtime.tables import MAX_SWITCHES
 
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_tables import (
@@ -53,78 +42,9 @@ def lost(exact: Sequence[mpf], deployed: Sequence[int], leader: int, other: int)
     return (exact[leader] - exact[other]) - (deployed[leader] - deployed[other])
 
 
-# The rows that can add the last step to a sum, and their arrays.
-LAST = (
-    ("the bias", "bias"),
-    ("a closed switch", "switch_rows"),
-    ("a missing switch", "switch_means"),
-    ("a bin", "joint_rows"),
-    ("a missing joint", "joint_means"),
-)
-
-
-def edges(full: bool) -> Iterator[Finding]:
-    """Check tables whose sums reach 32767, and those that reach 32768 by each possible row."""
-    right = Worst("sums of exactly +-32767", "accepted, and summed without overflow", 0, "tables")
-    wrong = Worst("sums of 32768", "rejected, in memory and as a file", 0, "tables")
-    for sign, classes, (name, arrays) in product((1, -1), (2, 3, MAX_CLASSES if full else 33), LAST):
-        tables = edge_tables(classes, sign, arrays)
-        at = f"{classes} classes, {'+' if sign > 0 else '-'} by {name}"
-        right.see(float(not _is_right(tables, sign)), at)
-        wrong.see(float(not _is_refused(tables, arrays, sign)), at)
-    yield right.finding()
-    yield wrong.finding()
-
-
-def edge_tables(classes: int, sign: int, last: str) -> IntegerTables:
-    """Return tables of one switch and one joint in which class 1 reaches 32767 steps by the row in `last`.
-
-    Its neighbours reach as far in the other direction, so that an overflow into the next lane would show.
-    """
-    arrays = {name: np.zeros((1, classes), np.int16) for _, name in LAST}
-    towards = np.full(classes, -sign)
-    towards[1] = sign
-    arrays["bias"][0] = towards * (LIMIT - 1)
-    arrays[last][0] += towards.astype(np.int16)
-    return IntegerTables(
-        bias=arrays["bias"][0],
-        switch_rows=arrays["switch_rows"],
-        thresholds=(np.array([100], np.uint16),),
-        joint_rows=(np.vstack([arrays["joint_rows"], 0 * towards]).astype(np.int16),),
-        switch_means=arrays["switch_means"],
-        joint_means=arrays["joint_means"],
-        scale=1.0,
-    )
-
-
-def _is_right(tables: IntegerTables, sign: int) -> bool:
-    read = tables_from_bytes(tables_to_bytes(tables))
-    found = furthest(read)
-    lanes = Scorer(read).lanes_without(found.bits, found.codes, found.lost_switches, found.lost_joints)
-    expected = [LANE_OFFSET + (LIMIT if k == 1 else -LIMIT) * sign for k in range(tables.n_classes)]
-    return read.bound == LIMIT and list(lanes) == expected
-
-
-def _is_refused(tables: IntegerTables, last: str, sign: int) -> bool:
-    row = tables.joint_rows[0] if last == "joint_rows" else getattr(tables, last)
-    if last == "bias" and sign > 0:
-        row = tables.switch_rows  # 32768 does not fit int16: the extra step comes from another row
-    row[..., 1].flat[0] += sign
-    altered = tables_to_bytes(tables)
-    return _refuses(lambda: replace(tables)) and _refuses(lambda: tables_from_bytes(altered))
-
-
-def _refuses(make: Callable[[], IntegerTables]) -> bool:
-    try:
-        make()
-    except BuildError:
-        return True
-    return False
-
-
 CASE = Case(
     title="Integers of 4 to 16 bits",
-    danger="rounding changes a score more than guaranteed, or a sum overflows",
+    danger="rounding changes a score or a decision more than guaranteed",
 )
 
 WIDTHS = range(4, 17)
@@ -139,7 +59,6 @@ def findings(full: bool) -> Iterator[Finding]:
     yield from _all_frames(range(12 if full else 2))
     yield _leads(seeds)
     yield _half_steps(full)
-    yield from edges(full)
 
 
 def _witnesses(seeds: range) -> Finding:

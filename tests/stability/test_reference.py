@@ -32,13 +32,11 @@ from thenar.stability.reference.intervals import normal_quantile, student, stude
 from thenar.stability.reference.logit import Column, largest_derivative
 from thenar.stability.reference.numbers import DIGITS, cos, precisely, sin, turn
 from thenar.stability.reference.standing_in import Kind, stand_ins
-from thenar.stability.reference.tables import steps
 
 HAIR = mpf(10) ** (8 - DIGITS)  # a few roundings of 60 digits
 
 COUNTS = st.integers(0, 12)
 TABLES = st.lists(st.tuples(COUNTS, COUNTS, COUNTS), min_size=1, max_size=4).filter(lambda t: any(map(any, t)))
-DOUBLES = st.floats(allow_nan=False, allow_infinity=False)
 
 
 @precisely()
@@ -162,14 +160,6 @@ def test_the_best_split_leaves_the_least_residual(
 def _neighbours(x: list[float]) -> list[tuple[float, float]]:
     values = sorted({v for v in x if not math.isnan(v)})
     return list(pairwise(values))
-
-
-@given(st.lists(st.tuples(DOUBLES, DOUBLES), min_size=1, max_size=5))
-def test_whole_steps_are_half_to_even(pairs: list[tuple[float, float]]) -> None:
-    for value, scale in pairs:
-        doubt = abs(steps(value, scale) - Fraction(value) * Fraction(scale))
-        assert doubt <= Fraction(1, 2)
-        assert doubt < Fraction(1, 2) or steps(value, scale) % 2 == 0
 
 
 @pytest.mark.parametrize("counts", [(30, 10), (5, 12, 40), (1, 1, 1, 97)])
