@@ -8,7 +8,7 @@ from concurrent.futures import BrokenExecutor
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Protocol, cast
+from types import ModuleType
 
 import msgspec
 
@@ -39,19 +39,9 @@ NAMES = (
 )
 
 
-class CaseModule(Protocol):
-    """A module of `cases`."""
-
-    CASE: Case
-
-    @staticmethod
-    def findings(full: bool) -> Iterator[Finding]:
-        """Run the case, quickly or in full, and yield its findings in a fixed order."""
-
-
-def load(name: str) -> CaseModule:
-    """Return the module of case `name`, one of NAMES."""
-    return cast("CaseModule", import_module(f".cases.{name}", __package__))
+def load(name: str) -> ModuleType:
+    """Return the module of case `name`, one of NAMES: its CASE, and its function findings(full)."""
+    return import_module(f".cases.{name}", __package__)
 
 
 Progress = Callable[[int, int], None]
@@ -144,7 +134,6 @@ _MEANINGS = (
     ("ulp", "the distance from the true number to the next double"),
     ("x 2^-53", "times 2^-53 of the number, or of the named quantity: the largest error of one rounding"),
     ("x rounding", "times the largest possible effect of rounding on this number, summed for each input"),
-    ("x growth", "the same, including the growth of earlier rounding errors in later rounds"),
     ("of the bound", "as a share of a bound that is computed for each input"),
     ("steps", "integers: entries of the integer tables, or a joint's codes"),
 )
@@ -208,12 +197,11 @@ def _fault(finding: Finding) -> str:
 def legend(report: Report) -> tuple[tuple[str, str], ...]:
     """Return the units in use that need an explanation, each with its meaning."""
     units = {check.finding.unit for case in report.cases for check in case.checks}
-    occurring = (
+    return tuple(
         (unit, meaning)
         for unit, meaning in _MEANINGS
         if any(each == unit or each.startswith(f"{unit} of ") for each in units)
     )
-    return tuple(occurring)
 
 
 def weka_lines(weka: Comparison | NotRun) -> tuple[str, ...]:
@@ -227,8 +215,6 @@ def weka_lines(weka: Comparison | NotRun) -> tuple[str, ...]:
         f"{_apart(weka.weka_itself, 'Weka with the two exp() settings of the JVM')}; {changed}",
         _apart(weka.ours_processor, "thenar and Weka with the processor's exp(), the default"),
         _apart(weka.ours_java, "thenar and Weka with Java's portable exp()"),
-        f"thenar trained on the rows in {weka.shuffles} other orders: "
-        + (f"at most {figure(weka.our_shuffled)}" if weka.our_shuffled else "the same bits"),
     )
 
 

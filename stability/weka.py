@@ -92,7 +92,6 @@ ROUNDS = 100
 CLASSES, ROWS_A_CLASS, SWITCHES, JOINTS = 10, 8, 16, 3
 _SEED = 6
 _FLIPPED = 0.12  # of the switches
-_SHUFFLES = 10
 
 
 class Differences(msgspec.Struct, frozen=True):
@@ -114,8 +113,6 @@ class Comparison(msgspec.Struct, frozen=True, tag="run"):
     ours_processor: Differences  # thenar and Weka with the processor's exp()
     ours_java: Differences
     weka_changed: int  # held-out rows whose class in Weka depends on the choice of exp()
-    shuffles: int  # number of other row orders in which thenar was trained
-    our_shuffled: float  # the largest difference between its held-out distributions in these orders
 
 
 class NotRun(msgspec.Struct, frozen=True, tag="not run"):
@@ -167,8 +164,6 @@ def _compare() -> Comparison:
         ours_processor=_differences(outputs["o"], outputs["p"]),
         ours_java=_differences(outputs["o"], outputs["j"]),
         weka_changed=int(np.count_nonzero(winners(processor.scores(held_out)) != winners(java.scores(held_out)))),
-        shuffles=_SHUFFLES,
-        our_shuffled=_shuffled(outputs["o"], *training, held_out),
     )
 
 
@@ -181,10 +176,3 @@ def _differences(one: Floats, other: Floats) -> Differences:
     largest = np.abs(one - other).max(axis=(1, 2))
     apart = np.flatnonzero(largest > DIVERGED)
     return Differences(tuple(largest.tolist()), int(apart[0]) + 1 if apart.size else None)
-
-
-def _shuffled(output: Floats, X: NDArray[np.int64], labels: NDArray[np.intp], held_out: NDArray[np.int64]) -> float:
-    random = np.random.default_rng(_SEED)
-    orders = (random.permutation(len(labels)) for _ in range(_SHUFFLES))
-    again = (_staged(boost(X[order], labels[order], CLASSES, rounds=ROUNDS)[0], held_out) for order in orders)
-    return max(float(np.abs(output - other).max()) for other in again)

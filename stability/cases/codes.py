@@ -1,38 +1,23 @@
 """Codes at the ends of their range, neighbouring codes, and the coding of floating-point degrees on import."""
 
 import csv
-import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.boosting.binning import midpoints
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.recordings.columns import ColumnRoles, JointColumns
-from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
 from thenar.compiler.recordings.table import read_table
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 
 from ..finding import Case, Finding, Worst
-
-# Neighbouring doubles, subnormal ones, both zeros, and ends at which a sum of two overflows.
-HARD_DOUBLES = sorted(
-    {
-        *(sign * x for sign in (-1, 1) for x in (5e-324, 1e-323, 2.2e-308, 1e-9, 1.0, 1e12, 8.9e307, 1.7e308)),
-        *(math.nextafter(x, math.inf) for x in (5e-324, 1.0, 1e12, 1.7e308, -1.7e308)),
-        *(1.0 + n * 1e-9 for n in range(1, 4)),
-        0.0,
-    }
-)
 
 # Values and their coding grids: half a step from two codes, a billionth apart, far from zero, next to the finest grid
 # allowed, subnormal, zeros, infinite binary fractions, huge and tiny.
@@ -49,44 +34,19 @@ HARD_DEGREES: tuple[tuple[tuple[float, ...], float], ...] = (
     ((1e-200, 1.4e-200, 2.3e-199), 1e-200),
 )
 
-# Invalid cells of a joint and a switch; the empty ones are missing.
-NO_NUMBERS = ("inf", "-inf", "Infinity", "1e400", "-1e400", "nan", "NaN", "", "?", "1_0", "0x10", "1,5", "one")
-NO_CODES = (*NO_NUMBERS, "-1", "65536", "0.5", "1e12", "5e-324")
-NO_BITS = (*NO_NUMBERS, "2", "-1", "0.5", "5e-324")
-# Any other text is a valid trial name.
-MISSING = ("nan", "NaN", "", "?")
-NO_FLOATS = (math.inf, -math.inf, math.nan)
-
 
 CASE = Case(
     title="Codes and degrees at their ends",
-    danger="a threshold falls on the wrong side of a code, or invalid text silently becomes a number",
+    danger="a threshold falls on the wrong side of a code, or a value gets a code that is not the nearest",
 )
 
 EVERY_CODE = np.arange(HIGHEST_CODE + 1)
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Split neighbouring values, evaluate every code with stumps and tables, and import hard values."""
-    yield _midpoints(200 if full else 20)
+    """Evaluate every code with stumps and tables, and import hard values."""
     yield _every_code(60 if full else 6)
     yield from _coded()
-    yield _refused()
-
-
-def _midpoints(draws: int) -> Finding:
-    """A threshold between neighbours separates them, at most half an ulp from their middle: one rounding."""
-    off = Worst("thresholds between neighbouring doubles", "fractions", 0.5, "ulp")
-    random = np.random.default_rng(4)
-    lists = [np.array(HARD_DOUBLES)]
-    lists += [np.unique(random.standard_normal(50) * 10.0 ** random.integers(-320, 300, 50)) for _ in range(draws)]
-    for values in lists:
-        found_between = zip(pairwise(values.tolist()), midpoints(values).tolist(), strict=True)
-        for (low, high), found in found_between:
-            middle = (Fraction(low) + Fraction(high)) / 2
-            error = abs(Fraction(found) - middle) / Fraction(math.ulp(float(middle)))
-            off.see(float(error) if low <= found < high else math.inf, f"between {low!r} and {high!r}")
-    return off.finding()
 
 
 def hard_codes(seed: int) -> tuple[NDArray[np.uint16], NDArray[np.intp]]:
@@ -147,58 +107,11 @@ def _coded() -> Iterator[Finding]:
 
 
 def _imported(values: Sequence[float], grid: float) -> tuple[GraspSet, ImportReport]:
-    rows = [["a", "1", repr(value)] for value in values]
+    columns = ColumnRoles(
+        "grasp", frames="independent", switches=("switch",), joints=(JointColumns(("joint",), grid=grid),)
+    )
     with TemporaryDirectory() as folder:
-        table = _csv(Path(folder), rows)
-        return import_table(read_table(table), _columns(JointColumns(("joint",), grid=grid)))
-
-
-def _columns(joint: JointColumns, trial: str | None = None) -> ColumnRoles:
-    frames: Literal["independent"] | None = None if trial else "independent"
-    return ColumnRoles(label="grasp", trial=trial, frames=frames, switches=("switch",), joints=(joint,))
-
-
-def _csv(folder: Path, rows: Sequence[Sequence[str]], heads: Sequence[str] = ("grasp", "switch", "joint")) -> Path:
-    path = folder / "table.csv"
-    with path.open("w", newline="") as file:
-        csv.writer(file).writerows([heads, *rows])
-    return path
-
-
-def _refused() -> Finding:
-    """Import rejects a cell that is not a number, code, bit or trial, and names its row and column."""
-    named = Worst("bad cells not rejected with row and column", "the cell's row and column", 0, "cells")
-    with TemporaryDirectory() as name:
-        for what, complaint, where in _complaints(Path(name)):
-            named.see(where not in complaint, f"{what}: {complaint}")
-    return named.finding()
-
-
-def _complaints(folder: Path) -> Iterator[tuple[str, str, str]]:
-    """Yield a description of the cell, the error message of its import, and the location that it must name."""
-    heads = ("grasp", "switch", "joint", "trial")
-    degrees, codes = JointColumns(("joint",)), JointColumns(("joint",), codes=True)
-    for column, entry, cells in (
-        ("joint", degrees, NO_NUMBERS),
-        ("joint", codes, NO_CODES),
-        ("switch", degrees, NO_BITS),
-        ("trial", degrees, MISSING),
-    ):
-        for cell in cells:
-            good = dict.fromkeys(heads, "1")
-            rows = [list((good | bad).values()) for bad in ({}, {}, {column: cell}, {})]
-            path = _csv(folder, rows, heads)
-            yield f"{column} {cell!r} as text", _complaint(path, entry), f"row 4 {column!r} ({cell!r})"
-    for column in heads:
-        for number in NO_FLOATS:
-            arrays = {head: np.array([1.0, 1.0, number if head == column else 1.0, 1.0]) for head in heads}
-            np.savez(folder / "table.npz", **arrays)  # type: ignore[arg-type]  # typeshed takes arrays for flags
-            yield f"{column} {number}", _complaint(folder / "table.npz", degrees), f"row 3 {column!r} ('{number}')"
-
-
-def _complaint(path: Path, entry: JointColumns) -> str:
-    try:
-        import_table(read_table(path), _columns(entry, trial="trial"))
-    except TableError as complaint:
-        return str(complaint)
-    return "no error"
+        path = Path(folder) / "table.csv"
+        with path.open("w", newline="") as file:
+            csv.writer(file).writerows([("grasp", "switch", "joint"), *(("a", "1", repr(value)) for value in values)])
+        return import_table(read_table(path), columns)

@@ -6,7 +6,7 @@ Mass is only a weight: a massless object is one without weight, held by skin and
 from collections.abc import Iterator
 from itertools import chain
 
-from ..contact import halving, rest, surfaces, systems
+from ..contact import halving, rest, surfaces
 from ..finding import Case, Finding
 
 CASE = Case(
@@ -16,6 +16,5 @@ CASE = Case(
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield errors of surfaces and rotations, of the Newton system, of rest, and of halved steps."""
-    parts = (surfaces, systems, rest, halving)
-    return chain.from_iterable(part.findings(full) for part in parts)
+    """Yield errors of surfaces and rotations, of rest, and of halved steps."""
+    return chain.from_iterable(part.findings(full) for part in (surfaces, rest, halving))

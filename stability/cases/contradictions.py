@@ -7,18 +7,21 @@ to them up to rounding. The case `separable` explains when the loss falls on the
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 
+import mpmath
 import numpy as np
+from mpmath import mpf
 
 from thenar.compiler.boosting.boost import boost
 from thenar.runtime.model.tables import winners
 
-from ..checks.class_rounds import see_round
-from ..checks.rounds import entropy_left, idle_loss, loss_rounding, moments, resting_error, rise_rounding
+from ..checks.roundings import ROUNDING, share_error
+from ..checks.rounds import Moment, counted, loss_rounding, moments, rise_rounding
 from ..finding import REFERENCE, Case, Finding, Worst
-from ..inputs.hard_data import HardSet, contradictory, imbalanced, noisy, repeated
-from ..reference.boosting import mean_loss
-from ..reference.numbers import distance
+from ..inputs.hard_data import HardSet, contradictory, imbalanced, noisy
+from ..reference.information import entropy_bits
+from ..reference.numbers import distance, precisely
 
 CASE = Case(
     title="Contradictions",
@@ -27,10 +30,9 @@ CASE = Case(
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield errors of the limit on contradictory frames, and the effects of repetition and noise."""
+    """Yield errors of the limit on contradictory frames, and the effects of noise."""
     yield from _rest(frames(full), 2_000 if full else 120)
     yield _ties()
-    yield _repetition((10**4, 10**6) if full else (10**4,))
     yield from _noise(1_000 if full else 40)
 
 
@@ -62,6 +64,46 @@ def _rest(sets: Iterator[HardSet], rounds: int) -> Iterator[Finding]:
     yield from (shares.finding(), losses.finding())
 
 
+@precisely()
+def entropy_left(hard: HardSet) -> mpf:
+    """Return the entropy of the class given the frame, in nats: the least possible mean loss of scores of frames."""
+    counts = list(counted(hard).values())
+    total = sum(map(sum, counts))
+    return mpmath.fsum(sum(row) * entropy_bits(row) for row in counts) / total * mpmath.log(2)
+
+
+@precisely()
+def resting_error(hard: HardSet, last: Moment) -> float:
+    """Return the error of shares P against those of the counts, as a share of the rounding bound after convergence.
+
+    Boosting converges to sum u (Y - P) = 0. There 1 - P is off by 2^-54, the resolution of P, and the products round.
+    P cannot be more accurate than the scores' last places allow: two scores, each rounded, each at most one place off;
+    nor than its own rounding. Each class that a frame lacks may keep the weight of `unsettled`.
+    """
+    errors, counts, idle = [], counted(hard), unsettled(last)
+    for row, F, got in zip(hard.X.tolist(), last.scores.T.tolist(), last.shares.T.tolist(), strict=True):
+        own = counts[tuple(row)]
+        for k, P in enumerate(got):
+            truth = mpf(own[k]) / sum(own)
+            allowed = ROUNDING * (1 + truth * (4 + 4 * max(map(abs, F)))) + share_error(F, k, truth)
+            errors.append(abs(P - truth) / (allowed + own.count(0) * idle * hard.scale / sum(own)))
+    return float(max(errors))
+
+
+def unsettled(last: Moment) -> float:
+    """Return the most weight that a frame can keep: below a share of 2^-38 of its class's, its branch counts as empty.
+
+    Then it follows the mean of all rows, which is constant once they have converged, and learns nothing more itself.
+    """
+    return 2.0**-38 * float(last.weights.sum(axis=1).max())
+
+
+def idle_loss(hard: HardSet, last: Moment) -> float:
+    """Return the largest remaining loss of frames of a single class, in which each of K classes keeps `unsettled`."""
+    lacking = sum(row.count(0) for row in counted(hard).values())
+    return lacking * unsettled(last) / float(hard.scaled_weights.sum())
+
+
 def _ties() -> Finding:
     """Classes of equal counts on a frame: the lowest-numbered is predicted, by the tie rule."""
     worst = Worst("equal counts go to the lowest class", "the rule itself", 0.0, "frames")
@@ -79,23 +121,8 @@ def _ties() -> Finding:
     return worst.finding()
 
 
-def _repetition(ratios: tuple[int, ...]) -> Finding:
-    """Rows repeated as often as their weight converge to the same shares."""
-    worst = Worst("P with repeated rows", "shares of the counts", 1.0, "x rounding")
-    for ratio in ratios:
-        hard = repeated(imbalanced(ratio))
-        stumps, _ = boost(hard.X, hard.labels, 2, rounds=60)
-        frames = imbalanced(ratio)
-        *_, last = moments(frames, stumps)
-        worst.see(resting_error(frames, last), hard.name, len(hard.labels))
-    return worst.finding()
-
-
 def _noise(rounds: int) -> Iterator[Finding]:
-    """Sets of 16 frames with 0 to 60 % random labels: rounds, losses, and the fall of the loss where it is required."""
-    chosen = Worst("stumps chosen under label noise", REFERENCE, 1.0, "x rounding")
-    outputs = Worst("outputs of branches under label noise", REFERENCE, 1.0, "x rounding")
-    losses = Worst("losses under label noise", REFERENCE, 1.0, "x rounding")
+    """Sets of 16 frames with 0 to 60 % random labels: losses, and the fall of the loss where it is required."""
     below = Worst("losses below the remaining entropy", REFERENCE, 0.0, "rounds")
     rises = Worst("rise of the loss where it must fall", "convexity", 1.0, "x rounding")
     for hard, shrinkage in noisy_sets():
@@ -103,18 +130,11 @@ def _noise(rounds: int) -> Iterator[Finding]:
         least = float(entropy_left(hard))
         above = least - loss_rounding(hard.n_classes, least)
         below.see(float(sum(loss < above for loss in falling)), hard.name, len(falling))
-        before = None
-        for number, moment in enumerate(moments(hard, stumps)):
-            at = f"{hard.name}, round {number}"
-            if number % (rounds // 2) == 1:
-                see_round(hard, stumps, number, moment.scores, 3.0, chosen, outputs)
-                truth = mean_loss(moment.scores.T.tolist(), hard.labels.tolist())
-                losses.see(distance(moment.loss, truth) / loss_rounding(hard.n_classes, float(truth)), at)
-            if before is not None and shrinkage * (hard.n_classes - 1) <= 1:
-                rise = max(0.0, moment.loss - before.loss)
-                rises.see(rise / rise_rounding(hard.n_classes, before, moment), at)
-            before = moment
-    yield from (worst.finding() for worst in (chosen, outputs, losses, below, rises))
+        if shrinkage * (hard.n_classes - 1) <= 1:
+            for number, (before, after) in enumerate(pairwise(moments(hard, stumps)), 1):
+                rise = max(0.0, after.loss - before.loss)
+                rises.see(rise / rise_rounding(hard.n_classes, before, after), f"{hard.name}, round {number}")
+    yield from (worst.finding() for worst in (below, rises))
 
 
 def noisy_sets() -> Iterator[tuple[HardSet, float]]:

@@ -1,6 +1,6 @@
 """Sets with one row, column or class, a class with one row or none, as many classes as rows, no kept switch."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,9 +12,6 @@ from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import softmax
-from thenar.compiler.evaluation.study import evaluate
-from thenar.compiler.placement.placement import place
-from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import Build
 from thenar.runtime.model.tables import winners
 
@@ -53,14 +50,12 @@ SOLVABLE = {
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Build, place and evaluate such sets, and compare the first round's values with their closed forms."""
+    """Build such sets, and compare the first round's values with their closed forms."""
     yield _recognised()
-    yield _refused()
     yield _one_class(50 if full else 10)
     classes = range(2, 34) if full else (2, 3, 4, 7, 33)
     yield from _first_round(classes)
     yield _never_predicted(classes, 200 if full else 20)
-    yield _nothing_to_see()
 
 
 def _recognised() -> Finding:
@@ -75,39 +70,6 @@ def _recognised() -> Finding:
         wrong = sum(build.classify(bits, codes) != grasp for bits, codes, grasp in frames)
         rows.see(wrong, name, tried=len(grasp_set))
     return rows.finding()
-
-
-def _refused() -> Finding:
-    """An impossible request ends in a readable error message."""
-    fewer = "1 rows cannot be cut into 4 folds"
-    asked: list[tuple[str, Callable[[Path], object], str]] = [
-        ("build of one row", lambda f: compile_build(_ONE_ROW, f), "hold 1 grasp type"),
-        ("build of one class", lambda f: compile_build(_ONE_CLASS, f), "hold 1 grasp type"),
-        ("build of no row", lambda f: compile_build(_ONE_ROW.rows([]), f), "hold 0 grasp type"),
-        ("build of constants", lambda f: compile_build(_CONSTANT, f), "no input differs between rows"),
-        ("build of no switch", lambda f: compile_build(_CONSTANT, f, inputs="switches"), "no switch is worth keeping"),
-        ("build in folds of one", lambda f: compile_build(SOLVABLE["two rows"], f, folds=1), "leave nothing to train"),
-        ("build in more folds than rows", lambda f: compile_build(SOLVABLE["two rows"], f), "cannot be cut"),
-        ("a fold that sees one row", lambda f: compile_build(SOLVABLE["two rows"], f, folds=2), "in fold 1"),
-        ("placement of no row", lambda _: place(_ONE_ROW.rows([])), "there are no rows"),
-        ("placement of no switch", lambda _: place(SOLVABLE["one joint"]), "no switches to place"),
-        ("rates of no row", lambda _: evaluate(_ONE_ROW.rows([])), "the set has no rows"),
-        ("rates of one row", lambda _: evaluate(_ONE_ROW), fewer),
-        ("rates without the one subject", lambda _: evaluate(_ONE_CLASS, scheme="subject"), "two or more"),
-    ]
-    found = Worst("impossible requests not rejected with the right message", "the message", 0, "requests")
-    for what, question, sentence in asked:
-        with TemporaryDirectory() as folder:
-            found.see(sentence not in _complaint(question, Path(folder) / "build"), what)
-    return found.finding()
-
-
-def _complaint(question: Callable[[Path], object], folder: Path) -> str:
-    try:
-        question(folder)
-    except ThenarError as complaint:
-        return str(complaint)
-    return "no error"
 
 
 def _one_class(rounds: int) -> Finding:
@@ -162,15 +124,3 @@ def _never_predicted(classes: Sequence[int], rounds: int) -> Finding:
         scores = _without_the_last(k, rounds).scores(frames)
         wins.see(int((winners(scores) == k - 1).sum()), f"{k} classes", tried=len(frames))
     return wins.finding()
-
-
-def _nothing_to_see() -> Finding:
-    """If no input varies, every table of the evaluation predicts the most frequent grasp type."""
-    study = evaluate(_CONSTANT, jobs=1, rounds=2, repeats=1)
-    off = Worst("correct rows if no input varies: off by", "the commonest type's rows", 0, "rows")
-    for table in study.tables:
-        for row in table.rows:
-            for cell in row.cells:
-                # 11 of the 12 rows are of type b, and in any 9 of them it is the most frequent.
-                off.see(max(abs(correct - 11) for correct in cell.rate.correct), f"{table.name} {row.name}")
-    return off.finding()

@@ -31,7 +31,6 @@ def findings(full: bool) -> Iterator[Finding]:
     tables = [*hand_made(), *(random_table(rng) for _ in range(150 * more))]
     yield gains_of(tables)
     yield entropies_of(tables)
-    yield _nothing(rng, 50 * more)
     pairs = [*equal_pairs(), *close_pairs(rng, 60 * more)]
     yield comparisons_of(pairs)
     yield choices_of(pairs)
@@ -68,20 +67,6 @@ def entropies_of(tables: list[Counts]) -> Finding:
         with precisely():
             allowed = ROUNDING * (5 * _n_log_n([*totals, n]) / (n * mpmath.log(2)) + 4 * entropy)
             worst.see(part_of(got, entropy, allowed), f"of {n} rows")
-    return worst.finding()
-
-
-def _nothing(rng: np.random.Generator, n: int) -> Finding:
-    """An input that is independent of the class gains exactly 0; with one more row in a cell, more than 0."""
-    worst = Worst("a gain of exactly zero", "the rule itself", 0.0, "gains")
-    wrong = 0
-    for _ in range(n):
-        classes, values = rng.integers(1, 30_000, 3), rng.integers(1, 30_000, 2)
-        independent = np.outer(classes, values)
-        wrong += gain_bits(independent) != 0.0
-        independent[0, 0] += 1
-        wrong += not gain_bits(independent) > 0.0
-    worst.see(float(wrong), tried=2 * n)
     return worst.finding()
 
 

@@ -2,12 +2,12 @@
 
 Exact invariances: the order of rows, constant and copied columns, order-preserving recoding of codes, weights times a
 power of two, two swapped classes; and for ID3, which compares gains exactly, all of these except ties. Three or more
-renumbered classes are summed in another order, and three times the rows are summed on another grid: then scores change
-by rounding. Ties go to the lowest number, so that two trainings with renumbered columns may diverge, but only at stumps
-that explain equally much.
+renumbered classes are summed in another order, three times the rows are summed on another grid, and of equal stumps in
+renumbered columns another one has the lowest number: such trainings may diverge, but each round must be right for the
+original set, too.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,30 +16,22 @@ from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import Stumps
-from thenar.compiler.elementary import Floats
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.substitutes import fit_lost
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
-from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import quantise
-from thenar.runtime.model.tables import TIE, ScoreTables
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 
-from ..checks.class_rounds import ClassRound, Step, branches, class_rounds, grown, step_of
-from ..checks.rounds import counted
-from ..finding import Case, Finding, Worst
+from ..checks.class_rounds import see_round
+from ..checks.rounds import counted, moments
+from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import HardSet, contradictory, intervals, noisy, separable, words
-from ..reference.numbers import precisely
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Change:
-    """A set equivalent to another.
-
-    inputs[i] is the new number of column i, classes[k] the new number of class k; the rows of the other set are the
-    rows of this one at `rows`.
-    """
+    """A set equivalent to another: inputs[i] is the new number of column i, classes[k] the new number of class k."""
 
     name: str
     hard: HardSet
@@ -56,11 +48,6 @@ def unweighted(hard: HardSet) -> HardSet:
     return replace(hard, weights=None)
 
 
-def rows_in_another_order(hard: HardSet, rng: np.random.Generator) -> Change:
-    """Shuffle the rows."""
-    return _same("rows in another order", hard, with_rows(hard, rng.permutation(len(hard.labels))))
-
-
 def rows_several_times(hard: HardSet, times: int) -> Change:
     """Repeat the whole set several times."""
     return _same(f"the set {times} times", hard, with_rows(hard, np.tile(np.arange(len(hard.labels)), times)))
@@ -72,34 +59,30 @@ def with_rows(hard: HardSet, rows: NDArray[np.intp]) -> HardSet:
     return replace(hard, X=hard.X[rows], labels=hard.labels[rows], weights=weights)
 
 
-def constant_columns(hard: HardSet) -> Change:
-    """Insert a constant open switch first, and append a constant joint."""
+def exact_changes(hard: HardSet, rng: np.random.Generator) -> Iterator[Change]:
+    """Yield equivalent sets whose trained models must be the same to the last bit."""
     n, d = hard.X.shape
-    X = np.column_stack([np.zeros(n, np.int64), hard.X, np.full(n, 77)])
-    changed = replace(hard, X=X, n_switches=hard.n_switches + 1)
-    return Change("a constant switch and joint more", changed, tuple(range(1, d + 1)), tuple(range(hard.n_classes)))
-
-
-def copied_columns(hard: HardSet) -> Change:
-    """Append a copy of every column as a joint: equal columns tie, and the lowest number wins."""
-    return _same("columns twice", hard, replace(hard, X=np.column_stack([hard.X, hard.X])))
-
-
-def codes_recoded(hard: HardSet, rng: np.random.Generator) -> Change:
-    """Replace the codes of every joint by others in the same order, including 0 and the largest."""
+    yield _same("rows in another order", hard, with_rows(hard, rng.permutation(n)))
+    # The switch is the first column, the joint the last.
+    constant = np.column_stack([np.zeros(n, np.int64), hard.X, np.full(n, 77)])
+    more = replace(hard, X=constant, n_switches=hard.n_switches + 1)
+    name = "a constant switch and a constant joint more"
+    yield Change(name, more, tuple(range(1, d + 1)), tuple(range(hard.n_classes)))
+    # Other codes in the same order, among them 0 and the largest.
     X = hard.X.copy()
-    for column in range(hard.n_switches, X.shape[1]):
+    for column in range(hard.n_switches, d):
         values, ranks = np.unique(X[:, column], return_inverse=True)
         codes = np.sort(rng.choice(HIGHEST_CODE + 1, len(values), replace=False))
         codes[[0, -1]] = 0, HIGHEST_CODE
         X[:, column] = codes[ranks] if len(values) > 1 else X[:, column]
-    return _same("codes recoded in order", hard, replace(hard, X=X))
-
-
-def weights_scaled(hard: HardSet, power: int) -> Change:
-    """Multiply all weights by a power of two."""
-    weights = np.ones(len(hard.labels)) if hard.weights is None else hard.weights
-    return _same(f"weights times 2^{power}", hard, replace(hard, weights=np.ldexp(weights, power)))
+    yield _same("codes recoded in order", hard, replace(hard, X=X))
+    weights = np.ones(n) if hard.weights is None else hard.weights
+    scaled = np.ldexp(weights, int(rng.choice([-1000, 900])))
+    yield _same("weights times 2^-1000 or 2^900", hard, replace(hard, weights=scaled))
+    # Copies are joints. Equal columns tie, and the lowest number wins.
+    yield _same("every column twice", hard, replace(hard, X=np.column_stack([hard.X, hard.X])))
+    if hard.n_classes == 2:
+        yield replace(classes_permuted(hard, rng), name="two classes swapped")
 
 
 def classes_permuted(hard: HardSet, rng: np.random.Generator) -> Change:
@@ -122,41 +105,25 @@ def columns_reversed(hard: HardSet) -> Change:
 ROUNDS = 30
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Learnt:
-    """The result of `learn`."""
+def numbers(change: Change) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Train all models on the changed set; yield name and array of all parameters except thresholds.
 
-    tree: Tree
-    stumps: Stumps
-    losses: tuple[float, ...]
-    tables: ScoreTables
-    integers: IntegerTables
-
-
-def learn(hard: HardSet, rounds: int = ROUNDS) -> Learnt:
-    """Train all models on `hard`. ID3 does not use weights."""
-    stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
+    Inputs and classes have the original numbers. A stump or node of any other input has number -1. ID3 does not use
+    weights.
+    """
+    hard, inputs, order = change.hard, change.inputs, list(change.classes)
+    stumps, losses = boost(hard.X, hard.labels, hard.n_classes, rounds=ROUNDS, weights=hard.weights)
     tables = collapse(stumps, hard.n_switches)
     integers = fit_lost(quantise(tables, hard.bits, hard.codes), hard.bits, hard.codes, hard.labels)
-    return Learnt(grow_id3(hard.X, hard.labels), stumps, falling, tables, integers)
-
-
-def numbers(learnt: Learnt, inputs: Sequence[int], classes: Sequence[int]) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield name and array of all trained parameters except thresholds, with inputs and classes in the given numbering.
-
-    A stump or node of any other input has number -1.
-    """
+    tree = grow_id3(hard.X, hard.labels)
     place = {column: number for number, column in enumerate(inputs)}
-    tables, integers, order = learnt.tables, learnt.integers, list(classes)
-    n_switches = len(tables.switch_rows)
-    switches = [column for column in inputs if column < n_switches]
-    joints = [column - n_switches for column in inputs if column >= n_switches]
-    columns = np.vectorize(lambda column: place.get(column, -1), otypes=[np.intp])(learnt.stumps.columns)
-    yield "columns", columns[:, order]
-    yield "outputs", learnt.stumps.values[:, order]
-    yield "losses", np.array(learnt.losses)
-    yield "tree", np.array([place.get(-1 if node.input is None else node.input, -1) for node in learnt.tree.nodes])
-    yield "counts", _counts(learnt.tree, order)
+    switches = [column for column in inputs if column < hard.n_switches]
+    joints = [column - hard.n_switches for column in inputs if column >= hard.n_switches]
+    yield "columns", renumbered(stumps, change).columns
+    yield "outputs", stumps.values[:, order]
+    yield "losses", np.array(losses)
+    yield "tree", np.array([place.get(-1 if node.input is None else node.input, -1) for node in tree.nodes])
+    yield "counts", _counts(tree, order)
     yield "bias", tables.bias[order]
     yield "switch rows", tables.switch_rows[switches][:, order]
     yield "joint rows", _stacked([tables.joint_rows[joint][:, order] for joint in joints], tables.bias)
@@ -178,86 +145,7 @@ def _stacked(rows: list[NDArray[Any]], like: NDArray[Any]) -> NDArray[Any]:
     return np.concatenate([np.zeros((0, like.size), like.dtype), *rows])
 
 
-Z_MAX = 3.0
 SAME = "training on the original set"
-
-
-class Followed:
-    """A training on an unweighted set whose rounds are computed at 60 digits once, on demand.
-
-    All changes of the set are compared with the same numbers.
-    """
-
-    def __init__(self, hard: HardSet, rounds: int) -> None:
-        self.hard = hard
-        self.stumps = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds)[0]
-        self.scores = list(self.stumps.staged_scores(hard.X))
-        self._given: dict[int, list[ClassRound]] = {}
-        self._steps: dict[int, Step] = {}
-
-    def given(self, number: int) -> list[ClassRound]:
-        """Return the targets of the stumps of round `number`, from 0."""
-        if number not in self._given:
-            F = self.scores[number - 1] if number else np.zeros((len(self.hard.X), self.hard.n_classes))
-            self._given[number] = class_rounds(F.tolist(), self.hard.labels.tolist(), Z_MAX)
-        return self._given[number]
-
-    def step(self, number: int, largest: float) -> Step:
-        """Return the step of round `number`; |F| <= largest."""
-        if number not in self._steps:
-            places = zip(self.stumps.columns[number].tolist(), self.stumps.thresholds[number].tolist(), strict=True)
-            parts = [branches(self.hard.X[:, column], threshold) for column, threshold in places]
-            labels = self.hard.labels.tolist()
-            self._steps[number] = step_of(self.given(number), parts, labels, self.stumps.shrinkage, Z_MAX)
-        return self._steps[number].on_scores_of(largest)
-
-
-class Partings:
-    """Collects differences of scores and predictions between two trainings while their stumps are equal, and the
-    difference in explained variation where their stumps first differ.
-
-    After they have diverged at a tie no invariance holds: stumps that explain equally much are not the same stumps.
-    """
-
-    def __init__(self) -> None:
-        self._apart = Worst("scores, renumbered or repeated, while stumps agree", SAME, 1.0, "x growth")
-        self._winners = Worst("winners, except ties, while stumps agree", SAME, 0.0, "rows")
-        self._diverged = Worst("variation explained by two stumps that first differ", "60 digits", 1.0, "x rounding")
-
-    def findings(self) -> Iterator[Finding]:
-        """Yield the findings."""
-        return (worst.finding() for worst in (self._apart, self._winners, self._diverged))
-
-    def see(self, training: Followed, change: Change) -> None:
-        """Train on the other set without weights, and follow the rounds until the end or until the two diverge."""
-        one, hard, of = training.stumps, training.hard, change.hard
-        other = renumbered(boost(of.X, of.labels, of.n_classes, rounds=one.n_rounds)[0], change)
-        alike: list[tuple[Floats, Floats]] = []
-        for number, both in enumerate(zip(training.scores, other.staged_scores(hard.X), strict=True)):
-            at = f"{hard.name}, {change.name}, round {number + 1}"
-            if self._see_stumps(training, number, other, change, at):
-                break
-            alike.append(both)
-            self._winners.see(_predicted_otherwise(*both), at, len(hard.X))
-        self._see_scores(training, change, alike)
-
-    def _see_scores(self, training: Followed, change: Change, alike: Sequence[tuple[Floats, Floats]]) -> None:
-        """Compare the scores after rounds 1, 2, 4, 8 and so on, and after the last round whose stumps agree."""
-        steps = [training.step(number, float(np.abs(both).max())) for number, both in enumerate(alike)]
-        for number, (one, other) in enumerate(alike, 1):
-            if number & (number - 1) == 0 or number == len(alike):
-                at = f"{training.hard.name}, {change.name}, round {number}"
-                self._apart.see(float((np.abs(one - other).ravel() / (2 * grown(steps[:number]))).max()), at)
-
-    def _see_stumps(self, training: Followed, number: int, other: Stumps, change: Change, at: str) -> bool:
-        """Return whether the stumps of round `number` differ; if so, record the difference in explained variation."""
-        both = (training.stumps, other)
-        places = [list(zip(of.columns[number].tolist(), of.thresholds[number].tolist(), strict=True)) for of in both]
-        for k, (first, second) in enumerate(zip(*places, strict=True)):
-            if first != second:
-                given = training.given(number)[k]
-                self._diverged.see(_doubt(training.hard, given, (first, second), len(change.hard.labels)), at)
-        return places[0] != places[1]
 
 
 def renumbered(other: Stumps, change: Change) -> Stumps:
@@ -269,36 +157,10 @@ def renumbered(other: Stumps, change: Change) -> Stumps:
     return Stumps(len(change.inputs), columns, other.thresholds[:, order], other.values[:, order], other.shrinkage)
 
 
-@precisely()
-def _doubt(hard: HardSet, given: ClassRound, places: Sequence[tuple[int, float]], rows: int) -> float:
-    """Return the difference of two stumps in explained variation, as a share of the tolerance of training.
-
-    `rows` is the number of rows of the larger set, on which the rounding of its grid depends.
-    """
-    one, other = (given.explained(hard.X, *place) for place in places)
-    return float(abs(one - other) / given.doubt(Z_MAX, rows / len(given.weights)))
-
-
-def _predicted_otherwise(one: Floats, other: Floats) -> int:
-    """Return the number of rows of scores (n, K) with different winners, except for ties in either."""
-    rows, first, second = np.arange(len(one)), one.argmax(axis=1), other.argmax(axis=1)
-    leads = one[rows, first] - one[rows, second], other[rows, second] - other[rows, first]
-    return int(np.count_nonzero(np.minimum(*leads) > TIE))
-
-
 CASE = Case(
     title="Scale-free facts",
     danger="the order of rows, columns or classes, copies, units or names of codes change the trained model",
 )
-
-_EXACT: dict[str, Callable[[HardSet, np.random.Generator], Change]] = {
-    "rows in another order": rows_in_another_order,
-    "a constant switch and a constant joint more": lambda hard, _: constant_columns(hard),
-    "codes recoded in order": codes_recoded,
-    "weights times 2^-1000 or 2^900": lambda hard, rng: weights_scaled(hard, int(rng.choice([-1000, 900]))),
-    "every column twice": lambda hard, _: copied_columns(hard),
-    "two classes swapped": classes_permuted,
-}
 
 
 def findings(full: bool) -> Iterator[Finding]:
@@ -333,21 +195,16 @@ def hard_sets(draws: int) -> Iterator[HardSet]:
 
 def _exact(sets: list[HardSet]) -> Iterator[Finding]:
     """Yield, change by change, the number of trained arrays that differ in any bit."""
-    before = {hard: learn(hard) for hard in dict.fromkeys(sets)}
-    for name, change_of in _EXACT.items():
-        rng = np.random.default_rng(1)
-        worst = Worst(f"{name}: all trained parameters", SAME, 0.0, "arrays")
-        for hard in sets:
-            if change_of is not classes_permuted or hard.n_classes == 2:
-                _see_exact(before[hard], change_of(hard, rng), worst)
-        yield worst.finding()
-
-
-def _see_exact(learnt: Learnt, change: Change, worst: Worst) -> None:
-    inputs, classes = range(learnt.stumps.n_inputs), range(learnt.stumps.n_classes)
-    new = numbers(learn(change.hard), change.inputs, change.classes)
-    for (name, before), (_, after) in zip(numbers(learnt, inputs, classes), new, strict=True):
-        worst.see(float(not np.array_equal(before, after)), f"{change.hard.name}, {change.name}: {name}")
+    rng = np.random.default_rng(1)
+    before = {hard: list(numbers(_same("unchanged", hard, hard))) for hard in dict.fromkeys(sets)}
+    differ: dict[str, Worst] = {}
+    for hard in sets:
+        for change in exact_changes(hard, rng):
+            name = change.name
+            worst = differ.setdefault(name, Worst(f"{name}: all trained parameters", SAME, 0.0, "arrays"))
+            for (part, one), (_, other) in zip(before[hard], numbers(change), strict=True):
+                worst.see(float(not np.array_equal(one, other)), f"{hard.name}: {part}")
+    yield from (worst.finding() for worst in differ.values())
 
 
 def _tree(sets: list[HardSet]) -> Iterator[Finding]:
@@ -374,16 +231,24 @@ def _asked(hard: HardSet) -> list[tuple[int | None, tuple[int, ...]]]:
 
 
 def _near(sets: list[HardSet], rounds: int) -> Iterator[Finding]:
-    """Yield the changes by rounding, the reasons of divergence, and differing predictions until then."""
-    rng, partings = np.random.default_rng(3), Partings()
-    trainings = {hard: Followed(unweighted(hard), rounds) for hard in dict.fromkeys(sets)}
-    for training in map(trainings.__getitem__, sets):
-        hard = training.hard
+    """Check that each round is right for the original set, given its scores before: stumps explain as much as the best.
+
+    Sums of three copies are on a grid that is three times as coarse, with three times the rows.
+    """
+    rng = np.random.default_rng(3)
+    chosen = Worst("stumps chosen, renumbered or repeated", REFERENCE, 3.0, "x rounding")
+    outputs = Worst("outputs of branches, renumbered or repeated", REFERENCE, 1.0, "x rounding")
+    for hard in map(unweighted, sets):
         for change in (
             classes_permuted(hard, rng),
             rows_several_times(hard, 2),
             rows_several_times(hard, 3),
             columns_reversed(hard),
         ):
-            partings.see(training, change)
-    yield from partings.findings()
+            of = change.hard
+            stumps = renumbered(boost(of.X, of.labels, of.n_classes, rounds=rounds)[0], change)
+            named = replace(hard, name=f"{hard.name}, {change.name}")
+            for number, moment in enumerate(moments(named, stumps)):
+                if number < rounds and number & (number + 1) == 0:
+                    see_round(named, stumps, number, moment.scores, 3.0, chosen, outputs)
+    yield from (chosen.finding(), outputs.finding())

@@ -14,11 +14,10 @@ from thenar.runtime.model.integers import LIMIT
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import ScoreTables
 
-from ..checks.integer_sums import largest_sum
 from ..checks.roundings import ROUNDING
 from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import HardSet, contradictory, intervals, noisy, separable, words
-from ..inputs.hard_tables import rows_of
+from ..inputs.hard_tables import largest_sum, rows_of
 from ..reference.logit import Column, largest_derivative
 from ..reference.numbers import precisely
 

@@ -1,22 +1,36 @@
 """Other numbers of threads, processors, Pythons and numpys.
 
-Every setting is a separate process, since libraries read it once on loading. They do change numbers: each finding gives
+Files must be equal on every platform: a simulated set, and the build compiled from it. Every setting is a separate
+process of this module as a program, since libraries read it once on loading. They do change numbers: each finding gives
 the number of its settings in which numpy's or Python's exp or matrix products gave other bits than here.
 """
 
+import hashlib
+import math
 import os
 import platform
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import msgspec
+import numpy as np
 
-from ..checks.built_bytes import Built
-from ..finding import Case, Finding
+from thenar.compiler.artifact.compile import compile_build
+from thenar.drivers.extras import optional
+from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import simulate
+
+from ..finding import Case, Finding, Worst
 from ..pythons import made
+
+with optional():
+    from threadpoolctl import threadpool_info
 
 CASE = Case(
     title="The platform",
@@ -41,6 +55,64 @@ _ARM_KERNELS = ("ARMV8",)
 _PLAIN_LIBM = "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4"
 
 
+class Built(msgspec.Struct, frozen=True):
+    """The results of a process.
+
+    python, numpy  their versions             kernels  the BLAS libraries' kernels and threads: "Haswell x2"
+    simd           numpy's instruction sets above its baseline that are in use
+    files          (name, SHA-256) of each file made
+    plain          SHA-256 of plain exp and matrix products there, which a build must not depend on
+    """
+
+    python: str
+    numpy: str
+    kernels: tuple[str, ...]
+    simd: tuple[str, ...]
+    files: tuple[tuple[str, str], ...]
+    plain: str
+
+
+def build() -> Built:
+    """Simulate a set, compile it, and return the digests of the files. Warnings are errors."""
+    with warnings.catch_warnings(), TemporaryDirectory() as folder:
+        warnings.simplefilter("error")
+        files = _files(Path(folder))
+    simd = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    return Built(
+        python=platform.python_version(),
+        numpy=np.__version__,
+        # scikit-learn also loads OpenMP's threads, which have no kernels.
+        kernels=tuple(
+            f"{blas['architecture']} x{blas['num_threads']}" for blas in threadpool_info() if blas["user_api"] == "blas"
+        ),
+        simd=tuple(simd),
+        files=files,
+        plain=_digest(_plain()),
+    )
+
+
+def _files(folder: Path) -> tuple[tuple[str, str], ...]:
+    # 160 switches, 16 joints, 14 grasp types, two hands: about half a second.
+    scene = msgspec.structs.replace(load_scene("quick"), repetitions=3)
+    found = simulate(scene, jobs=1).grasp_set
+    recorded = folder / "set.grasps"
+    found.save(recorded)
+    made = compile_build(found, folder / "build", rounds=20, folds=2).folder
+    files = recorded, *(made / name for name in (MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME))
+    return tuple((file.name, _digest(file.read_bytes())) for file in files)
+
+
+def _plain() -> bytes:
+    """Return processor-dependent results of numpy, the BLAS and libm: a matrix product, and exp by two methods."""
+    numbers = (np.arange(300 * 500) % 99_991 / 33_331.0).reshape(300, 500)
+    products = numbers @ numbers.T / 10_000
+    return np.exp(products).tobytes() + np.array([math.exp(number) for number in numbers.flat]).tobytes()
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
 class Setting(NamedTuple):
     """A process to run: its environment and its Python."""
 
@@ -49,78 +121,54 @@ class Setting(NamedTuple):
     python: Path = Path(sys.executable)
 
 
-class Ran(NamedTuple):
-    """The result of a process: the files it made, or how it failed."""
-
-    name: str
-    built: Built | None
-    ending: str = ""
-
-
 AS_IT_IS = Setting("as it is")
 
 
 def findings(full: bool) -> Iterator[Finding]:
     """Compare the files of every setting with those of this Python without settings."""
-    here = run(AS_IT_IS, full)
-    if here.built is None:
+    here = run(AS_IT_IS)
+    if isinstance(here, str):
         yield _failed(here)
         return
-    for check, settings in _settings(here.built, full):
-        yield held(check, here.built, [run(setting, full) for setting in settings])
+    yield _compared("threads, kernels, SIMD, libm, hash order", here, _settings(here, full))
     for python in made() if full else ():
-        yield _in_python(here.built, python)
+        there = run(AS_IT_IS._replace(python=python))
+        if isinstance(there, str):
+            yield _failed(there)
+        else:
+            check = f"Python {there.python} with numpy {there.numpy}"
+            yield _compared(check, here, [AS_IT_IS._replace(python=python), plainest(there)._replace(python=python)])
 
 
-def _settings(here: Built, full: bool) -> Iterator[tuple[str, list[Setting]]]:
-    """Yield (check, its settings)."""
-    if not full:
-        yield "threads, kernels, SIMD, libm, hash order", [plainest(here), _threads(2)]
-        return
-    yield "BLAS threads 1 and 2", [_threads(1), _threads(2)]
-    yield "BLAS kernels", [_set("OPENBLAS_CORETYPE", kernel) for kernel in _kernels(here)]
-    # Instruction sets are disabled from the newest on, until none is left.
-    limits = (" ".join(here.simd[kept:]) for kept in range(len(here.simd)))
-    yield "numpy's SIMD limited", [_set("NPY_DISABLE_CPU_FEATURES", limit) for limit in limits]
-    yield "libm without FMA and AVX2", [_set("GLIBC_TUNABLES", _PLAIN_LIBM)]
-    yield "hash order", [_set("PYTHONHASHSEED", seed) for seed in ("0", "1", "4294967295")]
-    yield "all of these at once", [plainest(here)]
+def _settings(here: Built, full: bool) -> list[Setting]:
+    settings = [plainest(here), _set("OPENBLAS_NUM_THREADS", "2")]
+    if full:
+        settings += [_set("OPENBLAS_CORETYPE", kernel) for kernel in _kernels(here)]
+        # Instruction sets are disabled from the newest on, until none is left.
+        settings += [_set("NPY_DISABLE_CPU_FEATURES", " ".join(here.simd[kept:])) for kept in range(len(here.simd))]
+        settings += [_set("GLIBC_TUNABLES", _PLAIN_LIBM)]
+        settings += [_set("PYTHONHASHSEED", seed) for seed in ("0", "1", "4294967295")]
+    return settings
 
 
-def _in_python(here: Built, python: Path) -> Finding:
-    """Compare another Python with this one: as it is, and with its libraries at their plainest."""
-    there = run(AS_IT_IS._replace(python=python), full=True)
-    if there.built is None:
-        return _failed(there)
-    limited = plainest(there.built)._replace(python=python)
-    check = f"Python {there.built.python} with numpy {there.built.numpy}"
-    return held(check, here, [there, run(limited, full=True)])
+def _failed(ending: str) -> Finding:
+    return Finding("a build as it is", "a process that succeeds", 1, 0, "processes", 1, ending)
 
 
-def _failed(ran: Ran) -> Finding:
-    return Finding("a build as it is", "a process that succeeds", 1, 0, "processes", 1, ran.ending)
-
-
-def held(check: str, here: Built, others: list[Ran]) -> Finding:
+def _compared(check: str, here: Built, settings: list[Setting]) -> Finding:
     """Count the files that differ from this process's. The bound is 0: bytes of files are not rounded."""
-    wrong = []
-    for ran in others:
-        there = dict(ran.built.files) if ran.built is not None else {}
-        wrong.append((ran, [name for name, digest in here.files if there.get(name) != digest]))
-    moved = sum(ran.built is not None and ran.built.plain != here.plain for ran in others)
-    return Finding(
-        check=check,
-        reference=f"bytes of a plain run (numpy's exp or products differ in {moved} of {len(others)})",
-        error=sum(len(files) for _, files in wrong),
-        bound=0,
-        unit="files",
-        tried=len(others) * len(here.files),
-        worst="; ".join(f"{ran.name}: {ran.ending or ', '.join(files)}" for ran, files in wrong if files),
-    )
-
-
-def _threads(count: int) -> Setting:
-    return _set("OPENBLAS_NUM_THREADS", str(count))
+    worst = Worst(check, "bytes of a plain run", 0, "files")
+    moved = 0
+    for setting in settings:
+        there = run(setting)
+        files = {} if isinstance(there, str) else dict(there.files)
+        wrong = [name for name, digest in here.files if files.get(name) != digest]
+        at = there if isinstance(there, str) else ", ".join(wrong)
+        worst.see(len(wrong), f"{setting.name}: {at}", tried=len(here.files))
+        moved += not isinstance(there, str) and there.plain != here.plain
+    found = worst.finding()
+    note = f"{found.reference} (numpy's exp or products differ in {moved} of {len(settings)})"
+    return msgspec.structs.replace(found, reference=note)
 
 
 def _set(name: str, value: str) -> Setting:
@@ -148,12 +196,16 @@ def plainest(built: Built) -> Setting:
     return Setting("plainest", tuple(environment.items()))
 
 
-def run(setting: Setting, full: bool) -> Ran:
-    """Build in a process of this setting."""
+def run(setting: Setting) -> Built | str:
+    """Build in a process of this setting; return the digests, or how the process failed."""
     environment = {name: value for name, value in os.environ.items() if name not in _OURS} | dict(setting.environment)
-    command = [str(setting.python), "-P", "-m", "thenar.stability.checks.built_bytes", *(["--large"] if full else [])]
+    command = [str(setting.python), "-P", "-m", __name__]
     ran = subprocess.run(command, env=environment, capture_output=True, check=False)
     if ran.returncode:
         words = ran.stderr.decode(errors="replace").strip().rpartition("\n")[2]
-        return Ran(setting.name, None, f"{setting.python} ended with {ran.returncode} {words}".strip())
-    return Ran(setting.name, msgspec.json.decode(ran.stdout, type=Built))
+        return f"{setting.python} ended with {ran.returncode} {words}".strip()
+    return msgspec.json.decode(ran.stdout, type=Built)
+
+
+if __name__ == "__main__":
+    sys.stdout.buffer.write(msgspec.json.encode(build()))

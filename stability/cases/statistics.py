@@ -1,21 +1,14 @@
-"""Intervals at rates 0 and 1, classes with fewer rows than folds, subjects that lack a class."""
+"""Intervals at rates 0 and 1, of repeats, and over clusters."""
 
 from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
 from mpmath import mpf
-from numpy.typing import NDArray
 
-from thenar.compiler.evaluation.folds import Fold, weka_folds
-from thenar.compiler.evaluation.plan import Data, FoldFit, predictions
-from thenar.compiler.evaluation.populations import Population, Scheme, populations
+from thenar.compiler.evaluation.populations import Scheme
 from thenar.compiler.evaluation.rates import ALIKE, UNITS, WEIGHT, Rate, clustered
-from thenar.compiler.evaluation.study import evaluate
-from thenar.compiler.evaluation.tables import Cell
-from thenar.compiler.placement.elements import elements_of
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.trainers.base import Training
 from thenar.runtime.manifest import Unit
 
 from ..checks.roundings import ROUNDING
@@ -38,39 +31,9 @@ def lopsided() -> dict[str, tuple[GraspSet, Scheme]]:
     }
 
 
-def parts_of(grasp_set: GraspSet, scheme: Scheme) -> tuple[Population, ...]:
-    """Return the populations of an evaluation in four folds and two repeats."""
-    return populations(grasp_set, scheme, 4, 2, 1)
-
-
-def tested_labels(grasp_set: GraspSet, part: Population) -> NDArray[np.intp]:
-    """Return the number of rows of each label (K,) that the population's folds test, over all repeats."""
-    rows = np.concatenate([fold.test for fold in part.folds])
-    return np.bincount(grasp_set.labels[rows], minlength=len(grasp_set.taxonomy.types))
-
-
-def differs(cell: Cell, tested: NDArray[np.intp]) -> bool:
-    """Return whether a cell's matrix does not match the tested rows or its rate."""
-    confusion = np.array(cell.confusion)
-    return not np.array_equal(confusion.sum(axis=1), tested) or confusion.trace() != sum(cell.rate.correct)
-
-
-def guessed_untrained(grasp_set: GraspSet, scheme: Scheme) -> int:
-    """Return the number of tested rows predicted as a class that their fold was not trained on."""
-    data = Data.of(grasp_set)
-    elements, joints = elements_of(data.samples), tuple(range(len(grasp_set.joints)))
-    wrong = 0
-    for part in parts_of(grasp_set, scheme):
-        for fold in part.folds:
-            fit = FoldFit(fold, elements, joints, part.grasps)
-            found = predictions(data, fit, Training("logitboost", {"rounds": 10}))
-            wrong += int((~np.isin(found, data.labels[fold.train])).sum())
-    return wrong
-
-
 CASE = Case(
-    title="Rates and folds at their ends",
-    danger="an interval leaves 0 to 1 or has no width, or a row is tested twice, never, or by its own training",
+    title="Rates at their ends",
+    danger="an interval leaves 0 to 1, has no width, or is too narrow for trials that are alike",
 )
 
 # Wilson's ends are (centre -+ reach) / shrink, where neither centre nor reach exceeds shrink, so that their errors
@@ -84,12 +47,10 @@ _TOTALS = (1, 2, 3, 5, 12, 33, 100, 999, 65536, 10**6, 10**9, 10**12)
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Compare intervals with 60 digits, and check the rules for all folds and evaluations."""
+    """Compare intervals with 60 digits."""
     yield from _wilson(range(1, 150) if full else range(1, 40))
     yield from _repeated(4 if full else 3)
     yield from _clusters(3000 if full else 300)
-    yield from _folds(400 if full else 60)
-    yield from _evaluations()
 
 
 def _wilson(totals: range) -> Iterator[Finding]:
@@ -179,45 +140,3 @@ def _over_clusters(recognised: list[int], sizes: list[int], unit: Unit) -> Inter
         effect = (weight * found + misses * max(effect, found)) / (weight + misses)
     n, z = total / effect, student_quantile(k - 1, mpf("0.975"))
     return wilson_of(p, z**2 / n)
-
-
-def _folds(draws: int) -> Iterator[Finding]:
-    """Classes of one or more rows: each row is tested once and trained on otherwise; each class is spread evenly."""
-    lost = Worst("rows not tested exactly once, or trained and tested in one fold", "the rule itself", 0, "rows")
-    uneven = Worst("classes with two rows more in one fold than in another", "the rule itself", 0, "classes")
-    random = np.random.default_rng(11)
-    for draw in range(draws):
-        labels = np.repeat(np.arange(6), random.integers(1, [1 + 1, 2, 3, 9, 20, 60]))
-        labels = labels[random.permutation(len(labels))]
-        n_folds = int(random.integers(2, min(len(labels), 12) + 1))
-        folds = weka_folds(labels, n_folds, draw)
-        what = f"draw {draw}: {np.bincount(labels).tolist()} in {n_folds}"
-        lost.see(_misused(folds, len(labels)), what, tried=len(labels))
-        shares = np.array([np.bincount(labels[fold.test], minlength=6) for fold in folds])
-        uneven.see(int((np.ptp(shares, axis=0) > 1).sum()), what, tried=6)
-    yield lost.finding()
-    yield uneven.finding()
-
-
-def _misused(folds: list[Fold], rows: int) -> int:
-    tested = np.bincount(np.concatenate([fold.test for fold in folds]), minlength=rows)
-    both = sum(len(np.intersect1d(fold.train, fold.test)) for fold in folds)
-    left = sum(rows - len(np.union1d(fold.train, fold.test)) for fold in folds)
-    return int((tested != 1).sum()) + both + left
-
-
-def _evaluations() -> Iterator[Finding]:
-    """Every row is counted once; a fold never predicts a class that it was not trained on, and a warning says so."""
-    miscounted = Worst("confusion matrices that do not match the tested rows", "the set's rows", 0, "matrices")
-    guessed = Worst("rows predicted as a class that their fold was not trained on", "the set's rows", 0, "rows")
-    silent = Worst("sets silently evaluated on untrained types", "a warning", 0, "sets")
-    for name, (grasp_set, scheme) in lopsided().items():
-        study = evaluate(grasp_set, jobs=1, scheme=scheme, rounds=10, repeats=2, tables=("compositions",))
-        rows = [row.cells for table in study.tables for row in table.rows]
-        tested = [tested_labels(grasp_set, part) for part in parts_of(grasp_set, scheme)]
-        miscounted.see(sum(sum(map(differs, cells, tested)) for cells in rows), name, tried=len(rows) * len(tested))
-        guessed.see(guessed_untrained(grasp_set, scheme), name, tried=len(grasp_set))
-        silent.see(not any("they cannot be recognised" in warning for warning in study.warnings), name)
-    yield miscounted.finding()
-    yield guessed.finding()
-    yield silent.finding()

@@ -1,24 +1,20 @@
-"""The best stump of a round, its thresholds and outputs; and whole trainings, round by round."""
+"""The best stump of a round, its thresholds and outputs."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from mpmath import mpf
-from numpy.typing import NDArray
 
 from thenar.compiler.boosting.binning import bin_columns, midpoints
-from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import Floats
 
-from ..checks.class_rounds import ClassRound, Step, branches, choice_error, class_rounds, grown, see_stump, step_of
+from ..checks.class_rounds import ClassRound, branches
 from ..finding import REFERENCE, Case, Finding, Worst
 from ..reference import boosting as truth
-from ..reference.boosting import Round, boost_rounds
 from ..reference.numbers import precisely
 
 
@@ -104,96 +100,6 @@ KINDS: dict[str, Callable[[np.random.Generator, int, float], tuple[Floats, Float
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Training:
-    """A small training set, X (n, d) and labels (n,), and its options."""
-
-    name: str
-    X: Floats
-    labels: NDArray[np.intp]
-    classes: int
-    shrinkage: float
-    z_max: float
-
-    def boosted(self, rounds: int) -> Stumps:
-        """Return our ensemble."""
-        return boost(self.X, self.labels, self.classes, rounds=rounds, shrinkage=self.shrinkage, z_max=self.z_max)[0]
-
-    def boosted_precisely(self, rounds: int) -> list[Round]:
-        """Return the reference's rounds."""
-        X, labels = self.X.tolist(), self.labels.tolist()
-        return boost_rounds(X, labels, self.classes, rounds, self.shrinkage, self.z_max)
-
-
-def trainings(full: bool) -> Iterator[Finding]:
-    """Yield errors of rounds, given the scores before them, and of scores after all rounds."""
-    rng, rounds = np.random.default_rng(5), 40 if full else 8
-    stumps = Worst("stumps of whole trainings", REFERENCE, 1.0, "x rounding")
-    outputs = Worst("outputs of a round, from its scores", REFERENCE, 1.0, "x rounding")
-    scores = Worst("scores after all rounds, from the start", REFERENCE, 1.0, "x growth")
-    for training in _sets(rng, 36 if full else 20):
-        ours = training.boosted(rounds)
-        stages = [np.zeros((len(training.X), training.classes)), *ours.staged_scores(training.X)]
-        for number, F in enumerate(stages[:-1]):
-            at = f"{training.name}, round {number + 1}"
-            for given in class_rounds(F.tolist(), training.labels.tolist(), training.z_max):
-                see_stump(given, training.X, ours, number, training.z_max, at, stumps, outputs)
-        _see_scores(training, stages, scores)
-    yield from (stumps.finding(), outputs.finding(), scores.finding())
-
-
-def _see_scores(training: Training, stages: Sequence[Floats], scores: Worst) -> None:
-    """Compare the scores of our training with the reference, as long as none of its choices is in doubt."""
-    rounds = training.boosted_precisely(len(stages) - 1)
-    F = [[mpf(0)] * training.classes for _ in training.labels]
-    labels, steps, truth = training.labels.tolist(), list[Step](), F
-    for each, ours in zip(rounds, stages[1:], strict=True):
-        given = class_rounds(truth, labels, training.z_max)
-        if _in_doubt(training, each, given):
-            break
-        parts = [branches(training.X[:, splits[0][1]], splits[0][2]) for splits in each.splits]
-        largest = float(np.abs(ours).max())
-        steps.append(step_of(given, parts, labels, training.shrinkage, training.z_max).on_scores_of(largest))
-        truth = each.scores
-    if not steps:
-        return
-    reached = stages[len(steps)]
-    with precisely():
-        errors = [
-            abs(mpf(a) - b)
-            for row, true in zip(reached.tolist(), truth, strict=True)
-            for a, b in zip(row, true, strict=True)
-        ]
-    ratios = np.array([float(error) for error in errors]) / grown(steps)
-    scores.see(float(ratios.max()), f"{training.name}, {len(steps)} rounds, off by {float(max(errors)):.2g}")
-
-
-def _in_doubt(training: Training, each: Round, given: Sequence[ClassRound]) -> bool:
-    """Whether rounding may decide between equal and unequal stumps, or whether a branch is empty."""
-    for splits, lead, of in zip(each.splits, each.leads(), given, strict=True):
-        best, column, lower, _ = splits[0]
-        light = [of.branch(rows).is_light for rows in branches(training.X[:, column], lower) if rows]
-        if any(light) or lead * best <= 2 * choice_error(of.weights, of.responses, training.z_max):
-            return True
-    return False
-
-
-def _sets(rng: np.random.Generator, n: int) -> Iterator[Training]:
-    """Yield sets of switches, codes and numbers that may be missing: noisy, separable, and of random labels."""
-    for name, classes, noise, shrinkage, z_max in (
-        ("noisy", 3, 0.2, 1.0, 3.0),
-        ("separable", 4, 0.0, 1.0, 3.0),
-        ("random labels", 2, 1.0, 1.0, 3.0),
-        ("shrunk", 3, 0.1, 0.3, 2.0),
-        ("hardly clamped", 3, 0.1, 1.0, 100.0),
-    ):
-        labels = np.arange(n) % classes
-        switches = rng.random((classes, 3))[labels] + noise * rng.normal(0, 1, (n, 3)) > 0.5
-        codes = 20 * labels + rng.integers(0, 20, n) + (200 * noise * rng.random(n)).astype(np.int64)
-        lacking = np.where(rng.random(n) < 0.3, np.nan, rng.integers(0, 5, n))
-        yield Training(name, np.column_stack([switches, codes, lacking]), labels, classes, shrinkage, z_max)
-
-
 CASE = Case(
     title="Stump fits",
     danger="a branch's output is the residue of rounding its weight, and rounding breaks ties between columns",
@@ -202,14 +108,13 @@ Z_MAX = 3.0
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield errors of thresholds, of the choice of stumps, of their outputs, and of whole trainings."""
+    """Yield errors of thresholds, of the choice of stumps, and of their outputs."""
     rng, more = np.random.default_rng(4), 12 if full else 1
     yield thresholds_of(neighbours(rng, 100 * more))
     fits = [(problem, fit(problem)) for problem in problems(rng, 8 * more, Z_MAX)]
     yield choices_of(fits)
     yield from outputs_of(fits)
     yield ties_of(tied(rng, Z_MAX) for _ in range(40 * more))
-    yield from trainings(full)
 
 
 def fit(problem: Problem) -> FittedStumps:
@@ -260,7 +165,7 @@ def outputs_of(fits: Iterable[tuple[Problem, FittedStumps]]) -> Iterator[Finding
 def _given(problem: Problem) -> ClassRound:
     """Return the problem as a round of one class with exact weights and responses."""
     exact = [mpf(0)] * len(problem.weights)
-    return ClassRound(0, [], problem.weights.tolist(), problem.responses.tolist(), exact)
+    return ClassRound(0, problem.weights.tolist(), problem.responses.tolist(), exact)
 
 
 def _place(fitted: FittedStumps) -> tuple[int, float]:

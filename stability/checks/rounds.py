@@ -1,4 +1,4 @@
-"""The state of a training, round by round; counts of rows by frame, their shares and their entropy."""
+"""The state of a training, round by round, and counts of rows by frame."""
 
 import math
 from collections import defaultdict
@@ -6,18 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 
-import mpmath
 import numpy as np
-from mpmath import mpf
 
 from thenar.compiler.boosting.boost import weights_and_responses
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import Floats, softmax_and_loss
 
 from ..inputs.hard_data import HardSet
-from ..reference.information import entropy_bits
-from ..reference.numbers import precisely
-from .roundings import ROUNDING, share_error
+from .roundings import ROUNDING
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,11 +63,6 @@ def rise_rounding(n_classes: int, before: Moment, after: Moment, z_max: float = 
     return rounded + held + blind
 
 
-def mean_score(scores: Floats) -> float:
-    """Return the largest |mean over the classes| of scores F (K, n)."""
-    return max(abs(math.fsum(row)) for row in scores.T.tolist()) / len(scores)
-
-
 Counts = dict[tuple[int, ...], list[int]]
 
 
@@ -82,43 +73,3 @@ def counted(hard: HardSet) -> Counts:
     for row, label, weight in zip(hard.X.tolist(), hard.labels.tolist(), weights.tolist(), strict=True):
         counts[tuple(row)][label] += int(weight)
     return counts
-
-
-@precisely()
-def entropy_left(hard: HardSet) -> mpf:
-    """Return the entropy of the class given the frame, in nats: the least possible mean loss of scores of frames."""
-    counts = list(counted(hard).values())
-    total = sum(map(sum, counts))
-    return mpmath.fsum(sum(row) * entropy_bits(row) for row in counts) / total * mpmath.log(2)
-
-
-@precisely()
-def resting_error(hard: HardSet, last: Moment) -> float:
-    """Return the error of shares P against those of the counts, as a share of the rounding bound after convergence.
-
-    Boosting converges to sum u (Y - P) = 0. There 1 - P is off by 2^-54, the resolution of P, and the products round.
-    P cannot be more accurate than the scores' last places allow: two scores, each rounded, each at most one place off;
-    nor than its own rounding. Each class that a frame lacks may keep the weight of `unsettled`.
-    """
-    errors, counts, idle = [], counted(hard), unsettled(last)
-    for row, F, got in zip(hard.X.tolist(), last.scores.T.tolist(), last.shares.T.tolist(), strict=True):
-        own = counts[tuple(row)]
-        for k, P in enumerate(got):
-            truth = mpf(own[k]) / sum(own)
-            allowed = ROUNDING * (1 + truth * (4 + 4 * max(map(abs, F)))) + share_error(F, k, truth)
-            errors.append(abs(P - truth) / (allowed + own.count(0) * idle * hard.scale / sum(own)))
-    return float(max(errors))
-
-
-def unsettled(last: Moment) -> float:
-    """Return the most weight that a frame can keep: below a share of 2^-38 of its class's, its branch counts as empty.
-
-    Then it follows the mean of all rows, which is constant once they have converged, and learns nothing more itself.
-    """
-    return 2.0**-38 * float(last.weights.sum(axis=1).max())
-
-
-def idle_loss(hard: HardSet, last: Moment) -> float:
-    """Return the largest remaining loss of frames of a single class, in which each of K classes keeps `unsettled`."""
-    lacking = sum(row.count(0) for row in counted(hard).values())
-    return lacking * unsettled(last) / float(hard.scaled_weights.sum())

@@ -1,4 +1,4 @@
-"""Halved steps: Newton's, the limits of rest, and the levels of a growing grip.
+"""Halved steps: Newton's, and the limits of rest.
 
 A force matters only if it changes a switch. The shipped scenes spread the thresholds of switches around 1 N with a
 standard deviation of 0.15 N (switch.threshold), because those of a real glove are no better known. So if halved steps
@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
-from thenar.simulator.body.layout import murakami160
 from thenar.simulator.contact.balance import USUAL, SolverSettings
 from thenar.simulator.contact.model import Contact, Load
 from thenar.simulator.effects import switch_threshold
 from thenar.simulator.effects.contact_quasistatic import Quasistatic
 from thenar.simulator.pipeline.batch import SLID_OUT_MM
-from thenar.simulator.pipeline.ramp import crossings
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import conditions_of
 from thenar.simulator.planning.postures import Postures
@@ -30,8 +28,6 @@ Bits = NDArray[np.bool_]
 THRESHOLD_N = 1.0
 SPREAD_N = switch_threshold.SD_N
 _DRAWS = 20
-_LEVELS = 5
-_THRESHOLDS_N = np.full(len(murakami160()), THRESHOLD_N)
 
 
 def findings(full: bool) -> Iterator[Finding]:
@@ -45,7 +41,6 @@ def findings(full: bool) -> Iterator[Finding]:
     if full:
         again = Quasistatic(pace=SolverSettings(parts=4)).solve(loads)
         yield _turned("quasistatic: Newton steps halved again", loads, halved, again)
-    yield _finer_grip(loads[:: 1 if full else 14])
 
 
 def shipped(repetitions: int) -> Iterator[Load]:
@@ -91,31 +86,6 @@ def _turned(check: str, loads: Sequence[Load], one: Sequence[Contact], other: Se
     most = f"{np.array(_names(loads))[good][change.argmax()]}: {change.max():.2g} N, median {np.median(change):.2g} N"
     error, bound, tried = float(turned), float(by_thresholds), int(np.count_nonzero(closed))
     return Finding(check, "the spread of thresholds", error, bound, "switches", tried, most)
-
-
-def _finer_grip(loads: Sequence[Load]) -> Finding:
-    """Count differences when a grip grows in twice as many levels.
-
-    The forces at a common level must be equal, and the first closing of a switch, from below to above its threshold,
-    may differ by at most a coarse level.
-    """
-    worst = Worst("ramp: twice as many levels of the grip", "the usual levels", 0.0, "switches")
-    model = Quasistatic()
-    for load in loads:
-        coarse, fine = (_grown(model, load, levels) for levels in (_LEVELS, 2 * _LEVELS))
-        worst.see(float(np.count_nonzero(fine[::2] != coarse)), load.condition.thing.name, coarse[0].size)
-        up, sooner = (crossings(forces, _THRESHOLDS_N, 1e6 / (len(forces) - 1))[0] for forces in (coarse, fine))
-        both = np.logical_or.reduce(coarse > _THRESHOLDS_N)
-        # A switch that the finer grip closes earlier, temporarily, is not late.
-        worst.see(float(np.count_nonzero((sooner > up + 1e6 / _LEVELS)[both])), load.condition.thing.name, 0)
-    return worst.finding()
-
-
-def _grown(model: Quasistatic, load: Load, levels: int) -> Floats:
-    """Return the forces (levels + 1, n, s) at evenly spaced levels of the grip, 0 at the first."""
-    grips = [load.grip_n * (level / levels) for level in range(1, levels + 1)]
-    solved = model.solve([Load(load.condition, load.posture_deg, load.pose, grip_n) for grip_n in grips])
-    return np.array([np.zeros_like(solved[0].forces_n), *(contact.forces_n for contact in solved)])
 
 
 def _capsules(contacts: Sequence[Contact]) -> Floats:

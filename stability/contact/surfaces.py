@@ -1,6 +1,5 @@
-"""Surfaces, rotations and the sharing of force in hard cases: middles, creases, half turns, tiny depths."""
+"""Surfaces and rotations in hard cases: middles, creases, half turns, tiny depths."""
 
-from collections import Counter
 from collections.abc import Iterator
 from itertools import product
 
@@ -9,19 +8,13 @@ import numpy as np
 from mpmath import mpf
 
 from thenar.compiler.elementary import Floats
-from thenar.simulator.body.hand import CAPSULES
-from thenar.simulator.body.layout import SwitchPlaces, murakami160
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere, rotation, rotation_vector
-from thenar.simulator.contact.model import split
 
 from ..checks.roundings import ROUNDING
 from ..finding import REFERENCE, Finding, Worst
 from ..reference.numbers import precisely, turn
-from .grasps import HAND
 from .posed import Matrix, exactly, length, surface
 
-# On any one segment of the glove.
-MOST_SWITCHES = max(Counter(patch.capsule for patch in murakami160()).values())
 _TINY = (5e-324, 1e-200, 1e-155, 1e-149, 1e-15, 1e-12, 1e-9)
 _THIN = 5e-324
 _LOST_MM = mpf(10) ** -150  # the squares of smaller lengths underflow
@@ -35,11 +28,10 @@ SHAPES: tuple[Shape, ...] = (
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield errors of distances and normals, of rotations, and of shared forces."""
+    """Yield errors of distances and normals, and of rotations."""
     rng, more = np.random.default_rng(12), 10 if full else 1
     yield from _surfaces(rng, 20 * more)
     yield from _turns(rng, 20 * more)
-    yield _shares(rng, 4 * more)
 
 
 def points(shape: Shape, rng: np.random.Generator, n: int) -> Floats:
@@ -123,29 +115,3 @@ def _turns(rng: np.random.Generator, n: int) -> list[Finding]:
 def _turned(vector: Floats) -> Matrix:
     angle = length(exactly(vector))
     return np.array(turn(vector.tolist(), angle) if angle else turn((1, 0, 0), 0))
-
-
-@precisely()
-def _shares(rng: np.random.Generator, n: int) -> Finding:
-    """Compare the forces on a segment's switches and between them with the force on the segment.
-
-    With k switches the sum of depths rounds k - 1 times, each quotient and product once: k + 1 roundings of the force,
-    plus halves of the smallest double.
-    """
-    switches = SwitchPlaces(HAND, murakami160())
-    worst = Worst("forces shared by switches", REFERENCE, MOST_SWITCHES + 1.0, "x 2^-53 of the force")
-    depths = rng.choice([-5.0, 0.0, -0.0, *_TINY, 0.3, 2.0], (len(switches.capsules), n))
-    forces = rng.choice([0.0, 5e-324, 1e-300, 0.7, 50.0, 1e300], (len(CAPSULES), n))
-    shared, between = split(switches, depths, forces)
-    for k in range(n):
-        fallen = mpf(0)
-        for capsule in range(len(CAPSULES)):
-            own = switches.capsules == capsule
-            force, borne = mpf(forces[capsule, k]), mpmath.fsum(mpf(x) for x in shared[own, k].tolist())
-            fallen += force if not (depths[own, k] > 0.0).any() else 0
-            if (depths[own, k] > 0.0).any():
-                doubt = max(abs(borne - force) - MOST_SWITCHES * mpf(2) ** -1074, mpf(0))
-                worst.see(float(doubt / (ROUNDING * force)) if force else float(borne != 0), f"{CAPSULES[capsule]}")
-        lost = abs(mpf(between[k]) - fallen)
-        worst.see(float(lost / (ROUNDING * fallen)) if fallen else float(lost), "between them")
-    return worst.finding()

@@ -1,7 +1,7 @@
 """Numerically hard training sets, counts and scores, constructed by rule or random from a seed."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,21 +105,6 @@ def contradictory(counts: Sequence[Sequence[int]]) -> HardSet:
 def imbalanced(ratio: int) -> HardSet:
     """Return two frames: on one the ratio of the classes is `ratio` to 1, on the other 1 to 1."""
     return contradictory([[ratio, 1], [1, 1]])
-
-
-def repeated(weighted: HardSet) -> HardSet:
-    """Return the same set with every row repeated as often as its weight."""
-    if weighted.weights is None:
-        return weighted
-    times = weighted.weights.astype(np.intp)
-    name = f"{weighted.name}, {times.sum()} rows"
-    return replace(
-        weighted,
-        name=name,
-        X=weighted.X.repeat(times, axis=0),
-        labels=weighted.labels.repeat(times),
-        weights=None,
-    )
 
 
 Counts = NDArray[np.int64]

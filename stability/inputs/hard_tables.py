@@ -1,6 +1,6 @@
 """Score tables that are hard to quantise, and all possible frames of small ones."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -96,6 +96,27 @@ def rows_of(tables: ScoreTables | IntegerTables) -> list[list[list[float]]]:
     """Return the rows (K,) of bias, switches and joints, input by input; a switch has the row for closed."""
     inputs = [[tables.bias.tolist()], *([row] for row in tables.switch_rows.tolist())]
     return [*inputs, *(rows.tolist() for rows in tables.joint_rows)]
+
+
+def largest_sum(inputs: Iterable[Sequence[Sequence[float]]]) -> float:
+    """Return the largest magnitude of a class's sum of rows (K,), at most one per input, in any order of summation.
+
+    It therefore also bounds all partial sums.
+    """
+    reached = 0.0
+    for sign in (1, -1):
+        tops = [[max(0, *(sign * step for step in column)) for column in zip(*rows, strict=True)] for rows in inputs]
+        reached = max(reached, *(sum(column) for column in zip(*tops, strict=True)))
+    return reached
+
+
+def first_best(scores: Sequence[int]) -> int:
+    """Return the index of the greatest score, of equal ones the first, written as in C."""
+    best = 0
+    for k in range(1, len(scores)):
+        if scores[k] > scores[best]:
+            best = k
+    return best
 
 
 def every_frame(tables: ScoreTables | IntegerTables) -> Iterator[Frame]:

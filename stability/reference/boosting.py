@@ -1,4 +1,4 @@
-"""LogitBoost on stumps at 60 digits: probabilities, losses and responses, the best stump, the rounds and their scores.
+"""LogitBoost on stumps at 60 digits: probabilities, losses and responses, the best stump, and scores.
 
 Friedman, Hastie and Tibshirani, Annals of Statistics 28 (2000), algorithm 6, with the clamp of the working response
 that they recommend in section 5 and that Weka 3.6 has.
@@ -14,7 +14,6 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
-from typing import NamedTuple
 
 import mpmath
 from mpmath import mpf
@@ -68,20 +67,10 @@ EQUAL = mpf(10) ** (10 - DIGITS)
 @precisely()
 def explained(x: Numbers, weights: Numbers, responses: Numbers, threshold: float) -> mpf:
     """Return the sum of C^2/W over the branches that have weight."""
-    return _explained(_branches(x, weights, responses, threshold))
-
-
-@precisely()
-def branch_values(
-    x: Numbers, weights: Numbers, responses: Numbers, threshold: float, z_max: float
-) -> tuple[mpf, mpf, mpf]:
-    """Return the outputs of left, right and missing: C/W within +-z_max; without weight, the mean of all rows."""
-    branches = _branches(x, weights, responses, threshold)
-    total = mpmath.fsum(weight for weight, _ in branches), mpmath.fsum(response for _, response in branches)
-    filled = [branch if branch[0] else total for branch in branches]
-    means = [response / weight if weight else mpf(0) for weight, response in filled]
-    left, right, missing = (min(max(mean, -mpf(z_max)), mpf(z_max)) for mean in means)
-    return left, right, missing
+    left = [row for row, value in enumerate(x) if value <= threshold]
+    right = [row for row, value in enumerate(x) if value > threshold]
+    missing = [row for row, value in enumerate(x) if math.isnan(value)]
+    return _explained([_sums(rows, weights, responses) for rows in (left, right, missing)])
 
 
 @precisely()
@@ -111,35 +100,12 @@ def _splits(number: int, x: Numbers, weights: Numbers, responses: Numbers) -> It
         yield _explained([left[i], right[i + 1], missing]), number, values[i], values[i + 1]
 
 
-def _branches(x: Numbers, weights: Numbers, responses: Numbers, threshold: float) -> list[Sums]:
-    left = [row for row, value in enumerate(x) if value <= threshold]
-    right = [row for row, value in enumerate(x) if value > threshold]
-    missing = [row for row, value in enumerate(x) if math.isnan(value)]
-    return [_sums(rows, weights, responses) for rows in (left, right, missing)]
-
-
 def _sums(rows: Sequence[int], weights: Numbers, responses: Numbers) -> Sums:
     return mpmath.fsum(weights[row] for row in rows), mpmath.fsum(responses[row] for row in rows)
 
 
 def _explained(branches: Sequence[Sums]) -> mpf:
     return mpmath.fsum(response**2 / weight for weight, response in branches if weight)
-
-
-Rows = Sequence[Sequence[float]]
-
-
-class Round(NamedTuple):
-    """One round: each class's splits, best first, the outputs of its best stump, and F (n, K) and the loss after it."""
-
-    splits: list[list[Split]]
-    values: list[tuple[mpf, mpf, mpf]]
-    scores: list[list[mpf]]
-    loss: mpf
-
-    def leads(self) -> list[mpf]:
-        """Return the relative lead in explained variation of each class's best stump over unequal ones; 1: no other."""
-        return [_lead(splits) for splits in self.splits]
 
 
 @precisely()
@@ -171,52 +137,3 @@ def output(x: float, threshold: float, branches: Sequence[float]) -> float:
     if math.isnan(x):
         return branches[2]
     return branches[0] if x <= threshold else branches[1]
-
-
-def boost_rounds(
-    X: Rows,
-    labels: Sequence[int],
-    n_classes: int,
-    rounds: int,
-    shrinkage: float = 1,
-    z_max: float = 3,
-    weights: Sequence[float] | None = None,
-) -> list[Round]:
-    """Train on X (n, d), in which at least one column varies; of equal stumps the lowest column and threshold wins."""
-    F = [[mpf(0)] * n_classes for _ in labels]
-    done: list[Round] = []
-    for _ in range(rounds):
-        done.append(_round(list(zip(*X, strict=True)), labels, F, shrinkage, z_max, weights))
-        F = done[-1].scores
-    return done
-
-
-@precisely()
-def _round(
-    columns: Rows,
-    labels: Sequence[int],
-    F: list[list[mpf]],
-    shrinkage: float,
-    z_max: float,
-    weights: Sequence[float] | None,
-) -> Round:
-    row_weights = [1] * len(labels) if weights is None else weights
-    P = [softmax(row) for row in F]
-    splits, values, outputs = [], [], []
-    for k in range(len(F[0])):
-        targets = [target(P[i][k], label == k, z_max, row_weights[i]) for i, label in enumerate(labels)]
-        w, r = [w for w, _ in targets], [w * z for w, z in targets]
-        splits.append(best_splits(columns, w, r))
-        _, column, lower, _ = splits[-1][0]
-        values.append(branch_values(columns[column], w, r, lower, z_max))
-        outputs.append([output(x, lower, values[-1]) for x in columns[column]])
-    steps = [step(row, shrinkage) for row in zip(*outputs, strict=True)]
-    F = [[f + s for f, s in zip(*both, strict=True)] for both in zip(F, steps, strict=True)]
-    return Round(splits, values, F, mean_loss(F, labels, weights))
-
-
-@precisely()
-def _lead(splits: list[Split]) -> mpf:
-    best = splits[0][0]
-    others = [split[0] for split in splits if best - split[0] > EQUAL * best]
-    return (best - max(others)) / best if others else mpf(1)

@@ -1,4 +1,4 @@
-"""Doubles as exact numbers of 60 digits, errors of doubles, linear equations and rotations."""
+"""Doubles as exact numbers of 60 digits, errors of doubles, and rotations."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -65,28 +65,6 @@ Vector = Sequence[float]
 
 # Of one number, in radians.
 sin, cos = precisely()(mpmath.sin), precisely()(mpmath.cos)
-
-
-@precisely()
-def solve(matrix: Sequence[Vector], right: Vector) -> list[mpf]:
-    """Return x with matrix (n, n) x = right (n,), by elimination, to 60 digits minus those of its condition number.
-
-    Raises ZeroDivisionError if the matrix is singular.
-    """
-    # Lists, with rows only of the remaining length: mpmath's matrices take four times as long.
-    rows = [[mpf(a) for a in (*row, b)] for row, b in zip(matrix, right, strict=True)]
-    nothing = max(mpmath.fsum(map(abs, row[:-1])) for row in rows) * mpmath.eps
-    done: list[list[mpf]] = []
-    while rows:
-        pivot = rows.pop(max(range(len(rows)), key=lambda row: abs(rows[row][0])))
-        if abs(pivot[0]) <= nothing:
-            raise ZeroDivisionError("the matrix is singular")
-        done.append([each / pivot[0] for each in pivot[1:]])
-        rows = [[a - row[0] * b for a, b in zip(row[1:], done[-1], strict=True)] if row[0] else row[1:] for row in rows]
-    x: list[mpf] = []
-    for row in reversed(done):
-        x.insert(0, row[-1] - mpmath.fdot(zip(row, x, strict=False)))
-    return x
 
 
 @precisely()

@@ -1,4 +1,4 @@
-"""Score tables of an ensemble, and their conversion to whole steps.
+"""Score tables of an ensemble.
 
 F_k = bias_k + sum of switch_rows[s][k] over the closed switches s + sum over joints of the row of the code's bin, where
 a code's bin is the number of thresholds below it.
@@ -6,7 +6,6 @@ a code's bin is the number of thresholds below it.
 
 import math
 from collections.abc import Sequence
-from fractions import Fraction
 
 import mpmath
 from mpmath import mpf
@@ -95,11 +94,6 @@ def mean_row(thresholds: Sequence[int], rows: Sequence[Row], codes: Sequence[int
 def mean_switch(row: Row, bits: Sequence[bool]) -> list[mpf]:
     """Return a switch's `row` (K,) times the share of `bits` (n,) that are 1, the replacement of a missing switch."""
     return [mpf(x) * sum(bits) / len(bits) for x in row]
-
-
-def steps(value: float, scale: float) -> int:
-    """Return value * scale rounded to an integer, half to even."""
-    return round(Fraction(value) * Fraction(scale))
 
 
 def _parts(

@@ -1,10 +1,8 @@
-"""The reference itself, against closed forms, whole numbers, fractions, scipy and Weka's recorded answers."""
+"""The reference itself, against closed forms, whole numbers, fractions and scipy."""
 
-import json
 import math
 from fractions import Fraction
 from itertools import combinations, pairwise, product
-from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -17,7 +15,6 @@ from scipy import special, stats
 
 from thenar.stability.reference.boosting import (
     best_splits,
-    boost_rounds,
     exp,
     explained,
     log,
@@ -34,14 +31,12 @@ from thenar.stability.reference.information import (
 from thenar.stability.reference.intervals import normal_quantile, student, student_quantile, wilson
 from thenar.stability.reference.logit import Column, largest_derivative
 from thenar.stability.reference.numbers import DIGITS, cos, precisely, sin, turn
-from thenar.stability.reference.standing_in import Kind, stand_ins, whole
-from thenar.stability.reference.tables import steps
+from thenar.stability.reference.standing_in import Kind, stand_ins
 
 HAIR = mpf(10) ** (8 - DIGITS)  # a few roundings of 60 digits
 
 COUNTS = st.integers(0, 12)
 TABLES = st.lists(st.tuples(COUNTS, COUNTS, COUNTS), min_size=1, max_size=4).filter(lambda t: any(map(any, t)))
-DOUBLES = st.floats(allow_nan=False, allow_infinity=False)
 
 
 @precisely()
@@ -167,51 +162,13 @@ def _neighbours(x: list[float]) -> list[tuple[float, float]]:
     return list(pairwise(values))
 
 
-def test_two_separable_classes_follow_their_recursion() -> None:
-    # Uncapped, a member's z is 1/P and the other class's mirror image: F grows by (1 + e^-2F)/2 a round.
-    training = boost_rounds([[0.0], [1.0], [1.0]], [0, 1, 1], 2, 12)
-    losses, F = [mean_loss([[0, 0]] * 3, [0, 1, 1]), *(each.loss for each in training)], training[-1].scores
-    with precisely():
-        f, truth = mpf(0), [mpmath.log(2)]
-        for _ in range(12):
-            f += (1 + mpmath.exp(-2 * f)) / 2
-            truth.append(mpmath.log1p(mpmath.exp(-2 * f)))
-        assert all(near(a, b) for a, b in zip(losses, truth, strict=True))
-        assert near(F[0][0], f)
-        assert near(F[1][0], -f)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["twoclass", "missing", "dupfeat"])
-def test_ten_rounds_are_wekas(weka_data: Path, name: str) -> None:
-    arrays = np.load(weka_data / "open" / f"{name}.npz")
-    n_classes = json.loads((weka_data / "open" / f"{name}.json").read_text())["J"]
-    rows = arrays["train_idx"]
-    columns: list[np.ndarray] = []
-    for column, n_values in zip(arrays["X"][rows].T, arrays["nominal"], strict=True):
-        # Of a nominal column of more than two values Weka tries the splits "is it v?", one after the other.
-        values = range(n_values) if n_values > 2 else ()
-        columns += [np.where(np.isnan(column), np.nan, column != value) for value in values] or [column]
-    F = boost_rounds(np.column_stack(columns).tolist(), arrays["y"][rows].tolist(), n_classes, 10)[-1].scores
-    got = np.array([[float(p) for p in softmax(row)] for row in F])
-    assert np.abs(got - arrays["default/I10/half/P_train"]).max() < 1e-9
-
-
-@given(st.lists(st.tuples(DOUBLES, DOUBLES), min_size=1, max_size=5))
-def test_whole_steps_are_half_to_even(pairs: list[tuple[float, float]]) -> None:
-    for value, scale in pairs:
-        doubt = abs(steps(value, scale) - Fraction(value) * Fraction(scale))
-        assert doubt <= Fraction(1, 2)
-        assert doubt < Fraction(1, 2) or steps(value, scale) % 2 == 0
-
-
 @pytest.mark.parametrize("counts", [(30, 10), (5, 12, 40), (1, 1, 1, 97)])
 def test_uninformative_inputs_are_substituted_by_class_frequencies(counts: tuple[int, ...]) -> None:
     labels = [label for label, count in enumerate(counts) for _ in range(count)]
     rows = [[0] * len(counts)] * len(labels)
     ends = ((-9000,) * len(counts), (9000,) * len(counts))
-    for starts in ({((0,) * len(counts),)}, {((500, *[-300] * (len(counts) - 1)),)}):
-        ((found,),) = stand_ins(Kind([rows], labels, [ends], 1000.0), starts)
+    for start in ([0.0] * len(counts), [500.0, *[-300.0] * (len(counts) - 1)]):
+        (found,) = stand_ins(Kind([rows], labels, [ends], 1000.0), [start])
         for one, other in combinations(range(len(counts)), 2):
             assert found[one] - found[other] == pytest.approx(1000 * math.log(counts[one] / counts[other]), abs=2)
 
@@ -221,20 +178,12 @@ def test_the_sum_of_a_kind_compensates_redundant_inputs() -> None:
     labels = [0] * 30 + [1] * 10
     known, nothing = [[549, -549]] * 40, [[0, 0]] * 40
     ends = [((-9000, -9000), (9000, 9000))] * 2
-    none = {((0, 0), (0, 0))}
-    ((alone, _),) = stand_ins(Kind([known, known], labels, ends, 1000.0), none)
-    ((one, other),) = stand_ins(Kind([known, known, nothing], labels, ends, 1000.0), none)
+    none = [[0.0, 0.0]] * 2
+    alone, _ = stand_ins(Kind([known, known], labels, ends, 1000.0), none)
+    one, other = stand_ins(Kind([known, known, nothing], labels, ends, 1000.0), none)
     assert max(map(abs, alone)) <= 1
     assert one == other
     assert 100 < one[0] < 549
-
-
-def test_a_step_next_to_a_half_is_followed_both_ways() -> None:
-    assert whole([[mpf("2.5"), mpf("-1.25")]], 1e-9, [((-9, -9), (9, 9))]) == {((2, -1),), ((3, -1),)}
-    assert whole([[mpf("2.5"), mpf("-1.25")]], 1e-9, [((-9, -9), (2, 9))]) == {((2, -1),)}
-    lack = math.log(30.5 / 20.5)
-    kind = Kind([[[0, 0]] * 40], [0] * 30 + [1] * 10, [((0, 0), (1, 0))], 0.5 / lack)
-    assert len(stand_ins(kind, {((0, 0),)})) == 2
 
 
 @given(st.integers(1, 10**6).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
