@@ -93,7 +93,7 @@ class Glove:
 
     Raises
     ------
-    BuildError, HarnessError, PreshapeError, SettingError
+    BuildError, HarnessError, SettingError
         If one of them is invalid, or they do not fit each other. Nothing is opened before.
     SinkError, OSError
         On entering the context, if a sink or the recording cannot be opened.

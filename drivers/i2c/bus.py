@@ -38,12 +38,8 @@ class Port:
         return 0 in reply or int.from_bytes(reply, "little") & high != high
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Ports, by their numbers in the scan, that one transfer reads."""
-
-    route: Route | None
-    ports: tuple[tuple[int, Port], ...]
+# Ports, by their numbers in the scan, that one transfer reads, and the route to them.
+Group = tuple[Route | None, tuple[tuple[int, Port], ...]]
 
 
 def cut(ports: Sequence[Port], way: BatchMode) -> Iterator[Group]:
@@ -53,11 +49,11 @@ def cut(ports: Sequence[Port], way: BatchMode) -> Iterator[Group]:
         if not port.member.present:
             continue
         if gathered and not _fits(port, [other for _, other in gathered], way):
-            yield Group(gathered[0][1].member.route, tuple(gathered))
+            yield gathered[0][1].member.route, tuple(gathered)
             gathered = []
         gathered.append((number, port))
     if gathered:
-        yield Group(gathered[0][1].member.route, tuple(gathered))
+        yield gathered[0][1].member.route, tuple(gathered)
 
 
 def _fits(port: Port, gathered: Sequence[Port], way: BatchMode) -> bool:
@@ -92,14 +88,14 @@ class Scan:
         if self._revision != keeper.revision or self._way is not self._node.way:
             self._plan()
         replies: list[int | None] = [None] * len(self._ports)
-        for group, run in self._groups:
+        for (route, ports), run in self._groups:
             try:
-                if group.route is not None:
-                    keeper.routes.select(group.route)
+                if route is not None:
+                    keeper.routes.select(route)
                 found: Sequence[bytes | None] = run()
             except OSError as error:
-                found = self._one_by_one(group, error)
-            for (number, port), reply in zip(group.ports, found, strict=True):
+                found = self._one_by_one(ports, error)
+            for (number, port), reply in zip(ports, found, strict=True):
                 if reply is None or not port.member.present:  # lost, maybe while its neighbours were read
                     continue
                 replies[number] = self._doubt(port, reply) if port.doubtful(reply) else port.value(reply)
@@ -117,14 +113,14 @@ class Scan:
         self._need_open()
         self._revision, self._way = self._keeper.revision, self._node.way
         groups = cut(self._ports, self._way)
-        self._groups = [(group, self._node.prepare([port.query for _, port in group.ports])) for group in groups]
+        self._groups = [(group, self._node.prepare([port.query for _, port in group[1]])) for group in groups]
 
-    def _one_by_one(self, group: Group, error: OSError) -> list[bytes | None]:
+    def _one_by_one(self, ports: Sequence[tuple[int, Port]], error: OSError) -> list[bytes | None]:
         """Read the ports of a failed transfer one by one; if the adapter rejects batches, reduce them from then on."""
         if error.errno in REFUSED and self._way is self._node.way:  # else it was lowered since `_plan`
-            self._node.way = self._way.lower() if len(group.ports) > 1 else BatchMode.SMBUS
+            self._node.way = self._way.lower() if len(ports) > 1 else BatchMode.SMBUS
         self._keeper.routes.forget()
-        return [self._alone(port) for _, port in group.ports]
+        return [self._alone(port) for _, port in ports]
 
     def _alone(self, port: Port) -> bytes | None:
         if not port.member.present:

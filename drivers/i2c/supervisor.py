@@ -97,16 +97,13 @@ class Routes:
         self._node.write(mux, control(channel))
 
 
-class ImpostorError(Exception):
-    """The device at an address is not the expected chip."""
-
-
-def set_up(node: Node, chip: Chip, address: int, used: frozenset[int]) -> None:
-    """Write the chip's registers and read them back. Raises OSError, or ImpostorError for a wrong reply."""
+def set_up(node: Node, chip: Chip, address: int, used: frozenset[int]) -> bool:
+    """Write the chip's registers and read them back; return whether it is the expected chip. Raises OSError."""
     for write in chip.setup(used):
         node.write(address, write.data)
         if write.expect and not write.holds(read_back(node, chip, address, write)):
-            raise ImpostorError
+            return False
+    return True
 
 
 def read_back(node: Node, chip: Chip, address: int, write: Write) -> bytes:
@@ -127,10 +124,9 @@ def identify_chip(node: Node, address: int) -> str:
 
 def _behaves_like(node: Node, chip: Chip, address: int) -> bool:
     try:
-        set_up(node, chip, address, frozenset())
-    except (OSError, ImpostorError):
+        return set_up(node, chip, address, frozenset())
+    except OSError:
         return False
-    return True
 
 
 @dataclass(eq=False, slots=True)
@@ -280,11 +276,10 @@ class ChipSupervisor:
         for left in reversed(range(tries)):
             if self.trouble:
                 break
-            try:
-                member.present = self.attempt(member, lambda: self._set_up(member), 1) is True
-            except ImpostorError:
-                if not left:
-                    self._refuse(member)
+            expected = self.attempt(member, lambda: self._set_up(member), 1)
+            member.present = expected is True
+            if expected is False and not left:
+                self._refuse(member)
             if member.present:
                 member.due = monotonic() + self._check_every_s
                 break
@@ -294,8 +289,7 @@ class ChipSupervisor:
 
     def _set_up(self, member: PlacedChip) -> bool:
         self._node.claim(member.address)
-        set_up(self._node, member.chip, member.address, member.used)
-        return True
+        return set_up(self._node, member.chip, member.address, member.used)
 
     def _refuse(self, member: PlacedChip) -> None:
         self.check_bus_stuck()  # a line held low looks like a reply of every chip

@@ -33,7 +33,10 @@ class Health:
         self._joint_names = tuple(joint.name for joint in build.manifest.joints)
         self._numbers = {grasp: number for number, grasp in enumerate(build.grasps)}
         self._all = (1 << len(self._switch_names)) - 1
-        self._stuck, self._drift = StuckSwitches(build), JointDrift(build.tables)
+        shares, classes = on_shares(build), build.tables.n_classes
+        self._never_closed, self._never_open = Missed(shares, classes), Missed([1 - share for share in shares], classes)
+        self._read: Mask = 0  # during the current grasp
+        self._drift = JointDrift(build.tables)
         self._chattering = Chattering(len(self._switch_names))
         self._switch_rate, self._glove_rate = FrameRate(), FrameRate()
         self._grasp = UNKNOWN
@@ -53,13 +56,15 @@ class Health:
         """
         self._published[grasp.health] += 1
         if grasp.grasp != self._grasp:
-            self._stuck.end_grasp(self._numbers.get(self._grasp))
+            self._end_grasp(self._numbers.get(self._grasp))
             self._grasp = grasp.grasp
         if switches is not None and switches.time_us > self._switches_us:
             self._switches_us = switches.time_us
             read = self._all & ~switches.lost
             self._switch_rate.frame(switches.time_us)
-            self._stuck.frame(switches.closed, read)
+            self._read |= read
+            self._never_closed.seen |= switches.closed & read
+            self._never_open.seen |= ~switches.closed & read
             self._chattering.frame(switches.time_us, switches.closed, read)
         if glove_us is not None and glove_us > self._glove_us:
             self._glove_us = glove_us
@@ -79,8 +84,8 @@ class Health:
         drifts = zip(self._joint_names, self._drift.codes, strict=False)
         return HealthReport(
             time_us=now_us,
-            stuck_open=self._named(self._stuck.open()),
-            stuck_closed=self._named(self._stuck.closed()),
+            stuck_open=self._named(self._never_closed.suspects()),
+            stuck_closed=self._named(self._never_open.suspects()),
             chattering=self._named(numbers(self._chattering.switches)),
             drifting=tuple(Drift(joint, codes) for joint, codes in drifts if codes),
             switch_hz=self._switch_rate.hz(now_us),
@@ -94,6 +99,13 @@ class Health:
             quarantined=quarantined,
             outputs=outputs,
         )
+
+    def _end_grasp(self, number: int | None) -> None:
+        """End a grasp of type `number`; None: it was none, and its observations count for the next."""
+        if number is not None:
+            self._never_closed.end_grasp(number, self._read)
+            self._never_open.end_grasp(number, self._read)
+            self._read = 0
 
     def _named(self, switches: Sequence[int]) -> tuple[str, ...]:
         return tuple(self._switch_names[number] for number in switches)
@@ -167,34 +179,3 @@ class Missed:
             for switch, (grasps, types) in enumerate(zip(self._grasps, self._types, strict=True))
             if grasps >= self._patience[switch] and types.bit_count() >= self._enough
         ]
-
-
-class StuckSwitches:
-    """Both kinds of stuck switches."""
-
-    def __init__(self, build: Build) -> None:
-        shares, classes = on_shares(build), build.tables.n_classes
-        self._on = Missed(shares, classes)
-        self._off = Missed([1 - share for share in shares], classes)
-        self._read: Mask = 0
-
-    def frame(self, closed: Mask, read: Mask) -> None:
-        """Take a frame in which the switches `read` were read."""
-        self._read |= read
-        self._on.seen |= closed & read
-        self._off.seen |= ~closed & read
-
-    def end_grasp(self, number: int | None) -> None:
-        """End a grasp of type `number`; None: it was none, and its observations count for the next."""
-        if number is not None:
-            self._on.end_grasp(number, self._read)
-            self._off.end_grasp(number, self._read)
-            self._read = 0
-
-    def open(self) -> list[int]:
-        """Return the switches that are suspected never to close."""
-        return self._on.suspects()
-
-    def closed(self) -> list[int]:
-        """Return the switches that are suspected never to open."""
-        return self._off.suspects()

@@ -1,7 +1,7 @@
 """Read a recording back: sessions, frames, predictions and labels in the order in which they were written."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 from struct import Struct, error, pack
@@ -41,27 +41,13 @@ _REASON = 200
 OTHER_RECORDS = 100_000
 
 
-@dataclass(slots=True)
-class Passed:
-    """Records, or parts of them, that were skipped: how many, and the first few with their places."""
-
-    count: int = 0
-    first: list[str] = field(default_factory=list)
-
-    def add(self, what: str, offset: int) -> None:
-        """Count one."""
-        self.count += 1
-        if len(self.first) < SHOWN:
-            self.first.append(f"{what} at byte {offset}")
-
-
 class Decoder:
     """Decodes the records of a data section one by one.
 
     session  the session of the next messages; None before the first
     ours     whether the file says that thenar wrote it
     foreign  whether another program has packed, numbered or added something
-    passed   the skipped records
+    skipped  the number of records, or parts of them, that were skipped; first_skipped, the first few with their places
     broken   the offset of a chunk that does not match its checksum; None: all match
     """
 
@@ -69,7 +55,8 @@ class Decoder:
         """Messages and sessions are counted in `tail`."""
         self.session: Session | None = None
         self.ours = self.foreign = False
-        self.passed = Passed()
+        self.skipped = 0
+        self.first_skipped: list[str] = []
         self.broken: int | None = None
         self._tail = tail
         self._schemas: dict[int, str] = {}
@@ -91,7 +78,7 @@ class Decoder:
         if content is None or (record.opcode != Opcode.CHUNK and len(content) > LARGEST_RECORD):
             self.foreign = True
             if not self._indexed:
-                self.passed.add(kind_of(record.opcode), record.offset)
+                self._skip(kind_of(record.opcode), record.offset)
         elif record.opcode == Opcode.MESSAGE:
             entry = self._message(content)
             if entry is not None:
@@ -100,6 +87,11 @@ class Decoder:
             yield from self._chunk(record.offset, self._parsed(Chunk, record, content))
         else:
             yield from self._described(record, content)
+
+    def _skip(self, what: str, offset: int) -> None:
+        self.skipped += 1
+        if len(self.first_skipped) < SHOWN:
+            self.first_skipped.append(f"{what} at byte {offset}")
 
     def count(self, record: RawRecord) -> None:
         """Count a record that holds no measurements. Raises McapError if there are too many to read in seconds."""
@@ -128,7 +120,7 @@ class Decoder:
         if rest:
             # MCAP lets later versions add fields. This version of the record has none.
             self.foreign = True
-            self.passed.add(f"{rest} bytes more than a {kind.__name__.lower()} has", record.end - rest)
+            self._skip(f"{rest} bytes more than a {kind.__name__.lower()} has", record.end - rest)
         return found
 
     def _message(self, content: bytes) -> Entry | None:
@@ -159,7 +151,7 @@ class Decoder:
     def _sessions(self, record: RawRecord, metadata: Metadata) -> Iterator[Session]:
         if metadata.name != METADATA:
             self.foreign = True
-            self.passed.add(f"metadata {shortened(repr(metadata.name))}", record.offset)
+            self._skip(f"metadata {shortened(repr(metadata.name))}", record.offset)
             return
         before, session = self.session, from_metadata(metadata.metadata)
         if before is not None and _wired(before) != _wired(session):
@@ -300,7 +292,7 @@ class Reader:
 
     def faults(self) -> Iterator[Fault]:
         """Yield the faults of the file, once its end is reached."""
-        name, end, passed = self.path.name, self.end, self._decoder.passed
+        name, end, skipped = self.path.name, self.end, self._decoder.skipped
         if end is not None and (end.whole < end.size or not (end.closed or self._in_data)):
             message = f"{name} is whole up to byte {end.whole} of {end.size}, the rest was left out: {end.reason}"
             yield Fault("cut recordings", 1, message)
@@ -309,9 +301,9 @@ class Reader:
             wrong.append(f"the chunk at byte {self._decoder.broken} does not match its checksum")
         if wrong:
             yield Fault("altered recordings", 1, f"{name} is altered: {'; '.join(wrong)}")
-        if passed.count:
-            message = f"{name} holds records that thenar skips: {list_names(passed.first, passed.count)}"
-            yield Fault("records passed over", passed.count, message)
+        if skipped:
+            message = f"{name} holds records that thenar skips: {list_names(self._decoder.first_skipped, skipped)}"
+            yield Fault("records passed over", skipped, message)
 
     def _read(self) -> Iterator[Entry]:
         for record in self._records:
