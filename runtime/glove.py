@@ -18,7 +18,7 @@ from .harness.writing import harness_to_toml
 from .live.health import Health
 from .live.recogniser import Moment
 from .live.sources import Snapshot
-from .live.system import System
+from .live.system import LiveSystem
 from .policy import Policy
 from .preshape.loading import preshape_selector
 from .published import DeviceHealth, HealthReport, JointAngles, OutputTrouble, Quarantined
@@ -77,7 +77,7 @@ class Glove:
     ----------
     frames : int
         The number of moments so far.
-    system : System
+    system : LiveSystem
         The build and the harness, combined.
     sources : Sources
         The devices.
@@ -129,7 +129,7 @@ class Glove:
     ) -> None:
         loaded = build if isinstance(build, Build) else Build.load(build)
         wired = harness if isinstance(harness, Harness) else load_harness(Path(harness))
-        self.system = system = System.of(loaded, wired, policy)
+        self.system = system = LiveSystem.of(loaded, wired, policy)
         self.stop = Event() if stop is None else stop
         self.frames, self.lacking = 0, ""
         self.health: HealthReport | None = None

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
 from ..extras import optional
-from ..lines import CLOCK_US, SEQUENCES, Header, checked, parsed, switches_field
+from ..lines import CLOCK_US, SEQUENCES, ColumnHeader, checked, parsed, switches_field
 
 if TYPE_CHECKING:
     from websockets.sync.server import ServerConnection
@@ -44,7 +44,9 @@ class LineSender(Closing):
     ) -> None:
         self._send, self._columns, self._time, self._scale = send, tuple(columns), time, _UNITS[unit]
         header = ",".join(self._columns).encode()
-        self._header = header + b"\n" if named and parsed(header) == Header(self._columns) and len(columns) > 1 else b""
+        self._header = (
+            header + b"\n" if named and parsed(header) == ColumnHeader(self._columns) and len(columns) > 1 else b""
+        )
         self._json, self._named_s = named and not self._header, -math.inf
         self._period_s, self._began = 1 / rate_hz, monotonic()
         self._values = dict.fromkeys(columns, 0.0)
@@ -106,7 +108,7 @@ class BoardSender(LineSender):
         return names + checked(("row", *head, *(str(round(values[name])) for name in self._readings)))
 
 
-class SocketLines(Closing):
+class LineServer(Closing):
     """A server of lines on loopback (`tcp://127.0.0.1:PORT`) or at a path (`unix:PATH`) for all clients.
 
     port  its address, in the form of a `[[stream]]`
@@ -223,14 +225,14 @@ class WebLines(Closing):
                 self._clients.discard(client)
 
 
-def lines_like(port: str, path: Path) -> SocketLines | DatagramLines | WebLines:
+def lines_like(port: str, path: Path) -> LineServer | DatagramLines | WebLines:
     """Return a sender of lines on loopback with the transport of `port`, or at the Unix socket `path` if `port` is not
     a network address.
     """
     if port.startswith("tcp:"):
-        return SocketLines()
+        return LineServer()
     if port.startswith("udp:"):
         return DatagramLines()
     if port.startswith(("ws:", "wss:")):
         return WebLines()
-    return SocketLines(path)
+    return LineServer(path)

@@ -8,7 +8,7 @@ from time import monotonic
 from typing import TypeVar
 
 from .chips import CHIPS, Chip, Write
-from .node import NOBODY, NOBODY_THERE, STUCK, Node, Query, failure, stuck
+from .node import NOBODY, NOBODY_THERE, STUCK, DeviceNode, Query, failure, stuck
 from .tca9548a import control
 
 _LOG = logging.getLogger(__name__)
@@ -47,7 +47,7 @@ class Routes:
     mux  the address of the last used mux
     """
 
-    def __init__(self, node: Node, muxes: Iterable[int]) -> None:
+    def __init__(self, node: DeviceNode, muxes: Iterable[int]) -> None:
         self._node = node
         self._connected = set(muxes)  # those that may have a channel on: initially all
         self.selected: Route | None = None
@@ -97,7 +97,7 @@ class Routes:
         self._node.write(mux, control(channel))
 
 
-def set_up(node: Node, chip: Chip, address: int, used: frozenset[int]) -> bool:
+def set_up(node: DeviceNode, chip: Chip, address: int, used: frozenset[int]) -> bool:
     """Write the chip's registers and read them back; return whether it is the expected chip. Raises OSError."""
     for write in chip.setup(used):
         node.write(address, write.data)
@@ -106,12 +106,12 @@ def set_up(node: Node, chip: Chip, address: int, used: frozenset[int]) -> bool:
     return True
 
 
-def read_back(node: Node, chip: Chip, address: int, write: Write) -> bytes:
+def read_back(node: DeviceNode, chip: Chip, address: int, write: Write) -> bytes:
     """Return the bytes at the location that `write` wrote."""
     return node.query(Query(address, write.data[:1] if chip.registers else b"", len(write.expect)))
 
 
-def identify_chip(node: Node, address: int) -> str:
+def identify_chip(node: DeviceNode, address: int) -> str:
     """Describe the device at an address: the first kind whose set-up succeeds, which leaves its pins inputs.
 
     Kinds without registers come last, since probing for registers drives their pins.
@@ -122,7 +122,7 @@ def identify_chip(node: Node, address: int) -> str:
     return "something unknown"
 
 
-def _behaves_like(node: Node, chip: Chip, address: int) -> bool:
+def _behaves_like(node: DeviceNode, chip: Chip, address: int) -> bool:
     try:
         return set_up(node, chip, address, frozenset())
     except OSError:
@@ -173,7 +173,7 @@ class ChipSupervisor:
     is gone, and no other error.
     """
 
-    def __init__(self, node: Node, members: Sequence[PlacedChip], check_every_s: float) -> None:
+    def __init__(self, node: DeviceNode, members: Sequence[PlacedChip], check_every_s: float) -> None:
         self._node = node
         self._members = members
         self._check_every_s = check_every_s

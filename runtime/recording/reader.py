@@ -41,7 +41,7 @@ _REASON = 200
 OTHER_RECORDS = 100_000
 
 
-class Decoder:
+class EntryDecoder:
     """Decodes the records of a data section one by one.
 
     session  the session of the next messages; None before the first
@@ -261,7 +261,7 @@ class Reader:
         self._wrong: list[str] = []
         self._in_data = True
         self._records = RecordStream(path)
-        self._decoder = Decoder(self.tail)
+        self._decoder = EntryDecoder(self.tail)
         self._entries = self._read()
         first = next(self._entries, None)
         if not isinstance(first, Session):

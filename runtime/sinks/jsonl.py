@@ -1,7 +1,7 @@
 """JSON lines to a file: stdout, a pipe, a file on disk, or anything else that takes bytes.
 
 Lines describe grasps, and now and then the glove's health and the hand's progress in a task. Readers distinguish them
-by `kind`; msgspec does so automatically: `msgspec.json.decode(line, type=Line | HealthLine | ProgressLine)`.
+by `kind`; msgspec does so automatically: `msgspec.json.decode(line, type=GraspLine | HealthLine | ProgressLine)`.
 
 A line is sent whole or not at all, and a slow descriptor delays nobody.
 """
@@ -25,7 +25,7 @@ from ..task import Progress, ProgressLine
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 
-class Line(LiveGrasp, frozen=True, tag_field="kind", tag="grasp"):
+class GraspLine(LiveGrasp, frozen=True, tag_field="kind", tag="grasp"):
     """The fields of `LiveGrasp`, followed by the preshape and the angles, null if there are none."""
 
     preshape: Preshape | None = None
@@ -50,7 +50,7 @@ _GRASP, _PRESHAPE, _ANGLES = b'{"kind":"grasp",', b',"preshape":', b',"angles":'
 def encode(grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> bytes:
     """Return a frame's line, including its newline. UTF-8, no newline inside.
 
-    The bytes equal those of a `Line`, without making one.
+    The bytes equal those of a `GraspLine`, without making one.
     """
     parts = (_GRASP, _encode(grasp)[1:-1], _PRESHAPE, _encode(preshape), _ANGLES, _encode(angles), b"}\n")
     return b"".join(parts)

@@ -1,4 +1,4 @@
-"""The page of a guided collection: its view of the Guide, and the keys pressed there.
+"""The page of a guided collection: its view of the guide, and the keys pressed there.
 
 Every open browser shows the same, and keys count in each.
 """
@@ -10,7 +10,7 @@ from thenar.drivers.closing import Closing
 from ..frames import SwitchFrame
 from ..live.sources import DeviceState
 from ..published import NONE
-from ..recording.guide import Guide, Key, Stage, Trial
+from ..recording.guide import CollectionGuide, Key, Stage, Trial
 from ..recording.session import Session
 from .presses import Presses
 from .server import Server, message
@@ -74,12 +74,12 @@ class GuidePage(Closing):
         self._server = Server("collect", address, token=token, on_message=self._presses.take, hello=lambda: self._first)
         self.url = self._server.url
 
-    def press(self, now_us: int, guide: Guide) -> None:
+    def press(self, now_us: int, guide: CollectionGuide) -> None:
         """Pass the keys pressed since the last call to `guide`, if they were meant for its current step."""
         for key in self._presses.due(lambda: guide.step):
             guide.press(now_us, key)
 
-    def show(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> None:
+    def show(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> None:
         """Show the state of `guide`, if it changed or the next refresh is due."""
         if now_us < self._due_us and guide.step == self._step:
             return
@@ -117,7 +117,7 @@ class GuidePage(Closing):
         """Close the page."""
         self._server.close()
 
-    def _seen(self, now_us: int, guide: Guide) -> dict[str, object]:
+    def _seen(self, now_us: int, guide: CollectionGuide) -> dict[str, object]:
         """Return the glove's readings, or those that were captured: one character per switch, "1" closed, "0" open, "x"
         not read; the joint values, in degrees if calibrated, null if not measured, none if the newest record is old;
         how far each taxel is pressed, 0 to 1.

@@ -12,7 +12,7 @@ from time import monotonic, monotonic_ns
 
 import pytest
 
-from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender, SocketLines, lines_like
+from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender, LineServer, lines_like
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.line_reader import LineReader, line_port_fault
@@ -175,7 +175,7 @@ def test_bytes_without_a_row_are_counted() -> None:
 def test_half_a_line_before_a_break_spoils_no_later_line(tmp_path: Path) -> None:
     with LineReader(f"unix:{tmp_path}/s") as reader:
         for last in (b"1,2\n77,", b"3,4\n"):
-            with SocketLines(tmp_path / "s") as server:
+            with LineServer(tmp_path / "s") as server:
                 reader.open()
                 while not server._clients:
                     pass

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.layout import GLOVE, LARGEST_RECORD, RECOGNITION, SWITCHES, TRIALS, beginning
 from thenar.runtime.recording.messages import encode_bytes, encode_text
-from thenar.runtime.recording.session import Collection, Label, Session, Task, to_metadata
+from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session, to_metadata
 
 READ = """
 import re, sys
@@ -42,7 +42,9 @@ print(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1
 print(calls)
 """
 
-COLLECTION = Collection("A", "own", ("cup", "pen"), (Task("cup", ("mug",)), Task("pen", ("biro",))), 1, 0)
+COLLECTION = Collection(
+    "A", "own", ("cup", "pen"), (CollectionTask("cup", ("mug",)), CollectionTask("pen", ("biro",))), 1, 0
+)
 SESSION = Session(thenar="1", switches=("s1", "s2"), sensors=(), collection=COLLECTION)
 GRASP = LiveGrasp(1, 1, 0, "cup", "cup", 1.0, 1, "ok", 1, 1, 1)
 LABEL = Label(1, "captured", 1, "cup", "A", "mug")

@@ -14,13 +14,13 @@ from msgspec import json
 
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import LiveGrasp
-from thenar.runtime.sinks import JsonLines, Line, SinkError, open_sink
+from thenar.runtime.sinks import GraspLine, JsonLines, SinkError, open_sink
 
 MakeGrasp = Callable[..., LiveGrasp]
 
 
 def numbers(data: bytes) -> list[int]:
-    return [json.decode(line, type=Line).number for line in data.splitlines()]
+    return [json.decode(line, type=GraspLine).number for line in data.splitlines()]
 
 
 def test_every_frame_is_a_line(make_grasp: MakeGrasp, preshape: Preshape) -> None:
@@ -163,5 +163,5 @@ def test_stdout_gets_the_lines_and_stays_open() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
     first, second = done.stdout.splitlines()
-    assert json.decode(first, type=Line).number == 3
+    assert json.decode(first, type=GraspLine).number == 3
     assert second == b"and more"

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from thenar.runtime.build import Build
 from thenar.runtime.live.recogniser import Moment
 from thenar.runtime.published import HealthReport, LiveGrasp
-from thenar.runtime.sinks import DetailLine, HealthLine, Line, SocketLines
+from thenar.runtime.sinks import DetailLine, GraspLine, HealthLine, SocketLines
 from thenar.runtime.sinks.sockets import HANGING_S, MAX_OF_ONE, MAX_READERS, open_tcp, open_unix
 
 MakeGrasp = Callable[..., LiveGrasp]
@@ -58,7 +58,7 @@ class Reader:
         self.lines = self.socket.makefile("rb")
 
     def number(self) -> int:
-        return json.decode(self.lines.readline(), type=Line).number
+        return json.decode(self.lines.readline(), type=GraspLine).number
 
     def close(self) -> None:
         self.lines.close()
@@ -303,7 +303,7 @@ def test_requested_details_follow_grasps_100_times_a_second(
             sink.publish(grasp, None, None)
             sink.moment(Moment(grasp, None, None, None))
     with closing(reader):
-        lines = [json.decode(line, type=Line | DetailLine) for line in reader.lines]
+        lines = [json.decode(line, type=GraspLine | DetailLine) for line in reader.lines]
     details = [line for line in lines if isinstance(line, DetailLine)]
     assert [line.number for line in details] == (list(range(0, 20, 4)) if detail else [])
     assert {line.build for line in details} <= {build.manifest.checksum}
