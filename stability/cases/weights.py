@@ -19,7 +19,7 @@ from thenar.compiler.elementary import Floats, add_up
 
 from ..checks.class_rounds import see_round
 from ..checks.roundings import ROUNDING
-from ..checks.rounds import Moment, mean_score, moments
+from ..checks.rounds import RoundState, mean_score, moments
 from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import HardSet, contradictory, imbalanced, intervals, noisy, separable
 from ..reference import boosting as ensembles
@@ -153,7 +153,7 @@ def _extreme(rounds: int) -> Iterator[Finding]:
     yield from (worst.finding() for worst in (chosen, outputs, outside))
 
 
-def _in_range(moment: Moment, loss: float) -> bool:
+def _in_range(moment: RoundState, loss: float) -> bool:
     finite = np.isfinite(moment.scores).all() and math.isfinite(loss)
     shares, weights = moment.shares, moment.weights
     return bool(finite and moment.loss == loss and ((shares >= 0) & (shares <= 1)).all() and (weights >= 0).all())

@@ -21,7 +21,7 @@ from .roundings import ROUNDING, share_error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moment:
+class RoundState:
     """The state after a round: scores F and shares P (K, n), weights w and weighted responses w z (K, n) of the next
     round, and the loss.
     """
@@ -33,13 +33,13 @@ class Moment:
     loss: float
 
 
-def moments(hard: HardSet, stumps: Stumps, z_max: float = 3.0) -> Iterator[Moment]:
+def moments(hard: HardSet, stumps: Stumps, z_max: float = 3.0) -> Iterator[RoundState]:
     """Yield the state before the first round and after every round, equal to the training's to the last bit."""
     weights = None if hard.weights is None else hard.scaled_weights
     stages = (np.ascontiguousarray(scores.T) for scores in stumps.staged_scores(hard.X))
     for scores in chain([np.zeros(hard.member.shape)], stages):
         shares, loss = softmax_and_loss(scores, hard.labels, weights)
-        yield Moment(scores, shares, *weights_and_responses(shares, hard.member, z_max, weights), loss)
+        yield RoundState(scores, shares, *weights_and_responses(shares, hard.member, z_max, weights), loss)
 
 
 def loss_rounding(n_classes: int, loss: float) -> float:
@@ -53,7 +53,7 @@ def loss_rounding(n_classes: int, loss: float) -> float:
     return ROUNDING * (2 + math.log(n_classes) + (n_classes - 1) + 4 * math.log(n_classes) + 6 * loss)
 
 
-def rise_rounding(n_classes: int, before: Moment, after: Moment, z_max: float = 3.0) -> float:
+def rise_rounding(n_classes: int, before: RoundState, after: RoundState, z_max: float = 3.0) -> float:
     """Return the largest rise of the computed loss in a round that does not raise the exact loss.
 
     Both losses are rounded. Scores are rounded to doubles, which changes a loss L by at most 2 |F| L: |dL/dF| is at
@@ -93,7 +93,7 @@ def entropy_left(hard: HardSet) -> mpf:
 
 
 @precisely()
-def resting_error(hard: HardSet, last: Moment) -> float:
+def resting_error(hard: HardSet, last: RoundState) -> float:
     """Return the error of shares P against those of the counts, as a share of the rounding bound after convergence.
 
     Boosting converges to sum u (Y - P) = 0. There 1 - P is off by 2^-54, the resolution of P, and the products round.
@@ -110,7 +110,7 @@ def resting_error(hard: HardSet, last: Moment) -> float:
     return float(max(errors))
 
 
-def unsettled(last: Moment) -> float:
+def unsettled(last: RoundState) -> float:
     """Return the most weight that a frame can keep: below a share of 2^-38 of its class's, its branch counts as empty.
 
     Then it follows the mean of all rows, which is constant once they have converged, and learns nothing more itself.
@@ -118,7 +118,7 @@ def unsettled(last: Moment) -> float:
     return 2.0**-38 * float(last.weights.sum(axis=1).max())
 
 
-def idle_loss(hard: HardSet, last: Moment) -> float:
+def idle_loss(hard: HardSet, last: RoundState) -> float:
     """Return the largest remaining loss of frames of a single class, in which each of K classes keeps `unsettled`."""
     lacking = sum(row.count(0) for row in counted(hard).values())
     return lacking * unsettled(last) / float(hard.scaled_weights.sum())
