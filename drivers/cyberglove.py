@@ -1,4 +1,4 @@
-"""The CyberGlove on a serial line: detection, set-up, records, its light and wrist switch.
+"""The CyberGlove on a serial line: detection, set-up, records.
 
     with CyberGlove("/dev/ttyUSB0") as glove:
         while (timed := glove.read(1.0)) is not None:
@@ -408,20 +408,18 @@ class CyberGlove(Closing):
                 return None
         return self._ready.popleft()
 
-    def light(self, on: bool) -> None:
-        """Switch the light at the wrist. A stream pauses meanwhile. Raises DeviceError as `ask` does."""
-        self._ask(setting("L", bytes([on])))
-
-    def switch(self) -> bool:
-        """Return whether the switch at the wrist is on (the status byte of records reports it without a pause)."""
-        return self.ask("W") != b"\0"
-
     def ask(self, letter: str) -> bytes:
         """Return the values of the box's reply to the query of this letter. A stream pauses meanwhile.
 
         Raises DeviceError if the line is gone or the box does not reply, SettingError if there is no such query.
         """
-        return self._ask(query(letter))
+        command, line = query(letter), self._opened()
+        dialogue = Dialogue(line)
+        dialogue.stop_stream()
+        try:
+            return dialogue.ask(command)
+        finally:
+            self._start(line)
 
     def close(self) -> None:
         """Stop the stream, unmask all sensors, if that is still possible, and close the line."""
@@ -435,15 +433,6 @@ class CyberGlove(Closing):
     def __enter__(self) -> Self:
         self.open()
         return self
-
-    def _ask(self, command: Command) -> bytes:
-        line = self._opened()
-        dialogue = Dialogue(line)
-        dialogue.stop_stream()
-        try:
-            return dialogue.ask(command)
-        finally:
-            self._start(line)
 
     def _opened(self) -> SerialLine:
         if self._line is None:
