@@ -25,7 +25,10 @@ from ..cyberglove_protocol import (
     SET,
     STOP,
     STREAM,
+    Record,
+    RecordFault,
     digitising_us,
+    encode,
     masked_sensors,
     period_us,
     shortest_us,
@@ -105,9 +108,9 @@ class CyberGloveBox:
 
     def record(self, *, streamed: bool, too_fast: bool = False) -> bytes:
         """Return a record's bytes on the wire."""
-        status = bytes([ALWAYS | PLUGGED * self.plugged]) if self.is_on("U") else b""
-        fault = b"eg" if not self.plugged else b"es" if too_fast else b""
-        return (STREAM if streamed else POLL) + self.sent() + status + fault + b"\0"
+        status = ALWAYS | PLUGGED * self.plugged if self.is_on("U") else None
+        fault: RecordFault | None = "unplugged" if not self.plugged else "too fast" if too_fast else None
+        return encode(Record(self.sent(), streamed, fault, status))
 
     def sent(self) -> bytes:
         """Return the values of the sensors that mask and number let through, or all if the box ignores its mask."""

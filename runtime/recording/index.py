@@ -21,7 +21,6 @@ from .session import Session
 # Distance from one recorded position to the next.
 _STEP_NS = 200_000_000
 _LOG_NS = slice(6, 14)
-_TIMED = {Opcode.MESSAGE, Opcode.CHUNK}
 _MANY = {SWITCHES, GLOVE, GRASP, TAXELS, RECOGNITION}
 
 
@@ -100,12 +99,10 @@ class Index:
                 yield _unix_us(entry, decoder), entry
 
     def _note(self, record: RawRecord) -> int:
-        """Record the position of a message or chunk, if the newest is far enough back; return its time."""
-        if record.opcode not in _TIMED or record.content is None or not self._sessions:
+        """Record the position of a message, if the newest is far enough back; return its time."""
+        if record.opcode != Opcode.MESSAGE or record.content is None or not self._sessions:
             return 0
-        content = record.content
-        where = _LOG_NS if record.opcode == Opcode.MESSAGE else slice(0, 8)
-        logged_ns = min(int.from_bytes(content[where], "little"), 2**62)
+        logged_ns = min(int.from_bytes(record.content[_LOG_NS], "little"), 2**62)
         if self.first_us is None:
             self.first_us = logged_ns // 1000
         self.last_us = max(self.last_us or 0, logged_ns // 1000)

@@ -8,14 +8,13 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from struct import pack
-from zlib import crc32
 
 import msgspec
 import pytest
 from msgspec.structs import replace
 
 from thenar.runtime.published import LiveGrasp
-from thenar.runtime.recording.layout import GLOVE, LARGEST_RECORD, RECOGNITION, SWITCHES, TRIALS, beginning
+from thenar.runtime.recording.layout import LARGEST_RECORD, RECOGNITION, SWITCHES, TRIALS, beginning
 from thenar.runtime.recording.messages import encode_bytes, encode_text
 from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session, to_metadata
 
@@ -73,10 +72,6 @@ def label(**changed: object) -> bytes:
     return message(TRIALS, encode_text(JSON(replace(LABEL, **changed))))
 
 
-def chunk(inner: bytes) -> bytes:
-    return record(6, pack("<QQQIIQ", 0, 0, len(inner), crc32(inner), 0, len(inner)) + inner)
-
-
 def long_list_in_a_message() -> Iterator[bytes]:
     yield described(SESSION)
     text = JSON(GRASP).replace(b'"lost":[]', b'"lost":["ab"' + b',"ab"' * (LARGEST_RECORD // 5 - 100) + b"]")
@@ -87,7 +82,6 @@ def message_beyond_the_longest() -> Iterator[bytes]:
     yield described(SESSION)
     text = JSON(GRASP).replace(b'"lost":[]', b'"lost":["ab"' + b',"ab"' * (2 * LARGEST_RECORD // 5) + b"]")
     yield message(RECOGNITION, encode_text(text))
-    yield chunk(message(RECOGNITION, encode_text(text)))
 
 
 def long_list_in_a_session() -> Iterator[bytes]:
@@ -99,11 +93,6 @@ def tasks_without_end() -> Iterator[bytes]:
     collection = JSON(COLLECTION).decode().partition('"tasks":')[0]
     tasks = ",".join([task] * (LARGEST_RECORD // 31))
     yield described(SESSION, collection=f'{collection}"tasks":[{tasks}],"repetitions":1000000,"seed":1}}')
-
-
-def chunk_of_small_messages() -> Iterator[bytes]:
-    yield described(replace(SESSION, switches=()))
-    yield chunk(message(GLOVE, encode_bytes(b"")) * 300_000)
 
 
 def trials_of_one_wide_frame() -> Iterator[bytes]:
@@ -134,7 +123,6 @@ def sessions_without_end() -> Iterator[bytes]:
         message_beyond_the_longest,
         long_list_in_a_session,
         tasks_without_end,
-        chunk_of_small_messages,
         trials_of_one_wide_frame,
         trials_beside_one_long_name,
         sessions_without_end,
