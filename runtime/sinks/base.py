@@ -43,7 +43,7 @@ class SinkReport(msgspec.Struct, frozen=True):
     lost      lines not sent: a reader was slow or gone, or the system refused
     error     the last error, or nothing
     gone      whether its only reader has gone for good
-    dropped   number of readers dropped because they took nothing, or were the slowest when all places were taken
+    dropped   number of readers dropped because they took nothing
     """
 
     where: str
