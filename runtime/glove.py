@@ -152,7 +152,7 @@ class Glove:
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
         self.follower = None if task is None else TaskFollower.of(Path(task), loaded.grasps)
-        self._health, self._due_us = Health(loaded), 0
+        self._health, self._due_us = Health(loaded, self._recognizer.quarantine), 0
         self._quarantined: tuple[Quarantined, ...] = ()
         self._fanout = Fanout(())
         self._open = ExitStack()
@@ -201,7 +201,7 @@ class Glove:
             self._fanout.publish(grasp, moment.preshape, moment.angles, moment)
         if progress is not None:
             self._fanout.task(progress)
-        self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
+        self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None)
         if self._recognizer.quarantine.found != self._quarantined:
             self._quarantined, self._due_us = self._recognizer.quarantine.found, now
         if now >= self._due_us or self.sources.changed:

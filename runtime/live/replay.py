@@ -30,7 +30,6 @@ def replayed(
 
     The newest frames at each moment are those that precede it in the recording, as the live loop wrote them. At the end
     `warn` takes a sentence on each fault of the file.
-    the end `warn` takes a sentence on each fault of the file.
 
     Raises McapError if it is not a recording, SettingError if it is from another build.
     """

@@ -48,7 +48,7 @@ class RosTopics(Sink):
         if not 1 <= rate <= _FASTEST_HZ:
             raise SettingError(f"ros:{name}: a rate of {rate} is not possible: use 1 to {_FASTEST_HZ} a second")
         self._where = f"ros:{domain.namespace(name)}" + "?public" * public
-        self._name, self._messages, self._volatile_readers = name, messages, domain.volatile_readers
+        self._name, self._messages = name, messages
         number = domain.domain()
         try:
             self._domain, participant = domain.join(number, public=public)
@@ -72,7 +72,6 @@ class RosTopics(Sink):
         self._period_us, self._written_us = 1_000_000 // rate, 0
         self._shown: tuple[object, ...] = ()
         self._told: Preshape | None = None
-        self._found, self._volatile = 0, frozenset[int]()
         self._sent = self._lost = self._unix_us = 0
         self._error = ""
 
@@ -114,21 +113,10 @@ class RosTopics(Sink):
             self._written_us = grasp.time_us
             if angles is not None:
                 self._angles.write(messages.joint_state(grasp.unix_us, angles))
-        if preshape is not None and (self._somebody_new() or preshape != self._told):
+        if preshape is not None and preshape != self._told:
             self._preshape.write(messages.trajectory(preshape))
             self._told, news = preshape, True
         return news
-
-    def _somebody_new(self) -> bool:
-        """Return whether a reader joined that DDS does not send the last preshape to: a volatile one, as in
-        ros2_control's trajectory controllers.
-        """
-        found = self._preshape.get_publication_matched_status().total_count
-        if found == self._found:
-            return False
-        before, self._volatile = self._volatile, self._volatile_readers(self._preshape)
-        self._found = found
-        return not self._volatile <= before
 
     def report(self) -> SinkReport:
         """Return the state of this sink; its readers are those of the grasp type."""

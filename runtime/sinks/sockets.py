@@ -188,7 +188,7 @@ class SocketLines(Sink):
 
 
 class _Reader:
-    """A reader of the lines, and the `host` it is on; "" for this one. At most the rest of one line waits for it here."""
+    """A reader of the lines, and the `host` it is on, "" for this one; the rest of one line may wait for it here."""
 
     __slots__ = ("_rest", "_socket", "_stalled_s", "host")
 
