@@ -128,7 +128,6 @@ class GloveSetup:
     words    the period (`cyberglove_protocol.period_words`)
     poll     whether to request each record, so that the host keeps the period
     sensors  the required number of sensors; None: as reported
-    status   whether records carry the status byte
     only     places, in wire order, of the sensors to send; None: all
     filtered  whether its digital filter is on; None: unchanged
     """
@@ -136,7 +135,6 @@ class GloveSetup:
     words: Words
     poll: bool
     sensors: int | None
-    status: bool
     only: frozenset[int] | None = None
     filtered: bool | None = None
 
@@ -261,10 +259,10 @@ def _configured(dialogue: Dialogue, wanted: GloveSetup) -> tuple[bool, tuple[str
     if wanted.filtered is not None:
         _optional(dialogue, setting("F", bytes([wanted.filtered])))
     _optional(dialogue, setting("D", b"\0"))  # fails on a box without time stamps
-    status = _optional(dialogue, setting("U", bytes([wanted.status]))) is not None
-    if wanted.status and not status:
+    status = _optional(dialogue, setting("U", b"\1")) is not None
+    if not status:
         odd += ("It sends no status byte: plug and wrist switch cannot be seen while it streams.",)
-    return status and wanted.status, odd
+    return status, odd
 
 
 def _until_ready(dialogue: Dialogue, url: str) -> tuple[str, ...]:
@@ -324,7 +322,6 @@ class CyberGlove(Closing):
     mode     "stream": the box sends by its own clock; "poll": each record is requested
     rate_hz  records a second; None: as many as possible
     sensors  18 or 22; None: as reported by the glove
-    status   whether records carry the status byte
     only     places, in wire order, of the requested sensors; None: all. If the box cannot send only these, by its
              replies or its records, all are sent: see `GloveInfo.places` and `unmasked`
     filtered  whether the box's digital filter is on; None: unchanged
@@ -340,7 +337,6 @@ class CyberGlove(Closing):
         mode: Mode = "stream",
         rate_hz: float | None = None,
         sensors: int | None = None,
-        status: bool = True,
         only: Collection[int] | None = None,
         filtered: bool | None = None,
     ) -> None:
@@ -351,7 +347,6 @@ class CyberGlove(Closing):
             period_words(rate_hz),
             poll=mode == "poll",
             sensors=sensors,
-            status=status,
             only=None if only is None else frozenset(only),
             filtered=filtered,
         )

@@ -60,12 +60,11 @@ def test_a_glove_is_found_and_read(line: PtyLine, sensors: int, mode: str) -> No
 
 
 @pytest.mark.parametrize("doubts", DOUBTS, ids=str)
-@pytest.mark.parametrize("status", [False, True])
-def test_whichever_of_the_doubtful_is_true_the_glove_is_read(line: PtyLine, doubts: Doubts, status: bool) -> None:
-    with EmulatedCyberGlove(line, doubts=doubts) as emulated, CyberGlove(str(line.link), status=status) as glove:
+def test_whichever_of_the_doubtful_is_true_the_glove_is_read(line: PtyLine, doubts: Doubts) -> None:
+    with EmulatedCyberGlove(line, doubts=doubts) as emulated, CyberGlove(str(line.link)) as glove:
         emulated.set(VALUES[18])
-        assert read(glove, lambda record: record.sensors == VALUES[18]).status == (0x81 if status else None)
-        assert glove.ask("U") == bytes([status])
+        assert read(glove, lambda record: record.sensors == VALUES[18]).status == 0x81
+        assert glove.ask("U") == b"\1"
         assert glove.counts.wrong_start + glove.counts.wrong_length == 0
 
 
