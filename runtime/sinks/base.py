@@ -185,7 +185,7 @@ def rate_of(where: SinkPlace, usual: int) -> int:
     return int(rate)
 
 
-class Pace:
+class PublishPace:
     """When a grasp is to be published: when what is shown of it changes, and `rate` times a second."""
 
     def __init__(self, rate: int) -> None:

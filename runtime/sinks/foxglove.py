@@ -29,7 +29,7 @@ from thenar.drivers.extras import optional
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
-from .base import Pace, Sink, SinkError, SinkKind, SinkPlace, SinkReport, rate_of
+from .base import PublishPace, Sink, SinkError, SinkKind, SinkPlace, SinkReport, rate_of
 from .sockets import resolve
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ class FoxgloveServer(Sink):
             hint = ": another process serves that port; use another" if "in use" in said else ""
             raise SinkError(f"{self._where} cannot be opened: {said}{hint}") from None
         self.port: int = self._server.port
-        self._pace, self._due, self._closed = Pace(rate), False, False
+        self._pace, self._due, self._closed = PublishPace(rate), False, False
         self._repeated_us = self._unix_us = self._time_us = 0
         # Preshape and task, by topic: late readers get them within a second.
         self._kept: dict[str, msgspec.Struct] = {}

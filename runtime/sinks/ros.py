@@ -22,7 +22,7 @@ from thenar.drivers.extras import optional
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
-from .base import Pace, Sink, SinkError, SinkKind, SinkPlace, SinkReport, rate_of
+from .base import PublishPace, Sink, SinkError, SinkKind, SinkPlace, SinkReport, rate_of
 
 RATE_HZ = 20
 
@@ -63,7 +63,7 @@ class RosTopics(Sink):
                 f"ros:{name}?public lets other machines read"
             ) from None
         self._closed = False
-        self._pace = Pace(rate)
+        self._pace = PublishPace(rate)
         self._told: Preshape | None = None
         self._sent = self._lost = self._unix_us = 0
         self._error = ""
