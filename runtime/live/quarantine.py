@@ -47,8 +47,9 @@ from numpy.typing import NDArray
 
 from ..build import Build
 from ..frames import Mask, SwitchFrame
+from ..model.integers import IntegerTables
+from ..model.terms.base import HIGHEST_CODE
 from ..published import Quarantined
-from ..tables import HIGHEST_CODE, IntegerTables
 
 # Time for which contacts must stay the same before a grasp is evaluated.
 SETTLED_US = 100_000

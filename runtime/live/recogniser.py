@@ -9,12 +9,12 @@ import numpy as np
 from ..build import Build
 from ..calibration import Joints, Meaning
 from ..frames import PERIODS, GloveFrame, Mask, Newest, SwitchFrame
+from ..model.integers import IntegerTables
 from ..policy import Policy
 from ..preshape.selector import Preshape
 from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
 from ..scores import LiveScores
 from ..segmenting.live import LiveSegments, Segment
-from ..tables import IntegerTables
 from .decision import Decision, Ranking, SequentialTest
 from .quarantine import Quarantine
 

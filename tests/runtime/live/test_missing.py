@@ -6,7 +6,7 @@ import pytest
 
 from thenar.runtime import Build
 from thenar.runtime.live.recogniser import MissingInputs, weights
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 MakeBuild = Callable[..., Build]
 MakeTables = Callable[..., IntegerTables]
