@@ -44,7 +44,7 @@ from rich.table import Table
 from thenar.runtime import Glove
 from thenar.runtime.frames import now_us
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.live.system import System
+from thenar.runtime.live.system import LiveSystem
 from thenar.simulator.playing.bench import Bench
 
 MOST_US, LEAST_SHARE, MOST_MIB, MOST_FILES = 150, 0.9, 80, 20
@@ -95,7 +95,7 @@ def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[C
     own = Path(stack.enter_context(TemporaryDirectory(dir=folder)))
     harness, feed = with_glove(board(scene), glove(scene)), Memory(len(scene.kept))
     if stage == 0:
-        recognizer = System.of(scene.build, harness).recognizer()
+        recognizer = LiveSystem.of(scene.build, harness).recognizer()
 
         def step() -> None:
             taken = feed.take()

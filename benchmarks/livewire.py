@@ -24,7 +24,7 @@ from thenar.runtime import Build, Glove
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live.sources import Snapshot, Sources
-from thenar.runtime.live.system import System
+from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.i2c import I2cDevice
 
@@ -151,7 +151,7 @@ class Ioctls:
 
 def scans(build: str, glove: str, which: str) -> None:
     """Scan the only bus: all wired switches, or the kept ones."""
-    system = System.of(Build.load(build), load_harness(glove))
+    system = LiveSystem.of(Build.load(build), load_harness(glove))
     scan = whole_scan(system.harness, system.harness.switches) if which == "all" else system.scan
     device = I2cDevice(system.harness, 0, scan)
     device.open()

@@ -36,7 +36,7 @@ from thenar.compiler.firmware.tools import (
 )
 from thenar.firmware_templates.rendering import file_text
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.system import System
+from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import SegmentModel
 
@@ -232,7 +232,7 @@ def frame_costs(rows: int = 800, turns: int = 15) -> dict[str, list[float]]:
     """Return the us of each step, the minimum over all turns, by what is new in it; for `rows` rows of 10 ms each."""
     with TemporaryDirectory() as name:
         scene = played("continuous", Path(name))
-        system = System.of(scene.build, with_glove(board(scene), glove(scene)))
+        system = LiveSystem.of(scene.build, with_glove(board(scene), glove(scene)))
     row_us, tick_us = scene.performance.period_us, scene.build.manifest.segmenting.tick_us
     keys, records = scene.keys[:rows], [record.tobytes() for record in scene.performance.sensors[:rows]]
     found: dict[str, list[float]] = {}
@@ -252,7 +252,7 @@ def frame_costs(rows: int = 800, turns: int = 15) -> dict[str, list[float]]:
     return found
 
 
-def _turn(system: System, frames: Sequence[tuple[SwitchFrame, GloveFrame]]) -> list[int]:
+def _turn(system: LiveSystem, frames: Sequence[tuple[SwitchFrame, GloveFrame]]) -> list[int]:
     """Return the ns of each step of a run."""
     live, took = system.recognizer(), list[int]()
     for switches, record in frames:

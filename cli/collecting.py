@@ -1,4 +1,4 @@
-"""A guided collection while it runs: devices, terminal and recording around the Guide."""
+"""A guided collection while it runs: devices, terminal and recording around the guide."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ from thenar.runtime.frames import SwitchFrame, now_us, old_after_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.sources import NOT_YET, DeviceState, Snapshot, Sources
 from thenar.runtime.names import list_names
-from thenar.runtime.recording.guide import Guide, Journal, Key, Stage, Trial
+from thenar.runtime.recording.guide import CollectionGuide, Journal, Key, Stage, Trial
 from thenar.runtime.recording.session import Collection, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.scanning.ports import whole_scan
@@ -103,7 +103,7 @@ def collect(
                 if typed:
                     faces.append(entered.enter_context(Terminal(taxonomy)))
                 old_us = old_after_us(sources.switch_period_us, sources.glove_period_us)
-                guide = Guide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
+                guide = CollectionGuide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
                 lead(guide, sources, recorder, faces, stop)
                 done = guide.done
         if recorder is not None and (recorder.failure is not None or recorder.lost):
@@ -143,10 +143,10 @@ def _is_read(frame: SwitchFrame, switches: int) -> bool:
 class Face(Protocol):
     """Where a collection is shown and keys are pressed: the terminal, or a page."""
 
-    def press(self, now_us: int, guide: Guide) -> None:
+    def press(self, now_us: int, guide: CollectionGuide) -> None:
         """Pass the keys pressed since the last call to the guide."""
 
-    def show(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> None:
+    def show(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> None:
         """Show the guide's state."""
 
 
@@ -159,7 +159,7 @@ class Terminal:
         self.show = self._view.show
         self._entered = ExitStack()
 
-    def press(self, now_us: int, guide: Guide) -> None:
+    def press(self, now_us: int, guide: CollectionGuide) -> None:
         """Pass the typed keys to the guide."""
         for key in self._keys.pressed():
             guide.press(now_us, key)
@@ -173,7 +173,7 @@ class Terminal:
         self._entered.__exit__(*of_error)
 
 
-def lead(guide: Guide, devices: Devices, recorder: Recorder, faces: Sequence[Face], stop: Event) -> None:
+def lead(guide: CollectionGuide, devices: Devices, recorder: Recorder, faces: Sequence[Face], stop: Event) -> None:
     """Lead through the guide's trials until all are done, the user leaves, `stop` is set, or the recording fails."""
     while guide.stage is not Stage.OVER and not recorder.lost and recorder.failure is None and not stop.is_set():
         arrived = devices.take(_WAIT_US).arrived

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from thenar.runtime.build import Build
     from thenar.runtime.harness.wiring import Harness
-    from thenar.runtime.live.checkup import Finding
+    from thenar.runtime.live.checkup import CheckResult
 
 
 @click.command("doctor")
@@ -80,7 +80,7 @@ def command(
     from thenar.runtime.build import Build
     from thenar.runtime.harness.loading import load_harness
     from thenar.runtime.live.checkup import check_up
-    from thenar.runtime.live.system import System
+    from thenar.runtime.live.system import LiveSystem
     from thenar.runtime.scanning.ports import whole_scan
 
     harness = load_harness(glove)
@@ -92,7 +92,7 @@ def command(
     else:
         switches = [switch.name for switch in loaded.manifest.switches]
         joints = [joint.name for joint in loaded.manifest.joints]
-        looks = list(check_up(harness, System.map_of(loaded, harness), switches, joints))
+        looks = list(check_up(harness, LiveSystem.map_of(loaded, harness), switches, joints))
     found = list(_calibration(harness, loaded))
     with progress("looking") as report:
         for number, look in enumerate(looks):
@@ -139,7 +139,7 @@ def _listen(port: str, baud: int, seconds: float, columns: "Sequence[str]", prop
         err().print(f"{propose}: review it, then run `thenar doctor {propose}`", highlight=False)
 
 
-def _write(glove: Path, found: "Sequence[Finding]") -> None:
+def _write(glove: Path, found: "Sequence[CheckResult]") -> None:
     from thenar.runtime.harness.writing import write_record_us
     from thenar.runtime.live.checkup import RECORD
 
@@ -150,27 +150,27 @@ def _write(glove: Path, found: "Sequence[Finding]") -> None:
     err().print(f"{glove}: record_us = {measured:.0f}", highlight=False)
 
 
-def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[Finding]":
+def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[CheckResult]":
     """Yield what is wrong with the joints: a calibration that does not fit would stop `thenar run` and `record`."""
     from thenar.drivers.errors import ThenarError
     from thenar.runtime.calibration import load_calibration
-    from thenar.runtime.live.checkup import Finding
-    from thenar.runtime.live.system import System
+    from thenar.runtime.live.checkup import CheckResult
+    from thenar.runtime.live.system import LiveSystem
 
     named = harness.calibration
     try:
         if build is not None:
-            system = System.of(build, harness)
+            system = LiveSystem.of(build, harness)
             system.recognizer()
             if system.unread:
-                yield Finding("joints", "", False, 0.0, None, (system.unread,))
+                yield CheckResult("joints", "", False, 0.0, None, (system.unread,))
         elif named is not None:
             load_calibration(Path(named))
     except ThenarError as wrong:
-        yield Finding("calibration", "" if named is None else Path(named).name, False, 0.0, None, (str(wrong),))
+        yield CheckResult("calibration", "" if named is None else Path(named).name, False, 0.0, None, (str(wrong),))
 
 
-def _print(found: "Sequence[Finding]") -> None:
+def _print(found: "Sequence[CheckResult]") -> None:
     numbers = ("predicted us", "measured us")
     devices = table(("device", "part", "there", *numbers), numbers, "Devices")
     for one in found:

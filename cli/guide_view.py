@@ -12,7 +12,7 @@ from rich.text import Text
 from thenar.compiler.recordings.taxonomy import MOVEMENTS, Taxonomy
 from thenar.runtime.live.sources import DeviceState
 from thenar.runtime.published import NONE
-from thenar.runtime.recording.guide import Guide, Stage
+from thenar.runtime.recording.guide import CollectionGuide, Stage
 
 from .guide_keys import LETTERS
 
@@ -39,7 +39,7 @@ class GuideView:
         if self._live is not None:
             self._live.stop()
 
-    def show(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> None:
+    def show(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> None:
         """Show the guide's state, if it changed or the next refresh is due."""
         if self._live is None:
             self._say(guide, devices)
@@ -48,7 +48,7 @@ class GuideView:
             self._shown = guide.step
             self._live.update(self._drawn(now_us, guide, devices), refresh=True)
 
-    def _say(self, guide: Guide, devices: Sequence[DeviceState]) -> None:
+    def _say(self, guide: CollectionGuide, devices: Sequence[DeviceState]) -> None:
         errors = "; ".join(device.error for device in devices if not device.connected)
         why = f" ({errors})" if errors else ""
         problem = f"not captured: {guide.problem}{why}; " if guide.problem else ""
@@ -58,7 +58,7 @@ class GuideView:
             self._said = line
             self._console.print(line, soft_wrap=True)
 
-    def _drawn(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> RenderableType:
+    def _drawn(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> RenderableType:
         table = Table.grid(padding=(0, 2))
         skipped = f", {guide.skipped} skipped" if guide.skipped else ""
         bar = ProgressBar(guide.total, guide.done, width=40)
@@ -68,7 +68,7 @@ class GuideView:
         stage = Text(self._standing(now_us, guide), style="bold")
         return Group(table, Text(), Text(self._task(guide), style="bold cyan"), stage, Text(_keys(guide)))
 
-    def _task(self, guide: Guide) -> str:
+    def _task(self, guide: CollectionGuide) -> str:
         trial = guide.trial
         if trial is None:
             return f"{guide.done} of {guide.total}: no trial is left"
@@ -79,7 +79,7 @@ class GuideView:
         name = trial.grasp if full == trial.grasp else f"{full} ({trial.grasp})"
         return f"{place}: {name}, object {trial.object}"
 
-    def _standing(self, now_us: int, guide: Guide) -> str:
+    def _standing(self, now_us: int, guide: CollectionGuide) -> str:
         if _waits(guide):
             return f"the countdown waits: {guide.lost}"
         if guide.stage is Stage.PAUSED:
@@ -99,11 +99,11 @@ class GuideView:
         return "captured: " + ", ".join(filter(None, (closed, sensors)))
 
 
-def _waits(guide: Guide) -> bool:
+def _waits(guide: CollectionGuide) -> bool:
     """Return whether no countdown can start, because something is not read."""
     return bool(guide.lost) and guide.stage in (Stage.READY, Stage.PAUSED)
 
 
-def _keys(guide: Guide) -> str:
+def _keys(guide: CollectionGuide) -> str:
     """Return the keys that are active now: "Enter: start the countdown   q: leave"."""
     return "   ".join(f"{LETTERS[key]}: {what}" for key, what in guide.offered().items())

@@ -17,7 +17,7 @@ from thenar.drivers.closing import Closing
 from thenar.runtime.hand import DrawnSwitch, DrawnTaxel, HandDrawing, Spot, drawn_joints
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.published import NONE
-from thenar.runtime.recording.guide import Guide, Trial
+from thenar.runtime.recording.guide import CollectionGuide, Trial
 from thenar.runtime.recording.session import Session
 from thenar.runtime.web.guided import GuidePage
 
@@ -152,11 +152,11 @@ class StudiedPage(Closing):
         self._background: BackgroundTask[InterimAccuracy | None] = BackgroundTask()
         self._studied = -1
 
-    def press(self, now_us: int, guide: Guide) -> None:
+    def press(self, now_us: int, guide: CollectionGuide) -> None:
         """Pass the keys pressed on a page to the guide."""
         self._page.press(now_us, guide)
 
-    def show(self, now_us: int, guide: Guide, devices: Any) -> None:
+    def show(self, now_us: int, guide: CollectionGuide, devices: Any) -> None:
         """Show the guide's state, and start or finish the computation."""
         self._page.show(now_us, guide, devices)
         self._fetch()

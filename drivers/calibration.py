@@ -83,7 +83,7 @@ class GloveCalibration(
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class CalibrationPose:
     """A pose to hold: an instruction, and the angle in degrees at each sensor that the pose calibrates."""
 
     name: str
@@ -99,36 +99,36 @@ class Held:
     wander: tuple[int, ...]
 
 
-FLAT = Pose("flat hand", "Lay the hand flat on a table, wrist straight, fingers and thumb together.", {})
+FLAT = CalibrationPose("flat hand", "Lay the hand flat on a table, wrist straight, fingers and thumb together.", {})
 POSES = (
-    Pose(
+    CalibrationPose(
         "fist",
         "Make a tight fist, the thumb outside.",
         {f"{finger}_{joint}": degrees for finger in _FINGERS for joint, degrees in (("mpj", 90.0), ("pij", 100.0))}
         | {f"{finger}_dij": 70.0 for finger in _FINGERS},
     ),
-    Pose(
+    CalibrationPose(
         "bent thumb",
         "Open the hand; bend both outer joints of the thumb as far as they go.",
         {"thumb_mpj": 50.0, "thumb_ij": 80.0},
     ),
-    Pose(
+    CalibrationPose(
         "spread hand",
         "Lay the hand flat again; spread thumb and fingers as far as they go.",
         {"thumb_abduction": 60.0}
         | dict.fromkeys(("middle_index_abduction", "ring_middle_abduction", "little_ring_abduction"), 20.0),
     ),
-    Pose(
+    CalibrationPose(
         "thumb across",
         "Touch the root of the little finger with the tip of the thumb.",
         {"thumb_rotation": 60.0, "palm_arch": 20.0},
     ),
-    Pose("wrist down", "Straighten the fingers; bend the wrist towards the palm.", {"wrist_pitch": 60.0}),
-    Pose("wrist aside", "Wrist straight again, then bent towards the little finger.", {"wrist_yaw": 30.0}),
+    CalibrationPose("wrist down", "Straighten the fingers; bend the wrist towards the palm.", {"wrist_pitch": 60.0}),
+    CalibrationPose("wrist aside", "Wrist straight again, then bent towards the little finger.", {"wrist_yaw": 30.0}),
 )
 
 
-def poses_of(names: Sequence[str]) -> tuple[Pose, ...]:
+def poses_of(names: Sequence[str]) -> tuple[CalibrationPose, ...]:
     """Return the poses that calibrate sensors of these names, the flat hand first.
 
     A sensor whose name implies no joint is bent as far as it goes, which counts as 90 degrees.
@@ -137,7 +137,7 @@ def poses_of(names: Sequence[str]) -> tuple[Pose, ...]:
     others = [name for name in names if not any(name in pose.degrees for pose in POSES)]
     if others:
         how = "Bend every joint that has a sensor as far as it goes."
-        known.append(Pose("everything bent", how, dict.fromkeys(others, 90.0)))
+        known.append(CalibrationPose("everything bent", how, dict.fromkeys(others, 90.0)))
     return (FLAT, *known)
 
 
@@ -148,7 +148,7 @@ def held(samples: Sequence[bytes]) -> Held:
     return Held(raw, tuple(max(column) - min(column) for column in columns))
 
 
-def problems(names: Sequence[str], flat: Held | None, pose: Pose, found: Held) -> list[str]:
+def problems(names: Sequence[str], flat: Held | None, pose: CalibrationPose, found: Held) -> list[str]:
     """Return reasons to reject a pose, in sentences; `flat` is None when the pose is the flat hand itself."""
     concerned = [place for place, name in enumerate(names) if flat is None or name in pose.degrees]
     out = []
@@ -163,7 +163,9 @@ def problems(names: Sequence[str], flat: Held | None, pose: Pose, found: Held) -
     return out
 
 
-def calibration(names: Sequence[str], flat: Held, found: Sequence[tuple[Pose, Held]], subject: str) -> GloveCalibration:
+def calibration(
+    names: Sequence[str], flat: Held, found: Sequence[tuple[CalibrationPose, Held]], subject: str
+) -> GloveCalibration:
     """Return the lines through the flat hand and the poses, in wire order; a sensor that did not move is left out."""
     ends = {
         name: (pose_held.raw[names.index(name)], degrees)

@@ -1,12 +1,12 @@
 """TI CD74HC4067: an analog multiplexer of sixteen channels, four select lines and a common, for boards' converters."""
 
-from .i2c.chips.base import Package
+from .i2c.chips.base import ChipPackage
 
 CHANNELS = 16
 SELECTS = ("S0", "S1", "S2", "S3")
 COMMON, ENABLE = "COMMON", "E"
 
-PACKAGE = Package(
+PACKAGE = ChipPackage(
     part="CD74HC4067M96",
     maker="Texas Instruments",
     symbol="CD74HC4067M",

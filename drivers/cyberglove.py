@@ -1,4 +1,4 @@
-"""The CyberGlove on a serial line: detection, set-up, records, its light and wrist switch.
+"""The CyberGlove on a serial line: detection, set-up, records.
 
     with CyberGlove("/dev/ttyUSB0") as glove:
         while (timed := glove.read(1.0)) is not None:
@@ -128,7 +128,6 @@ class GloveSetup:
     words    the period (`cyberglove_protocol.period_words`)
     poll     whether to request each record, so that the host keeps the period
     sensors  the required number of sensors; None: as reported
-    status   whether records carry the status byte
     only     places, in wire order, of the sensors to send; None: all
     filtered  whether its digital filter is on; None: unchanged
     """
@@ -136,7 +135,6 @@ class GloveSetup:
     words: Words
     poll: bool
     sensors: int | None
-    status: bool
     only: frozenset[int] | None = None
     filtered: bool | None = None
 
@@ -261,10 +259,10 @@ def _configured(dialogue: Dialogue, wanted: GloveSetup) -> tuple[bool, tuple[str
     if wanted.filtered is not None:
         _optional(dialogue, setting("F", bytes([wanted.filtered])))
     _optional(dialogue, setting("D", b"\0"))  # fails on a box without time stamps
-    status = _optional(dialogue, setting("U", bytes([wanted.status]))) is not None
-    if wanted.status and not status:
+    status = _optional(dialogue, setting("U", b"\1")) is not None
+    if not status:
         odd += ("It sends no status byte: plug and wrist switch cannot be seen while it streams.",)
-    return status and wanted.status, odd
+    return status, odd
 
 
 def _until_ready(dialogue: Dialogue, url: str) -> tuple[str, ...]:
@@ -324,7 +322,6 @@ class CyberGlove(Closing):
     mode     "stream": the box sends by its own clock; "poll": each record is requested
     rate_hz  records a second; None: as many as possible
     sensors  18 or 22; None: as reported by the glove
-    status   whether records carry the status byte
     only     places, in wire order, of the requested sensors; None: all. If the box cannot send only these, by its
              replies or its records, all are sent: see `GloveInfo.places` and `unmasked`
     filtered  whether the box's digital filter is on; None: unchanged
@@ -340,7 +337,6 @@ class CyberGlove(Closing):
         mode: Mode = "stream",
         rate_hz: float | None = None,
         sensors: int | None = None,
-        status: bool = True,
         only: Collection[int] | None = None,
         filtered: bool | None = None,
     ) -> None:
@@ -351,7 +347,6 @@ class CyberGlove(Closing):
             period_words(rate_hz),
             poll=mode == "poll",
             sensors=sensors,
-            status=status,
             only=None if only is None else frozenset(only),
             filtered=filtered,
         )
@@ -408,20 +403,18 @@ class CyberGlove(Closing):
                 return None
         return self._ready.popleft()
 
-    def light(self, on: bool) -> None:
-        """Switch the light at the wrist. A stream pauses meanwhile. Raises DeviceError as `ask` does."""
-        self._ask(setting("L", bytes([on])))
-
-    def switch(self) -> bool:
-        """Return whether the switch at the wrist is on (the status byte of records reports it without a pause)."""
-        return self.ask("W") != b"\0"
-
     def ask(self, letter: str) -> bytes:
         """Return the values of the box's reply to the query of this letter. A stream pauses meanwhile.
 
         Raises DeviceError if the line is gone or the box does not reply, SettingError if there is no such query.
         """
-        return self._ask(query(letter))
+        command, line = query(letter), self._opened()
+        dialogue = Dialogue(line)
+        dialogue.stop_stream()
+        try:
+            return dialogue.ask(command)
+        finally:
+            self._start(line)
 
     def close(self) -> None:
         """Stop the stream, unmask all sensors, if that is still possible, and close the line."""
@@ -435,15 +428,6 @@ class CyberGlove(Closing):
     def __enter__(self) -> Self:
         self.open()
         return self
-
-    def _ask(self, command: Command) -> bytes:
-        line = self._opened()
-        dialogue = Dialogue(line)
-        dialogue.stop_stream()
-        try:
-            return dialogue.ask(command)
-        finally:
-            self._start(line)
 
     def _opened(self) -> SerialLine:
         if self._line is None:

@@ -52,7 +52,6 @@ _SLOTS = (
 MASK_18 = bytes.fromhex("3F BB 7B")
 MASK_22 = bytes.fromhex("7F FF 7F")
 STOP = b"\x03"  # Ctrl-C
-RESTART = b"\x12"  # Ctrl-R
 POLL, STREAM = b"G", b"S"  # also what their records begin with
 # The reply to ?G when all is well: bit 0 initialised, bit 1 glove connected (two of seven sources swap the bits).
 READY = 3
@@ -65,10 +64,8 @@ _ERRORS = {
     b"s": "sampling too fast",
 }
 # Bytes in the reply to ?X, by X; below, bytes after X as a setting. docs/reference/devices.md explains each letter.
-REPLY_BYTES: Mapping[str, int] = (
-    dict.fromkeys("BDFGJLNQRSUWY", 1) | dict.fromkeys("KMP", 3) | dict.fromkeys("TV", 4) | {"A": 6}
-)
-SET: Mapping[str, int] = dict.fromkeys("BDFJLNQUWY", 1) | {"M": 3, "T": 4}
+REPLY_BYTES: Mapping[str, int] = dict.fromkeys("DFGNRSU", 1) | {"M": 3, "T": 4}
+SET: Mapping[str, int] = dict.fromkeys("DFNU", 1) | {"M": 3, "T": 4}
 TICKS_HZ = 115_200
 DIGITISED_US = 250.0
 FILTERED_US = 125.6
@@ -78,8 +75,8 @@ FASTEST: Words = (0, 0)
 SENSORS = 18
 # A record's length on the wire is its sensors plus these; the status byte is one more.
 OVERHEAD = 2
-# Bits of the status byte: a glove is plugged into the box; the wrist's switch; the wrist's light; always 1.
-PLUGGED, SWITCH, LIGHT, ALWAYS = 0x01, 0x02, 0x04, 0x80
+# Bits of the status byte: a glove is plugged into the box; always 1. Between are the wrist's switch and light.
+PLUGGED, ALWAYS = 0x01, 0x80
 RecordFault = Literal["too fast", "unplugged"]
 _FAULTS: dict[bytes, RecordFault] = {b"es": "too fast", b"eg": "unplugged"}
 _ENDINGS: dict[RecordFault | None, bytes] = {None: b"", **{fault: ending for ending, fault in _FAULTS.items()}}
@@ -234,11 +231,6 @@ class RecordCounts:
     unplugged: int = 0
     wrong_start: int = 0
     wrong_length: int = 0
-
-    @property
-    def resyncs(self) -> int:
-        """Number of times that bytes were skipped up to the next NUL."""
-        return self.wrong_start + self.wrong_length
 
 
 def encode(record: Record) -> bytes:

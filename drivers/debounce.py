@@ -19,6 +19,9 @@ class Debouncer:
                       that comes after this time: if scans are further apart than release_us / 2, a release takes fewer
                       than two scans. Closed readings within release_us of the opening count as bounce and are ignored.
 
+    A switch that was not read for twice the longer of both begins anew, as open: its bounces are over, and it may have
+    opened and closed since.
+
     Raises SettingError for a negative time.
     """
 
@@ -26,7 +29,11 @@ class Debouncer:
         if press_lockout_us < 0 or release_us < 0:
             raise SettingError(f"debounce times are 0 or more, not {press_lockout_us} us and {release_us} us")
         self.press_lockout_us, self.release_us = press_lockout_us, release_us
+        self._pause_us = 2 * max(press_lockout_us, release_us)
         self._closed: Mask = 0
+        # Read in the last update; and the others, with the time of their last reading.
+        self._known: Mask = 0
+        self._unread: list[tuple[int, Mask]] = []
         self._time: int | None = None
         self._period: int | None = None
         # Ignored until a time; read open since a time. The two are disjoint, and each switch is in at most one group.
@@ -38,7 +45,7 @@ class Debouncer:
 
         Switches that were not read keep their state, and their timers run on. A time that goes back is ignored.
         """
-        now = self._advance(time_us)
+        now = self._advance(time_us, known)
         free = known & ~self._locked(now) if self._locks else known
         pressed = closed & free & ~self._closed
         opened = ~closed & free & self._closed
@@ -49,19 +56,26 @@ class Debouncer:
             self._lock(now, now + self.press_lockout_us, pressed)
         return self._closed
 
-    def forget(self, switches: Mask) -> None:
-        """Reset these switches: they are open, and their timers are cleared."""
-        self._closed &= ~switches
+    def _forget_after_pauses(self, last_us: int, interval: int, known: Mask) -> None:
+        """Take which switches are read, `interval` after the last reading; begin anew with those that had a pause."""
+        since, now = [(last_us, self._known), *self._unread], last_us + interval
+        over = sum(mask & known for time, mask in since if now - time > self._pause_us)
+        self._unread = [(time, rest) for time, mask in since if (rest := mask & ~known)]
+        self._known = known
+        self._closed &= ~over
         self._locks, self._openings = (
-            [(time, mask & ~switches) for time, mask in timers if mask & ~switches]
-            for timers in (self._locks, self._openings)
+            [(time, mask & ~over) for time, mask in timers if mask & ~over] for timers in (self._locks, self._openings)
         )
 
-    def _advance(self, time_us: int) -> int:
-        """Store the time, and the shortest recent period as the earliest time of the next reading."""
+    def _advance(self, time_us: int, known: Mask) -> int:
+        """Store the time, and the shortest recent period as the earliest time of the next reading; forget the switches
+        that are read after a pause.
+        """
         if self._time is None:
             self._time = time_us
         interval = max(0, time_us - self._time)
+        if interval > self._pause_us or known != self._known:
+            self._forget_after_pauses(self._time, interval, known)
         self._time += interval
         if self._period is None or interval <= self._period:
             self._period = interval or self._period

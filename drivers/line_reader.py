@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from time import monotonic_ns, time_ns
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from .closing import Closing
@@ -102,7 +102,7 @@ class LineReader(RowReader):
         """Return the received rows."""
         if isinstance(self._line, _Datagrams):
             came = self._line.read(timeout_s)
-            return () if came is None else self._of_datagram(came)
+            return () if came is None else self._of_datagram(*came)
         assert isinstance(self._line, SerialLine | _Descriptor | _WebSocket)
         return self._rows(self._line.read(timeout_s))
 
@@ -112,16 +112,16 @@ class LineReader(RowReader):
         self.odd = self._parser.odd
         return rows
 
-    def _of_datagram(self, came: "_Datagram") -> Sequence[Row]:
+    def _of_datagram(self, data: bytes, address: Address, came_us: int) -> Sequence[Row]:
         """Return the rows of a datagram, each of which begins and ends lines; none if it is from another sender."""
         named, before = self._named, self._senders.current
-        sender = named if named is not None and named.covers(came.sender) else came.sender
-        if not self._senders.admits(sender, came.came_us):
-            self._parser.counts.foreign += came.data.strip().count(b"\n") + 1
+        sender = named if named is not None and named.covers(address) else address
+        if not self._senders.admits(sender, came_us):
+            self._parser.counts.foreign += data.strip().count(b"\n") + 1
             return ()
         if self._senders.current != before:
             self._parser.begin()
-        return [row._replace(came_us=came.came_us) for row in self._rows(came.data + b"\n")]
+        return [row._replace(came_us=came_us) for row in self._rows(data + b"\n")]
 
     def other_sender(self) -> str:
         """Return a sentence on another sender of datagrams."""
@@ -259,22 +259,14 @@ class _Descriptor(Closing):
             self._line.close()
 
 
-class _Datagram(NamedTuple):
-    """A datagram, the address that it came from, and when it came, by the monotonic clock."""
-
-    data: bytes
-    sender: Address
-    came_us: int
-
-
 class _Datagrams(Closing):
     """A socket of datagrams."""
 
     def __init__(self, port: str, line: socket.socket) -> None:
         self._port, self._line = port, line
 
-    def read(self, timeout_s: float) -> _Datagram | None:
-        """Return the next datagram; None if none comes until the timeout."""
+    def read(self, timeout_s: float) -> tuple[bytes, Address, int] | None:
+        """Return the next datagram, its sender's address, and when it came, by the monotonic clock; None: none came."""
         try:
             ready, _, _ = select.select([self._line], [], [], max(0.0, timeout_s))
             if not ready:
@@ -283,7 +275,7 @@ class _Datagrams(Closing):
         except (OSError, ValueError) as reason:  # ValueError: closed meanwhile
             raise DeviceError(f"{self._port}: it is gone ({reason})") from reason
         waited_us = _waited_us(notes)
-        return _Datagram(data, address_of(host, port), monotonic_ns() // 1000 - waited_us)
+        return data, address_of(host, port), monotonic_ns() // 1000 - waited_us
 
     def close(self) -> None:
         """Close the socket."""

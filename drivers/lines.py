@@ -57,7 +57,7 @@ class Row(NamedTuple):
     sequence: int | None = None
 
 
-class Header(NamedTuple):
+class ColumnHeader(NamedTuple):
     """A line that names the columns of the lines that follow."""
 
     names: tuple[str, ...]
@@ -107,7 +107,7 @@ class Damaged(NamedTuple):
     """A line that a board did not print: its checksum or its form is wrong."""
 
 
-def parsed(line: bytes, columns: int = 0) -> Row | Header | Damaged | None:
+def parsed(line: bytes, columns: int = 0) -> Row | ColumnHeader | Damaged | None:
     """Parse a line; None for a misfit. `columns` is the known number of columns; 0: unknown, and then a board's row is
     a misfit, too. The time of a board's row is that of its clock, which begins again after CLOCK_US.
     """
@@ -126,7 +126,7 @@ def parsed(line: bytes, columns: int = 0) -> Row | Header | Damaged | None:
     # Words separated by blanks are a message.
     worded = len(fields) == 1 or len(text.split()) < len(fields) or not set(text).isdisjoint(",;\t")
     if worded and all(map(_NAME.fullmatch, fields)) and not all(map(_NO_NUMBER.fullmatch, fields)):
-        return Header(tuple(fields)) if _sound(fields) else None
+        return ColumnHeader(tuple(fields)) if _sound(fields) else None
     return _row(None, fields, columns)
 
 
@@ -135,7 +135,7 @@ def _is_of_board(line: bytes) -> bool:
     return line[:1] == b"$" or _CHECKSUM.search(line) is not None
 
 
-def _of_board(line: bytes, columns: int) -> Row | Header | Damaged | None:
+def _of_board(line: bytes, columns: int) -> Row | ColumnHeader | Damaged | None:
     """Parse a line with a checksum, or what is left of one."""
     found = _CHECKED.fullmatch(line)
     if found is None or reduce(xor, found[1], 0) != int(found[2], 16):
@@ -146,7 +146,7 @@ def _of_board(line: bytes, columns: int) -> Row | Header | Damaged | None:
         return Damaged()
     if kind == "columns":
         sound = _sound(fields) and all(map(str.isprintable, fields))
-        return Header(tuple(fields)) if fields and sound else Damaged()
+        return ColumnHeader(tuple(fields)) if fields and sound else Damaged()
     return _of_board_row(fields, columns) if kind == "row" else None
 
 
@@ -285,7 +285,7 @@ class LineParser:
         self._checked = True
         if isinstance(found, Row):
             return found._replace(names=self._names, time_s=self._unwrapped_s(round((found.time_s or 0.0) * 1e6)))
-        if isinstance(found, Header):
+        if isinstance(found, ColumnHeader):
             self._names = found.names
         elif not line.startswith(b"$row,"):
             self._take_misfit(line, None)
@@ -305,7 +305,7 @@ class LineParser:
                 found = parsed(line, len(self._header))
         if isinstance(found, Row):
             return self._with_names(found)
-        header = found if isinstance(found, Header) else None
+        header = found if isinstance(found, ColumnHeader) else None
         if header is None or header.names != self._names:
             self._take_misfit(line, header)
         return None
@@ -314,7 +314,7 @@ class LineParser:
     def _known(self) -> int:
         return len(self._names or ()) or self._columns
 
-    def _take_misfit(self, line: bytes, header: Header | None) -> None:
+    def _take_misfit(self, line: bytes, header: ColumnHeader | None) -> None:
         """Count a line that is no row, or not yet the header of one; a word alone is a message."""
         self.counts.misfits += 1
         if header is not None and len(header.names) > 1:

@@ -8,13 +8,13 @@ import sys
 from msgspec import json
 
 from thenar.runtime.preshape import PreshapeSelector, load_preshapes
-from thenar.runtime.sinks import HealthLine, Line
+from thenar.runtime.sinks import GraspLine, HealthLine
 
 selector = PreshapeSelector(load_preshapes("barrett_bh8"), min_probability=0.8, settle_ms=100)
 shown = None
 for line in sys.stdin.buffer:
-    grasp = json.decode(line, type=Line | HealthLine)
-    preshape = selector.update(grasp) if isinstance(grasp, Line) else None
+    grasp = json.decode(line, type=GraspLine | HealthLine)
+    preshape = selector.update(grasp) if isinstance(grasp, GraspLine) else None
     if preshape is not None and preshape is not shown:
         joints = zip(preshape.joint_names, preshape.positions, strict=True)
         print(preshape.name, *(f"{name}={position:.3f}" for name, position in joints), flush=True)

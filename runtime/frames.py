@@ -122,29 +122,3 @@ class BitRemap:
             self._turned = sum([switch for bit, switch in self._pairs if bits & bit])
             self._last = bits
         return self._turned
-
-
-class Pauses:
-    """Tracks which switches are read, and how long the others have not been: for a switch that is read again after a
-    pause, earlier readings say nothing.
-    """
-
-    __slots__ = ("_away", "_known", "pause_us")
-
-    def __init__(self, pause_us: int) -> None:
-        self.pause_us = pause_us
-        self._known: Mask = 0
-        self._away: list[tuple[int, Mask]] = []
-
-    def over(self, time_us: int, known: Mask) -> Mask:
-        """Return the switches that are read now but were not read for longer than `pause_us`."""
-        over, away = 0, []
-        for since_us, switches in self._away:
-            if time_us - since_us > self.pause_us:
-                over |= switches & known
-            if rest := switches & ~known:
-                away.append((since_us, rest))
-        if gone := self._known & ~known:
-            away.append((time_us, gone))
-        self._known, self._away = known, away
-        return over

@@ -18,7 +18,7 @@ from .harness.writing import harness_to_toml
 from .live.health import Health
 from .live.recogniser import Moment
 from .live.sources import Snapshot
-from .live.system import System
+from .live.system import LiveSystem
 from .policy import Policy
 from .preshape.loading import preshape_selector
 from .published import DeviceHealth, HealthReport, JointAngles, OutputTrouble, Quarantined
@@ -77,7 +77,7 @@ class Glove:
     ----------
     frames : int
         The number of moments so far.
-    system : System
+    system : LiveSystem
         The build and the harness, combined.
     sources : Sources
         The devices.
@@ -93,7 +93,7 @@ class Glove:
 
     Raises
     ------
-    BuildError, HarnessError, PreshapeError, SettingError
+    BuildError, HarnessError, SettingError
         If one of them is invalid, or they do not fit each other. Nothing is opened before.
     SinkError, OSError
         On entering the context, if a sink or the recording cannot be opened.
@@ -129,7 +129,7 @@ class Glove:
     ) -> None:
         loaded = build if isinstance(build, Build) else Build.load(build)
         wired = harness if isinstance(harness, Harness) else load_harness(Path(harness))
-        self.system = system = System.of(loaded, wired, policy)
+        self.system = system = LiveSystem.of(loaded, wired, policy)
         self.stop = Event() if stop is None else stop
         self.frames, self.lacking = 0, ""
         self.health: HealthReport | None = None
@@ -152,7 +152,7 @@ class Glove:
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
         self.follower = None if task is None else TaskFollower.of(Path(task), loaded.grasps)
-        self._health, self._due_us = Health(loaded), 0
+        self._health, self._due_us = Health(loaded, self._recognizer.quarantine), 0
         self._quarantined: tuple[Quarantined, ...] = ()
         self._fanout = Fanout(())
         self._open = ExitStack()
@@ -201,7 +201,7 @@ class Glove:
             self._fanout.publish(grasp, moment.preshape, moment.angles, moment)
         if progress is not None:
             self._fanout.task(progress)
-        self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
+        self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None)
         if self._recognizer.quarantine.found != self._quarantined:
             self._quarantined, self._due_us = self._recognizer.quarantine.found, now
         if now >= self._due_us or self.sources.changed:

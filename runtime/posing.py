@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from enum import Enum
 
 from thenar.drivers.calibration import (
+    CalibrationPose,
     GloveCalibration,
     Held,
-    Pose,
     calibration,
     held,
     poses_of,
@@ -72,7 +72,7 @@ class PoseGuide:
         self._low, self._high = [256] * len(self.names), [-1] * len(self.names)
 
     @property
-    def pose(self) -> Pose:
+    def pose(self) -> CalibrationPose:
         """The pose that is next or held; when all are taken, the last."""
         return self.poses[min(len(self.taken), len(self.poses) - 1)]
 

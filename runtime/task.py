@@ -22,7 +22,7 @@ _Seconds = Annotated[float, Meta(ge=0.0, le=1e9)]
 Deviation = Literal["", "unexpected", "skipped", "too long"]
 
 
-class Step(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class TaskStep(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A grasp of a task.
 
     grasp      its type
@@ -62,7 +62,7 @@ class Task(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     preshapes: str | None
     units: dict[_Name, str]
     first: tuple[_Name, ...]
-    steps: Annotated[tuple[Step, ...], Meta(min_length=1)]
+    steps: Annotated[tuple[TaskStep, ...], Meta(min_length=1)]
 
     def check(self, grasps: tuple[str, ...]) -> None:
         """Raise SettingError if a build that recognises `grasps` can never see a step."""

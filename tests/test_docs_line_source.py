@@ -4,7 +4,7 @@ import re
 from dataclasses import fields
 from pathlib import Path
 
-from thenar.drivers.lines import LONGEST, Header, LineCounts, Row, parsed
+from thenar.drivers.lines import LONGEST, ColumnHeader, LineCounts, Row, parsed
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.sinks.base import SINKS
 from thenar.runtime.sources.base import SOURCES
@@ -28,7 +28,7 @@ def test_its_harnesses_are_sound() -> None:
 
 def test_its_lines_are_rows() -> None:
     found = [parsed(text.strip("`").encode()) for text in cells("line")]
-    assert [type(one) for one in found] == [Row, Header, Row, Row, Row]
+    assert [type(one) for one in found] == [Row, ColumnHeader, Row, Row, Row]
 
 
 def test_every_count_and_every_way_is_there() -> None:

@@ -12,7 +12,7 @@ from msgspec import Struct
 from thenar.drivers import cd74hc4067
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips.base import GROUND as GROUND_PINS
-from thenar.drivers.i2c.chips.base import RESET, Package
+from thenar.drivers.i2c.chips.base import RESET, ChipPackage
 from thenar.drivers.i2c.chips.base import SUPPLY as SUPPLY_PINS
 from thenar.runtime.harness.wiring import ChipWiring, Harness, MuxChannel, SpiWiring
 
@@ -152,7 +152,7 @@ def _add_expander(circuit: Circuit, unit: Unit, ends: Sequence[WireEnd]) -> None
 
 
 def _ground_unused(
-    circuit: Circuit, unit: Unit, package: Package, pins: Sequence[str], ends: Sequence[WireEnd]
+    circuit: Circuit, unit: Unit, package: ChipPackage, pins: Sequence[str], ends: Sequence[WireEnd]
 ) -> None:
     """Ground unconnected inputs: a floating one draws current, or disturbs its neighbours."""
     used = {end.pin for end in ends}
@@ -198,7 +198,7 @@ def _add_multiplexers(circuit: Circuit, units: Sequence[Unit], ends: Sequence[Wi
         _ground_unused(circuit, unit, package, inputs, [end for end in ends if end.unit == unit])
 
 
-def _add_power(circuit: Circuit, ref: str, package: Package, above: int, bus: tuple[str, str]) -> None:
+def _add_power(circuit: Circuit, ref: str, package: ChipPackage, above: int, bus: tuple[str, str]) -> None:
     """Connect supply, ground, reset and address of a chip on a bus, `above` its lowest address."""
     nets = {"low": GROUND, "high": SUPPLY, "SDA": bus[0], "SCL": bus[1]}
     for number, name in enumerate(package.pins, start=1):
@@ -253,7 +253,7 @@ def _pull_up(clock_hz: int) -> ComponentKind:
     return resistor("1k", f"{note}; for {clock_hz} Hz, with short wires only: measure the rise time")
 
 
-def _kind(package: Package, inputs: Sequence[str]) -> ComponentKind:
+def _kind(package: ChipPackage, inputs: Sequence[str]) -> ComponentKind:
     def type_of(name: str) -> str:
         if name in (*SUPPLY_PINS, *GROUND_PINS):
             return "power_in"

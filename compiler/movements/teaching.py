@@ -18,7 +18,7 @@ import numpy as np
 
 from thenar.runtime.build import Build
 from thenar.runtime.preshape.selector import PreshapeTable
-from thenar.runtime.task import Step, Task
+from thenar.runtime.task import Task, TaskStep
 
 from .scores import levenshtein
 from .streams import MovementError
@@ -174,7 +174,7 @@ def _step(
     following: str | None,
     preshapes: PreshapeTable | None,
     transitions: Transitions | None,
-) -> Step:
+) -> TaskStep:
     grasps = [shown[number].grasps[at] for number, at in places.items()]
     after = Counter(shown[number].types[at + 1] for number, at in places.items() if at + 1 < len(shown[number].types))
     then = _ordered(following, after)
@@ -185,7 +185,7 @@ def _step(
     values = np.median(np.array(read), axis=0).round(2).tolist() if read else []
     joints = {joint.name: value for joint, value in zip(build.manifest.joints, values, strict=False)}
     preshape = None if preshapes is None else preshapes.chosen.get(grasp)
-    return Step(
+    return TaskStep(
         grasp=grasp,
         shown=len(places),
         preshape=None if preshape is None else preshape.name,

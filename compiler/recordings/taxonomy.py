@@ -19,7 +19,7 @@ from unicodedata import decimal
 
 from thenar.runtime.names import LONGEST_SHOWN, MOST_COMPARED, shortened
 from thenar.runtime.published import NONE
-from thenar.runtime.recording.session import Task
+from thenar.runtime.recording.session import CollectionTask
 from thenar.runtime.toml_source import TomlText, read_source
 
 from .errors import ColumnsError, RecordingError, check_names
@@ -182,7 +182,7 @@ MOVEMENTS = {
 }
 
 
-def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[Taxonomy, tuple[Task, ...]]:
+def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[Taxonomy, tuple[CollectionTask, ...]]:
     """Return the taxonomy of this name and the tasks to collect: those that `objects` lists, or every type.
 
     With `none`, movements of the empty hand are included. "own" is the user's own taxonomy: the types that `objects`
@@ -190,7 +190,7 @@ def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[
     """
     if objects is None:
         types = published(taxonomy)
-        return types, (*(Task(grasp, (ANY,)) for grasp in types.types), *_nothing(tuple(MOVEMENTS), none))
+        return types, (*(CollectionTask(grasp, (ANY,)) for grasp in types.types), *_nothing(tuple(MOVEMENTS), none))
     source = read_source(objects, ColumnsError)
     tables = source.tables()
     listed = [key for key in tables if plain(key) == NONE]
@@ -199,19 +199,19 @@ def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[
         raise ColumnsError(f"{objects.name} names {len(tables)} grasp types: a collection takes two at least")
     types = own(tables) if taxonomy == "own" else published(taxonomy)
     find = types.finder()
-    tasks: dict[str, Task] = {}
+    tasks: dict[str, CollectionTask] = {}
     for key, value in tables.items():
         grasp = find(key)
         if grasp is None:
             raise source.error((key,), types.unknown(key))
         if grasp in tasks:
             raise source.error((key,), f"is {grasp}, which is listed already: list it once")
-        tasks[grasp] = Task(grasp, _objects(source, key, value))
+        tasks[grasp] = CollectionTask(grasp, _objects(source, key, value))
     return types, (*tasks.values(), *_nothing(movements, none))
 
 
-def _nothing(movements: tuple[str, ...], none: bool) -> tuple[Task, ...]:
-    return (Task(NONE, movements),) if none else ()
+def _nothing(movements: tuple[str, ...], none: bool) -> tuple[CollectionTask, ...]:
+    return (CollectionTask(NONE, movements),) if none else ()
 
 
 def _objects(source: TomlText, key: str, value: object) -> tuple[str, ...]:

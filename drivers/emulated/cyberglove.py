@@ -7,26 +7,189 @@ The line emulates a bad cable (`PtyLine.damage`, `.unplug`, `.send` for unsolici
 """
 
 from collections import deque
+from dataclasses import dataclass
 from threading import Condition, Thread
 from time import monotonic
+from typing import Literal
 
 from ..closing import Closing
-from ..cyberglove_protocol import TICKS_HZ, digitising_us, period_us, shortest_us
-from .cyberglove_box import Action, CyberGloveBox, Doubts, GloveState
+from ..cyberglove_protocol import (
+    ALWAYS,
+    INFORMATION,
+    MASK_18,
+    MASK_22,
+    PLUGGED,
+    POLL,
+    READY,
+    REPLY_BYTES,
+    SET,
+    STOP,
+    STREAM,
+    Record,
+    RecordFault,
+    digitising_us,
+    encode,
+    masked_sensors,
+    period_us,
+    shortest_us,
+)
+from ..errors import SettingError
 from .serial_line import PtyLine
 
-_RESTART_S = 1.75  # from the vendor's manual, as ViSTA quotes it
+MASKS = {18: MASK_18, 22: MASK_22}
+_SWITCHES = "DFU"  # settings that are 0 or 1
+_NOT_READY = 1
+_TEXT_END = b"\r\n\0"
 
 
-class EmulatedCyberGlove(Closing):
-    """A glove of 18 or 22 sensors on `line`, in a separate thread.
+@dataclass(frozen=True, slots=True)
+class Doubts:
+    """Behaviour on which the sources disagree or are silent.
+
+    error_echo   whether an error reply begins with the command's echo
+    stop_echo    whether the reply to a Ctrl-C is itself and a NUL
+    stray_nul    whether a NUL follows a text reply
+    mask         the effect of a sensor mask: accepted, an unknown command, acknowledged and ignored, or reported back
+                 but without effect
+    """
+
+    error_echo: bool = True
+    stop_echo: bool = False
+    stray_nul: bool = False
+    mask: Literal["taken", "unknown", "ignored", "feigned"] = "taken"
+
+
+class CyberGloveBox:
+    """A glove of 18 or 22 sensors and its box, without a clock or a line: commands in, replies out.
+
+    It understands the commands that the driver sends. While it streams, it understands only Ctrl-C.
 
     text       the reply to ?i
     not_ready  number of replies 1 to ?G before the reply 3
     doubts     its behaviour where the sources disagree
 
-    `state` holds the glove and the settings of its box, `box` whether it streams. Changes take effect with the next
-    record. Raises SettingError for another number of sensors.
+    plugged is whether the glove is connected to its box. `settings` holds the settings of the box, by letter. Raises
+    SettingError for another number of sensors.
+    """
+
+    def __init__(
+        self, sensors: int = 18, text: str = "CyberGlove, emulated", not_ready: int = 0, doubts: Doubts | None = None
+    ) -> None:
+        if sensors not in MASKS:
+            raise SettingError(f"there are CyberGloves of 18 and of 22 sensors, not of {sensors}")
+        self.sensors, self.text, self.doubts = sensors, text, doubts or Doubts()
+        self.plugged, self.streaming = True, False
+        self._not_ready, self._pending = not_ready, b""
+        self._all = masked_sensors(MASKS[sensors])
+        self.values = bytes([100] * sensors)
+        # The state after power-up. (No source gives a real box's settings then.)
+        self.settings = dict.fromkeys(_SWITCHES, b"\0") | {"T": bytes(4), "M": MASKS[sensors], "N": bytes([sensors])}
+
+    def set(self, values: bytes) -> None:
+        """Set the sensor values, one byte of 1 to 255 per sensor. Raises SettingError for others."""
+        if len(values) != self.sensors or 0 in values:
+            raise SettingError(f"a CyberGlove's {self.sensors} sensors need as many bytes of 1 to 255, not {values!r}")
+        self.values = values
+
+    def is_on(self, letter: str) -> bool:
+        """Return whether a setting of 0 or 1 is on."""
+        return self.settings[letter] != b"\0"
+
+    def apply(self, letter: str, values: bytes) -> bool:
+        """Apply the setting of this letter, and return whether it is valid."""
+        if letter in _SWITCHES and values[0] > 1:
+            return False
+        if letter == "N" and not 1 <= values[0] <= len(masked_sensors(self.settings["M"])):
+            return False
+        if letter == "M":
+            self.settings["N"] = bytes([len(self._masked(values))])
+        self.settings[letter] = values
+        return True
+
+    def record(self, *, streamed: bool, too_fast: bool = False) -> bytes:
+        """Return a record's bytes on the wire."""
+        status = ALWAYS | PLUGGED * self.plugged if self.is_on("U") else None
+        fault: RecordFault | None = "unplugged" if not self.plugged else "too fast" if too_fast else None
+        return encode(Record(self.sent(), streamed, fault, status))
+
+    def sent(self) -> bytes:
+        """Return the values of the sensors that mask and number let through, or all if the box ignores its mask."""
+        if self.doubts.mask == "feigned":
+            return self.values
+        names = self._masked(self.settings["M"])[: self.settings["N"][0]]
+        return bytes(self.values[self._all.index(name)] for name in names)
+
+    def _masked(self, mask: bytes) -> list[str]:
+        return [name for name in masked_sensors(mask) if name in self._all]
+
+    def feed(self, data: bytes) -> list[bytes | None]:
+        """Return the effects of `data`, in order: bytes to send at once; None: a record is requested."""
+        self._pending += data
+        out: list[bytes | None] = []
+        while self._pending:
+            used = self._command(out)
+            if not used:
+                break
+            self._pending = self._pending[used:]
+        return out
+
+    def _command(self, out: list[bytes | None]) -> int:
+        """Execute the first pending command; return its length, 0 while it is incomplete."""
+        first = self._pending[:1]
+        letter = first.decode("latin-1")
+        if first == STOP:
+            self.streaming = False
+            out += [STOP + b"\0"] if self.doubts.stop_echo else []
+            return 1
+        if self.streaming or first in b"\r\n \0":
+            return 1
+        if first == b"?":
+            return self._query(out)
+        if first in (POLL, STREAM):
+            self.streaming = first == STREAM
+            out += [] if self.streaming else [None]
+            return 1
+        if letter not in SET or (letter == "M" and self.doubts.mask == "unknown"):
+            out.append(self._error(first, b"?"))
+            return 1
+        size = 1 + SET[letter]
+        if len(self._pending) < size:
+            return 0
+        ignored = letter == "M" and self.doubts.mask == "ignored"
+        is_set = ignored or self.apply(letter, self._pending[1:size])
+        out.append(first + b"\0" if is_set else self._error(first, b"n"))
+        return size
+
+    def _query(self, out: list[bytes | None]) -> int:
+        echo = self._pending[:2]
+        if len(echo) < 2:
+            return 0
+        letter = echo[1:].decode("latin-1")
+        if echo == INFORMATION.echo:
+            out.append(echo + self.text.encode("ascii") + _TEXT_END + b"\0" * self.doubts.stray_nul)
+        elif letter in REPLY_BYTES:
+            constant = {"S": bytes([self.sensors]), "R": b"\1"}
+            values = self._readiness() if letter == "G" else constant.get(letter) or self.settings[letter]
+            out.append(echo + values + b"\0")
+        else:
+            out.append(self._error(echo, b"?"))
+        return 2
+
+    def _readiness(self) -> bytes:
+        if self._not_ready:
+            self._not_ready -= 1
+            return bytes([_NOT_READY])
+        return bytes([READY if self.plugged else _NOT_READY])
+
+    def _error(self, echo: bytes, kind: bytes) -> bytes:
+        return echo * self.doubts.error_echo + b"e" + kind + b"\0"
+
+
+class EmulatedCyberGlove(Closing):
+    """A glove of 18 or 22 sensors on `line`, in a separate thread.
+
+    text, not_ready and doubts are those of its `box`, whose changes take effect with the next record. Raises
+    SettingError for another number of sensors.
     """
 
     def __init__(
@@ -39,12 +202,10 @@ class EmulatedCyberGlove(Closing):
         doubts: Doubts | None = None,
     ) -> None:
         self._line = line
-        self.state = GloveState(sensors, not_ready)
-        self.box = CyberGloveBox(self.state, text, doubts or Doubts())
+        self.box = CyberGloveBox(sensors, text, not_ready, doubts)
         self._changed = Condition()
         self._heard: deque[bytes] = deque()
         self._closing = False
-        self._started = monotonic()
         self._next = 0.0
         self.records = 0
         self._thread = Thread(target=self._run, name="emulated CyberGlove", daemon=True)
@@ -53,7 +214,7 @@ class EmulatedCyberGlove(Closing):
 
     def set(self, sensors: bytes) -> None:
         """Set the sensor values, one byte of 1 to 255 per sensor. Raises SettingError for others."""
-        self.state.set(sensors)
+        self.box.set(sensors)
 
     def close(self) -> None:
         """Stop sending and receiving. The line stays."""
@@ -87,46 +248,30 @@ class EmulatedCyberGlove(Closing):
     def _hear(self, data: bytes) -> None:
         was_streaming = self.box.streaming
         for reply in self.box.feed(data):
-            if isinstance(reply, bytes):
+            if reply is not None:
                 self._line.send(reply)
-            else:
-                self._act(reply)
+                continue
+            with self._changed:
+                self._changed.wait_for(lambda: self._closing, self._digitising_s)
+            self._send(self.box.record(streamed=False))
         if self.box.streaming and not was_streaming:
-            self._next = monotonic() + digitising_us(self._count(), self.state.is_on("F")) / 1e6
+            self._next = monotonic() + self._digitising_s
 
-    def _act(self, action: Action) -> None:
-        if action is Action.RESTARTED:
-            self._wait(_RESTART_S)
-            self._heard.clear()
-            return
-        self._wait(digitising_us(self._count(), self.state.is_on("F")) / 1e6)
-        as_text = action is Action.POLLED_AS_TEXT
-        self._send(self.box.polled_as_text() if as_text else self.state.record(streamed=False, ticks=self._ticks()))
+    @property
+    def _digitising_s(self) -> float:
+        return digitising_us(len(self.box.sent()), self.box.is_on("F")) / 1e6
 
     def _stream(self) -> None:
         """Send a record when it is due, and schedule the next by the set period or the shortest possible one."""
         if monotonic() < self._next:
             return
-        settings = self.state.settings
-        words = int.from_bytes(settings["T"][:2], "big"), int.from_bytes(settings["T"][2:], "big")
-        period = period_us(words)
-        shortest = shortest_us(
-            self._count(), self._line.baud, status=self.state.is_on("U"), filtered=self.state.is_on("F")
-        )
-        self._send(self.state.record(streamed=True, too_fast=0 < period < shortest, ticks=self._ticks()))
+        box, words = self.box, self.box.settings["T"]
+        period = period_us((int.from_bytes(words[:2], "big"), int.from_bytes(words[2:], "big")))
+        shortest = shortest_us(len(box.sent()), self._line.baud, status=box.is_on("U"), filtered=box.is_on("F"))
+        self._send(box.record(streamed=True, too_fast=0 < period < shortest))
         # If the host wakes this thread late, there is no burst to catch up.
         self._next = max(self._next + max(period, shortest) / 1e6, monotonic())
 
     def _send(self, record: bytes) -> None:
         self.records += 1
         self._line.send(record)
-
-    def _wait(self, seconds: float) -> None:
-        with self._changed:
-            self._changed.wait_for(lambda: self._closing, seconds)
-
-    def _count(self) -> int:
-        return len(self.state.sent())
-
-    def _ticks(self) -> int:
-        return int((monotonic() - self._started) * TICKS_HZ)

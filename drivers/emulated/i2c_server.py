@@ -1,7 +1,7 @@
 """Serves emulated I2C buses as device nodes through umockdev, controlled by JSON lines on stdin and stdout.
 
 It is started by `umockdev-wrapper /usr/bin/python3 -I`: it needs the system's Python, which has PyGObject, and no other
-package. Each line in is [verb, arguments...] of `Server`; each line out is the reply.
+package. Each line in is [verb, arguments...] of `EmulationServer`; each line out is the reply.
 """
 
 import errno
@@ -227,7 +227,7 @@ class SpiNode(EmulatedNode):
         return total
 
 
-class Server:
+class EmulationServer:
     """The verbs of lines on stdin; a chip is its number on its bus. SPI devices follow the buses."""
 
     def __init__(self, testbed: Any, buses: list[dict[str, Any]]) -> None:
@@ -304,7 +304,7 @@ def _wait_until(moment: float) -> None:
 def main() -> None:
     """Read the buses from the first line, print the location of the testbed, and execute every further line."""
     testbed = UMockdev.Testbed.new()
-    server = Server(testbed, json.loads(sys.stdin.readline()))
+    server = EmulationServer(testbed, json.loads(sys.stdin.readline()))
     print(json.dumps(testbed.get_root_dir()), flush=True)
     for line in sys.stdin:
         verb, *arguments = json.loads(line)

@@ -137,21 +137,13 @@ QUICK, BYTE, BYTE_DATA, WORD_DATA, I2C_BLOCK = 0, 1, 2, 3, 8
 _READ_SIZES = {BYTE: 1, BYTE_DATA: 1, WORD_DATA: 2}
 
 
-@dataclass(frozen=True)
-class Temper:
-    """The error codes of an adapter: errno of a NAK; errno with SDA held low (None: not detected)."""
-
-    nak: int
-    stuck: int | None
-    plain_i2c: bool = True
-
-
-ADAPTERS = {
-    "bcm2835": Temper(errno.EREMOTEIO, errno.ETIMEDOUT),
-    "designware": Temper(errno.EREMOTEIO, errno.EAGAIN),
-    "i2c-gpio": Temper(errno.ENXIO, None),
-    "any": Temper(errno.EREMOTEIO, errno.EBUSY),
-    "smbus-only": Temper(errno.ENXIO, errno.EBUSY, plain_i2c=False),
+# The error codes of each adapter: errno of a NAK; errno with SDA held low (None: not detected).
+ADAPTERS: dict[str, tuple[int, int | None]] = {
+    "bcm2835": (errno.EREMOTEIO, errno.ETIMEDOUT),
+    "designware": (errno.EREMOTEIO, errno.EAGAIN),
+    "i2c-gpio": (errno.ENXIO, None),
+    "any": (errno.EREMOTEIO, errno.EBUSY),
+    "smbus-only": (errno.ENXIO, errno.EBUSY),
 }
 
 
@@ -183,7 +175,8 @@ class Adapter:
     def __init__(self, wire: Wire, kind: str) -> None:
         self.wire = wire
         self.kind = kind
-        self.temper = ADAPTERS[kind]
+        self.nak_errno, self.stuck_errno = ADAPTERS[kind]
+        self.plain_i2c = kind != "smbus-only"
         self.faults: list[TransferFault] = []
         self.claimed: set[int] = set()
         self.stuck_for: int | None = None
@@ -192,7 +185,7 @@ class Adapter:
     @property
     def funcs(self) -> int:
         """The reply to I2C_FUNCS."""
-        return FUNC_SMBUS | (FUNC_I2C if self.temper.plain_i2c else 0)
+        return FUNC_SMBUS | (FUNC_I2C if self.plain_i2c else 0)
 
     def slave(self, address: int) -> None:
         """I2C_SLAVE: EBUSY if a kernel driver holds the address."""
@@ -214,7 +207,7 @@ class Adapter:
 
     def rdwr(self, messages: list[Message]) -> list[bytes]:
         """I2C_RDWR: send all messages in one transfer."""
-        if not self.temper.plain_i2c:
+        if not self.plain_i2c:
             raise OSError(errno.EOPNOTSUPP, "no I2C_RDWR")
         if len(messages) > MOST_MESSAGES:
             raise OSError(errno.EINVAL, "too many messages")
@@ -244,11 +237,11 @@ class Adapter:
         try:
             return self.wire.transfer(messages)
         except NakError:
-            raise OSError(self.temper.nak, "NAK") from None
+            raise OSError(self.nak_errno, "NAK") from None
 
     def _clock_out(self) -> None:
         if self.stuck_for is not None:
             self.stuck_for -= 1
             self.wire.sda_low = self.stuck_for > 0
-        if self.wire.sda_low and self.temper.stuck is not None:
-            raise OSError(self.temper.stuck, "SDA is low")
+        if self.wire.sda_low and self.stuck_errno is not None:
+            raise OSError(self.stuck_errno, "SDA is low")

@@ -1,4 +1,4 @@
-"""Emulated boards or programs that send rows of numbers as lines: over a pty, TCP, UDP, Unix socket or WebSocket."""
+"""Emulated boards or programs that send rows of numbers as lines: over a pty, TCP, UDP or a Unix socket."""
 
 import contextlib
 import json
@@ -8,15 +8,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Event, Lock, Thread
 from time import monotonic
-from typing import TYPE_CHECKING
 
 from ..closing import Closing
-from ..errors import DeviceError, SettingError
-from ..extras import optional
-from ..lines import CLOCK_US, SEQUENCES, Header, checked, parsed, switches_field
-
-if TYPE_CHECKING:
-    from websockets.sync.server import ServerConnection
+from ..errors import DeviceError
+from ..lines import CLOCK_US, SEQUENCES, ColumnHeader, checked, parsed, switches_field
 
 _UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 # A client that does not accept a line within this time is dropped.
@@ -44,7 +39,9 @@ class LineSender(Closing):
     ) -> None:
         self._send, self._columns, self._time, self._scale = send, tuple(columns), time, _UNITS[unit]
         header = ",".join(self._columns).encode()
-        self._header = header + b"\n" if named and parsed(header) == Header(self._columns) and len(columns) > 1 else b""
+        self._header = (
+            header + b"\n" if named and parsed(header) == ColumnHeader(self._columns) and len(columns) > 1 else b""
+        )
         self._json, self._named_s = named and not self._header, -math.inf
         self._period_s, self._began = 1 / rate_hz, monotonic()
         self._values = dict.fromkeys(columns, 0.0)
@@ -106,7 +103,7 @@ class BoardSender(LineSender):
         return names + checked(("row", *head, *(str(round(values[name])) for name in self._readings)))
 
 
-class SocketLines(Closing):
+class LineServer(Closing):
     """A server of lines on loopback (`tcp://127.0.0.1:PORT`) or at a path (`unix:PATH`) for all clients.
 
     port  its address, in the form of a `[[stream]]`
@@ -181,56 +178,10 @@ class DatagramLines(Closing):
         self._line.close()
 
 
-class WebLines(Closing):
-    """A WebSocket on loopback for all clients."""
-
-    def __init__(self) -> None:
-        with optional(SettingError):
-            from websockets.sync.server import serve
-        self._clients: set[ServerConnection] = set()
-        self._lock, self._closing = Lock(), Event()
-        self._server = serve(self._serve, "127.0.0.1", 0, compression=None)
-        self.port = f"ws://127.0.0.1:{self._server.socket.getsockname()[1]}/"
-        self._thread = Thread(target=self._server.serve_forever, name=f"lines at {self.port}", daemon=True)
-        self._thread.start()
-
-    def send(self, data: bytes) -> None:
-        """Send a message to all connected clients."""
-        with self._lock:
-            clients = tuple(self._clients)
-        for client in clients:
-            with contextlib.suppress(Exception):  # it is gone, which its thread detects
-                client.send(data.decode())
-
-    def close(self) -> None:
-        """Hang up."""
-        self._closing.set()
-        self._server.shutdown()
-        with self._lock:
-            clients = tuple(self._clients)
-        for client in clients:
-            client.close()
-        self._thread.join()
-
-    def _serve(self, client: "ServerConnection") -> None:
-        with self._lock:
-            self._clients.add(client)
-        try:
-            for _ in client:  # its messages are ignored; the iteration ends when it is gone
-                pass
-        finally:
-            with self._lock:
-                self._clients.discard(client)
-
-
-def lines_like(port: str, path: Path) -> SocketLines | DatagramLines | WebLines:
-    """Return a sender of lines on loopback with the transport of `port`, or at the Unix socket `path` if `port` is not
-    a network address.
+def lines_like(port: str, path: Path) -> LineServer | DatagramLines:
+    """Return a sender of lines on loopback: of datagrams if `port` takes them, over TCP for another network address,
+    and otherwise at the Unix socket `path`.
     """
-    if port.startswith("tcp:"):
-        return SocketLines()
     if port.startswith("udp:"):
         return DatagramLines()
-    if port.startswith(("ws:", "wss:")):
-        return WebLines()
-    return SocketLines(path)
+    return LineServer(None if port.startswith(("tcp:", "ws:", "wss:")) else path)

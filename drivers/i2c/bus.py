@@ -8,13 +8,13 @@ from time import monotonic, sleep
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
 from .chips import Chip, Conversion, Converter, Reading
-from .node import MOST_MESSAGES, REFUSED, BatchMode, Node, Query, Run
+from .node import MOST_MESSAGES, REFUSED, BatchMode, DeviceNode, Query, Run
 from .supervisor import ChipSupervisor, PlacedChip, Route
 from .tca9548a import ADDRESSES, CHANNELS
 
 
 @dataclass(eq=False, slots=True)
-class Port:
+class PlacedPort:
     """A port to read, and its chip.
 
     believed: a suspicious reply that was found to be right, and the number of checks of its chip by then.
@@ -38,29 +38,25 @@ class Port:
         return 0 in reply or int.from_bytes(reply, "little") & high != high
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Ports, by their numbers in the scan, that one transfer reads."""
-
-    route: Route | None
-    ports: tuple[tuple[int, Port], ...]
+# Ports, by their numbers in the scan, that one transfer reads, and the route to them.
+Group = tuple[Route | None, tuple[tuple[int, PlacedPort], ...]]
 
 
-def cut(ports: Sequence[Port], way: BatchMode) -> Iterator[Group]:
+def cut(ports: Sequence[PlacedPort], way: BatchMode) -> Iterator[Group]:
     """Return the groups that read the ports of all present chips, in order."""
-    gathered: list[tuple[int, Port]] = []
+    gathered: list[tuple[int, PlacedPort]] = []
     for number, port in enumerate(ports):
         if not port.member.present:
             continue
         if gathered and not _fits(port, [other for _, other in gathered], way):
-            yield Group(gathered[0][1].member.route, tuple(gathered))
+            yield gathered[0][1].member.route, tuple(gathered)
             gathered = []
         gathered.append((number, port))
     if gathered:
-        yield Group(gathered[0][1].member.route, tuple(gathered))
+        yield gathered[0][1].member.route, tuple(gathered)
 
 
-def _fits(port: Port, gathered: Sequence[Port], way: BatchMode) -> bool:
+def _fits(port: PlacedPort, gathered: Sequence[PlacedPort], way: BatchMode) -> bool:
     last = gathered[-1]
     if way in (BatchMode.PORT, BatchMode.SMBUS) or port.member.route != last.member.route:
         return False
@@ -72,7 +68,7 @@ def _fits(port: Port, gathered: Sequence[Port], way: BatchMode) -> bool:
 class Scan:
     """Ports in a fixed order, read by as few transfers as the adapter allows."""
 
-    def __init__(self, node: Node, keeper: ChipSupervisor, ports: Sequence[Port]) -> None:
+    def __init__(self, node: DeviceNode, keeper: ChipSupervisor, ports: Sequence[PlacedPort]) -> None:
         self._node = node
         self._keeper = keeper
         self._ports = ports
@@ -92,14 +88,14 @@ class Scan:
         if self._revision != keeper.revision or self._way is not self._node.way:
             self._plan()
         replies: list[int | None] = [None] * len(self._ports)
-        for group, run in self._groups:
+        for (route, ports), run in self._groups:
             try:
-                if group.route is not None:
-                    keeper.routes.select(group.route)
+                if route is not None:
+                    keeper.routes.select(route)
                 found: Sequence[bytes | None] = run()
             except OSError as error:
-                found = self._one_by_one(group, error)
-            for (number, port), reply in zip(group.ports, found, strict=True):
+                found = self._one_by_one(ports, error)
+            for (number, port), reply in zip(ports, found, strict=True):
                 if reply is None or not port.member.present:  # lost, maybe while its neighbours were read
                     continue
                 replies[number] = self._doubt(port, reply) if port.doubtful(reply) else port.value(reply)
@@ -117,21 +113,21 @@ class Scan:
         self._need_open()
         self._revision, self._way = self._keeper.revision, self._node.way
         groups = cut(self._ports, self._way)
-        self._groups = [(group, self._node.prepare([port.query for _, port in group.ports])) for group in groups]
+        self._groups = [(group, self._node.prepare([port.query for _, port in group[1]])) for group in groups]
 
-    def _one_by_one(self, group: Group, error: OSError) -> list[bytes | None]:
+    def _one_by_one(self, ports: Sequence[tuple[int, PlacedPort]], error: OSError) -> list[bytes | None]:
         """Read the ports of a failed transfer one by one; if the adapter rejects batches, reduce them from then on."""
         if error.errno in REFUSED and self._way is self._node.way:  # else it was lowered since `_plan`
-            self._node.way = self._way.lower() if len(group.ports) > 1 else BatchMode.SMBUS
+            self._node.way = self._way.lower() if len(ports) > 1 else BatchMode.SMBUS
         self._keeper.routes.forget()
-        return [self._alone(port) for _, port in group.ports]
+        return [self._alone(port) for _, port in ports]
 
-    def _alone(self, port: Port) -> bytes | None:
+    def _alone(self, port: PlacedPort) -> bytes | None:
         if not port.member.present:
             return None
         return self._keeper.attempt(port.member, lambda: self._node.query(port.query))
 
-    def _doubt(self, port: Port, reply: bytes) -> int | None:
+    def _doubt(self, port: PlacedPort, reply: bytes) -> int | None:
         """Return a suspicious reply if it proves right, else the value read after recovery.
 
         On adapters that do not notice SDA held low, it reads as zeros, but so do eight closed switches. A 0 on a pin
@@ -157,7 +153,7 @@ class Scan:
 class _Converting:
     """A converter in a scan: its remaining steps, the one that converts, and the time until which it is busy."""
 
-    def __init__(self, node: Node, keeper: ChipSupervisor, member: PlacedChip) -> None:
+    def __init__(self, node: DeviceNode, keeper: ChipSupervisor, member: PlacedChip) -> None:
         self._node, self._keeper, self._member = node, keeper, member
         self._conversions: dict[int, Conversion] = {}
         self._left: deque[int] = deque()
@@ -209,7 +205,7 @@ class Interleaved:
     the first later one that is ready is read ahead. `thenar.runtime.scanning.timing` models the same order.
     """
 
-    def __init__(self, node: Node, keeper: ChipSupervisor, groups: Sequence[Sequence[Port]]) -> None:
+    def __init__(self, node: DeviceNode, keeper: ChipSupervisor, groups: Sequence[Sequence[PlacedPort]]) -> None:
         self._scans = [Scan(node, keeper, group) for group in groups]
         slow: dict[PlacedChip, _Converting] = {}
         self._slow: dict[int, _Converting] = {}
@@ -290,7 +286,7 @@ class I2cBus(Closing):
         self.device, self.clock_hz = device, clock_hz
         _refuse_clashes(device, chips)
         self.chips = tuple(PlacedChip(device, at.chip, at.address, at.used, _route(at)) for at in chips)
-        self._node = Node(device)
+        self._node = DeviceNode(device)
         self._keeper = ChipSupervisor(self._node, self.chips, check_every_s)
 
     def open(self) -> None:
@@ -316,9 +312,9 @@ class I2cBus(Closing):
         """
         return Interleaved(self._node, self._keeper, [self._made(group) for group in groups])
 
-    def _made(self, ports: Sequence[PortRead]) -> list[Port]:
+    def _made(self, ports: Sequence[PortRead]) -> list[PlacedPort]:
         read = ((self.chips[port.chip], port.reading) for port in ports)
-        return [Port(chip, Query(chip.address, one.command, one.length), one) for chip, one in read]
+        return [PlacedPort(chip, Query(chip.address, one.command, one.length), one) for chip, one in read]
 
     @property
     def way(self) -> str:
@@ -344,12 +340,12 @@ class I2cBus(Closing):
 _REGISTERS = Reading("registers", b"", ())
 
 
-def _control(member: PlacedChip) -> Port:
+def _control(member: PlacedChip) -> PlacedPort:
     watched = member.watched
     if watched is None:
         reading = member.chip.readings[0]
-        return Port(member, Query(member.address, reading.command, reading.length), reading)
-    return Port(member, Query(member.address, watched.data[:1], len(watched.expect)), _REGISTERS)
+        return PlacedPort(member, Query(member.address, reading.command, reading.length), reading)
+    return PlacedPort(member, Query(member.address, watched.data[:1], len(watched.expect)), _REGISTERS)
 
 
 def _route(at: ChipAt) -> Route | None:

@@ -90,7 +90,7 @@ class Query:
         return 2 if self.command else 1
 
 
-class Node:
+class DeviceNode:
     """The open node. Errors of transfers are OSErrors of the adapter; `transfers` counts the ioctl calls.
 
     way is the batching that its adapter supports, as far as it is known.

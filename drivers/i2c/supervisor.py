@@ -8,7 +8,7 @@ from time import monotonic
 from typing import TypeVar
 
 from .chips import CHIPS, Chip, Write
-from .node import NOBODY, NOBODY_THERE, STUCK, Node, Query, failure, stuck
+from .node import NOBODY, NOBODY_THERE, STUCK, DeviceNode, Query, failure, stuck
 from .tca9548a import control
 
 _LOG = logging.getLogger(__name__)
@@ -47,7 +47,7 @@ class Routes:
     mux  the address of the last used mux
     """
 
-    def __init__(self, node: Node, muxes: Iterable[int]) -> None:
+    def __init__(self, node: DeviceNode, muxes: Iterable[int]) -> None:
         self._node = node
         self._connected = set(muxes)  # those that may have a channel on: initially all
         self.selected: Route | None = None
@@ -97,24 +97,21 @@ class Routes:
         self._node.write(mux, control(channel))
 
 
-class ImpostorError(Exception):
-    """The device at an address is not the expected chip."""
-
-
-def set_up(node: Node, chip: Chip, address: int, used: frozenset[int]) -> None:
-    """Write the chip's registers and read them back. Raises OSError, or ImpostorError for a wrong reply."""
+def set_up(node: DeviceNode, chip: Chip, address: int, used: frozenset[int]) -> bool:
+    """Write the chip's registers and read them back; return whether it is the expected chip. Raises OSError."""
     for write in chip.setup(used):
         node.write(address, write.data)
         if write.expect and not write.holds(read_back(node, chip, address, write)):
-            raise ImpostorError
+            return False
+    return True
 
 
-def read_back(node: Node, chip: Chip, address: int, write: Write) -> bytes:
+def read_back(node: DeviceNode, chip: Chip, address: int, write: Write) -> bytes:
     """Return the bytes at the location that `write` wrote."""
     return node.query(Query(address, write.data[:1] if chip.registers else b"", len(write.expect)))
 
 
-def identify_chip(node: Node, address: int) -> str:
+def identify_chip(node: DeviceNode, address: int) -> str:
     """Describe the device at an address: the first kind whose set-up succeeds, which leaves its pins inputs.
 
     Kinds without registers come last, since probing for registers drives their pins.
@@ -125,12 +122,11 @@ def identify_chip(node: Node, address: int) -> str:
     return "something unknown"
 
 
-def _behaves_like(node: Node, chip: Chip, address: int) -> bool:
+def _behaves_like(node: DeviceNode, chip: Chip, address: int) -> bool:
     try:
-        set_up(node, chip, address, frozenset())
-    except (OSError, ImpostorError):
+        return set_up(node, chip, address, frozenset())
+    except OSError:
         return False
-    return True
 
 
 @dataclass(eq=False, slots=True)
@@ -177,7 +173,7 @@ class ChipSupervisor:
     is gone, and no other error.
     """
 
-    def __init__(self, node: Node, members: Sequence[PlacedChip], check_every_s: float) -> None:
+    def __init__(self, node: DeviceNode, members: Sequence[PlacedChip], check_every_s: float) -> None:
         self._node = node
         self._members = members
         self._check_every_s = check_every_s
@@ -280,11 +276,10 @@ class ChipSupervisor:
         for left in reversed(range(tries)):
             if self.trouble:
                 break
-            try:
-                member.present = self.attempt(member, lambda: self._set_up(member), 1) is True
-            except ImpostorError:
-                if not left:
-                    self._refuse(member)
+            expected = self.attempt(member, lambda: self._set_up(member), 1)
+            member.present = expected is True
+            if expected is False and not left:
+                self._refuse(member)
             if member.present:
                 member.due = monotonic() + self._check_every_s
                 break
@@ -294,8 +289,7 @@ class ChipSupervisor:
 
     def _set_up(self, member: PlacedChip) -> bool:
         self._node.claim(member.address)
-        set_up(self._node, member.chip, member.address, member.used)
-        return True
+        return set_up(self._node, member.chip, member.address, member.used)
 
     def _refuse(self, member: PlacedChip) -> None:
         self.check_bus_stuck()  # a line held low looks like a reply of every chip

@@ -1,6 +1,6 @@
 """TI TCA9548A: a mux of eight channels behind one control register. Bit c of the register connects channel c."""
 
-from .chips.base import TSSOP24, Device, Package
+from .chips.base import TSSOP24, ChipPackage, Device
 
 ADDRESSES = range(0x70, 0x78)
 CHANNELS = range(8)
@@ -9,7 +9,7 @@ CLOCK_HZ = 400_000
 # Address and control byte: the cost of one selection, and of reading the register back.
 SCL_PERIODS = 20
 
-PACKAGE = Package(
+PACKAGE = ChipPackage(
     part="TCA9548APWR",
     maker="Texas Instruments",
     symbol="TCA9548APWR",

@@ -6,7 +6,7 @@ Its package names it in pyproject.toml:
     tca9534 = "my_package.chip:MEMBER"
 """
 
-from thenar.drivers.i2c.chips import Chip, Device, Package, Reading, Write, byte_pins
+from thenar.drivers.i2c.chips import Chip, ChipPackage, Device, Reading, Write, byte_pins
 
 INPUT, OUTPUT, POLARITY, CONFIGURATION = range(4)
 
@@ -43,7 +43,7 @@ class Tca9534(Chip):
     pins = tuple(f"P{bit}" for bit in range(8))
     readings = (Reading("P", bytes((INPUT,)), byte_pins(0)),)
     pulls_up = False
-    package = Package(
+    package = ChipPackage(
         part="TCA9534PWR",
         maker="Texas Instruments",
         symbol="TCA9534",

@@ -34,7 +34,7 @@ _STARTS_S = 3.0
 RECORD = "a record"
 
 
-class Finding(msgspec.Struct, frozen=True):
+class CheckResult(msgspec.Struct, frozen=True):
     """The finding on a device; for a bus, chip by chip and as a whole.
 
     predicted_us  from one record or row to the next, or the time of the readings, by the arithmetic of the
@@ -55,7 +55,7 @@ class Finding(msgspec.Struct, frozen=True):
 
 def check_up(
     harness: Harness, scan: ScanMap, names: Sequence[str], sensors: Sequence[str] | None = None
-) -> Iterator[Callable[[], tuple[Finding, ...]]]:
+) -> Iterator[Callable[[], tuple[CheckResult, ...]]]:
     """Yield a finding on each device of `harness`, of its chips and streams only what `scan` reads: the switches
     `names`, and of the joints only `sensors`, if not all are read. A finding takes a second or a few.
 
@@ -70,7 +70,7 @@ def check_up(
         yield lambda bus=bus, look=look: look(harness, bus, scan)  # type: ignore[misc]
 
 
-def _glove(wiring: GloveWiring, read: Sequence[str]) -> tuple[Finding, ...]:
+def _glove(wiring: GloveWiring, read: Sequence[str]) -> tuple[CheckResult, ...]:
     """Return the kind and the speed of the glove as wired, and its best record times: of all its sensors, and of those
     that are `read`, or half of them.
     """
@@ -80,16 +80,16 @@ def _glove(wiring: GloveWiring, read: Sequence[str]) -> tuple[Finding, ...]:
         measured, info = _gap(lambda: device.read(_LISTEN_S)), device.info
         remarks = (*(() if info is None else info.notes), *_counted(device))
     except ThenarError as wrong:
-        return (Finding(device.name, "", False, predicted, None, (str(wrong),)),)
+        return (CheckResult(device.name, "", False, predicted, None, (str(wrong),)),)
     finally:
         device.close()
-    found = _remarked(Finding(device.name, "" if info is None else info.text, True, predicted, measured, remarks))
+    found = _remarked(CheckResult(device.name, "" if info is None else info.text, True, predicted, measured, remarks))
     some = read if 0 < len(read) < device.sensors else wiring.sensor_names[: device.sensors // 2]
     fastest = msgspec.structs.replace(wiring, rate_hz=None, mode="stream", record_us=None)
     return (found, _record(fastest, wiring.sensor_names), _record(fastest, some))
 
 
-def _record(wiring: GloveWiring, read: Sequence[str]) -> Finding:
+def _record(wiring: GloveWiring, read: Sequence[str]) -> CheckResult:
     """Return the record time of these sensors by the vendor's formula, and as measured."""
     device = GloveDevice(wiring)
     device.read_only(read)
@@ -99,18 +99,18 @@ def _record(wiring: GloveWiring, read: Sequence[str]) -> Finding:
         device.open()
         measured, unmasked = _gap(lambda: device.read(_LISTEN_S), fmean), device.trouble()
     except ThenarError as wrong:
-        return Finding(device.name, part, True, predicted, None, (str(wrong),))
+        return CheckResult(device.name, part, True, predicted, None, (str(wrong),))
     finally:
         device.close()
     if unmasked or measured is None:
-        return Finding(device.name, part, True, predicted, measured, (unmasked or "no record comes",))
+        return CheckResult(device.name, part, True, predicted, measured, (unmasked or "no record comes",))
     said = f"{measured:.0f} us were measured, {measured / predicted:.2f} of the vendor's formula, {predicted:.0f} us"
-    return Finding(device.name, part, True, predicted, measured, (said,))
+    return CheckResult(device.name, part, True, predicted, measured, (said,))
 
 
 def _stream(
     harness: Harness, number: int, scan: ScanMap, names: Sequence[str], sensors: Sequence[str] | None
-) -> tuple[Finding, ...]:
+) -> tuple[CheckResult, ...]:
     made = (source for kind in SOURCES.values() for source in kind.sources(harness, names, scan))
     streams = (source for source in made if isinstance(source, RowSource))
     device = next(source for source in streams if source.wiring is harness.streams[number])
@@ -129,10 +129,10 @@ def _stream(
         wrong = (device.trouble(), f"counted: {faults}" if (faults := device.faults()) else "")
         remarks = (*filter(None, wrong), *_wrong(names, frames))
     except ThenarError as error:
-        return (Finding(device.name, "", False, predicted, None, (str(error),)),)
+        return (CheckResult(device.name, "", False, predicted, None, (str(error),)),)
     finally:
         device.close()
-    found = Finding(
+    found = CheckResult(
         device.name, "rows", bool(rows), predicted, measured, remarks or (() if rows else ("no row comes",))
     )
     return (found, *taxel_findings(device.name, tuple(device.wiring.taxels), harness, frames, None))
@@ -154,7 +154,7 @@ def _wrong(switches: Sequence[str], frames: Sequence[SwitchFrame]) -> Iterator[s
 
 def taxel_findings(
     device: str, names: Sequence[str], harness: Harness, frames: Sequence[SwitchFrame], highest: int | None
-) -> Iterator[Finding]:
+) -> Iterator[CheckResult]:
     """Yield a finding on each taxel of these names: its counts, their noise, and its faults.
 
     Without a calibration, counts at the ends of the converter are remarked, but are not faults.
@@ -177,10 +177,10 @@ def taxel_findings(
             remarks.insert(0, f"{median_low(counts)} counts, noise {pstdev(counts):.1f}, {wander} from end to end")
             if not fault and highest is not None and median_low(counts) in (0, highest):
                 remarks.append("at the end of the converter: at rest, pressed hard, or an open wire")
-        yield Finding(device, f"taxel {name}", fault in ("", "saturated"), 0.0, None, tuple(remarks))
+        yield CheckResult(device, f"taxel {name}", fault in ("", "saturated"), 0.0, None, tuple(remarks))
 
 
-def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:
+def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[CheckResult, ...]:
     device = I2cDevice(harness, number, scan)
     ports = tuple(port for port in scan.ports if port.bus == number)
     times = scan_us(msgspec.structs.replace(scan, ports=ports), harness)
@@ -191,15 +191,15 @@ def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:
         frames = [device.read(_LISTEN_S) for _ in range(_SCANS)] if device.taxels else []
         way = (device.bus.trouble,) if device.bus.trouble else (f"reads {device.bus.way}",)
     except ThenarError as wrong:
-        return (Finding(device.name, "", False, times.us, None, (str(wrong),)),)
+        return (CheckResult(device.name, "", False, times.us, None, (str(wrong),)),)
     finally:
         device.close()
     there = all(finding.present for finding in found)
-    scanned = _remarked(Finding(device.name, "a whole scan", there, times.us, whole if there else None, way))
+    scanned = _remarked(CheckResult(device.name, "a whole scan", there, times.us, whole if there else None, way))
     return (*found, scanned, *_taxels(device.name, device.taxels, harness, frames))
 
 
-def _spi(harness: Harness, bus: int, scan: ScanMap) -> tuple[Finding, ...]:
+def _spi(harness: Harness, bus: int, scan: ScanMap) -> tuple[CheckResult, ...]:
     device = SpiConverter(harness, bus - len(harness.buses), scan)
     ports = tuple(port for port in scan.ports if port.bus == bus)
     (predicted,) = scan_us(msgspec.structs.replace(scan, ports=ports), harness).chips
@@ -209,33 +209,33 @@ def _spi(harness: Harness, bus: int, scan: ScanMap) -> tuple[Finding, ...]:
         frames = [device.read(_LISTEN_S) for _ in range(_SCANS)]
         wrong = device.trouble()
     except ThenarError as error:
-        return (Finding(device.name, "", False, predicted.us, None, (str(error),)),)
+        return (CheckResult(device.name, "", False, predicted.us, None, (str(error),)),)
     finally:
         device.close()
     there = not device.silent
     remarks = (wrong,) if wrong and not there else ()
-    found = Finding(device.name, device.device.chip.name, there, predicted.us, measured if there else None, remarks)
+    found = CheckResult(device.name, device.device.chip.name, there, predicted.us, measured if there else None, remarks)
     return (_remarked(found), *_taxels(device.name, device.taxels, harness, frames))
 
 
 def _taxels(
     device: str, taxels: Sequence[PortLevels], harness: Harness, frames: Sequence[SwitchFrame | None]
-) -> Iterator[Finding]:
+) -> Iterator[CheckResult]:
     came = [frame for frame in frames if frame is not None]
     for taxel in taxels:
         yield from taxel_findings(device, [taxel.name], harness, came, taxel.highest)
 
 
-def _chip(device: I2cDevice, place: int, time: ChipTime) -> Finding:
+def _chip(device: I2cDevice, place: int, time: ChipTime) -> CheckResult:
     taken = _duration(device.scan(place).read)
     state = device.bus.chips[place]
     if not state.present:
-        return Finding(device.name, time.place, False, time.us, None, (state.last_error,))
+        return CheckResult(device.name, time.place, False, time.us, None, (state.last_error,))
     remarks = (f"{state.errors} failures, the last: {state.last_error}",) if state.errors else ()
-    return _remarked(Finding(device.name, time.place, True, time.us, taken, remarks))
+    return _remarked(CheckResult(device.name, time.place, True, time.us, taken, remarks))
 
 
-def _remarked(finding: Finding) -> Finding:
+def _remarked(finding: CheckResult) -> CheckResult:
     """Return the finding with a remark if it is slow, or silent."""
     if finding.measured_us is None and finding.present:
         remark = "it responds, and then nothing comes: is it busy, or set to another rate?"

@@ -7,7 +7,8 @@ share p of grasps, it stays open throughout n of them with a probability of at m
 p^n, given that grasps are distributed as in the recordings. Because people also repeat one grasp for long, a switch is
 only suspected once half of the grasp types were seen since its other state was last seen.
 
-The quarantine (quarantine.py) finds faults from all other inputs and leaves those inputs out of the prediction.
+The quarantine (quarantine.py) finds faults from all other inputs and leaves those inputs out of the prediction; which
+inputs chatter and drift is known from it.
 """
 
 import math
@@ -17,7 +18,7 @@ from collections.abc import Sequence
 from ..build import Build
 from ..frames import Mask, SwitchFrame
 from ..published import UNKNOWN, DeviceHealth, Drift, HealthReport, LiveGrasp, OutputTrouble, Quarantined
-from .quarantine import Chattering, JointDrift, numbers
+from .quarantine import Quarantine, numbers
 
 RATE_US = 1_000_000
 # How improbable the observation must be for a working switch.
@@ -26,15 +27,17 @@ _SURE = 1 - 1e-12
 
 
 class Health:
-    """Observes frames and grasps; its findings change no prediction."""
+    """Observes frames and grasps; its findings change no prediction. `quarantine` is that of the recogniser."""
 
-    def __init__(self, build: Build) -> None:
+    def __init__(self, build: Build, quarantine: Quarantine) -> None:
         self._switch_names = tuple(switch.name for switch in build.manifest.switches)
         self._joint_names = tuple(joint.name for joint in build.manifest.joints)
         self._numbers = {grasp: number for number, grasp in enumerate(build.grasps)}
         self._all = (1 << len(self._switch_names)) - 1
-        self._stuck, self._drift = StuckSwitches(build), JointDrift(build.tables)
-        self._chattering = Chattering(len(self._switch_names))
+        shares, classes = on_shares(build), build.tables.n_classes
+        self._never_closed, self._never_open = Missed(shares, classes), Missed([1 - share for share in shares], classes)
+        self._read: Mask = 0  # during the current grasp
+        self._quarantine = quarantine
         self._switch_rate, self._glove_rate = FrameRate(), FrameRate()
         self._grasp = UNKNOWN
         self._switches_us = self._glove_us = -1
@@ -45,27 +48,24 @@ class Health:
         grasp: LiveGrasp,
         switches: SwitchFrame | None,
         glove_us: int | None = None,
-        codes: Sequence[int] | None = None,
     ) -> None:
-        """Take a published grasp, and the frames behind it; a frame that was seen before counts once.
-
-        glove_us is the time of the glove's frame, codes are its joints' (`Moment.codes`), None while lost.
+        """Take a published grasp, the frame of switches behind it, and the time of the glove's; a frame that was seen
+        before counts once.
         """
         self._published[grasp.health] += 1
         if grasp.grasp != self._grasp:
-            self._stuck.end_grasp(self._numbers.get(self._grasp))
+            self._end_grasp(self._numbers.get(self._grasp))
             self._grasp = grasp.grasp
         if switches is not None and switches.time_us > self._switches_us:
             self._switches_us = switches.time_us
             read = self._all & ~switches.lost
             self._switch_rate.frame(switches.time_us)
-            self._stuck.frame(switches.closed, read)
-            self._chattering.frame(switches.time_us, switches.closed, read)
+            self._read |= read
+            self._never_closed.seen |= switches.closed & read
+            self._never_open.seen |= ~switches.closed & read
         if glove_us is not None and glove_us > self._glove_us:
             self._glove_us = glove_us
             self._glove_rate.frame(glove_us)
-            if codes:
-                self._drift.frame(glove_us, codes)
 
     def report(
         self,
@@ -76,12 +76,12 @@ class Health:
         outputs: tuple[OutputTrouble, ...] = (),
     ) -> HealthReport:
         """Return the current health."""
-        drifts = zip(self._joint_names, self._drift.codes, strict=False)
+        drifts = zip(self._joint_names, self._quarantine.drift.codes, strict=False)
         return HealthReport(
             time_us=now_us,
-            stuck_open=self._named(self._stuck.open()),
-            stuck_closed=self._named(self._stuck.closed()),
-            chattering=self._named(numbers(self._chattering.switches)),
+            stuck_open=self._named(self._never_closed.suspects()),
+            stuck_closed=self._named(self._never_open.suspects()),
+            chattering=self._named(numbers(self._quarantine.chattering.switches)),
             drifting=tuple(Drift(joint, codes) for joint, codes in drifts if codes),
             switch_hz=self._switch_rate.hz(now_us),
             glove_hz=self._glove_rate.hz(now_us),
@@ -94,6 +94,13 @@ class Health:
             quarantined=quarantined,
             outputs=outputs,
         )
+
+    def _end_grasp(self, number: int | None) -> None:
+        """End a grasp of type `number`; None: it was none, and its observations count for the next."""
+        if number is not None:
+            self._never_closed.end_grasp(number, self._read)
+            self._never_open.end_grasp(number, self._read)
+            self._read = 0
 
     def _named(self, switches: Sequence[int]) -> tuple[str, ...]:
         return tuple(self._switch_names[number] for number in switches)
@@ -167,34 +174,3 @@ class Missed:
             for switch, (grasps, types) in enumerate(zip(self._grasps, self._types, strict=True))
             if grasps >= self._patience[switch] and types.bit_count() >= self._enough
         ]
-
-
-class StuckSwitches:
-    """Both kinds of stuck switches."""
-
-    def __init__(self, build: Build) -> None:
-        shares, classes = on_shares(build), build.tables.n_classes
-        self._on = Missed(shares, classes)
-        self._off = Missed([1 - share for share in shares], classes)
-        self._read: Mask = 0
-
-    def frame(self, closed: Mask, read: Mask) -> None:
-        """Take a frame in which the switches `read` were read."""
-        self._read |= read
-        self._on.seen |= closed & read
-        self._off.seen |= ~closed & read
-
-    def end_grasp(self, number: int | None) -> None:
-        """End a grasp of type `number`; None: it was none, and its observations count for the next."""
-        if number is not None:
-            self._on.end_grasp(number, self._read)
-            self._off.end_grasp(number, self._read)
-            self._read = 0
-
-    def open(self) -> list[int]:
-        """Return the switches that are suspected never to close."""
-        return self._on.suspects()
-
-    def closed(self) -> list[int]:
-        """Return the switches that are suspected never to open."""
-        return self._off.suspects()

@@ -1,7 +1,7 @@
 """The live recogniser: joins the newest frame of each device, scores it and decides."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -113,7 +113,7 @@ class LiveRecognizer:
             self._scored = codes, lost_joints
         closed, lost = (0, self._all_switches) if frame is None else (frame.closed & ~frame.lost, frame.lost)
         standing = Ranking(lanes := self._scores.lanes(closed, lost))
-        missing = self._missing.of(lost, lost_joints | joints_lost)
+        missing, too_much = self._missing.of(lost, lost_joints | joints_lost)
         if read is not None:
             self.quarantine.look(read, lanes, lost)
         refused = False
@@ -121,14 +121,14 @@ class LiveRecognizer:
             refused = self._rejector.refuses(lanes, closed, lost, codes, lost_joints=lost_joints)
             standing = standing.with_none_class(self._none_leads[refused])
         seen_us = max(newest.time_us, self._joints.newest.time_us)
-        if missing.too_much:
+        if too_much:
             self._decider.forget()
             decided = None
         else:
-            decided = self._decider.update(max(seen_us, 0), standing, whole=not (missing.names or late))
-        scores, refused = (None, False) if missing.too_much else (lanes, refused)
+            decided = self._decider.update(max(seen_us, 0), standing, whole=not (missing or late))
+        scores, refused = (None, False) if too_much else (lanes, refused)
         segment = Segment() if self._segments is None else self._segments.update(now_us, scores, refused)
-        grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us, segment, late)
+        grasp = self._published(now_us, unix_us, standing, missing, too_much, decided, seen_us, segment, late)
         self._number += 1
         return Moment(grasp, switches, glove, codes, scores=scores, refused=refused)
 
@@ -137,18 +137,18 @@ class LiveRecognizer:
         now_us: int,
         unix_us: int,
         standing: Ranking,
-        missing: "Missing",
+        missing: tuple[str, ...],
+        unknown: bool,
         decided: int | None,
         seen_us: int,
         segment: Segment,
         late: bool,
     ) -> LiveGrasp:
         switches_us, glove_us = self._switches.time_us, self._joints.newest.time_us
-        unknown = missing.too_much
         health: Health = "ok"
         if unknown:
             health = "unknown"
-        elif missing.names or late:
+        elif missing or late:
             health = "degraded"
         elif decided is None or standing.contradicts(decided, self._lead):
             health = "changing"
@@ -169,7 +169,7 @@ class LiveRecognizer:
             None if switches_us < 0 else now_us - switches_us,
             None if glove_us < 0 else now_us - glove_us,
             0 if seen_us < 0 else now_us - seen_us,
-            missing.names,
+            missing,
             segment.state,
             segment.number,
             segment.type,
@@ -183,15 +183,6 @@ def _decider(build: Build, policy: Policy) -> Decision | SequentialTest:
     if policy.error_rate is None:
         return Decision(policy.lead_steps(scale), policy.dwell_us, policy.hold_us)
     return SequentialTest(len(build.manifest.classes), scale, policy.error_rate, policy.hold_us, policy.spacing_us)
-
-
-@dataclass(frozen=True, slots=True)
-class Missing:
-    """Names of lost switches and joints; share of the tables' weight that is lost; whether that is too much."""
-
-    names: tuple[str, ...] = ()
-    share: float = 0.0
-    too_much: bool = False
 
 
 class MissingInputs:
@@ -209,10 +200,10 @@ class MissingInputs:
         self._total = sum(self._weights)
         self._max_lost = max_lost
         self._state: Mask = 0
-        self._last = Missing()
+        self._last: tuple[tuple[str, ...], bool] = (), False
 
-    def of(self, switches: Mask, joints: Mask) -> Missing:
-        """Return the missing inputs when these switches and joints are lost."""
+    def of(self, switches: Mask, joints: Mask) -> tuple[tuple[str, ...], bool]:
+        """Return the names of the missing inputs when these are lost, and whether too much is."""
         lost = switches | joints << self._n_switches
         if lost != self._state:
             self._state, self._last = lost, self._work_out(lost)
@@ -220,14 +211,14 @@ class MissingInputs:
 
     def may_be_lost(self, switches: Mask, joints: Mask) -> bool:
         """Return whether a grasp can be recognised without these."""
-        return not self._work_out(switches | joints << self._n_switches).too_much
+        return not self._work_out(switches | joints << self._n_switches)[1]
 
-    def _work_out(self, lost: Mask) -> Missing:
+    def _work_out(self, lost: Mask) -> tuple[tuple[str, ...], bool]:
         numbers = [number for number in range(len(self._names)) if lost >> number & 1]
         nothing_left = len(numbers) == len(self._names)
         share = 1.0 if nothing_left else sum(map(self._weights.__getitem__, numbers)) / max(self._total, 1)
         names = tuple(map(self._names.__getitem__, numbers))
-        return Missing(names, share, nothing_left or share > self._max_lost)
+        return names, nothing_left or share > self._max_lost
 
 
 def weights(tables: IntegerTables) -> list[int]:

@@ -17,7 +17,7 @@ from ..recording.reader import Entry, Reader
 from ..recording.session import Session
 from ..taxels import Taxels, count_limit
 from .recogniser import LiveRecognizer, Moment
-from .system import System
+from .system import LiveSystem
 
 # The period of a device is the one that nineteen of twenty of its frames kept.
 _USUALLY = 0.95
@@ -30,7 +30,6 @@ def replayed(
 
     The newest frames at each moment are those that precede it in the recording, as the live loop wrote them. At the end
     `warn` takes a sentence on each fault of the file.
-    the end `warn` takes a sentence on each fault of the file.
 
     Raises McapError if it is not a recording, SettingError if it is from another build.
     """
@@ -179,15 +178,17 @@ class _Inputs:
         )
 
 
-def _system(build: Build, session: Session, name: str, policy: Policy | None) -> System:
+def _system(build: Build, session: Session, name: str, policy: Policy | None) -> LiveSystem:
     if session.build != build.manifest.checksum:
         raise SettingError(
             f"{name} was recorded with another build: replay it with its own, or let "
             "`thenar segment` classify it with this one"
         )
     harness = parse_harness(session.harness, name)
-    scan = System.map_of(build, harness)
-    system = System(build, harness, scan, session.sensors, session.calibration, policy or session.policy or Policy())
+    scan = LiveSystem.map_of(build, harness)
+    system = LiveSystem(
+        build, harness, scan, session.sensors, session.calibration, policy or session.policy or Policy()
+    )
     if session.switches != system.switch_names:
         raise SettingError(f"{name} names other switches than its build: it is damaged")
     return system

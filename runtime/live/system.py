@@ -33,7 +33,7 @@ def unread_joints(harness: Harness, scan: ScanMap, joints: Sequence[str]) -> str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class System:
+class LiveSystem:
     """The running system: `scan` is the build's own map, or one that was planned for the harness now."""
 
     build: Build
@@ -44,7 +44,7 @@ class System:
     policy: Policy
 
     @classmethod
-    def of(cls, build: Build, harness: Harness, policy: Policy | None = None) -> "System":
+    def of(cls, build: Build, harness: Harness, policy: Policy | None = None) -> "LiveSystem":
         """Combine `build` and `harness`.
 
         Raises HarnessError if they do not fit, SettingError if the CyberGlove's calibration does not.

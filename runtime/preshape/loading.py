@@ -24,10 +24,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from thenar.drivers.errors import SettingError
+
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, TomlText, read_source
 from ..toml_struct import check_finite, convert
-from .selector import Preshape, PreshapeError, PreshapeSelector, PreshapeTable
+from .selector import Preshape, PreshapeSelector, PreshapeTable
 
 if TYPE_CHECKING:
     from ..build import Build
@@ -61,9 +63,9 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def load_preshapes(name: str | os.PathLike[str]) -> PreshapeTable:
     """Return a table shipped with thenar, by its name (one of SHIPPED), or the user's, by its path.
 
-    Raises PreshapeError naming the file, its line and the key.
+    Raises SettingError naming the file, its line and the key.
     """
-    source = read_source(_find(name), PreshapeError)
+    source = read_source(_find(name), SettingError)
     tables = source.tables()
     check_finite(source, (), tables)
     content = convert(source, (), tables, _File)
@@ -83,7 +85,7 @@ def preshape_selector(
     It selects by `segments` if the build was trained with rows in which nothing is held, otherwise by the grasp type
     alone: a build that only refuses frames misses most losses of contact.
 
-    Raises PreshapeError.
+    Raises SettingError.
     """
     table = load_preshapes(name)
     by_segments = segments and build.none is not None
@@ -95,7 +97,7 @@ def _find(name: str | os.PathLike[str]) -> Traversable:
         return files(__package__) / "tables" / f"{name}.toml"
     path = Path(name)
     if not path.exists():
-        raise PreshapeError(
+        raise SettingError(
             f"there is neither a file {path} nor a table of that name{nearest(str(name), SHIPPED)}: "
             "name a shipped table, or the path of your own"
         )

@@ -8,12 +8,9 @@ from difflib import get_close_matches
 
 import msgspec
 
-from ..errors import ThenarError
+from thenar.drivers.errors import SettingError
+
 from ..published import NONE, UNKNOWN, LiveGrasp
-
-
-class PreshapeError(ThenarError, ValueError):
-    """A table of preshapes cannot be used as it is, or not with this build."""
 
 
 class Preshape(msgspec.Struct, frozen=True):
@@ -44,7 +41,7 @@ class PreshapeTable:
     def check(self, grasps: Iterable[str]) -> str:
         """Return a sentence about grasp types of the build (`grasps`) that have no preshape, or "" if all have one.
 
-        Raises PreshapeError if the table names none of them, since it is for another taxonomy.
+        Raises SettingError if the table names none of them, since it is for another taxonomy.
         """
         wanted = tuple(grasp for grasp in grasps if grasp != NONE)
         missing = tuple(grasp for grasp in wanted if grasp not in self.chosen)
@@ -53,7 +50,7 @@ class PreshapeTable:
         spare = [grasp for grasp in self.chosen if grasp not in wanted]
         likely = {grasp: get_close_matches(grasp, spare, n=1, cutoff=0.8) for grasp in missing}
         if len(missing) == len(wanted) and not any(likely.values()):
-            raise PreshapeError(
+            raise SettingError(
                 f"preshapes {self.name}: none of the build's grasp types ({', '.join(wanted)}) is among the table's "
                 f"({', '.join(self.chosen)}): use a table for the taxonomy of the build"
             )
@@ -99,11 +96,11 @@ class PreshapeSelector:
         segments: bool = False,
         change_while_held: bool = False,
     ) -> None:
-        """Raise PreshapeError unless 0 <= min_probability <= 1 and settle_ms >= 0."""
+        """Raise SettingError unless 0 <= min_probability <= 1 and settle_ms >= 0."""
         if not 0 <= min_probability <= 1:
-            raise PreshapeError(f"the minimum probability of a preshape must be between 0 and 1, not {min_probability}")
+            raise SettingError(f"the minimum probability of a preshape must be between 0 and 1, not {min_probability}")
         if not settle_ms >= 0:
-            raise PreshapeError(f"the settle time of a preshape must be 0 ms or more, not {settle_ms}")
+            raise SettingError(f"the settle time of a preshape must be 0 ms or more, not {settle_ms}")
         self._table = table
         self._min_probability = min_probability
         self._settle_us = settle_ms * 1000

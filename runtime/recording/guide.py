@@ -133,7 +133,7 @@ _ALSO = {
 _WAITING = (Stage.READY, Stage.PAUSED)
 
 
-class Guide:
+class CollectionGuide:
     """Leads through `trials`: countdown, capture, judgement, one key per trial.
 
     stage, trial  the current state (trial: None if none is left)

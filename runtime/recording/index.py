@@ -14,14 +14,13 @@ from mcap.opcode import Opcode
 
 from ..errors import McapError
 from .layout import GLOVE, GRASP, RECOGNITION, SWITCHES, TAXELS, Tail
-from .reader import Decoder, Entry, Reader
+from .reader import Entry, EntryDecoder, Reader
 from .records import End, RawRecord, RecordStream
 from .session import Session
 
 # Distance from one recorded position to the next.
 _STEP_NS = 200_000_000
 _LOG_NS = slice(6, 14)
-_TIMED = {Opcode.MESSAGE, Opcode.CHUNK}
 _MANY = {SWITCHES, GLOVE, GRASP, TAXELS, RECOGNITION}
 
 
@@ -48,7 +47,7 @@ class Index:
 
         One prediction per `every_us` is decoded, and no frame; with 0 all are.
         """
-        decoder, due_ns, in_data = Decoder(Tail()), 0, True
+        decoder, due_ns, in_data = EntryDecoder(Tail()), 0, True
         stream = RecordStream(self.path)
         self.size = stream.size
         try:
@@ -87,7 +86,7 @@ class Index:
         if not len(self._offsets):
             return
         offset, until = self._offsets[at], self.scanned
-        decoder = Decoder(Tail())
+        decoder = EntryDecoder(Tail())
         for record in self._head:
             list(_entries(decoder, record))
         (session,) = [record for place, record in self._sessions if place <= offset][-1:]
@@ -100,12 +99,10 @@ class Index:
                 yield _unix_us(entry, decoder), entry
 
     def _note(self, record: RawRecord) -> int:
-        """Record the position of a message or chunk, if the newest is far enough back; return its time."""
-        if record.opcode not in _TIMED or record.content is None or not self._sessions:
+        """Record the position of a message, if the newest is far enough back; return its time."""
+        if record.opcode != Opcode.MESSAGE or record.content is None or not self._sessions:
             return 0
-        content = record.content
-        where = _LOG_NS if record.opcode == Opcode.MESSAGE else slice(0, 8)
-        logged_ns = min(int.from_bytes(content[where], "little"), 2**62)
+        logged_ns = min(int.from_bytes(record.content[_LOG_NS], "little"), 2**62)
         if self.first_us is None:
             self.first_us = logged_ns // 1000
         self.last_us = max(self.last_us or 0, logged_ns // 1000)
@@ -115,14 +112,14 @@ class Index:
         return logged_ns
 
 
-def _entries(decoder: Decoder, record: RawRecord) -> Iterator[Entry]:
+def _entries(decoder: EntryDecoder, record: RawRecord) -> Iterator[Entry]:
     try:
         yield from decoder.entries(record)
     except McapError as wrong:
         raise McapError(f"the record at byte {record.offset} {wrong}, and nothing behind it is read") from None
 
 
-def _unix_us(entry: Entry, decoder: Decoder) -> int:
+def _unix_us(entry: Entry, decoder: EntryDecoder) -> int:
     """Return the time of an entry, in microseconds since 1970."""
     clock_us = decoder.session.clock_ns // 1000 if decoder.session is not None else 0
     return clock_us if isinstance(entry, Session) else clock_us + entry.time_us

@@ -1,7 +1,7 @@
 """Read a recording back: sessions, frames, predictions and labels in the order in which they were written."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 from struct import Struct, error, pack
@@ -13,15 +13,15 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.exceptions import McapError as LibraryError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, Footer, Header, Metadata, Schema
+from mcap.records import Channel, DataEnd, Footer, Header, Metadata, Schema
 
 from ..errors import McapError
 from ..frames import GloveFrame, SwitchFrame
 from ..names import SHOWN, list_names, shortened
 from ..published import LiveGrasp
-from .layout import CHANNELS, GLOVE, LARGEST_RECORD, MARKS, RECOGNITION, SWITCHES, TAXELS, TRIALS, WRITER, Tail
+from .layout import CHANNELS, GLOVE, MARKS, RECOGNITION, SWITCHES, TAXELS, TRIALS, WRITER, Tail
 from .messages import decode_bytes, decode_text, glove_frame, switch_frame, taxel_codes
-from .records import End, RawRecord, RecordStream, inside, kind_of
+from .records import End, RawRecord, RecordStream, kind_of
 from .session import METADATA, Label, Mark, Session, from_metadata
 
 Entry = Session | SwitchFrame | GloveFrame | LiveGrasp | Label | Mark
@@ -37,44 +37,28 @@ _UNREADABLE = (LibraryError, error, UnicodeDecodeError, OverflowError)
 # Limits that no valid time or count of a recording exceeds.
 _LEAST, _LARGEST = -(2**63), 2**63 - 1
 _REASON = 200
-# The most records of a file that are neither messages nor chunks: a recording has a few dozen.
+# The most records of a file that are no messages: a recording has a few dozen.
 OTHER_RECORDS = 100_000
 
 
-@dataclass(slots=True)
-class Passed:
-    """Records, or parts of them, that were skipped: how many, and the first few with their places."""
-
-    count: int = 0
-    first: list[str] = field(default_factory=list)
-
-    def add(self, what: str, offset: int) -> None:
-        """Count one."""
-        self.count += 1
-        if len(self.first) < SHOWN:
-            self.first.append(f"{what} at byte {offset}")
-
-
-class Decoder:
+class EntryDecoder:
     """Decodes the records of a data section one by one.
 
     session  the session of the next messages; None before the first
     ours     whether the file says that thenar wrote it
-    foreign  whether another program has packed, numbered or added something
-    passed   the skipped records
-    broken   the offset of a chunk that does not match its checksum; None: all match
+    foreign  whether another program has numbered or added something
+    skipped  the number of records, or parts of them, that were skipped; first_skipped, the first few with their places
     """
 
     def __init__(self, tail: Tail) -> None:
         """Messages and sessions are counted in `tail`."""
         self.session: Session | None = None
         self.ours = self.foreign = False
-        self.passed = Passed()
-        self.broken: int | None = None
+        self.skipped = 0
+        self.first_skipped: list[str] = []
         self._tail = tail
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, int | None] = {}
-        self._indexed = False
         self._others = 0
         self._codes: tuple[int | None, tuple[int | None, ...]] = None, ()
 
@@ -85,25 +69,30 @@ class Decoder:
     def entries(self, record: RawRecord) -> Iterator[Entry]:
         """Yield the record's entries. Raises McapError, whose text continues "the record at byte 17 "."""
         self.count(record)
-        # Indices of its messages follow a chunk. They repeat its content.
-        self._indexed = self._indexed and record.opcode == Opcode.MESSAGE_INDEX
         content = record.content
-        if content is None or (record.opcode != Opcode.CHUNK and len(content) > LARGEST_RECORD):
+        if record.opcode == Opcode.CHUNK:
+            raise McapError(
+                "is a chunk, which thenar's recordings do not have: another program packed them; read the original, or "
+                "save other programs' data as CSV"
+            )
+        if content is None:
             self.foreign = True
-            if not self._indexed:
-                self.passed.add(kind_of(record.opcode), record.offset)
+            self._skip(kind_of(record.opcode), record.offset)
         elif record.opcode == Opcode.MESSAGE:
             entry = self._message(content)
             if entry is not None:
                 yield entry
-        elif record.opcode == Opcode.CHUNK:
-            yield from self._chunk(record.offset, self._parsed(Chunk, record, content))
         else:
             yield from self._described(record, content)
 
+    def _skip(self, what: str, offset: int) -> None:
+        self.skipped += 1
+        if len(self.first_skipped) < SHOWN:
+            self.first_skipped.append(f"{what} at byte {offset}")
+
     def count(self, record: RawRecord) -> None:
         """Count a record that holds no measurements. Raises McapError if there are too many to read in seconds."""
-        self._others += record.opcode not in (Opcode.MESSAGE, Opcode.CHUNK)
+        self._others += record.opcode != Opcode.MESSAGE
         if self._others > OTHER_RECORDS:
             raise McapError(
                 f"is one of more than {OTHER_RECORDS} that hold no measurements, the most that are read: the file is "
@@ -128,7 +117,7 @@ class Decoder:
         if rest:
             # MCAP lets later versions add fields. This version of the record has none.
             self.foreign = True
-            self.passed.add(f"{rest} bytes more than a {kind.__name__.lower()} has", record.end - rest)
+            self._skip(f"{rest} bytes more than a {kind.__name__.lower()} has", record.end - rest)
         return found
 
     def _message(self, content: bytes) -> Entry | None:
@@ -159,7 +148,7 @@ class Decoder:
     def _sessions(self, record: RawRecord, metadata: Metadata) -> Iterator[Session]:
         if metadata.name != METADATA:
             self.foreign = True
-            self.passed.add(f"metadata {shortened(repr(metadata.name))}", record.offset)
+            self._skip(f"metadata {shortened(repr(metadata.name))}", record.offset)
             return
         before, session = self.session, from_metadata(metadata.metadata)
         if before is not None and _wired(before) != _wired(session):
@@ -182,20 +171,6 @@ class Decoder:
                 return
         self.foreign = True
         self._channels.setdefault(channel.id, None)
-
-    def _chunk(self, offset: int, chunk: Chunk) -> Iterator[Entry]:
-        self.foreign = True
-        if chunk.compression:
-            raise McapError(
-                f"is compressed by {shortened(chunk.compression)}, as thenar's recordings are not: of a copy of "
-                "one `mcap decompress` makes a file that is read; save other programs' data as CSV"
-            )
-        # 0 if a program calculated none.
-        if chunk.uncompressed_crc not in (0, crc32(chunk.data)) or chunk.uncompressed_size != len(chunk.data):
-            self.broken = offset
-        for record in inside(chunk.data, offset):
-            yield from self.entries(record)
-        self._indexed = True
 
 
 def _wired(session: Session) -> tuple[tuple[str, ...], ...]:
@@ -259,7 +234,7 @@ class Reader:
     tail      the data section read so far, after which a Recorder can continue
     end       how the file ends; None before the end is reached
     altered   whether a checksum of a closed file does not match, or is missing although thenar writes it
-    foreign   whether another program has packed or added something, so that no Recorder may continue
+    foreign   whether another program has added something, so that no Recorder may continue
     """
 
     def __init__(self, path: Path) -> None:
@@ -269,7 +244,7 @@ class Reader:
         self._wrong: list[str] = []
         self._in_data = True
         self._records = RecordStream(path)
-        self._decoder = Decoder(self.tail)
+        self._decoder = EntryDecoder(self.tail)
         self._entries = self._read()
         first = next(self._entries, None)
         if not isinstance(first, Session):
@@ -284,11 +259,11 @@ class Reader:
     @property
     def altered(self) -> bool:
         """Whether some byte is known to have changed since it was written."""
-        return bool(self._wrong) or self._decoder.broken is not None
+        return bool(self._wrong)
 
     @property
     def foreign(self) -> bool:
-        """Whether another program has packed or added something."""
+        """Whether another program has added something."""
         return self._decoder.foreign
 
     def __iter__(self) -> Iterator[Entry]:
@@ -300,18 +275,15 @@ class Reader:
 
     def faults(self) -> Iterator[Fault]:
         """Yield the faults of the file, once its end is reached."""
-        name, end, passed = self.path.name, self.end, self._decoder.passed
+        name, end, skipped = self.path.name, self.end, self._decoder.skipped
         if end is not None and (end.whole < end.size or not (end.closed or self._in_data)):
             message = f"{name} is whole up to byte {end.whole} of {end.size}, the rest was left out: {end.reason}"
             yield Fault("cut recordings", 1, message)
-        wrong = list(self._wrong)
-        if self._decoder.broken is not None:
-            wrong.append(f"the chunk at byte {self._decoder.broken} does not match its checksum")
-        if wrong:
-            yield Fault("altered recordings", 1, f"{name} is altered: {'; '.join(wrong)}")
-        if passed.count:
-            message = f"{name} holds records that thenar skips: {list_names(passed.first, passed.count)}"
-            yield Fault("records passed over", passed.count, message)
+        if self._wrong:
+            yield Fault("altered recordings", 1, f"{name} is altered: {'; '.join(self._wrong)}")
+        if skipped:
+            message = f"{name} holds records that thenar skips: {list_names(self._decoder.first_skipped, skipped)}"
+            yield Fault("records passed over", skipped, message)
 
     def _read(self) -> Iterator[Entry]:
         for record in self._records:

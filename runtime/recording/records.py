@@ -5,7 +5,7 @@ Every byte counts in the checksums, including those of unknown records and of th
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from io import SEEK_END, BytesIO
+from io import SEEK_END
 from pathlib import Path
 from struct import Struct
 from typing import BinaryIO
@@ -18,8 +18,6 @@ from ..files import open_file
 from .layout import LARGEST_RECORD, MAGIC
 
 _OPENING = Struct("<BQ")
-# Other programs' chunks are usually 1 to 4 MB. Longer ones are skipped.
-LARGEST_CHUNK = 64 << 20
 _PIECE = 1 << 20
 _READ = frozenset(
     {
@@ -28,7 +26,6 @@ _READ = frozenset(
         Opcode.CHANNEL,
         Opcode.MESSAGE,
         Opcode.METADATA,
-        Opcode.CHUNK,
         Opcode.DATA_END,
         Opcode.FOOTER,
     }
@@ -113,7 +110,7 @@ class RecordStream:
 
     def _content(self, file: BinaryIO, opcode: int, length: int) -> bytes | None:
         """Return the next `length` bytes, or nothing for a record that is skipped. Its bytes count all the same."""
-        if opcode in _READ and length <= (LARGEST_CHUNK if opcode == Opcode.CHUNK else LARGEST_RECORD):
+        if opcode in _READ and length <= LARGEST_RECORD:
             content = file.read(length)
             self._crc = crc32(content, self._crc)
             return content
@@ -145,15 +142,3 @@ def kind_of(opcode: int) -> str:
         return Opcode(opcode).name.lower().replace("_", " ")
     except ValueError:
         return f"record of unknown kind {opcode:#04x}"
-
-
-def inside(chunk: bytes, offset: int) -> Iterator[RawRecord]:
-    """Return the records inside a chunk's data, all placed at the chunk's `offset`. Raises McapError."""
-    file = BytesIO(chunk)
-    while opening := file.read(_OPENING.size):
-        opcode, length = _OPENING.unpack(opening) if len(opening) == _OPENING.size else (0, len(chunk))
-        if length > len(chunk) - file.tell():
-            raise McapError("is a chunk that ends inside a record")
-        if opcode not in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
-            raise McapError(f"is a chunk that holds a record of kind {opcode}, which no chunk may")
-        yield RawRecord(offset, opcode, file.read(length), offset, 0, 0)

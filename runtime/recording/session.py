@@ -26,7 +26,7 @@ MOST_TRIALS = 1_000_000
 Number = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 
 
-class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class CollectionTask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A grasp type to collect, and its objects, by turns; for "none", the movements of the empty hand."""
 
     grasp: str
@@ -42,7 +42,7 @@ class Collection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     subject: str
     taxonomy: str
     types: Annotated[tuple[str, ...], msgspec.Meta(max_length=_MOST_TYPES)]
-    tasks: Annotated[tuple[Task, ...], msgspec.Meta(max_length=_MOST_TYPES)]
+    tasks: Annotated[tuple[CollectionTask, ...], msgspec.Meta(max_length=_MOST_TYPES)]
     repetitions: Annotated[int, msgspec.Meta(ge=1, le=MOST_TRIALS)]
     seed: Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
 

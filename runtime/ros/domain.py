@@ -143,10 +143,3 @@ def reader(participant: DomainParticipant, name: str, kind: Any) -> Any:
         Policy.Userdata(f"typehash={TYPE_HASHES[kind.__idl_typename__]};".encode()),
     ]
     return DataReader(participant, Topic(participant, dds_topic(name), kind), qos=Qos(*policies))
-
-
-def volatile_readers(of: Any) -> frozenset[int]:
-    """Return a writer's known readers that do not request messages written before they joined."""
-    readers = {handle: of.get_matched_subscription_data(handle) for handle in of.get_matched_subscriptions()}
-    wanted = {handle: data.qos[Policy.Durability] for handle, data in readers.items() if data is not None}
-    return frozenset(handle for handle, durability in wanted.items() if durability == Policy.Durability.Volatile)

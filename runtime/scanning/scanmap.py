@@ -85,10 +85,10 @@ def scanmap_from_bytes(data: bytes, what: str = "scan.json") -> ScanMap:
     return scan
 
 
-def check_switches(scan: ScanMap, switches: int, what: str = "scan.json") -> None:
+def check_switches(scan: ScanMap, switches: int) -> None:
     """Raise BuildError unless `scan` reads each of a build's `switches` once, and nothing else."""
     if sorted(scan.switches) != list(range(switches)):
-        raise BuildError(f"{what} does not read each of the {switches} kept switches once: compile the build again")
+        raise BuildError(f"scan.json does not read each of the {switches} kept switches once: compile the build again")
 
 
 def _check_once(scan: ScanMap, what: str) -> None:

@@ -1,8 +1,7 @@
 """Reading times on the wire, predicted from clocks and baud rates.
 
 A transaction takes its SCL periods plus the time for which the bus must be free before the next START, which the
-standard gives by speed: 4.7, 1.3 and 0.5 us up to 100 kHz, 400 kHz and above. Each transaction and each selection of a
-mux's channel is one system call, whose cost depends on the machine and is given by the caller.
+standard gives by speed: 4.7, 1.3 and 0.5 us up to 100 kHz, 400 kHz and above.
 
 A slow converter begins its next conversion as soon as its last was read, and the bus reads other ports in the
 meantime: the first in scan order that can be read. It waits if none can.
@@ -31,7 +30,7 @@ _BAUD = 115_200
 
 class ChipTime(Struct, frozen=True):
     """The time of one chip of a scan alone: harness.chip_of(bus, chip), by name; its readings; the number of kept
-    switches, levels included, that they show; microseconds with system calls and conversions, without selections.
+    switches, levels included, that they show; microseconds with conversions, without selections.
     """
 
     bus: int
@@ -101,36 +100,36 @@ def reading_of(port: Port, harness: Harness) -> Reading:
     return {reading.name: reading for reading in readings}[port.reading]
 
 
-def scan_us(scan: ScanMap, harness: Harness, ioctl_us: float = 0.0) -> ScanTime:
-    """Return the time of a scan of the map with all ports, with system calls of `ioctl_us` microseconds each."""
-    chips = tuple(_chip_times(scan.ports, harness, ioctl_us))
-    chosen = _selected_us(scan.ports, harness, ioctl_us)
+def scan_us(scan: ScanMap, harness: Harness) -> ScanTime:
+    """Return the time of a scan of the map with all ports."""
+    chips = tuple(_chip_times(scan.ports, harness))
+    chosen = _selected_us(scan.ports, harness)
     everything = whole_scan(harness, harness.switches, every_taxel=True).ports
-    us, full_us = (_whole_us(ports, harness, ioctl_us) for ports in (scan.ports, everything))
+    us, full_us = (_whole_us(ports, harness) for ports in (scan.ports, everything))
     return ScanTime(chips, len(chosen), fsum(chosen), us, full_us)
 
 
-def _whole_us(ports: Sequence[Port], harness: Harness, ioctl_us: float) -> float:
+def _whole_us(ports: Sequence[Port], harness: Harness) -> float:
     """Return the time to read these ports. fsum: in another order, the same to the last bit if nothing waits."""
     slow = {port.bus for port in ports if waiting_us(reading_of(port, harness))}
     fast = [port for port in ports if port.bus not in slow]
-    times = (*_selected_us(fast, harness, ioctl_us), *(t.us for t in _chip_times(fast, harness, ioctl_us)))
-    overlapped = (overlapped_us([port for port in ports if port.bus == bus], harness, ioctl_us) for bus in sorted(slow))
+    times = (*_selected_us(fast, harness), *(t.us for t in _chip_times(fast, harness)))
+    overlapped = (overlapped_us([port for port in ports if port.bus == bus], harness) for bus in sorted(slow))
     return fsum((*times, *overlapped))
 
 
-def overlapped_us(ports: Sequence[Port], harness: Harness, ioctl_us: float = 0.0) -> float:
+def overlapped_us(ports: Sequence[Port], harness: Harness) -> float:
     """Return the time to read these ports of one bus, with conversions overlapped with other readings."""
     clock_hz = harness.line_of(ports[0].bus).clock_hz
     route: MuxChannel | None = None
     us = 0.0
     for _ in range(2):  # the first scan leaves the mux in the state that every further one finds
-        us, route = _one_round(ports, harness, clock_hz, ioctl_us, route)
+        us, route = _one_round(ports, harness, clock_hz, route)
     return us
 
 
 def _one_round(
-    ports: Sequence[Port], harness: Harness, clock_hz: int, ioctl_us: float, route: MuxChannel | None
+    ports: Sequence[Port], harness: Harness, clock_hz: int, route: MuxChannel | None
 ) -> tuple[float, MuxChannel | None]:
     """Return the time of one scan, and the channel that is connected after it."""
     now, ready = 0.0, dict[int, float]()
@@ -141,9 +140,9 @@ def _one_round(
         mux = mux_of(port, harness)
         if mux is not None and mux != route:
             between = route is not None and route.address != mux.address
-            now += (1 + between) * (select_us(clock_hz) + ioctl_us)
+            now += (1 + between) * select_us(clock_hz)
             route = mux
-        now += wire_us + ioctl_us
+        now += wire_us
 
     def begin(chip: int) -> None:
         port = next((port for port in left if port.chip == chip), None)
@@ -209,11 +208,11 @@ def row_us(switches: int, readings: int, baud: int) -> float:
     return sending_us(_ROW_BYTES + -(-switches // 4) + readings * _READING_BYTES, baud)
 
 
-def _selected_us(ports: Iterable[Port], harness: Harness, ioctl_us: float) -> list[float]:
-    return [select_us(harness.buses[bus].clock_hz) + ioctl_us for bus, *_ in selections(ports, harness)]
+def _selected_us(ports: Iterable[Port], harness: Harness) -> list[float]:
+    return [select_us(harness.buses[bus].clock_hz) for bus, *_ in selections(ports, harness)]
 
 
-def _chip_times(ports: Iterable[Port], harness: Harness, ioctl_us: float) -> Iterator[ChipTime]:
+def _chip_times(ports: Iterable[Port], harness: Harness) -> Iterator[ChipTime]:
     by_chip: dict[tuple[int, int], list[Port]] = {}
     for port in ports:
         by_chip.setdefault((port.bus, port.chip), []).append(port)
@@ -226,11 +225,10 @@ def _chip_times(ports: Iterable[Port], harness: Harness, ioctl_us: float) -> Ite
             place=harness.chip_of(bus, chip).place,
             readings=tuple(port.reading for port in group),
             switches=sum(len(port.elements) for port in group),
-            us=sum(_alone_us(reading_of(port, harness), line.clock_hz, ioctl_us) for port in group),
+            us=sum(_alone_us(reading_of(port, harness), line.clock_hz) for port in group),
         )
 
 
-def _alone_us(reading: Reading, clock_hz: int, ioctl_us: float) -> float:
+def _alone_us(reading: Reading, clock_hz: int) -> float:
     """Return the time of a reading if nothing else is read in parallel."""
-    calls = 2 if start_us(reading, clock_hz) else 1
-    return port_us(reading, clock_hz) + waiting_us(reading) + calls * ioctl_us
+    return port_us(reading, clock_hz) + waiting_us(reading)

@@ -145,10 +145,10 @@ def _costs(shift: int, gain: int, most: int) -> bytes:
     return bytes(min(behind * gain >> 8, most) for behind in range(1 << 16 - shift))
 
 
-def gain_of(scale: float, temperature: float, steps: int = STEPS) -> tuple[int, int]:
+def gain_of(scale: float, temperature: float) -> tuple[int, int]:
     """Return `shift` and `gain` for tables of `scale` steps per unit: score differences times `temperature`, in steps
-    of 1 / `steps`.
+    of 1 / `STEPS`.
     """
-    factor = steps * temperature / scale
+    factor = STEPS * temperature / scale
     shift = max((shift for shift in range(9) if round(factor * 2.0 ** (8 + shift)) <= 255), default=0)
     return shift, min(max(round(factor * 2.0 ** (8 + shift)), 1), 65535)

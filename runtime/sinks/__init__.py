@@ -3,17 +3,17 @@
 from ..published import JointAngles
 from ..task import ProgressLine
 from .base import SINKS, Fanout, Sink, SinkError, SinkKind, SinkPlace, SinkReport, open_sink
-from .jsonl import DetailLine, HealthLine, JsonLines, Line
+from .jsonl import DetailLine, GraspLine, HealthLine, JsonLines
 from .sockets import SocketLines
 
 __all__ = [
     "SINKS",
     "DetailLine",
     "Fanout",
+    "GraspLine",
     "HealthLine",
     "JointAngles",
     "JsonLines",
-    "Line",
     "ProgressLine",
     "Sink",
     "SinkError",

@@ -1,6 +1,7 @@
 """The interface of all sinks, their kinds, and several sinks as one."""
 
 import logging
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -43,7 +44,7 @@ class SinkReport(msgspec.Struct, frozen=True):
     lost      lines not sent: a reader was slow or gone, or the system refused
     error     the last error, or nothing
     gone      whether its only reader has gone for good
-    dropped   number of readers dropped because they took nothing, or were the slowest when all places were taken
+    dropped   number of readers dropped because they took nothing
     """
 
     where: str
@@ -168,6 +169,36 @@ def open_sink(where: str, *, wait: bool = False) -> Sink:
             raise SettingError(f"{shortened(repr(where))}: after the question mark only {spelled} can follow")
         options = {option: value for option, _, value in parts}
     return kind.open(SinkPlace(where, place, options, wait))
+
+
+# Rates of sinks that repeat what has not changed.
+_FASTEST_HZ = 1000
+
+
+def rate_of(where: SinkPlace, usual: int) -> int:
+    """Return the option `rate` of a place, or `usual`. Raises SettingError for a rate that is not possible."""
+    rate = where.options.get("rate", str(usual))
+    if not re.fullmatch("[0-9]{1,9}", rate) or not 1 <= int(rate) <= _FASTEST_HZ:
+        raise SettingError(
+            f"{where.text}: a rate of {shortened(repr(rate))} is not possible: use 1 to {_FASTEST_HZ} a second"
+        )
+    return int(rate)
+
+
+class PublishPace:
+    """When a grasp is to be published: when what is shown of it changes, and `rate` times a second."""
+
+    def __init__(self, rate: int) -> None:
+        self._period_us, self._last_us = 1_000_000 // rate, 0
+        self._shown: tuple[object, ...] = ()
+
+    def due(self, time_us: int, shown: tuple[object, ...]) -> tuple[bool, bool]:
+        """Return whether a grasp of this time that shows this is to be published, and whether its period has passed."""
+        # The recording of several sessions may go back in time.
+        due = not self._shown or not 0 <= time_us - self._last_us < self._period_us
+        self._last_us = time_us if due else self._last_us
+        changed, self._shown = shown != self._shown, shown
+        return due or changed, due
 
 
 class _Receiver:

@@ -26,11 +26,10 @@ import msgspec
 from thenar.drivers.errors import SettingError
 from thenar.drivers.extras import optional
 
-from ..names import shortened
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
-from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+from .base import PublishPace, Sink, SinkError, SinkKind, SinkPlace, SinkReport, rate_of
 from .sockets import resolve
 
 if TYPE_CHECKING:
@@ -38,7 +37,6 @@ if TYPE_CHECKING:
     from ..live.recogniser import Moment
 
 RATE_HZ = 50
-_FASTEST_HZ = 1000
 _REPEAT_US = 1_000_000
 # Messages queued for one reader, over all topics: about two seconds.
 BACKLOG = 512
@@ -139,8 +137,6 @@ class FoxgloveServer(Sink):
         from foxglove.websocket import ServerListener
 
         self._where = where or f"foxglove:{host}:{port}"
-        if not 1 <= rate <= _FASTEST_HZ:
-            raise SettingError(f"{self._where}: a rate of {rate} is not possible: use 1 to {_FASTEST_HZ} a second")
         # Channels end when it is garbage-collected.
         self._context = context = foxglove.Context()
         self._channels = {
@@ -162,9 +158,8 @@ class FoxgloveServer(Sink):
             hint = ": another process serves that port; use another" if "in use" in said else ""
             raise SinkError(f"{self._where} cannot be opened: {said}{hint}") from None
         self.port: int = self._server.port
-        self._period_us, self._due, self._closed = 1_000_000 // rate, False, False
-        self._written_us = self._repeated_us = self._unix_us = self._time_us = 0
-        self._shown: tuple[object, ...] = ()
+        self._pace, self._due, self._closed = PublishPace(rate), False, False
+        self._repeated_us = self._unix_us = self._time_us = 0
         # Preshape and task, by topic: late readers get them within a second.
         self._kept: dict[str, msgspec.Struct] = {}
         self._build: Build | None = None
@@ -179,12 +174,8 @@ class FoxgloveServer(Sink):
         """Publish the grasp if it changed or is due, and the kept messages."""
         self._time_us, self._unix_us = grasp.time_us, grasp.unix_us
         shown = (grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type)
-        # The recording of several sessions may go back in time.
-        due = not self._shown or not 0 <= grasp.time_us - self._written_us < self._period_us
-        self._due = due or shown != self._shown
+        self._due, _ = self._pace.due(grasp.time_us, shown)
         if self._due:
-            self._shown = shown
-            self._written_us = grasp.time_us if due else self._written_us
             self._log("/thenar/grasp", grasp)
         if preshape is not None and preshape is not self._kept.get("/thenar/preshape"):
             self._keep("/thenar/preshape", preshape)
@@ -283,11 +274,7 @@ def _joints(moment: "Moment", build: "Build") -> JointValues:
 
 
 def _open(where: SinkPlace) -> Sink:
-    rate = where.options.get("rate", str(RATE_HZ))
-    if not re.fullmatch("[0-9]{1,9}", rate):
-        raise SettingError(
-            f"{where.text}: a rate of {shortened(repr(rate))} is not possible: use 1 to {_FASTEST_HZ} a second"
-        )
+    rate = rate_of(where, RATE_HZ)
     _, address = resolve(where.place, where.text, "foxglove:127.0.0.1:8765")
     if "public" not in where.options and not ipaddress.ip_address(address[0].partition("%")[0]).is_loopback:
         raise SettingError(
@@ -295,7 +282,7 @@ def _open(where: SinkPlace) -> Sink:
             f"foxglove:{where.place}?public to let them"
         )
     with optional(SinkError, where.text):
-        return FoxgloveServer(*address[:2], rate=int(rate), where=where.text)
+        return FoxgloveServer(*address[:2], rate=rate, where=where.text)
 
 
 MEMBER = SinkKind(

@@ -1,16 +1,14 @@
 """JSON lines to a file: stdout, a pipe, a file on disk, or anything else that takes bytes.
 
 Lines describe grasps, and now and then the glove's health and the hand's progress in a task. Readers distinguish them
-by `kind`; msgspec does so automatically: `msgspec.json.decode(line, type=Line | HealthLine | ProgressLine)`.
+by `kind`; msgspec does so automatically: `msgspec.json.decode(line, type=GraspLine | HealthLine | ProgressLine)`.
 
-A line is sent whole or not at all, and a slow descriptor delays nobody.
+A line is sent whole or not at all.
 """
 
 import os
-import select
 import stat
 import sys
-from collections.abc import Callable
 from contextlib import suppress
 from io import UnsupportedOperation
 from pathlib import Path
@@ -25,7 +23,7 @@ from ..task import Progress, ProgressLine
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 
-class Line(LiveGrasp, frozen=True, tag_field="kind", tag="grasp"):
+class GraspLine(LiveGrasp, frozen=True, tag_field="kind", tag="grasp"):
     """The fields of `LiveGrasp`, followed by the preshape and the angles, null if there are none."""
 
     preshape: Preshape | None = None
@@ -50,7 +48,7 @@ _GRASP, _PRESHAPE, _ANGLES = b'{"kind":"grasp",', b',"preshape":', b',"angles":'
 def encode(grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> bytes:
     """Return a frame's line, including its newline. UTF-8, no newline inside.
 
-    The bytes equal those of a `Line`, without making one.
+    The bytes equal those of a `GraspLine`, without making one.
     """
     parts = (_GRASP, _encode(grasp)[1:-1], _PRESHAPE, _encode(preshape), _ANGLES, _encode(angles), b"}\n")
     return b"".join(parts)
@@ -71,85 +69,19 @@ def encode_task(progress: Progress) -> bytes:
     return _encode(ProgressLine(**structs.asdict(progress))) + b"\n"
 
 
-# Bytes that a writable descriptor takes at once without blocking, even if it is set to block (POSIX: PIPE_BUF).
-_PIECE = select.PIPE_BUF
-# If an error is pending or the reader is gone, writing reports it.
-_WRITABLE = select.POLLOUT | select.POLLERR | select.POLLHUP
-
-
-# Writes some of the bytes and returns how many. Raises BlockingIOError: none now; any other OSError: never again.
-Writer = Callable[[bytes], int]
-
-
-class Outlet:
-    """One reader's end: at most the rest of one line waits here; the rest waits in the system's buffer.
-
-    written   number of bytes that it has taken
-    """
-
-    __slots__ = ("_rest", "_write", "written")
-
-    def __init__(self, write: Writer) -> None:
-        self._write = write
-        self._rest = b""
-        self.written = 0
-
-    @property
-    def waiting(self) -> int:
-        """The number of bytes of the newest line that are not written yet."""
-        return len(self._rest)
-
-    def forget(self) -> None:
-        """Drop what waits."""
-        self._rest = b""
-
-    def send(self, line: bytes) -> bool:
-        """Send `line` if the reader keeps up; return whether it was at least begun. Raises OSError if it is gone."""
-        for data in (self._rest, line):
-            self._rest = data
-            try:
-                while self._rest:
-                    taken = self._write(self._rest)
-                    self.written += taken
-                    self._rest = self._rest[taken:]
-            except BlockingIOError:
-                if data is not line:
-                    return False
-        # Nothing of this line was sent: it is lost, and the next one starts afresh.
-        if line and len(self._rest) == len(line):
-            self._rest = b""
-            return False
-        return True
-
-
-def patient_writer(descriptor: int) -> Writer:
-    """Return a writer for a shared descriptor, which must not be set to non-blocking."""
-    poll = select.poll()
-    poll.register(descriptor, select.POLLOUT)
-
-    def write(data: bytes) -> int:
-        events = poll.poll(0)
-        if not events or not events[0][1] & _WRITABLE:
-            raise BlockingIOError
-        return os.write(descriptor, data[:_PIECE])
-
-    return write
-
-
 class JsonLines(Sink):
-    """Writes one line per frame to `file`.
+    """Writes one line per frame to `file`, and waits for a slow reader, in a live run on its own thread (`Fanout`).
 
-    A pipe with a slow reader loses whole lines and delays nobody; with `wait` it waits instead, which is right for a
-    replay and wrong for a live glove. A reader that is gone (`head`) is noted in the report. A full disk loses lines
-    until it has room again.
+    A reader that is gone (`head`) is noted in the report. A full disk loses lines until it has room again.
     """
 
-    __slots__ = ("_error", "_file", "_gone", "_lost", "_outlet", "_owned", "_sent", "_where")
+    __slots__ = ("_error", "_file", "_gone", "_lost", "_owned", "_rest", "_sent", "_where")
 
-    def __init__(self, file: BinaryIO, *, wait: bool = False, where: str = "jsonl", owned: bool = False) -> None:
+    def __init__(self, file: BinaryIO, *, where: str = "jsonl", owned: bool = False) -> None:
         """Write into `file`, which `close` closes only if it is `owned`."""
+        file.flush()
         self._file = file
-        self._outlet = Outlet(_writer(file, wait))
+        self._rest = b""
         self._owned = owned
         self._where = where
         self._sent = self._lost = 0
@@ -168,28 +100,41 @@ class JsonLines(Sink):
         self._send(encode_task(progress))
 
     def _send(self, line: bytes) -> None:
-        sent = False
-        if not self._gone:
-            try:
-                sent = self._outlet.send(line)
-            except (OSError, ValueError) as reason:  # ValueError: somebody closed the file
-                self._error = getattr(reason, "strerror", None) or str(reason)
-                self._gone = isinstance(reason, BrokenPipeError)
-                self._take_back(len(line) - self._outlet.waiting)
+        """Write the rest of a line that a full disk cut, then this line, or lose it."""
+        left, sent = self._rest + line, False
+        try:
+            while left and not self._gone:
+                left = left[self._write(left) :]
+            self._rest, sent = b"", not self._gone
+        except (OSError, ValueError) as reason:  # ValueError: somebody closed the file
+            self._error = getattr(reason, "strerror", None) or str(reason)
+            self._gone = isinstance(reason, BrokenPipeError)
+            torn = len(line) - len(left)
+            self._rest = left[: max(-torn, 0)] if torn <= 0 or self._takes_back(torn) else left
         if line:
             self._sent += sent
             self._lost += not sent
 
-    def _take_back(self, torn: int) -> None:
-        """Cut off the part of a line that still fitted on a full disk, unless another process has written after it."""
-        if not self._owned:
-            return
-        with suppress(OSError, ValueError):
+    def _write(self, data: bytes) -> int:
+        try:
             descriptor = self._file.fileno()
-            end = os.lseek(descriptor, 0, os.SEEK_CUR)
-            if os.fstat(descriptor).st_size == end:
-                os.ftruncate(descriptor, end - torn)
-                self._outlet.forget()
+        except (AttributeError, UnsupportedOperation):  # held in memory
+            written = self._file.write(data)
+            self._file.flush()
+            return written
+        # No lock is held while this waits: the interpreter may end meanwhile.
+        return os.write(descriptor, data)
+
+    def _takes_back(self, torn: int) -> bool:
+        """Cut off the part of a line that still fitted on a full disk, unless another process has written after it."""
+        if self._owned:
+            with suppress(OSError, ValueError):
+                descriptor = self._file.fileno()
+                end = os.lseek(descriptor, 0, os.SEEK_CUR)
+                if os.fstat(descriptor).st_size == end:
+                    os.ftruncate(descriptor, end - torn)
+                    return True
+        return False
 
     def report(self) -> SinkReport:
         """Return how this sink is doing."""
@@ -202,27 +147,11 @@ class JsonLines(Sink):
             self._file.close()
 
 
-def _writer(file: BinaryIO, wait: bool) -> Writer:
-    def write(data: bytes) -> int:
-        written = file.write(data)
-        file.flush()
-        return written
-
-    if wait:
-        return write
-    try:
-        descriptor = file.fileno()
-    except (AttributeError, UnsupportedOperation):  # held in memory
-        return write
-    file.flush()
-    return patient_writer(descriptor)
-
-
 def _open(place: SinkPlace) -> JsonLines:
     """Return JSON lines on stdout ("-") or at the end of a file or named pipe. Raises SinkError."""
-    where, path, wait = place.text, place.place, place.wait
+    where, path = place.text, place.place
     if path == "-":
-        return JsonLines(sys.stdout.buffer, wait=wait, where=where)
+        return JsonLines(sys.stdout.buffer, where=where)
     try:
         # A named pipe without a reader would block the open forever.
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK, 0o666)
@@ -234,9 +163,8 @@ def _open(place: SinkPlace) -> JsonLines:
     except OSError as reason:
         os.close(descriptor)
         raise SinkError(f"{where} cannot be written: {reason.strerror}") from None
-    if wait:
-        os.set_blocking(descriptor, True)
-    return JsonLines(os.fdopen(descriptor, "wb", buffering=0), wait=wait, where=where, owned=True)
+    os.set_blocking(descriptor, True)
+    return JsonLines(os.fdopen(descriptor, "wb", buffering=0), where=where, owned=True)
 
 
 def _finish_line(descriptor: int, path: str) -> None:

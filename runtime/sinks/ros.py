@@ -13,22 +13,18 @@ local: late readers get the newest at once. Nodes of this machine can read, othe
 them; ROS_DOMAIN_ID sets the domain, as for a ROS 2 node.
 """
 
-import re
 from collections.abc import Callable
 
 from msgspec import json
 
-from thenar.drivers.errors import SettingError
 from thenar.drivers.extras import optional
 
-from ..names import shortened
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
-from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+from .base import PublishPace, Sink, SinkError, SinkKind, SinkPlace, SinkReport, rate_of
 
 RATE_HZ = 20
-_FASTEST_HZ = 1000
 
 
 class RosTopics(Sink):
@@ -38,17 +34,15 @@ class RosTopics(Sink):
         """Publish under `name` to this machine, or to all networks that Cyclone DDS finds if `public`; repeat unchanged
         values `rate` times a second.
 
-        Raise SettingError for an invalid name, domain or rate, SinkError if DDS does not start.
+        Raise SettingError for an invalid name or domain, SinkError if DDS does not start.
         """
         # Cyclone DDS, which these import, is an extra.
         from cyclonedds.core import DDSException
 
         from ..ros import domain, messages
 
-        if not 1 <= rate <= _FASTEST_HZ:
-            raise SettingError(f"ros:{name}: a rate of {rate} is not possible: use 1 to {_FASTEST_HZ} a second")
         self._where = f"ros:{domain.namespace(name)}" + "?public" * public
-        self._name, self._messages, self._volatile_readers = name, messages, domain.volatile_readers
+        self._name, self._messages = name, messages
         number = domain.domain()
         try:
             self._domain, participant = domain.join(number, public=public)
@@ -69,10 +63,8 @@ class RosTopics(Sink):
                 f"ros:{name}?public lets other machines read"
             ) from None
         self._closed = False
-        self._period_us, self._written_us = 1_000_000 // rate, 0
-        self._shown: tuple[object, ...] = ()
+        self._pace = PublishPace(rate)
         self._told: Preshape | None = None
-        self._found, self._volatile = 0, frozenset[int]()
         self._sent = self._lost = self._unix_us = 0
         self._error = ""
 
@@ -103,32 +95,16 @@ class RosTopics(Sink):
         """Return whether anything was published."""
         messages = self._messages
         shown = (grasp.grasp, messages.LEVELS[grasp.health], grasp.state, grasp.segment, grasp.segment_type)
-        # The recording of several sessions may go back in time.
-        due = not self._shown or not 0 <= grasp.time_us - self._written_us < self._period_us
-        news = due or shown != self._shown
+        news, due = self._pace.due(grasp.time_us, shown)
         if news:
             self._grasp.write(messages.String(grasp.grasp))
             self._segment.write(messages.segment(self._name, grasp))
-            self._shown = shown
-        if due:
-            self._written_us = grasp.time_us
-            if angles is not None:
-                self._angles.write(messages.joint_state(grasp.unix_us, angles))
-        if preshape is not None and (self._somebody_new() or preshape != self._told):
+        if due and angles is not None:
+            self._angles.write(messages.joint_state(grasp.unix_us, angles))
+        if preshape is not None and preshape != self._told:
             self._preshape.write(messages.trajectory(preshape))
             self._told, news = preshape, True
         return news
-
-    def _somebody_new(self) -> bool:
-        """Return whether a reader joined that DDS does not send the last preshape to: a volatile one, as in
-        ros2_control's trajectory controllers.
-        """
-        found = self._preshape.get_publication_matched_status().total_count
-        if found == self._found:
-            return False
-        before, self._volatile = self._volatile, self._volatile_readers(self._preshape)
-        self._found = found
-        return not self._volatile <= before
 
     def report(self) -> SinkReport:
         """Return the state of this sink; its readers are those of the grasp type."""
@@ -145,13 +121,9 @@ class RosTopics(Sink):
 
 
 def _open(where: SinkPlace) -> Sink:
-    rate = where.options.get("rate", str(RATE_HZ))
-    if not re.fullmatch("[0-9]{1,9}", rate):
-        raise SettingError(
-            f"ros:{where.place}: a rate of {shortened(repr(rate))} is not possible: use 1 to {_FASTEST_HZ} a second"
-        )
+    rate = rate_of(where, RATE_HZ)
     with optional(SinkError, f"ros:{where.place}"):
-        return RosTopics(where.place, public="public" in where.options, rate=int(rate))
+        return RosTopics(where.place, public="public" in where.options, rate=rate)
 
 
 MEMBER = SinkKind(

@@ -4,7 +4,7 @@ Everything happens inside `publish`, without threads and without waiting: new re
 line if it keeps up. A slow reader loses whole lines, which shows as gaps in `number`, and delays nobody. Only the rest
 of one line waits for it, and the system's buffer, which is kept small so that it does not read the past.
 
-Places are limited. A reader that takes nothing for five seconds is dropped, and earlier if a new reader finds no place.
+Places are limited. A reader that takes nothing for five seconds is dropped.
 """
 
 import errno
@@ -27,7 +27,7 @@ from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkReport
-from .jsonl import Outlet, encode, encode_detail, encode_health, encode_task
+from .jsonl import encode, encode_detail, encode_health, encode_task
 
 if TYPE_CHECKING:
     from ..build import Build
@@ -41,8 +41,6 @@ MAX_OF_ONE = 8
 HANGING_S = 5.0
 # About fifty lines; the kernel doubles it for its own bookkeeping.
 SEND_BUFFER = 16384
-# A reader that lost a line counts as slow until it has lost none for this long.
-_LEVEL_S = 1.0
 # Readers accepted per frame, so that many at once do not delay it.
 _KNOCKS = 16
 # People cannot follow faster changes.
@@ -143,26 +141,15 @@ class SocketLines(Sink):
             reader.close()
 
     def _has_room(self, host: str) -> bool:
-        """Return whether one more reader of `host` has a place, after dropping the slowest reader if that makes one."""
-        alike = [reader for reader in self._readers if host and reader.host == host]
-        if len(alike) >= MAX_OF_ONE:
-            crowd, full = alike, f"more than {MAX_OF_ONE} readers on {host}"
+        """Return whether one more reader of `host` has a place."""
+        if host and sum(reader.host == host for reader in self._readers) >= MAX_OF_ONE:
+            full = f"more than {MAX_OF_ONE} readers on {host}"
         elif len(self._readers) >= MAX_READERS:
-            crowd, full = self._readers, f"more than {MAX_READERS} readers"
+            full = f"more than {MAX_READERS} readers"
         else:
             return True
-        slow = [(reader.slow_since_s, place) for place, reader in enumerate(crowd) if reader.slow_since_s is not None]
-        if not slow:
-            self._error = f"{full}: the newest were rejected"
-            return False
-        self._drop(crowd[min(slow)[1]], f"{full}: the slowest was dropped for a new one")
-        return True
-
-    def _drop(self, reader: "_Reader", why: str) -> None:
-        self._readers.remove(reader)
-        reader.close()
-        self._dropped += 1
-        self._error = why
+        self._error = f"{full}: the newest were rejected"
+        return False
 
     def _send_all(self, line: bytes) -> None:
         now_s = self._clock()
@@ -179,7 +166,10 @@ class SocketLines(Sink):
             reader.close()
             return False
         if reader.hangs(now_s):
-            self._drop(reader, f"a reader that took nothing for {HANGING_S:g} s was dropped")
+            self._readers.remove(reader)
+            reader.close()
+            self._dropped += 1
+            self._error = f"a reader that took nothing for {HANGING_S:g} s was dropped"
         return sent
 
     def report(self) -> SinkReport:
@@ -198,13 +188,9 @@ class SocketLines(Sink):
 
 
 class _Reader:
-    """A reader of the lines.
+    """A reader of the lines, and the `host` it is on, "" for this one; the rest of one line may wait for it here."""
 
-    host          the machine it is on; "" for this one
-    slow_since_s  when it began to lose lines; None while it keeps up
-    """
-
-    __slots__ = ("_missed_s", "_outlet", "_socket", "_stalled_s", "host", "slow_since_s")
+    __slots__ = ("_rest", "_socket", "_stalled_s", "host")
 
     def __init__(self, reader: socket.socket, host: str) -> None:
         reader.setblocking(False)
@@ -212,25 +198,23 @@ class _Reader:
         if reader.family != socket.AF_UNIX:
             reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.host = host
-        self.slow_since_s: float | None = None
-        self._socket = reader
-        self._outlet = Outlet(reader.send)
+        self._socket, self._rest = reader, b""
         self._stalled_s: float | None = None
-        self._missed_s = 0.0
 
     def send(self, line: bytes, now_s: float) -> bool:
-        """Send `line` if there is room for it; return whether it was sent. Raises OSError if the reader is gone."""
-        before = self._outlet.written
-        sent = self._outlet.send(line)
-        if self._outlet.written > before:
+        """Send `line` if there is room for it; return whether it was begun. Raises OSError if the reader is gone."""
+        left = self._rest + line
+        took = 0
+        with suppress(BlockingIOError):
+            while took < len(left):
+                took += self._socket.send(left[took:])
+        if took:
             self._stalled_s = None
         elif self._stalled_s is None:
             self._stalled_s = now_s
-        if not sent:
-            self._missed_s = now_s
-            self.slow_since_s = now_s if self.slow_since_s is None else self.slow_since_s
-        elif self.slow_since_s is not None and now_s - self._missed_s >= _LEVEL_S:
-            self.slow_since_s = None
+        sent = took > len(self._rest)
+        # Of a line of which nothing was sent, nothing is kept: it is lost, and the next one starts afresh.
+        self._rest = left[took:] if sent else self._rest[took:]
         return sent
 
     def hangs(self, now_s: float) -> bool:

@@ -120,11 +120,3 @@ def debouncer_of(debounce: Debounce) -> Debouncer | None:
     if not debounce.enabled:
         return None
     return Debouncer(round(debounce.press_lockout_ms * 1000), round(debounce.release_ms * 1000))
-
-
-def pause_us(debounce: Debounce) -> int:
-    """Return how long a switch must have gone unread for its bounces to be over.
-
-    A switch that was closed before such a pause may have opened since: it must not be assumed closed.
-    """
-    return round(2000 * max(debounce.press_lockout_ms, debounce.release_ms))

@@ -15,7 +15,7 @@ from ..published import Count
 from ..scanning.scanmap import Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
 from ..taxels import TaxelCalibration, Taxels, calibration_of
-from .base import SHORTEST_US, Source, SourceKind, debouncer_of, pause_us
+from .base import SHORTEST_US, Source, SourceKind, debouncer_of
 
 # Delay between attempts on a bus without any chip, to avoid a busy loop.
 _NOBODY_THERE_S = 0.01
@@ -27,9 +27,7 @@ class _Port(ABC):
     targets: Mask
 
     def __init__(self, debounce: Debounce) -> None:
-        self._debounce, self._debouncer = debounce, debouncer_of(debounce)
-        self._pause_us = pause_us(debounce)
-        self._read_us = 0
+        self._debouncer = debouncer_of(debounce)
 
     def states(self, reply: int | None) -> tuple[Mask, Mask]:
         """Return the closed and the lost switches from a reply that came now; None: none came."""
@@ -37,10 +35,6 @@ class _Port(ABC):
         closed, lost = self._states(reply, time_us)
         if self._debouncer is None or reply is None:
             return closed, lost
-        if time_us - self._read_us > self._pause_us:
-            self._debouncer = debouncer_of(self._debounce)
-            assert self._debouncer is not None
-        self._read_us = time_us
         return self._debouncer.update(time_us, closed, self.targets & ~lost) & ~lost, lost
 
     @abstractmethod

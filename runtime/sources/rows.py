@@ -10,13 +10,13 @@ from thenar.drivers.line_reader import RowReader
 from thenar.drivers.lines import SEQUENCES, Row
 from thenar.drivers.senders import SILENCE_US
 
-from ..frames import PERIODS, GloveFrame, Mask, Pauses, SwitchFrame, now_us
+from ..frames import PERIODS, GloveFrame, Mask, SwitchFrame, now_us
 from ..harness.wiring import Harness, Range, StreamWiring
 from ..names import list_names, shortened
 from ..published import Count
 from ..scanning.scanmap import ScanMap
 from ..taxels import Level, Taxels, calibration_of
-from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of, pause_us
+from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of
 
 # Codes of joints are bytes, as a CyberGlove's; 0 is a joint without a value. A taxel's whole numbers are its codes;
 # closer numbers are coded in this many steps.
@@ -258,7 +258,7 @@ class RowSource(Source):
         self._last: tuple[float, Sequence[float | None]] | None = None
         self._ready.clear()
         self.watch.begin()
-        self._debouncer, self._pauses = debouncer_of(self._debounce), Pauses(pause_us(self._debounce))
+        self._debouncer = debouncer_of(self._debounce)
         self._taxels = [
             Taxels([name], [levels], self._calibration, self._settings, grid.last)
             for name, levels, grid in zip(self._taxel_names, self._levels, self._grids, strict=True)
@@ -366,8 +366,6 @@ class RowSource(Source):
             pressed, lost = taxels.read(time_us, (code,))
             closed, known = closed | pressed, known | taxels.owned & ~lost
         if self._debouncer is not None:
-            if over := self._pauses.over(time_us, known):
-                self._debouncer.forget(over)
             closed = self._debouncer.update(time_us, closed, known) & known
         return SwitchFrame(time_us, closed, self.owned & ~known, glove, tuple(row) if self._grids else None)
 

@@ -1,4 +1,4 @@
-"""The page of a guided collection: its view of the Guide, and the keys pressed there.
+"""The page of a guided collection: its view of the guide, and the keys pressed there.
 
 Every open browser shows the same, and keys count in each.
 """
@@ -10,7 +10,7 @@ from thenar.drivers.closing import Closing
 from ..frames import SwitchFrame
 from ..live.sources import DeviceState
 from ..published import NONE
-from ..recording.guide import Guide, Key, Stage, Trial
+from ..recording.guide import CollectionGuide, Key, Stage, Trial
 from ..recording.session import Session
 from .presses import Presses
 from .server import Server, message
@@ -55,7 +55,11 @@ class GuidePage(Closing):
         calibrated = () if session.calibration is None else session.calibration.sensors
         lines = {line.name: line for line in calibrated}
         self._lines = [lines.get(name) for name in session.sensors]
-        self._pads = _Pads(session)
+        given = session.taxel_calibration
+        fitted = [None if given is None else given.line(name) for name in session.taxels]
+        # From rest to press of each taxel if it is calibrated, else the range seen so far.
+        self._taxel_ends = [None if line is None else (line.rest, line.press) for line in fitted]
+        self._calibrated = [line is not None for line in fitted]
         self._presses = Presses(Key)
         self._due_us, self._step = 0, -1
         first = message(
@@ -70,12 +74,12 @@ class GuidePage(Closing):
         self._server = Server("collect", address, token=token, on_message=self._presses.take, hello=lambda: self._first)
         self.url = self._server.url
 
-    def press(self, now_us: int, guide: Guide) -> None:
+    def press(self, now_us: int, guide: CollectionGuide) -> None:
         """Pass the keys pressed since the last call to `guide`, if they were meant for its current step."""
         for key in self._presses.due(lambda: guide.step):
             guide.press(now_us, key)
 
-    def show(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> None:
+    def show(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> None:
         """Show the state of `guide`, if it changed or the next refresh is due."""
         if now_us < self._due_us and guide.step == self._step:
             return
@@ -113,7 +117,7 @@ class GuidePage(Closing):
         """Close the page."""
         self._server.close()
 
-    def _seen(self, now_us: int, guide: Guide) -> dict[str, object]:
+    def _seen(self, now_us: int, guide: CollectionGuide) -> dict[str, object]:
         """Return the glove's readings, or those that were captured: one character per switch, "1" closed, "0" open, "x"
         not read; the joint values, in degrees if calibrated, null if not measured, none if the newest record is old;
         how far each taxel is pressed, 0 to 1.
@@ -129,38 +133,25 @@ class GuidePage(Closing):
         return {
             "closed": "" if switches is None else _letters(switches, self._switches),
             "joints": joints,
-            "taxels": () if switches is None else self._pads.pressed(switches.taxels or ()),
+            "taxels": () if switches is None else self._pressed(switches.taxels or ()),
         }
+
+    def _pressed(self, codes: Sequence[int | None]) -> list[float | None]:
+        """Return how far each taxel is pressed, 0 to 1, or None if it was not read."""
+        found: list[float | None] = []
+        for place, code in enumerate(codes):
+            if code is None:
+                found.append(None)
+                continue
+            rest, press = self._taxel_ends[place] or (code, code)
+            if not self._calibrated[place]:
+                rest, press = min(rest, code), max(press, code)
+            self._taxel_ends[place] = rest, press
+            found.append(0.0 if rest == press else round(min(max((code - rest) / (press - rest), 0.0), 1.0), 3))
+        return found
 
 
 def _letters(frame: SwitchFrame, switches: int) -> str:
     return "".join(
         "x" if frame.lost >> number & 1 else "1" if frame.closed >> number & 1 else "0" for number in range(switches)
     )
-
-
-class _Pads:
-    """How far taxels are pressed: from rest to press if calibrated, else within the range seen so far."""
-
-    def __init__(self, session: Session) -> None:
-        given = session.taxel_calibration
-        self._ends: list[list[int] | None] = []
-        for name in session.taxels:
-            line = None if given is None else given.line(name)
-            self._ends.append(None if line is None else [line.rest, line.press])
-        self._fixed = [ends is not None for ends in self._ends]
-
-    def pressed(self, codes: Sequence[int | None]) -> list[float | None]:
-        """Return the share of each taxel, 0 to 1, or None if it was not read."""
-        found: list[float | None] = []
-        for place, code in enumerate(codes):
-            if code is None:
-                found.append(None)
-                continue
-            ends = self._ends[place] or [code, code]
-            if not self._fixed[place]:
-                ends = [min(ends[0], code), max(ends[1], code)]
-            self._ends[place] = ends
-            rest, press = ends
-            found.append(0.0 if rest == press else round(min(max((code - rest) / (press - rest), 0.0), 1.0), 3))
-        return found

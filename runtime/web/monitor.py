@@ -21,7 +21,7 @@ from ..detail import Detail
 from ..frames import now_us
 from ..hand import load_hand
 from ..names import shortened
-from ..sinks.jsonl import DetailLine, HealthLine, Line
+from ..sinks.jsonl import DetailLine, GraspLine, HealthLine
 from ..task import ProgressLine
 from .live import Past, build_message
 from .server import Server, message
@@ -30,12 +30,12 @@ RETRY_S, _WAIT_S = 1.0, 0.2
 # Longer than any line of a run: more bytes without a newline are not from a run.
 LONGEST_LINE = 1 << 20
 _TCP = re.compile(r"tcp:(?:\[([^][]+)\]|([^][:]+)):([0-9]{1,5})")
-_decode = msgspec.json.Decoder(Line | DetailLine | HealthLine | ProgressLine).decode
+_decode = msgspec.json.Decoder(GraspLine | DetailLine | HealthLine | ProgressLine).decode
 # A stream counts as one with details for this long after the last detail; moments without are left out.
 _DETAILED_US = 1_000_000
 
 
-class Source(msgspec.Struct, frozen=True):
+class MonitoredStream(msgspec.Struct, frozen=True):
     """The source of the page's moments, whether it is connected, and its error."""
 
     where: str
@@ -72,13 +72,13 @@ class StreamMonitor(Closing):
         self._place, self._where = _place(where), where
         self._build, self._first = _first(where, build)
         self._past = Past()
-        self._line: Line | None = None
+        self._line: GraspLine | None = None
         self._line_us = 0
         self._detailed_us: int | None = None
-        self._source = Source(where, connected=False, error="not connected yet")
+        self._source = MonitoredStream(where, connected=False, error="not connected yet")
         self.server = Server("live", address, token=token, hello=self._hello)
 
-    def run(self, stop: Event, say: Callable[[Source], None] = lambda _: None) -> None:
+    def run(self, stop: Event, say: Callable[[MonitoredStream], None] = lambda _: None) -> None:
         """Read and show until `stop` is set, reconnecting if the connection is lost. `say` is called whenever the state
         of the stream changes.
         """
@@ -86,13 +86,15 @@ class StreamMonitor(Closing):
         while not stop.is_set():
             try:
                 with _connected(self._place, self._where) as stream:
-                    self._tell(Source(self._where, connected=True))
+                    self._tell(MonitoredStream(self._where, connected=True))
                     for line in _lines(stream, stop):
                         self._show(line)
                 if not stop.is_set():
-                    self._tell(Source(self._where, connected=False, error="the run has ended, or dropped this page"))
+                    self._tell(
+                        MonitoredStream(self._where, connected=False, error="the run has ended, or dropped this page")
+                    )
             except (DeviceError, OSError) as reason:
-                self._tell(Source(self._where, connected=False, error=str(reason)))
+                self._tell(MonitoredStream(self._where, connected=False, error=str(reason)))
             stop.wait(RETRY_S)
 
     def close(self) -> None:
@@ -104,7 +106,7 @@ class StreamMonitor(Closing):
             line = _decode(text)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
             raise DeviceError(f"the data is not a stream of thenar: {shortened(str(wrong), 120)}") from None
-        if isinstance(line, Line):
+        if isinstance(line, GraspLine):
             self._past.add(line)
             self._line, self._line_us = line, now_us()
             if self._detailed_us is None or not 0 <= line.time_us - self._detailed_us < _DETAILED_US:
@@ -128,7 +130,7 @@ class StreamMonitor(Closing):
             more = {name: getattr(detail, name) for name in Detail.__struct_fields__}
             self.server.publish("frame", partial(_frame, line, self._line_us, taxels={}, **more))
 
-    def _tell(self, source: Source) -> None:
+    def _tell(self, source: MonitoredStream) -> None:
         self.server.publish("source", message("source", source))
         if source != self._source:
             self._source = source
@@ -147,7 +149,7 @@ def _first(where: str, folder: Path | None) -> tuple[str, tuple[bytes, ...]]:
     return manifest.checksum, (build, message("hand", load_hand(folder, manifest)))
 
 
-def _frame(line: Line, arrived_us: int, **more: object) -> bytes:
+def _frame(line: GraspLine, arrived_us: int, **more: object) -> bytes:
     """Return the message of a moment, with its age since it arrived here."""
     return message("frame", line, late_us=now_us() - arrived_us, **more)
 

@@ -17,7 +17,7 @@ from thenar.compiler.boosting.boost import boost
 from thenar.runtime.model.tables import winners
 
 from ..checks.roundings import ROUNDING, share_error
-from ..checks.rounds import Moment, counted, loss_rounding, moments, rise_rounding
+from ..checks.rounds import RoundState, counted, loss_rounding, moments, rise_rounding
 from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import HardSet, contradictory, imbalanced, noisy
 from ..reference.information import entropy_bits
@@ -73,7 +73,7 @@ def entropy_left(hard: HardSet) -> mpf:
 
 
 @precisely()
-def resting_error(hard: HardSet, last: Moment) -> float:
+def resting_error(hard: HardSet, last: RoundState) -> float:
     """Return the error of shares P against those of the counts, as a share of the rounding bound after convergence.
 
     Boosting converges to sum u (Y - P) = 0. There 1 - P is off by 2^-54, the resolution of P, and the products round.
@@ -90,7 +90,7 @@ def resting_error(hard: HardSet, last: Moment) -> float:
     return float(max(errors))
 
 
-def unsettled(last: Moment) -> float:
+def unsettled(last: RoundState) -> float:
     """Return the most weight that a frame can keep: below a share of 2^-38 of its class's, its branch counts as empty.
 
     Then it follows the mean of all rows, which is constant once they have converged, and learns nothing more itself.
@@ -98,7 +98,7 @@ def unsettled(last: Moment) -> float:
     return 2.0**-38 * float(last.weights.sum(axis=1).max())
 
 
-def idle_loss(hard: HardSet, last: Moment) -> float:
+def idle_loss(hard: HardSet, last: RoundState) -> float:
     """Return the largest remaining loss of frames of a single class, in which each of K classes keeps `unsettled`."""
     lacking = sum(row.count(0) for row in counted(hard).values())
     return lacking * unsettled(last) / float(hard.scaled_weights.sum())

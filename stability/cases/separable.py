@@ -22,7 +22,7 @@ from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners
 
 from ..checks.roundings import ROUNDING, loss_error, part_of
-from ..checks.rounds import Moment, loss_rounding, moments, rise_rounding
+from ..checks.rounds import RoundState, loss_rounding, moments, rise_rounding
 from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import HardSet, intervals, separable, words
 from ..inputs.hard_tables import largest_sum, rows_of
@@ -62,7 +62,7 @@ def _trained(runs: list[tuple[HardSet, int, bool]]) -> Iterator[Finding]:
     wrong = Worst("frames predicted wrongly by ensemble and integers", "their labels", 0.0, "frames")
     for hard, rounds, must_fall in runs:
         stumps, fallen = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds)
-        before: Moment | None = None
+        before: RoundState | None = None
         for number, moment in enumerate(moments(hard, stumps)):
             at = f"{hard.name}, round {number}"
             outside.see(float(not _in_range(hard, moment)), at)
@@ -81,7 +81,7 @@ def _trained(runs: list[tuple[HardSet, int, bool]]) -> Iterator[Finding]:
     yield from (worst.finding() for worst in (outside, sums, rises, reported, losses, overflow, wrong))
 
 
-def _in_range(hard: HardSet, moment: Moment) -> bool:
+def _in_range(hard: HardSet, moment: RoundState) -> bool:
     """Whether 0 <= P <= 1; 0 <= w <= 1/3, the largest of (1 - p) max(p, 1/3); |w z| = |Y - P|; 0 for a settled row.
 
     1/3, |Y - P| and their product round once each.
@@ -97,7 +97,7 @@ def _in_range(hard: HardSet, moment: Moment) -> bool:
     )
 
 
-def _loss_error(hard: HardSet, moment: Moment) -> float:
+def _loss_error(hard: HardSet, moment: RoundState) -> float:
     rows, labels = moment.scores.T.tolist(), hard.labels.tolist()
     return part_of(moment.loss, mean_loss(rows, labels), loss_error(rows, labels, [1.0] * len(labels)))
 

@@ -14,7 +14,7 @@ from thenar.compiler.boosting.boost import boost
 
 from ..checks.class_rounds import see_round
 from ..checks.roundings import ROUNDING
-from ..checks.rounds import Moment, moments
+from ..checks.rounds import RoundState, moments
 from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import HardSet, contradictory, imbalanced, intervals, noisy, separable
 
@@ -70,7 +70,7 @@ def _extreme(rounds: int) -> Iterator[Finding]:
     yield from (worst.finding() for worst in (chosen, outputs, outside))
 
 
-def _in_range(moment: Moment, loss: float) -> bool:
+def _in_range(moment: RoundState, loss: float) -> bool:
     finite = np.isfinite(moment.scores).all() and math.isfinite(loss)
     shares, weights = moment.shares, moment.weights
     return bool(finite and moment.loss == loss and ((shares >= 0) & (shares <= 1)).all() and (weights >= 0).all())
@@ -86,7 +86,7 @@ def _settled(rounds: int) -> Iterator[Finding]:
     )
     for hard in (separable(2), separable(14), intervals(5)):
         stumps, _ = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds)
-        rest: Moment | None = None
+        rest: RoundState | None = None
         first = 0
         for number, moment in enumerate(moments(hard, stumps)):
             settled = hard.member & (moment.shares == 1.0)

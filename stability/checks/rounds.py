@@ -17,7 +17,7 @@ from .roundings import ROUNDING
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moment:
+class RoundState:
     """The state after a round: scores F and shares P (K, n), weights w and weighted responses w z (K, n) of the next
     round, and the loss.
     """
@@ -29,13 +29,13 @@ class Moment:
     loss: float
 
 
-def moments(hard: HardSet, stumps: Stumps, z_max: float = 3.0) -> Iterator[Moment]:
+def moments(hard: HardSet, stumps: Stumps, z_max: float = 3.0) -> Iterator[RoundState]:
     """Yield the state before the first round and after every round, equal to the training's to the last bit."""
     weights = None if hard.weights is None else hard.scaled_weights
     stages = (np.ascontiguousarray(scores.T) for scores in stumps.staged_scores(hard.X))
     for scores in chain([np.zeros(hard.member.shape)], stages):
         shares, loss = softmax_and_loss(scores, hard.labels, weights)
-        yield Moment(scores, shares, *weights_and_responses(shares, hard.member, z_max, weights), loss)
+        yield RoundState(scores, shares, *weights_and_responses(shares, hard.member, z_max, weights), loss)
 
 
 def loss_rounding(n_classes: int, loss: float) -> float:
@@ -49,7 +49,7 @@ def loss_rounding(n_classes: int, loss: float) -> float:
     return ROUNDING * (2 + math.log(n_classes) + (n_classes - 1) + 4 * math.log(n_classes) + 6 * loss)
 
 
-def rise_rounding(n_classes: int, before: Moment, after: Moment, z_max: float = 3.0) -> float:
+def rise_rounding(n_classes: int, before: RoundState, after: RoundState, z_max: float = 3.0) -> float:
     """Return the largest rise of the computed loss in a round that does not raise the exact loss.
 
     Both losses are rounded. Scores are rounded to doubles, which changes a loss L by at most 2 |F| L: |dL/dF| is at

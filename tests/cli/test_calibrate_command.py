@@ -190,7 +190,7 @@ def test_whatever_ends_it_early_leaves_the_old_file(
 
 def test_an_unplugged_glove_is_not_calibrated(line: PtyLine, tmp_path: Path) -> None:
     with EmulatedCyberGlove(line) as glove, calibrating(line, tmp_path / "anna.toml") as process:
-        glove.state.plugged = False
+        glove.box.plugged = False
         code, _, said = converse(process, lambda _: None)
     assert code == 2
     assert "?G returns 1, not 3" in said

@@ -8,8 +8,7 @@ import pytest
 from thenar.compiler import GraspSet, compile_build
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
-from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.cyberglove_box import Doubts
+from thenar.drivers.emulated.cyberglove import Doubts, EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]

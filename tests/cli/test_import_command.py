@@ -10,7 +10,7 @@ from thenar.cli import run
 from thenar.compiler import GraspSet
 from thenar.compiler.text import INDEPENDENT
 from thenar.runtime.frames import SwitchFrame
-from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
 
 TABLE = "label,who,s1,s2,j1\nmug,A,0,0,10.2\nball,A,1,0,20\nmug,B,0,0,30\nball,B,1,0,\n"
@@ -290,7 +290,7 @@ def test_a_hostile_columns_toml_is_one_sentence(text: str, folder: Path, capsys:
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     types = ("cup", "pen")
-    tasks = tuple(Task(grasp, ("thing",)) for grasp in types)
+    tasks = tuple(CollectionTask(grasp, ("thing",)) for grasp in types)
     session = Session(
         thenar="1", switches=("s1", "s2"), sensors=(), collection=Collection("A", "own", types, tasks, 1, 0)
     )

@@ -14,12 +14,12 @@ from thenar.compiler import GraspSet, Joint, compile_build
 from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.live.system import System
+from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.preshape import PreshapeSelector, load_preshapes
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.session import Session
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.sinks import Line
+from thenar.runtime.sinks import GraspLine
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 FORBIDDEN = """
@@ -194,7 +194,7 @@ def test_a_replayed_set_takes_sinks_and_preshapes_as_a_live_run_does(
     done = thenar(*run, "--sink", f"jsonl:{tmp_path / 'one'}", "--sink", f"jsonl:{tmp_path / 'two'}")
     assert (done.returncode, done.stdout) == (0, "")
     for name in ("one", "two"):
-        sent = msgspec.json.Decoder(Line).decode_lines((tmp_path / name).read_bytes())
+        sent = msgspec.json.Decoder(GraspLine).decode_lines((tmp_path / name).read_bytes())
         assert [line.preshape and line.preshape.name for line in sent] == shapes
         assert [line.grasp for line in sent] == [line["grasp"] for line in lines]
 
@@ -230,7 +230,7 @@ def test_a_replayed_recording_takes_preshapes_too(
     joints = tuple(Joint(name, "deg", 1, 0.5, 255, 127.5) for name in small_set.joint_names)
     folder = compile_build(replace(small_set, joints=joints), tmp_path / "build", rounds=10, folds=0).folder
     build, path = Build.load(folder), tmp_path / "run.mcap"
-    system = System.of(build, parse_harness(GLOVE, "glove.toml"))
+    system = LiveSystem.of(build, parse_harness(GLOVE, "glove.toml"))
     session = Session(
         thenar="0",
         switches=system.switch_names,
@@ -251,7 +251,7 @@ def test_a_replayed_recording_takes_preshapes_too(
             recorder.grasp(recognizer.step(time_us + 1, 0, switches, glove).grasp)
     done = thenar("run", folder, "--replay", path, "--preshape", gripper, "--frames", 30)
     assert "30 of 30 frames recognised as they were recorded" in done.stderr
-    shapes = [line.preshape for line in msgspec.json.Decoder(Line).decode_lines(done.stdout.encode())]
+    shapes = [line.preshape for line in msgspec.json.Decoder(GraspLine).decode_lines(done.stdout.encode())]
     assert {shape.name for shape in shapes if shape is not None} == {"wide"}
     assert len(shapes) == 30
 

@@ -18,7 +18,7 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.graspset import Joint
-from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender, SocketLines
+from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender, LineServer
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime import Build
 from thenar.runtime.harness.loading import load_harness
@@ -46,10 +46,10 @@ PORTS = [
 
 
 @pytest.fixture
-def moving(tmp_path: Path) -> Iterator[SocketLines]:
+def moving(tmp_path: Path) -> Iterator[LineServer]:
     """Yield a sender of a clock, a count, two switches, a pad and a flex sensor, which all move."""
     done = Event()
-    with SocketLines(tmp_path / "line") as lines:
+    with LineServer(tmp_path / "line") as lines:
 
         def move() -> None:
             began, n = monotonic(), 0
@@ -67,7 +67,7 @@ def moving(tmp_path: Path) -> Iterator[SocketLines]:
 
 
 @pytest.mark.slow
-def test_doctor_shows_rows_and_proposes_a_sound_harness(thenar: Thenar, moving: SocketLines, tmp_path: Path) -> None:
+def test_doctor_shows_rows_and_proposes_a_sound_harness(thenar: Thenar, moving: LineServer, tmp_path: Path) -> None:
     path = tmp_path / "glove.toml"
     done = thenar("doctor", "--line", moving.port, "--seconds", "2", "--propose", path, "--json")
     assert done.returncode == 0, done.stderr
@@ -258,7 +258,7 @@ def test_doctor_says_what_is_wrong_with_rows(
     thenar: Thenar, tmp_path: Path, rate_hz: int, line: str, said: str
 ) -> None:
     path, done = tmp_path / "glove.toml", Event()
-    with SocketLines(tmp_path / "line") as lines:
+    with LineServer(tmp_path / "line") as lines:
         text = STREAM.format(port=lines.port, joints="{ j0 = [0, 127.5], j1 = [0, 127.5] }")
         path.write_text(text.replace("rate_hz = 100", f"rate_hz = {rate_hz}"))
 
@@ -382,7 +382,7 @@ def test_a_broken_sender_spoils_no_answer_and_is_counted(thenar: Thenar, build_f
     ]
     out, done, said = tmp_path / "out.jsonl", Event(), '[[stream]]\nrate_hz = 50\nswitches = ["s0", "s1", "s2", "s3", '
     said += '"s4", "s5"]\njoints = { j0 = [0, 127.5], j1 = [0, 127.5] }\ntime = "ms"\n'
-    with SocketLines(tmp_path / "s") as lines:
+    with LineServer(tmp_path / "s") as lines:
         (tmp_path / "mine.toml").write_text(f'{said}port = "{lines.port}"\n')
         values = {f"s{number}": number % 2 for number in range(6)} | {"j0": 60.0, "j1": 35.0}
 
@@ -487,7 +487,7 @@ def test_calibrate_refuses_rows_from_stdin_where_the_user_types(
 @pytest.mark.slow
 def test_calibrate_asks_for_the_joints_of_a_stream(tmp_path: Path) -> None:
     path, out = tmp_path / "glove.toml", tmp_path / "anna.toml"
-    with SocketLines(tmp_path / "s") as lines, LineSender(lines.send, ("flex",), 100, None, "ms") as sender:
+    with LineServer(tmp_path / "s") as lines, LineSender(lines.send, ("flex",), 100, None, "ms") as sender:
         path.write_text(f'[[stream]]\nport = "{lines.port}"\njoints = {{ flex = [0, 1000] }}\ncolumns = ["flex"]\n')
         master, slave = pty.openpty()
         command = [sys.executable, "-m", "thenar.cli", "calibrate", str(path), "-o", str(out), "--hold", "0.1"]

@@ -17,10 +17,10 @@ from thenar.runtime import Build, Glove
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.live.sources import Snapshot
-from thenar.runtime.live.system import System
+from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.recording.session import Session
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.sinks import HealthLine, Line, ProgressLine
+from thenar.runtime.sinks import GraspLine, HealthLine, ProgressLine
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 TYPES = ("cup", "pen", "rod")
@@ -91,7 +91,7 @@ def record(
 ) -> Path:
     """Record a live run in which this is held, 10 ms a frame, on another clock or with frames that cannot be read."""
     build = Build.load(folder)
-    system = System.of(build, parse_harness(GLOVE, "glove.toml"))
+    system = LiveSystem.of(build, parse_harness(GLOVE, "glove.toml"))
     session = Session(
         thenar="0",
         switches=system.switch_names,
@@ -122,7 +122,7 @@ def demos(build: Path, tmp_path: Path) -> list[Path]:
 
 def progress_of(done: subprocess.CompletedProcess[str]) -> list[ProgressLine]:
     assert done.returncode == 0, done.stderr
-    lines = msgspec.json.Decoder(Line | HealthLine | ProgressLine).decode_lines(done.stdout.encode())
+    lines = msgspec.json.Decoder(GraspLine | HealthLine | ProgressLine).decode_lines(done.stdout.encode())
     return [line for line in lines if isinstance(line, ProgressLine)]
 
 
@@ -240,7 +240,7 @@ def test_a_live_glove_reports_task_steps_to_view_and_sinks(
             pass
         assert glove.follower is not None
         assert glove.follower.progress.text == "task is done"
-    sent = msgspec.json.Decoder(Line | HealthLine | ProgressLine).decode_lines(lines.read_bytes())
+    sent = msgspec.json.Decoder(GraspLine | HealthLine | ProgressLine).decode_lines(lines.read_bytes())
     news = [line for line in sent if isinstance(line, ProgressLine)]
     assert [(each.step, each.grasp) for each in news if each.grasp != "none"] == [(1, "cup"), (2, "pen"), (3, "rod")]
     assert msgspec.structs.asdict(news[-1]) == msgspec.structs.asdict(glove.follower.progress)

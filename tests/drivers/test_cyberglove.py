@@ -14,8 +14,7 @@ import pytest
 
 from thenar.drivers.cyberglove import CyberGlove
 from thenar.drivers.cyberglove_protocol import MASK_18, MASK_22, SENSORS_18, SENSORS_22, Record, mask_of
-from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
+from thenar.drivers.emulated.cyberglove import CyberGloveBox, Doubts, EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.serial_line import SerialLine
@@ -61,13 +60,12 @@ def test_a_glove_is_found_and_read(line: PtyLine, sensors: int, mode: str) -> No
 
 
 @pytest.mark.parametrize("doubts", DOUBTS, ids=str)
-@pytest.mark.parametrize("status", [False, True])
-def test_whichever_of_the_doubtful_is_true_the_glove_is_read(line: PtyLine, doubts: Doubts, status: bool) -> None:
-    with EmulatedCyberGlove(line, doubts=doubts) as emulated, CyberGlove(str(line.link), status=status) as glove:
+def test_whichever_of_the_doubtful_is_true_the_glove_is_read(line: PtyLine, doubts: Doubts) -> None:
+    with EmulatedCyberGlove(line, doubts=doubts) as emulated, CyberGlove(str(line.link)) as glove:
         emulated.set(VALUES[18])
-        assert read(glove, lambda record: record.sensors == VALUES[18]).status == (0x81 if status else None)
-        assert glove.ask("U") == bytes([status])
-        assert glove.counts.resyncs == 0
+        assert read(glove, lambda record: record.sensors == VALUES[18]).status == 0x81
+        assert glove.ask("U") == b"\1"
+        assert glove.counts.wrong_start + glove.counts.wrong_length == 0
 
 
 def test_every_query_of_the_box_can_be_asked_while_it_streams(line: PtyLine) -> None:
@@ -80,7 +78,7 @@ def test_every_query_of_the_box_can_be_asked_while_it_streams(line: PtyLine) -> 
         with pytest.raises(SettingError, match=r"no query \?Z"):
             glove.ask("Z")
         assert read(glove)
-        assert glove.counts.resyncs == 0
+        assert glove.counts.wrong_start + glove.counts.wrong_length == 0
 
 
 def test_times_are_when_records_came_and_no_later_than_now(line: PtyLine) -> None:
@@ -147,26 +145,13 @@ def test_a_lost_poll_is_asked_again(line: PtyLine) -> None:
         assert emulated.records == 3
 
 
-def test_light_and_switch(line: PtyLine) -> None:
-    with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link)) as glove:
-        seen = []
-        for on in (True, False):
-            glove.light(on)
-            seen.append((emulated.state.is_on("L"), read(glove).status))
-        assert seen == [(True, 0x85), (False, 0x81)]
-        for on in (False, True):
-            emulated.state.turn_switch(on)
-            assert glove.switch() == on
-        assert read(glove).status == 0x87
-
-
 def test_a_glove_that_is_unplugged_and_plugged_in_again_says_so(line: PtyLine) -> None:
     with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link)) as glove:
-        emulated.state.plugged = False
+        emulated.box.plugged = False
         assert read(glove, lambda record: record.fault is not None) == Record(
             bytes([100] * 18), True, "unplugged", 0x80
         )
-        emulated.state.plugged = True
+        emulated.box.plugged = True
         read(glove, lambda record: record.fault is None)
         assert glove.counts.unplugged >= 1
 
@@ -196,12 +181,12 @@ def test_a_box_that_is_not_ready_yet_is_waited_for(line: PtyLine, not_ready: int
 
 def test_a_box_that_never_is_ready_is_read_with_a_note(line: PtyLine) -> None:
     with EmulatedCyberGlove(line) as emulated:
-        emulated.state.plugged = False
+        emulated.box.plugged = False
         glove = CyberGlove(str(line.link))
         (note,) = glove.open().notes
         assert "?G returns 1, not 3" in note
         assert read(glove).fault == "unplugged"
-        emulated.state.plugged = True
+        emulated.box.plugged = True
         assert read(glove, lambda record: record.fault is None)
         glove.close()
 
@@ -216,7 +201,7 @@ def test_a_stream_left_on_is_stopped_and_set_up_anew(line: PtyLine) -> None:
         with CyberGlove(str(line.link)) as glove:
             assert read(glove).sensors == VALUES[18]
             assert glove.ask("D") == b"\0"
-            assert glove.counts.resyncs == 0
+            assert glove.counts.wrong_start + glove.counts.wrong_length == 0
 
 
 def altered(line: PtyLine, sent: bytes, heard: bytes) -> list[bytes]:
@@ -266,7 +251,7 @@ def test_a_question_within_a_record_costs_no_later_record(line: PtyLine) -> None
         assert glove.ask("G") == b"\x03"
         line.send(b"S" + VALUES[18] + b"\x81\0")
         read(glove, lambda record: record.sensors == VALUES[18])
-        assert glove.counts.resyncs == 0
+        assert glove.counts.wrong_start + glove.counts.wrong_length == 0
 
 
 def test_a_command_left_half_sent_is_overcome(line: PtyLine) -> None:
@@ -282,7 +267,7 @@ def test_garbage_at_power_up_is_overcome(line: PtyLine) -> None:
         line.send(bytes(range(256)) * 2 + b"?G?G\xff\0")
         with CyberGlove(str(line.link)) as glove:
             assert read(glove)
-            assert glove.counts.resyncs == 0
+            assert glove.counts.wrong_start + glove.counts.wrong_length == 0
 
 
 @pytest.mark.parametrize("lost", range(10))
@@ -413,7 +398,7 @@ def test_a_leftover_mask_is_removed_or_the_glove_refused(
         with CyberGlove(str(line.link)) as glove:
             assert read(glove).sensors == VALUES[18]
     with EmulatedCyberGlove(line, doubts=Doubts(mask="unknown")) as emulated:
-        emulated.state.apply("M", b"\3\0\0")
+        emulated.box.apply("M", b"\3\0\0")
         with pytest.raises(DeviceError, match="sends 2 sensors, neither 18 nor 22: another program masked some"):
             CyberGlove(str(line.link)).open()
 
@@ -432,9 +417,9 @@ def test_only_requested_sensors_are_sent_until_it_is_closed(
             assert glove.ask("M") == mask_of([names[place] for place in some])
             assert glove.counts.wrong_length == 0
         end = monotonic() + SOON_S
-        while emulated.state.settings["M"] != {18: MASK_18, 22: MASK_22}[sensors] and monotonic() < end:
+        while emulated.box.settings["M"] != {18: MASK_18, 22: MASK_22}[sensors] and monotonic() < end:
             threading.Event().wait(0.01)
-        assert emulated.state.settings["N"] == bytes([sensors])
+        assert emulated.box.settings["N"] == bytes([sensors])
 
 
 def test_a_masked_record_comes_as_much_sooner_as_the_formula_says(line: PtyLine) -> None:
@@ -475,10 +460,10 @@ def test_after_a_feigned_mask_the_box_is_read_whole(line: PtyLine) -> None:
 @pytest.mark.parametrize("wanted", [False, True])
 def test_the_filter_is_set_as_requested_and_slows_records(line: PtyLine, wanted: bool) -> None:
     with EmulatedCyberGlove(line) as emulated:
-        emulated.state.apply("F", bytes([not wanted]))
+        emulated.box.apply("F", bytes([not wanted]))
         glove = CyberGlove(str(line.link), filtered=wanted)
         assert glove.open().period_us == round(18 * (375.6 if wanted else 250) + 21 * 10e6 / 115_200)
-        assert emulated.state.is_on("F") == wanted
+        assert emulated.box.is_on("F") == wanted
         glove.close()
 
 
@@ -513,7 +498,7 @@ def test_a_box_that_is_neither_initialised_nor_has_a_glove_is_refused(line: PtyL
 @pytest.mark.parametrize("seed", range(6))
 def test_any_answers_give_a_glove_or_our_error(tmp_path: Path, seed: int) -> None:
     random = Random(seed)
-    box = CyberGloveBox(GloveState(18, 0), "CyberGlove", Doubts())
+    box = CyberGloveBox()
 
     with PtyLine(tmp_path / "glove", paced=False) as line:
 

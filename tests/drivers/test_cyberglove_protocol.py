@@ -104,7 +104,7 @@ def test_text_ends_with_cr_lf_nul() -> None:
 
 
 def test_what_the_box_does_not_have_is_refused_before_it_is_asked() -> None:
-    with pytest.raises(SettingError, match=r"no query \?Z: it has \?A, \?B"):
+    with pytest.raises(SettingError, match=r"no query \?Z: it has \?D, \?F"):
         query("Z")
     with pytest.raises(SettingError, match=r"T cannot be set to 3 bytes: .*T \(4\)"):
         setting("T", b"123")
@@ -193,7 +193,7 @@ def test_a_lost_byte_costs_one_record(values: bytes, place: int) -> None:
     encoded = encode(Record(values))
     decoder = RecordDecoder()
     assert decoder.feed(encoded[:place] + encoded[place + 1 :] + encode(OPEN_HAND)) == [OPEN_HAND]
-    assert decoder.counts.wrong_start + decoder.counts.wrong_length == decoder.counts.resyncs == 1
+    assert decoder.counts.wrong_start + decoder.counts.wrong_length == 1
 
 
 @pytest.mark.parametrize("ending", [b"es", b"eg"])

@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
+from threading import Thread
 from time import monotonic, monotonic_ns
 
 import pytest
 
-from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender, SocketLines, lines_like
+from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender, LineServer, lines_like
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.line_reader import LineReader, line_port_fault
@@ -30,8 +31,40 @@ def way(request: pytest.FixtureRequest, tool: Callable[[str], str], tmp_path: Pa
         with PtyLine(tmp_path / "port") as line:
             yield str(line.link), line.send
         return
+    if request.param.startswith("ws"):
+        with web_socket() as way:
+            yield way
+        return
     with contextlib.closing(lines_like(request.param, tmp_path / "s")) as sender:
         yield sender.port, sender.send
+
+
+@contextlib.contextmanager
+def web_socket() -> Iterator[tuple[str, Send]]:
+    """Serve a WebSocket; give its port, and a function that sends to all clients."""
+    from websockets.sync.server import ServerConnection, serve
+
+    clients = set[ServerConnection]()
+
+    def attend(client: ServerConnection) -> None:
+        clients.add(client)
+        for _ in client:  # until it goes
+            pass
+        clients.discard(client)
+
+    def send(data: bytes) -> None:
+        for client in tuple(clients):
+            with contextlib.suppress(Exception):
+                client.send(data.decode())
+
+    with serve(attend, "127.0.0.1", 0, compression=None) as server:
+        thread = Thread(target=server.serve_forever)
+        thread.start()
+        yield f"ws://127.0.0.1:{server.socket.getsockname()[1]}/", send
+        for client in tuple(clients):
+            client.close()
+        server.shutdown()
+        thread.join()
 
 
 def heard(reader: LineReader, rows: int) -> list[Row]:
@@ -175,7 +208,7 @@ def test_bytes_without_a_row_are_counted() -> None:
 def test_half_a_line_before_a_break_spoils_no_later_line(tmp_path: Path) -> None:
     with LineReader(f"unix:{tmp_path}/s") as reader:
         for last in (b"1,2\n77,", b"3,4\n"):
-            with SocketLines(tmp_path / "s") as server:
+            with LineServer(tmp_path / "s") as server:
                 reader.open()
                 while not server._clients:
                     pass

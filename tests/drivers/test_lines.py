@@ -12,8 +12,8 @@ from thenar.drivers.lines import (
     CLOCK_US,
     LONGEST,
     SEQUENCES,
+    ColumnHeader,
     Damaged,
-    Header,
     LineCounts,
     LineParser,
     Row,
@@ -111,7 +111,7 @@ def test_a_header_names_the_rows_after_it_until_the_line_begins_anew() -> None:
         Row(("ms", "thumb"), (3, 4)),
         Row(None, (5, 6, 7)),
     ]
-    assert parsed(b"ms, thumb tip") == Header(("ms", "thumb tip"))
+    assert parsed(b"ms, thumb tip") == ColumnHeader(("ms", "thumb tip"))
     assert parser.counts.misfits == 0
     assert parser.feed(b"saved,3 files\nno,more,words\n8,9\nms,thumb\n8,9\n") == 2 * [Row(("ms", "thumb"), (8, 9))]
     assert (parser.counts.misfits, parser.odd) == (2, "'no,more,words'")
@@ -194,7 +194,7 @@ def boards(draw: st.DrawFn) -> tuple[LineParser, Sent, tuple[str, ...]]:
 @given(boards())
 def test_what_a_board_prints_is_its_row(case: tuple[LineParser, Sent, tuple[str, ...]]) -> None:
     parser, sent, called = case
-    assert parsed(checked(("columns", *called)).strip()) == Header(called)
+    assert parsed(checked(("columns", *called)).strip()) == ColumnHeader(called)
     assert parser.feed(sent.line()) == [sent.row(called)]
     assert parser.feed(sent.line().replace(b"\r", b"")) == [sent.row(called)]
     assert LineParser(len(called)).feed(sent.line()) == [sent.row(None)]

@@ -22,7 +22,7 @@ from thenar.drivers.cyberglove_protocol import (
     query,
     setting,
 )
-from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
+from thenar.drivers.emulated.cyberglove import CyberGloveBox, Doubts
 
 Feed = Callable[[bytes], list[Any]]
 
@@ -166,7 +166,7 @@ def test_an_answer_is_found_behind_any_frames_that_are_not_its_own(
 
 @given(st.lists(st.binary(max_size=200) | REPLIES, max_size=20), st.builds(Doubts, st.booleans(), st.booleans()))
 def test_an_emulated_glove_takes_any_bytes_and_still_stops(chunks: list[bytes], doubts: Doubts) -> None:
-    box = CyberGloveBox(GloveState(18, 0), "CyberGlove", doubts)
+    box = CyberGloveBox(doubts=doubts)
     for chunk in chunks:
         box.feed(chunk)
         assert len(box._pending) < 600

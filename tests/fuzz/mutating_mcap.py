@@ -1,4 +1,4 @@
-"""Mutants of recordings: records changed, added and packed into chunks, with their lengths and checksums right again.
+"""Mutants of recordings: records changed and added, with their lengths and checksums right again.
 
 MCAP specification: https://mcap.dev/spec
 """
@@ -17,11 +17,9 @@ from thenar.runtime.recording.messages import decode_text, encode_bytes, encode_
 _OPENING = Struct("<BQ")
 _LENGTH = Struct("<I")
 _MESSAGE = Struct("<HIQQ")
-_CHUNK = Struct("<QQQI")
-_MESSAGE_OP, _CHUNK_OP, _METADATA_OP, _DATA_END_OP, _FOOTER_OP = 5, 6, 12, 15, 2
-# What is repeated fills no more: chunks of chunks, 500 times over, were files of 300 MB, held in memory to be written.
+_MESSAGE_OP, _METADATA_OP, _DATA_END_OP, _FOOTER_OP = 5, 12, 15, 2
+# What is repeated fills no more: it is held in memory to be written.
 _LARGEST = 2_000_000
-_COMPRESSIONS = ("", "", "", "zstd", "lz4", "bz2", "\x1b[2J", "a" * 1000)
 
 
 class Record(NamedTuple):
@@ -68,7 +66,7 @@ def joined(records: list[Record], sound: bool = True) -> bytes:
 def _change(records: list[Record], random: Random) -> None:
     at = random.randrange(len(records))
     record = records[at]
-    match random.randrange(10):
+    match random.randrange(9):
         case 0:
             records[at] = record._replace(opcode=random.choice((0, 1, 3, 4, 5, 6, 9, 12, 15, 0x7F, 0x80, 255)))
         case 1:
@@ -79,9 +77,6 @@ def _change(records: list[Record], random: Random) -> None:
             other = random.randrange(len(records))
             records[at], records[other] = records[other], record
         case 4:
-            end = min(at + random.choice((1, 3, 50)), len(records))
-            records[at:end] = [_chunk(records[at:end], random)]
-        case 5:
             records[at:at] = [record] * _times(record.content, random.choice((2, 500)))
         case _:
             records[at] = record._replace(content=_content(record, random))
@@ -159,15 +154,3 @@ def _text(content: bytes, at: int) -> tuple[bytes, int]:
 
 def _packed(text: bytes) -> bytes:
     return _LENGTH.pack(len(text)) + text
-
-
-def _chunk(records: list[Record], random: Random) -> Record:
-    """Return a chunk of these records, whose sizes, checksum and compression now and then are not what they say."""
-    inside = b"".join(_OPENING.pack(opcode, len(content)) + content for opcode, content in records)
-    inside *= _times(inside, random.choice((1, 1, 1, 1, 3, 200)))
-    size = random.choice((len(inside), len(inside), len(inside), *INTEGERS)) % 2**64
-    crc = random.choice((crc32(inside), crc32(inside), 0, 1))
-    compression = random.choice(_COMPRESSIONS).encode()
-    length = random.choice((len(inside), len(inside), len(inside), *INTEGERS)) % 2**64
-    head = _CHUNK.pack(0, random.choice((0, 2**64 - 1)), size, crc)
-    return Record(_CHUNK_OP, head + _packed(compression) + length.to_bytes(8, "little") + inside)

@@ -30,7 +30,7 @@ from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.hand import HAND_NAME, load_hand
-from thenar.runtime.live.system import System
+from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import scan_us
@@ -92,7 +92,7 @@ def _allowed(step: Callable[[Build, Path], object], build: Build, folder: Path) 
 
 
 def _live(build: Build, _folder: Path) -> None:
-    system = System.of(build, harness())
+    system = LiveSystem.of(build, harness())
     glove = GloveFrame(0, bytes(range(100, 118)), None)
     frame = SwitchFrame(0, closed=5, lost=2)
     system.recognizer().step(0, 0, frame, glove)

@@ -10,7 +10,7 @@ from material import Format
 from mutating import altered
 
 from thenar.drivers import cyberglove_protocol
-from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
+from thenar.drivers.emulated.cyberglove import CyberGloveBox
 from thenar.drivers.lines import LONGEST, LineParser, checked
 
 _RECORD = cyberglove_protocol.Record(b"S" * 18)
@@ -32,7 +32,7 @@ def _glove_says() -> list[bytes]:
 def _glove(data: bytes, _folder: Path) -> None:
     _records(data)
     _answer(data)
-    box = CyberGloveBox(GloveState(18, 0), "CyberGlove", Doubts())
+    box = CyberGloveBox()
     box.feed(data)
     assert len(box._pending) < 600
 

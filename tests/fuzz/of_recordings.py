@@ -17,12 +17,12 @@ from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.replay import replayed
-from thenar.runtime.live.system import System
+from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.recording import layout
 from thenar.runtime.recording.guide import planned, read_journal
 from thenar.runtime.recording.layout import Tail, beginning, ending, session_record
 from thenar.runtime.recording.messages import encode_bytes, encode_text, glove_bytes, switch_bytes
-from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.simulator.playing.performance import of_recording
 
 _MESSAGE = Struct("<BQHIQQ")
@@ -58,7 +58,7 @@ def _recording(session: Session, messages: Sequence[Message]) -> bytes:
 def _collected() -> bytes:
     """Return a guided collection, calibrated: two trials, the second done again, and one of the empty hand."""
     lines = tuple(SensorCalibration(name, 40, 0.0, 200, 90.0) for name in SENSORS_18)
-    tasks = tuple(Task(grasp, ("mug", "pen")) for grasp in (*GRASPS, "none"))
+    tasks = tuple(CollectionTask(grasp, ("mug", "pen")) for grasp in (*GRASPS, "none"))
     session = Session(
         thenar="0.1.0",
         switches=SWITCHES,
@@ -98,7 +98,7 @@ def recognised() -> bytes:
         harness=GLOVE_TOML,
         clock_ns=_CLOCK_NS,
     )
-    recognizer = System.of(build, harness()).recognizer()
+    recognizer = LiveSystem.of(build, harness()).recognizer()
     messages: list[Message] = []
     for number in range(4):
         time_us = 10_000 * number

@@ -3,9 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.runtime.frames import BitRemap, Newest, Pauses, SwitchFrame
+from thenar.runtime.frames import BitRemap, Newest, SwitchFrame
 
-MASKS = st.integers(0, 255)
 PAIRS = st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)), unique_by=(lambda p: p[0], lambda p: p[1]))
 
 
@@ -32,21 +31,6 @@ def test_an_older_frame_does_not_replace_a_newer_one() -> None:
     for frame in (SwitchFrame(50, 1), SwitchFrame(49, 2), SwitchFrame(50, 3)):
         newest.take(frame, 60, 200)
     assert newest.fresh(60) == SwitchFrame(50, 3)
-
-
-@given(st.lists(st.tuples(st.integers(0, 200), MASKS), max_size=40), st.integers(0, 300))
-def test_it_is_so_for_every_switch_by_itself(steps: list[tuple[int, int]], pause_us: int) -> None:
-    pauses, now = Pauses(pause_us), 0
-    gone = dict[int, int]()
-    before = 0
-    for passed, known in steps:
-        now += passed
-        gone |= {switch: now for switch in range(8) if (before & ~known) >> switch & 1}
-        back = [switch for switch in gone if known >> switch & 1]
-        assert pauses.over(now, known) == sum(1 << one for one in back if now - gone[one] > pause_us)
-        for one in back:
-            del gone[one]
-        before = known
 
 
 @given(PAIRS, st.lists(st.integers(0, 2**41 - 1)))

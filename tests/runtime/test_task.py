@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.published import LiveGrasp, State
-from thenar.runtime.task import Progress, Step, Task, TaskFollower, begun, load_task
+from thenar.runtime.task import Progress, Task, TaskFollower, TaskStep, begun, load_task
 
 TYPES = ("a", "b", "c", "d")
 
@@ -19,7 +19,7 @@ def task_of(types: str, also: dict[int, tuple[str, ...]] | None = None) -> Task:
     then = [((types[at],) if at < len(types) else ()) + (also or {}).get(at, ()) for at in range(len(types) + 1)]
     common: dict[str, Any] = {"shown": 1, "preshape": None, "joints": {}}
     common |= {"median_s": 1.0, "spread_s": 0.1, "limit_s": 2.0}
-    steps = tuple(Step(grasp=each, then=then[at], **common) for at, each in enumerate(types, 1))
+    steps = tuple(TaskStep(grasp=each, then=then[at], **common) for at, each in enumerate(types, 1))
     return Task(name="t", build="", demonstrations=("x",), preshapes=None, units={}, first=then[0], steps=steps)
 
 

@@ -1,15 +1,15 @@
 """The port expanders and converters: one file per chip, with all its data."""
 
 from ...members import Members
-from .base import Chip, Conversion, Converter, Device, Package, Reading, Write, byte_pins, port_pins
+from .base import Chip, ChipPackage, Conversion, Converter, Device, Reading, Write, byte_pins, port_pins
 
 __all__ = [
     "CHIPS",
     "Chip",
+    "ChipPackage",
     "Conversion",
     "Converter",
     "Device",
-    "Package",
     "Reading",
     "Write",
     "byte_pins",

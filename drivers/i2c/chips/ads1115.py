@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-from .base import Conversion, Converter, ConverterModel, Package, Write
+from .base import ChipPackage, Conversion, Converter, ConverterModel, Write
 
 _RESULT, _CONFIG, _LOW, _HIGH = 0, 1, 2, 3
 # One conversion: start; channel against ground; 4.096 V; power down afterwards. 860 a second; no comparator.
@@ -86,7 +86,7 @@ class Ads1115(Converter):
         for channel in range(4)
     )
     model = Ads1115Model
-    package = Package(
+    package = ChipPackage(
         part="ADS1115IDGSR",
         maker="Texas Instruments",
         symbol="ADS1115IDGS",

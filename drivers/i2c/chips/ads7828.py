@@ -1,6 +1,6 @@
 """TI ADS7828: eight channels of 12 bits against the supply, converted within the transfer that reads them (SBAS181)."""
 
-from .base import Conversion, Converter, ConverterModel, Package, Write
+from .base import ChipPackage, Conversion, Converter, ConverterModel, Write
 
 # Single-ended, converter on between conversions, internal reference off: REF is the supply.
 _SINGLE, _ON = 0x80, 0x04
@@ -55,7 +55,7 @@ class Ads7828(Converter):
     )
     registers = False
     model = Ads7828Model
-    package = Package(
+    package = ChipPackage(
         part="ADS7828E/250",
         maker="Texas Instruments",
         symbol="ADS7828",

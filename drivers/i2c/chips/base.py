@@ -123,7 +123,7 @@ class Device(ABC):
 
 
 @dataclass(frozen=True, slots=True)
-class Package:
+class ChipPackage:
     """A chip as a part to buy and to solder: part number, maker, KiCad's symbol and footprint.
 
     pins  the name of pin n of the data sheet's package at pins[n - 1], "NC" if unconnected. Inputs have the driver's
@@ -191,7 +191,7 @@ class Chip(ABC):
     registers: ClassVar[bool] = True
     pulls_up: ClassVar[bool] = True
     tried: ClassVar[bool] = True
-    package: ClassVar[Package]
+    package: ClassVar[ChipPackage]
     model: ClassVar[type[Device]]
 
     @abstractmethod

@@ -1,6 +1,6 @@
 """Microchip MCP23008: one port of eight pins, of which seven may be inputs (DS20001919)."""
 
-from .base import Chip, Package, Reading, Write, byte_pins
+from .base import Chip, ChipPackage, Reading, Write, byte_pins
 from .mcp23017 import NOT_AN_INPUT, OPEN_DRAIN, Mcp230xxModel
 
 _IODIR, _IOCON, _GPIO, _OLAT = 0x00, 0x05, 0x09, 0x0A
@@ -24,7 +24,7 @@ class Mcp23008(Chip):
     not_inputs = {"GP7": NOT_AN_INPUT}  # noqa: RUF012
     readings = (Reading("GPIO", bytes((_GPIO,)), byte_pins(0), high=0x80),)
     model = Mcp23008Model
-    package = Package(
+    package = ChipPackage(
         part="MCP23008-E/SO",
         maker="Microchip",
         symbol="MCP23008-xSO",

@@ -1,6 +1,6 @@
 """Microchip MCP23017: two ports of eight pins, of which seven each may be inputs (DS20001952, BANK = 0)."""
 
-from .base import Chip, Device, Package, Reading, Write, byte_pins
+from .base import Chip, ChipPackage, Device, Reading, Write, byte_pins
 
 _IODIRA, _IOCON, _GPIOA, _GPIOB = 0x00, 0x0A, 0x12, 0x13
 _IOCON_OF_BANK_1 = 0x05
@@ -104,7 +104,7 @@ class Mcp23017(Chip):
         Reading("AB", bytes((_GPIOA,)), byte_pins(0, 1), high=0x8080),
     )
     model = Mcp23017Model
-    package = Package(
+    package = ChipPackage(
         part="MCP23017-E/SO",
         maker="Microchip",
         symbol="MCP23017_SO",

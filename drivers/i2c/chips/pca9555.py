@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from typing import ClassVar
 
-from .base import TSSOP24, Chip, Device, Package, Reading, Write, byte_pins, pins_of_24, port_pins
+from .base import TSSOP24, Chip, ChipPackage, Device, Reading, Write, byte_pins, pins_of_24, port_pins
 
 _INPUT_0, _INPUT_1, _OUTPUT, _POLARITY, _CONFIGURATION = 0, 1, 2, 4, 6
 
@@ -85,7 +85,7 @@ class Pca9555(Chip):
         Reading("01", bytes((_INPUT_0,)), byte_pins(0, 1)),
     )
     model = Pca9555Model
-    package = Package("PCA9555PW,118", "NXP", "PCA9555PW", TSSOP24, pins_of_24("VSS", "VDD"))
+    package = ChipPackage("PCA9555PW,118", "NXP", "PCA9555PW", TSSOP24, pins_of_24("VSS", "VDD"))
 
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
         """Return the writes that make all pins inputs, read as they are.
@@ -105,7 +105,7 @@ class Tca9555(Pca9555):
     name = "tca9555"
     rank = 7
     tried = False
-    package = Package("TCA9555PWR", "Texas Instruments", "TCA9555PWR", TSSOP24, pins_of_24("GND", "VCC"))
+    package = ChipPackage("TCA9555PWR", "Texas Instruments", "TCA9555PWR", TSSOP24, pins_of_24("GND", "VCC"))
 
 
 MEMBER = Pca9555(), Tca9555()

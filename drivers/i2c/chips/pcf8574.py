@@ -1,6 +1,6 @@
 """NXP and TI PCF8574 and PCF8574A: eight quasi-bidirectional pins, no registers, different addresses."""
 
-from .base import Chip, Device, Package, Reading, Write, byte_pins
+from .base import Chip, ChipPackage, Device, Reading, Write, byte_pins
 
 _SOIC16 = "Package_SO:SOIC-16W_7.5x10.3mm_P1.27mm"
 _PINS = ("A0", "A1", "A2", "P0", "P1", "P2", "P3", "VSS", "P4", "P5", "P6", "P7", "INT", "SCL", "SDA", "VDD")
@@ -46,7 +46,7 @@ class Pcf8574(Chip):
     readings = (Reading("P", b"", byte_pins(0)),)
     registers = False
     model = Pcf8574Model
-    package = Package("PCF8574T/3,518", "NXP", "PCF8574", _SOIC16, _PINS, sure=False, note=_DOUBT)
+    package = ChipPackage("PCF8574T/3,518", "NXP", "PCF8574", _SOIC16, _PINS, sure=False, note=_DOUBT)
 
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
         """Return the writes that release all pins.
@@ -65,7 +65,7 @@ class Pcf8574a(Pcf8574):
     name = "pcf8574a"
     rank = 5
     addresses = range(0x38, 0x40)
-    package = Package("PCF8574AT/3,518", "NXP", "PCF8574A", _SOIC16, _PINS, sure=False, note=_DOUBT)
+    package = ChipPackage("PCF8574AT/3,518", "NXP", "PCF8574A", _SOIC16, _PINS, sure=False, note=_DOUBT)
 
 
 MEMBER = Pcf8574(), Pcf8574a()

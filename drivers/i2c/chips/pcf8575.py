@@ -1,6 +1,6 @@
 """NXP and TI PCF8575: sixteen quasi-bidirectional pins and no registers."""
 
-from .base import TSSOP24, Chip, Device, Package, Reading, Write, byte_pins, pins_of_24, port_pins
+from .base import TSSOP24, Chip, ChipPackage, Device, Reading, Write, byte_pins, pins_of_24, port_pins
 
 
 class Pcf8575Model(Device):
@@ -42,7 +42,7 @@ class Pcf8575(Chip):
     readings = (Reading("P", b"", byte_pins(0, 1)),)
     registers = False
     model = Pcf8575Model
-    package = Package(
+    package = ChipPackage(
         part="PCF8575PWR",
         maker="Texas Instruments",
         symbol="PCF8575",

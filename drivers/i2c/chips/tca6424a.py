@@ -1,6 +1,6 @@
 """TI TCA6424A: three ports of eight pins without pull-ups; registers in groups of three."""
 
-from .base import Chip, Package, Reading, Write, byte_pins, port_pins
+from .base import Chip, ChipPackage, Reading, Write, byte_pins, port_pins
 from .pca9555 import BankedModel
 
 _INPUT, _OUTPUT, _POLARITY, _CONFIGURATION = 0x00, 0x04, 0x08, 0x0C
@@ -37,7 +37,7 @@ class Tca6424a(Chip):
     )
     pulls_up = False
     model = Tca6424aModel
-    package = Package(
+    package = ChipPackage(
         part="TCA6424ARGJR",
         maker="Texas Instruments",
         symbol="TCA6424A",

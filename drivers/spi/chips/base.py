@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ...i2c.chips.base import Package, Reading
+from ...i2c.chips.base import ChipPackage, Reading
 
 _BITS = 8
 # The time that chip select must be high between two transfers (MCP3208: 500 ns, MCP3008: 270 ns).
@@ -62,7 +62,7 @@ class SpiChip(ABC):
     most_hz: ClassVar[int]
     pins: ClassVar[tuple[str, ...]]
     bits: ClassVar[int]
-    package: ClassVar[Package]
+    package: ClassVar[ChipPackage]
     model: ClassVar[type[SpiModel]]
 
     @abstractmethod

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from ...i2c.chips.base import Package
+from ...i2c.chips.base import ChipPackage
 from .base import SpiChip, SpiModel
 
 _SOIC16 = "Package_SO:SOIC-16_3.9x9.9mm_P1.27mm"
@@ -43,7 +43,7 @@ class Mcp3208(SpiChip):
     pins = tuple(f"CH{channel}" for channel in range(8))
     bits = 12
     model: ClassVar[type[SpiModel]] = Mcp3208Model
-    package = Package(
+    package = ChipPackage(
         part="MCP3208-CI/SL",
         maker="Microchip",
         symbol="MCP3208",
@@ -66,7 +66,7 @@ class Mcp3204(Mcp3208):
     rank = 2
     pins = tuple(f"CH{channel}" for channel in range(4))
     model = Mcp3204Model
-    package = Package(
+    package = ChipPackage(
         part="MCP3204-CI/SL",
         maker="Microchip",
         symbol="MCP3204",

@@ -16,7 +16,7 @@ from thenar.compiler.evaluation.sofar import (
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
 
 
@@ -111,7 +111,7 @@ def test_one_type_alone_is_taken_for_nothing_else() -> None:
 
 
 def test_a_recording_is_read_while_it_is_written(tmp_path: Path) -> None:
-    tasks = (Task("cup", ("mug",)), Task("pen", ("biro",)))
+    tasks = (CollectionTask("cup", ("mug",)), CollectionTask("pen", ("biro",)))
     collection = Collection("A", "own", ("cup", "pen"), tasks, 3, 0)
     session = Session(thenar="1", switches=("a", "b"), sensors=("j",), collection=collection)
     path = tmp_path / "a.mcap"

@@ -8,16 +8,15 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from struct import pack
-from zlib import crc32
 
 import msgspec
 import pytest
 from msgspec.structs import replace
 
 from thenar.runtime.published import LiveGrasp
-from thenar.runtime.recording.layout import GLOVE, LARGEST_RECORD, RECOGNITION, SWITCHES, TRIALS, beginning
+from thenar.runtime.recording.layout import LARGEST_RECORD, RECOGNITION, SWITCHES, TRIALS, beginning
 from thenar.runtime.recording.messages import encode_bytes, encode_text
-from thenar.runtime.recording.session import Collection, Label, Session, Task, to_metadata
+from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session, to_metadata
 
 READ = """
 import re, sys
@@ -42,7 +41,9 @@ print(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1
 print(calls)
 """
 
-COLLECTION = Collection("A", "own", ("cup", "pen"), (Task("cup", ("mug",)), Task("pen", ("biro",))), 1, 0)
+COLLECTION = Collection(
+    "A", "own", ("cup", "pen"), (CollectionTask("cup", ("mug",)), CollectionTask("pen", ("biro",))), 1, 0
+)
 SESSION = Session(thenar="1", switches=("s1", "s2"), sensors=(), collection=COLLECTION)
 GRASP = LiveGrasp(1, 1, 0, "cup", "cup", 1.0, 1, "ok", 1, 1, 1)
 LABEL = Label(1, "captured", 1, "cup", "A", "mug")
@@ -71,10 +72,6 @@ def label(**changed: object) -> bytes:
     return message(TRIALS, encode_text(JSON(replace(LABEL, **changed))))
 
 
-def chunk(inner: bytes) -> bytes:
-    return record(6, pack("<QQQIIQ", 0, 0, len(inner), crc32(inner), 0, len(inner)) + inner)
-
-
 def long_list_in_a_message() -> Iterator[bytes]:
     yield described(SESSION)
     text = JSON(GRASP).replace(b'"lost":[]', b'"lost":["ab"' + b',"ab"' * (LARGEST_RECORD // 5 - 100) + b"]")
@@ -85,7 +82,6 @@ def message_beyond_the_longest() -> Iterator[bytes]:
     yield described(SESSION)
     text = JSON(GRASP).replace(b'"lost":[]', b'"lost":["ab"' + b',"ab"' * (2 * LARGEST_RECORD // 5) + b"]")
     yield message(RECOGNITION, encode_text(text))
-    yield chunk(message(RECOGNITION, encode_text(text)))
 
 
 def long_list_in_a_session() -> Iterator[bytes]:
@@ -97,11 +93,6 @@ def tasks_without_end() -> Iterator[bytes]:
     collection = JSON(COLLECTION).decode().partition('"tasks":')[0]
     tasks = ",".join([task] * (LARGEST_RECORD // 31))
     yield described(SESSION, collection=f'{collection}"tasks":[{tasks}],"repetitions":1000000,"seed":1}}')
-
-
-def chunk_of_small_messages() -> Iterator[bytes]:
-    yield described(replace(SESSION, switches=()))
-    yield chunk(message(GLOVE, encode_bytes(b"")) * 300_000)
 
 
 def trials_of_one_wide_frame() -> Iterator[bytes]:
@@ -132,7 +123,6 @@ def sessions_without_end() -> Iterator[bytes]:
         message_beyond_the_longest,
         long_list_in_a_session,
         tasks_without_end,
-        chunk_of_small_messages,
         trials_of_one_wide_frame,
         trials_beside_one_long_name,
         sessions_without_end,

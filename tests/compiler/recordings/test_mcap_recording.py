@@ -16,7 +16,7 @@ from thenar.runtime.calibration import CodeTables
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.manifest import Calibration, Threshold
 from thenar.runtime.recording.guide import read_journal
-from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine, Taxels, count_limit
 
@@ -26,7 +26,12 @@ CALIBRATION = GloveCalibration(
     sensors=tuple(SensorCalibration(name, 50, 0.0, 150, 61.3) for name in SENSORS),
 )
 COLLECTION = Collection(
-    "A", "kamakura14", KAMAKURA_14.types, (Task("PoS", ("jar",)), Task("Tip", ("pin",))), repetitions=3, seed=0
+    "A",
+    "kamakura14",
+    KAMAKURA_14.types,
+    (CollectionTask("PoS", ("jar",)), CollectionTask("Tip", ("pin",))),
+    repetitions=3,
+    seed=0,
 )
 SESSION = Session(thenar="1", switches=("s1", "s2", "s3"), sensors=SENSORS, collection=COLLECTION)
 

@@ -10,15 +10,17 @@ from thenar.compiler.recordings.mcap_recording import import_files, import_recor
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14, MOVEMENTS, collected
 from thenar.runtime.errors import McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.recording.guide import MOVING_US, Guide, Key, Stage, planned, read_journal
+from thenar.runtime.recording.guide import MOVING_US, CollectionGuide, Key, Stage, planned, read_journal
 from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
 
 SENSORS = tuple(f"j{number}" for number in range(4))
 START_US, COUNTDOWN_US, TICK_US = 1_000_000, 2_000_000, 5_000
-GRASPS = (Task("PoS", ("jar",)), Task("Tip", ("pin",)))
-COLLECTION = Collection("A", "kamakura14", KAMAKURA_14.types, (*GRASPS, Task("none", tuple(MOVEMENTS)[:2])), 2, 3)
+GRASPS = (CollectionTask("PoS", ("jar",)), CollectionTask("Tip", ("pin",)))
+COLLECTION = Collection(
+    "A", "kamakura14", KAMAKURA_14.types, (*GRASPS, CollectionTask("none", tuple(MOVEMENTS)[:2])), 2, 3
+)
 SESSION = Session(thenar="1", switches=("s1", "s2", "s3"), sensors=SENSORS, collection=COLLECTION)
 POSES: dict[str, tuple[int, tuple[float, ...]]] = {
     "PoS": (0b011, (180, 170, 160, 150)),
@@ -31,7 +33,7 @@ class Wearer:
     """A hand that does what it is asked for: closes a second after a trial has begun, opens when it was judged."""
 
     def __init__(self, recorder: Recorder, redo: int = 0, undo: int = 0) -> None:
-        self.guide = Guide(planned(recorder.session.collection or COLLECTION), recorder, COUNTDOWN_US)
+        self.guide = CollectionGuide(planned(recorder.session.collection or COLLECTION), recorder, COUNTDOWN_US)
         self.truth: list[tuple[int, str, int]] = []  # when which grasp closed and opened: time, type, trial
         self._redo, self._undo, self._at, self._goal, self._closed = redo, undo, OPEN.copy(), OPEN, 0
         self._random = np.random.default_rng(4)
@@ -198,10 +200,14 @@ def test_a_stream_longer_than_its_file_can_have_recorded_is_refused(
 def test_the_empty_hand_is_collected_where_it_is_asked_for(tmp_path: Path) -> None:
     types, tasks = collected("kamakura14", None, none=True)
     assert types == KAMAKURA_14
-    assert (len(tasks), tasks[-1]) == (15, Task("none", tuple(MOVEMENTS)))
+    assert (len(tasks), tasks[-1]) == (15, CollectionTask("none", tuple(MOVEMENTS)))
     objects = tmp_path / "objects.toml"
     objects.write_text('cup = ["mug"]\nNone = ["wave"]\npen = ["biro"]\n', encoding="utf-8")
     types, tasks = collected("own", objects, none=True)
     assert types.types == ("cup", "pen")
-    assert tasks == (Task("cup", ("mug",)), Task("pen", ("biro",)), Task("none", ("wave",)))
+    assert tasks == (
+        CollectionTask("cup", ("mug",)),
+        CollectionTask("pen", ("biro",)),
+        CollectionTask("none", ("wave",)),
+    )
     assert collected("own", objects)[1] == tasks[:2]

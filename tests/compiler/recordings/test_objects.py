@@ -4,7 +4,7 @@ import pytest
 
 from thenar.compiler.recordings.errors import ColumnsError, RecordingError
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14, collected
-from thenar.runtime.recording.session import Task
+from thenar.runtime.recording.session import CollectionTask
 
 
 @pytest.fixture
@@ -15,14 +15,14 @@ def file(tmp_path: Path) -> Path:
 def test_without_a_list_every_type_is_collected_with_any_object() -> None:
     taxonomy, tasks = collected("kamakura14", None)
     assert taxonomy == KAMAKURA_14
-    assert tasks == tuple(Task(grasp, ("any",)) for grasp in KAMAKURA_14.types)
+    assert tasks == tuple(CollectionTask(grasp, ("any",)) for grasp in KAMAKURA_14.types)
 
 
 def test_a_list_says_which_types_and_with_what(file: Path) -> None:
     file.write_text('pos = ["bottle", "jar"]\n"tip grip" = ["pin"]\n')
     taxonomy, tasks = collected("kamakura14", file)
     assert taxonomy == KAMAKURA_14
-    assert tasks == (Task("PoS", ("bottle", "jar")), Task("Tip", ("pin",)))
+    assert tasks == (CollectionTask("PoS", ("bottle", "jar")), CollectionTask("Tip", ("pin",)))
 
 
 def test_a_taxonomy_of_ones_own_is_what_the_list_names(file: Path) -> None:

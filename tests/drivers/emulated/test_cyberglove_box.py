@@ -13,16 +13,16 @@ from thenar.drivers.cyberglove_protocol import (
     query,
     setting,
 )
-from thenar.drivers.emulated.cyberglove_box import Action, CyberGloveBox, Doubts, GloveState
+from thenar.drivers.emulated.cyberglove import CyberGloveBox, Doubts
 from thenar.drivers.errors import SettingError
 
 VALUES = bytes(range(60, 78))
 
 
 def box(sensors: int = 18, doubts: Doubts | None = None, not_ready: int = 0) -> CyberGloveBox:
-    state = GloveState(sensors, not_ready)
-    state.set(bytes(range(60, 60 + sensors)))
-    return CyberGloveBox(state, "CyberGlove", doubts or Doubts())
+    made = CyberGloveBox(sensors, "CyberGlove", not_ready, doubts)
+    made.set(bytes(range(60, 60 + sensors)))
+    return made
 
 
 @pytest.mark.parametrize(
@@ -32,37 +32,16 @@ def box(sensors: int = 18, doubts: Doubts | None = None, not_ready: int = 0) -> 
         (b"?S", b"?S\x12\0"),
         (b"?N", b"?N\x12\0"),
         (b"?M", b"?M\x3f\xbb\x7b\0"),
-        (b"?K", b"?K\x3f\xbb\x7b\0"),
         (b"?R", b"?R\x01\0"),
         (b"?U", b"?U\0\0"),
         (b"?T", b"?T\0\0\0\0\0"),
-        (b"?P", b"?P\x01\xc8\0\0"),
-        (b"?V", b"?V\x02\x04\0\x01\0"),
-        (b"?C", b"?C" + b"\x40" * 18 + b"\x80" * 18 + b"\0"),
         (b"?i", b"?iCyberGlove\r\n\0"),
-        (b"?g", b"?g 3\r\n\0"),
-        (b"?m", b"?m 63 187 123\r\n\0"),
         (b"T\x04\x80\0\x01?T", b"T\0?T\x04\x80\0\x01\0"),
-        (b"t 1152 1\r?t", b"t\r\n\0?t 1152 1\r\n\0"),
-        (b"T\x04\x80\0\x01?t", b"T\0?t 1152 1\r\n\0"),
         (b"U\x01?U", b"U\0?U\x01\0"),
-        (b"u 1\r\n?U", b"u\r\n\0?U\x01\0"),
         (b"F\0", b"F\0"),
-        (b"W\x01?W?L", b"W\0?W\x01\0?L\x01\0"),
-        (b"J\0W\x01?W?L", b"J\0W\0?W\x01\0?L\0\0"),
-        (b"A\xff123456", b"A\0"),
-        (b"A\x020a1b", b"A\0"),
-        (b"CO1a", b"C\0"),
-        (b"CA" + bytes(36), b"C\0"),
-        (b"\x09", b"\x09\r\n\0"),
         (b"\x03", b""),
         (b"U\x02", b"Uen\0"),
         (b"N\0", b"Nen\0"),
-        (b"u 2\r", b"uen\0"),
-        (b"t 1152\r", b"ten\0"),
-        (b"t 65536 1\r", b"ten\0"),
-        (b"u x\r", b"uen\0"),
-        (b"z 1\r", b"ze?\0"),
         (b"Z", b"Ze?\0"),
         (b"?Z", b"?Ze?\0"),
         (b"?I", b"?Ie?\0"),
@@ -75,8 +54,8 @@ def test_a_command_is_answered_as_the_drivers_of_real_gloves_expect(sent: bytes,
 
 
 def test_a_glove_of_22_sensors_says_so() -> None:
-    out = box(22).feed(b"?S?N?M?K")
-    assert out == [b"?S\x16\0", b"?N\x16\0", b"?M" + MASK_22 + b"\0", b"?K" + MASK_22 + b"\0"]
+    out = box(22).feed(b"?S?N?M")
+    assert out == [b"?S\x16\0", b"?N\x16\0", b"?M" + MASK_22 + b"\0"]
     with pytest.raises(SettingError, match="18 and of 22 sensors, not of 20"):
         box(20)
 
@@ -98,7 +77,7 @@ def test_the_doubtful_can_be_had_either_way() -> None:
 def test_the_box_is_ready_after_its_given_refusals() -> None:
     one = box(not_ready=2)
     assert one.feed(b"?G?G?G") == [b"?G\x01\0", b"?G\x01\0", b"?G\x03\0"]
-    one.state.plugged = False
+    one.plugged = False
     assert one.feed(b"?G") == [b"?G\x01\0"]
 
 
@@ -110,36 +89,28 @@ def test_while_it_streams_it_hears_nothing_but_a_ctrl_c() -> None:
     assert not one.streaming
 
 
-def test_records_are_asked_for_in_both_dialects() -> None:
+def test_a_requested_record_is_made_when_its_time_has_passed() -> None:
     one = box()
-    assert one.feed(b"GgG") == [Action.POLLED, Action.POLLED_AS_TEXT, Action.POLLED]
-    assert one.state.record(streamed=False) == b"G" + VALUES + b"\0"
-    assert one.state.record(streamed=True) == b"S" + VALUES + b"\0"
-    assert one.polled_as_text() == b"g " + b" ".join(b"%d" % value for value in VALUES) + b"\r\n\0"
+    assert one.feed(b"GG?U") == [None, None, b"?U\0\0"]
+    assert one.record(streamed=False) == b"G" + VALUES + b"\0"
+    assert one.record(streamed=True) == b"S" + VALUES + b"\0"
 
 
-def test_a_restart_forgets_all_settings() -> None:
+def test_status_stands_between_sensors_and_fault() -> None:
     one = box()
-    assert one.feed(b"U\x01\x12?U") == [b"U\0", Action.RESTARTED, b"\x12\r\n\0", b"?U\0\0"]
-
-
-@pytest.mark.parametrize(("ticks", "stamp"), [(0x01020304, b"\0\4\3\2\1"), (0x00FF0000, b"\x0b\1\1\xff\1")])
-def test_stamp_and_status_stand_between_sensors_and_fault(ticks: int, stamp: bytes) -> None:
-    one = box()
-    one.feed(b"D\x01U\x01")
-    assert one.state.record(streamed=True, ticks=ticks) == b"S" + VALUES + stamp + b"\x81\0"
-    one.state.turn_switch(True)
-    assert one.state.record(streamed=True, too_fast=True, ticks=ticks) == b"S" + VALUES + stamp + b"\x87es\0"
-    one.state.plugged = False
-    assert one.state.record(streamed=True, too_fast=True, ticks=ticks) == b"S" + VALUES + stamp + b"\x86eg\0"
+    one.feed(b"U\x01")
+    assert one.record(streamed=True) == b"S" + VALUES + b"\x81\0"
+    assert one.record(streamed=True, too_fast=True) == b"S" + VALUES + b"\x81es\0"
+    one.plugged = False
+    assert one.record(streamed=True, too_fast=True) == b"S" + VALUES + b"\x80eg\0"
 
 
 def test_a_mask_takes_sensors_out_of_the_records() -> None:
     one = box()
     assert one.feed(b"M\x03\0\0?N") == [b"M\0", b"?N\x02\0"]
-    assert one.state.record(streamed=True) == b"S" + VALUES[:2] + b"\0"
+    assert one.record(streamed=True) == b"S" + VALUES[:2] + b"\0"
     assert one.feed(b"M" + MASK_18 + b"N\x05") == [b"M\0", b"N\0"]
-    assert one.state.record(streamed=True) == b"S" + VALUES[:5] + b"\0"
+    assert one.record(streamed=True) == b"S" + VALUES[:5] + b"\0"
     assert one.feed(b"N\x13") == [b"Nen\0"]
 
 
@@ -149,10 +120,10 @@ def test_only_possible_sensor_bytes_are_accepted_and_read(values: bytes, status:
     one.feed(setting("U", bytes([status])).request)
     if 0 in values:
         with pytest.raises(SettingError, match="bytes of 1 to 255"):
-            one.state.set(values)
+            one.set(values)
         return
-    one.state.set(values)
-    (record,) = RecordDecoder(status=status).feed(one.state.record(streamed=True))
+    one.set(values)
+    (record,) = RecordDecoder(status=status).feed(one.record(streamed=True))
     assert record.sensors == values
     assert (record.status is not None) == status
 

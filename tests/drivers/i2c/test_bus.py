@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, Port, PortRead, cut
+from thenar.drivers.i2c.bus import ChipAt, I2cBus, PlacedPort, PortRead, cut
 from thenar.drivers.i2c.chips import CHIPS, Reading
 from thenar.drivers.i2c.node import MOST_MESSAGES, BatchMode, Query
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
@@ -192,7 +192,7 @@ MEMBERS = [
 ]
 ports = st.lists(
     st.builds(
-        lambda member, command: Port(member, Query(member.address, command, 1), Reading("", command, ())),
+        lambda member, command: PlacedPort(member, Query(member.address, command, 1), Reading("", command, ())),
         st.sampled_from(MEMBERS),
         st.sampled_from([b"", b"\x12"]),
     ),
@@ -202,18 +202,18 @@ ports = st.lists(
 
 @pytest.mark.parametrize("way", BatchMode)
 @given(ports=ports)
-def test_groups_hold_each_present_port_once_in_order(way: BatchMode, ports: list[Port]) -> None:
-    numbers = [number for group in cut(ports, way) for number, _ in group.ports]
+def test_groups_hold_each_present_port_once_in_order(way: BatchMode, ports: list[PlacedPort]) -> None:
+    numbers = [number for _, group in cut(ports, way) for number, _ in group]
     assert numbers == [number for number, port in enumerate(ports) if port.member.present]
-    assert all(ports[number] is port for group in cut(ports, way) for number, port in group.ports)
+    assert all(ports[number] is port for _, group in cut(ports, way) for number, port in group)
 
 
 @pytest.mark.parametrize("way", BatchMode)
 @given(ports=ports)
-def test_no_group_asks_more_than_its_way_allows(way: BatchMode, ports: list[Port]) -> None:
-    for group in cut(ports, way):
-        members = {id(port.member) for _, port in group.ports}
-        assert {port.member.route for _, port in group.ports} == {group.route}
-        assert sum(port.query.messages for _, port in group.ports) <= MOST_MESSAGES
+def test_no_group_asks_more_than_its_way_allows(way: BatchMode, ports: list[PlacedPort]) -> None:
+    for route, group in cut(ports, way):
+        members = {id(port.member) for _, port in group}
+        assert {port.member.route for _, port in group} == {route}
+        assert sum(port.query.messages for _, port in group) <= MOST_MESSAGES
         assert len(members) == 1 or way is BatchMode.CHANNEL
-        assert len(group.ports) == 1 or way in (BatchMode.CHANNEL, BatchMode.CHIP)
+        assert len(group) == 1 or way in (BatchMode.CHANNEL, BatchMode.CHIP)

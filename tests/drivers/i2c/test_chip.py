@@ -2,7 +2,7 @@ import pytest
 
 from thenar.drivers.errors import SettingError
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.chips import CHIPS, Conversion, Package, Write, expanders
+from thenar.drivers.i2c.chips import CHIPS, ChipPackage, Conversion, Write, expanders
 from thenar.drivers.i2c.chips.base import GROUND, SUPPLY
 
 # Bytes on the wire and SCL periods of one read of all pins, as the data sheets draw them.
@@ -108,7 +108,7 @@ def test_every_chips_package_has_its_drivers_pins_supply_and_bus(kind: str) -> N
     ],
     ids=[*STRAPPED, "tca9548a"],
 )
-def test_the_straps_of_an_address_are_its_lowest_bits(package: Package, addresses: range) -> None:
+def test_the_straps_of_an_address_are_its_lowest_bits(package: ChipPackage, addresses: range) -> None:
     for address in addresses:
         straps = package.selects(address - min(addresses))
         assert sum(1 << bit for bit, (_, to) in enumerate(straps) if to == "high") == address - min(addresses)

@@ -11,7 +11,7 @@ from thenar.drivers.i2c import bus as module
 from thenar.drivers.i2c import supervisor
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
 from thenar.drivers.i2c.chips import CHIPS
-from thenar.drivers.i2c.node import BatchMode, Node, Query, Run
+from thenar.drivers.i2c.node import BatchMode, DeviceNode, Query, Run
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.scanmap import Port
@@ -46,7 +46,7 @@ class World:
             self.now += wire.duration_s(wire.scl_periods - before[0], wire.transfers - before[1])
 
 
-class WorldNode(Node):
+class WorldNode(DeviceNode):
     world: World
 
     @property
@@ -79,7 +79,7 @@ class WorldNode(Node):
 
 def opened(monkeypatch: pytest.MonkeyPatch, world: World, places: Sequence[Place]) -> I2cBus:
     WorldNode.world = world
-    monkeypatch.setattr(module, "Node", WorldNode)
+    monkeypatch.setattr(module, "DeviceNode", WorldNode)
     for each in (module, supervisor):
         monkeypatch.setattr(each, "monotonic", world.clock)
     monkeypatch.setattr(module, "sleep", world.sleep)

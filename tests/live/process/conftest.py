@@ -19,10 +19,10 @@ from thenar.drivers.emulated.i2c import WireCounters
 from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.sinks.jsonl import HealthLine, Line
+from thenar.runtime.sinks.jsonl import GraspLine, HealthLine
 from thenar.simulator.playing.bench import Bench
 
-_line = msgspec.json.Decoder(Line | HealthLine)
+_line = msgspec.json.Decoder(GraspLine | HealthLine)
 ENDING_S = 20.0
 
 
@@ -49,7 +49,7 @@ class Client:
             if not text.endswith(b"\n"):  # killed amid a line
                 return
             line = _line.decode(text)
-            if isinstance(line, Line):
+            if isinstance(line, GraspLine):
                 self._scene.grasps.add(line)
             else:
                 self.reports.append(line)

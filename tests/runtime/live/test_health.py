@@ -8,6 +8,7 @@ from msgspec.structs import replace as changed
 from thenar.runtime import Build
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.live.health import Health, on_shares, patience
+from thenar.runtime.live.quarantine import Chattering, JointDrift, Quarantine
 from thenar.runtime.published import UNKNOWN, Count, DeviceHealth, Drift, HealthReport, LiveGrasp
 
 MakeBuild = Callable[..., Build]
@@ -24,6 +25,10 @@ def build(make_build: MakeBuild) -> Build:
         changed(switch, closed_share=share) for switch, share in zip(made.manifest.switches, SHARES, strict=True)
     )
     return Build(changed(made.manifest, switches=switches), made.tables)
+
+
+def health_of(build: Build) -> Health:
+    return Health(build, Quarantine(build, lambda _switches, _joints: True))
 
 
 def grasp(name: str, health: str = "ok") -> LiveGrasp:
@@ -58,7 +63,7 @@ def test_patience_is_the_number_of_misses_that_chance_does_not_explain() -> None
 
 
 def test_switches_that_work_are_never_suspected(build: Build) -> None:
-    health, random = Health(build), np.random.default_rng(2)
+    health, random = health_of(build), np.random.default_rng(2)
     patterns = [sum(1 << s for s in range(4) if random.random() < SHARES[s]) for _ in range(500)]
     hold(health, of_types(build, 500), lambda number: patterns[number])
     report = health.report(10**9)
@@ -67,7 +72,7 @@ def test_switches_that_work_are_never_suspected(build: Build) -> None:
 
 def test_stuck_switches_are_named_once_chance_is_ruled_out(build: Build) -> None:
     """Switch 1 never closes, switch 0 never opens; the others do both. A grasp counts once it is over."""
-    health = Health(build)
+    health = health_of(build)
     hold(health, of_types(build, 14), lambda number: 0b1101 if number % 2 else 0b0001)
     assert health.report(0).stuck_open == ()
     hold(health, of_types(build, 1), lambda number: 0b1101)
@@ -80,73 +85,79 @@ def test_stuck_switches_are_named_once_chance_is_ruled_out(build: Build) -> None
 
 def test_one_grasp_held_or_repeated_for_long_suspects_nobody(build: Build) -> None:
     for grasps in ([build.grasps[0]] * 400, [build.grasps[0], UNKNOWN] * 200):
-        health = Health(build)
+        health = health_of(build)
         hold(health, grasps, lambda number: 0)
         assert health.report(0).stuck_open == ()
 
 
 def test_half_of_the_types_are_enough_to_suspect_a_switch(build: Build) -> None:
-    health = Health(build)
+    health = health_of(build)
     hold(health, of_types(build, 60, types=2), lambda number: 0)
     assert health.report(0).stuck_open == ("s0", "s1", "s2", "s3")
 
 
 def test_unread_switches_become_no_more_suspect(build: Build) -> None:
-    health = Health(build)
+    health = health_of(build)
     hold(health, of_types(build, 8), lambda number: 0)
     hold(health, of_types(build, 100), lambda number: 0, lost=0b0010)
     assert health.report(0).stuck_open == ("s0", "s2", "s3")
 
 
-def test_a_switch_that_changes_faster_than_a_hand_chatters(build: Build) -> None:
-    health = Health(build)
+def test_a_switch_that_changes_faster_than_a_hand_chatters() -> None:
+    chattering = Chattering(4)
     for number in range(120):
         closed = (number & 1) | (number // 10 & 1) << 1
-        health.update(grasp("a"), SwitchFrame(number * SECOND // 100, closed))
-    assert health.report(0).chattering == ("s0",)
+        chattering.frame(number * SECOND // 100, closed, 0b1111)
+    assert chattering.switches == 0b1
     for number in range(120, 350):
-        health.update(grasp("a"), SwitchFrame(number * SECOND // 100, 0))
-    assert health.report(0).chattering == ()
+        chattering.frame(number * SECOND // 100, 0, 0b1111)
+    assert chattering.switches == 0
 
 
-def test_a_closed_switch_read_now_and_then_does_not_chatter(build: Build) -> None:
-    health = Health(build)
+def test_a_closed_switch_read_now_and_then_does_not_chatter() -> None:
+    chattering = Chattering(1)
     for number in range(250):
-        health.update(grasp("a"), SwitchFrame(number * SECOND // 100, 1 - number % 2, lost=number % 2))
-    assert health.report(0).chattering == ()
+        chattering.frame(number * SECOND // 100, 1 - number % 2, 1 - number % 2)
+    assert chattering.switches == 0
 
 
-def moving(health: Health, minutes: int, first: int, shift: int, narrow: int = 0) -> None:
+def moving(drift: JointDrift, minutes: int, first: int, shift: int, narrow: int = 0) -> None:
     """Move joint 0 between two ends, and joint 1 between 50 and 150, a frame a second."""
     for second in range(minutes * 60 + 1):
         up = second % 2
         codes = [100 + shift + 100 * up + (-narrow if up else narrow), 50 + 100 * up]
-        health.update(grasp("a"), None, (first * 60 + second) * SECOND, codes)
+        drift.frame((first * 60 + second) * SECOND, codes)
 
 
 @pytest.mark.parametrize(
     ("shift", "narrow", "drifting"),
-    [(0, 0, ()), (20, 0, ()), (21, 0, (Drift("j0", 21),)), (-40, 0, (Drift("j0", -40),)), (0, 30, ()), (0, -30, ())],
+    [(0, 0, 0), (20, 0, 0), (21, 0, 21), (-40, 0, -40), (0, 30, 0), (0, -30, 0)],
 )
-def test_a_joint_drifts_when_both_ends_move_the_same_way(
-    build: Build, shift: int, narrow: int, drifting: tuple[Drift, ...]
-) -> None:
-    health = Health(build)
-    moving(health, 1, 0, 0)
-    assert health.report(0).drifting == ()
-    moving(health, 3, 1, shift, narrow)
-    assert health.report(0).drifting == drifting
+def test_a_joint_drifts_when_both_ends_move_the_same_way(build: Build, shift: int, narrow: int, drifting: int) -> None:
+    drift = JointDrift(build.tables)
+    moving(drift, 1, 0, 0)
+    assert not any(drift.codes)
+    moving(drift, 3, 1, shift, narrow)
+    assert drift.codes == (drifting, 0)
+
+
+def test_chattering_and_drift_are_those_of_the_quarantine(build: Build) -> None:
+    quarantine = Quarantine(build, lambda _switches, _joints: True)
+    health = Health(build, quarantine)
+    quarantine.chattering.switches, quarantine.drift.codes = 0b10, (0, 7)
+    report = health.report(0)
+    assert (report.chattering, report.drifting) == (("s1",), (Drift("j1", 7),))
 
 
 @pytest.mark.parametrize("hz", [10, 100, 333])
 def test_rates_are_of_the_last_second_and_fall_with_silence(build: Build, hz: int) -> None:
-    health = Health(build)
+    health = health_of(build)
     assert (health.report(0).switch_hz, health.report(0).glove_hz) == (0, 0)
     for number in range(3 * hz + 1):
         now = number * SECOND // hz
         frame = SwitchFrame(now, 0)
         for _ in range(2):
-            health.update(grasp("a"), frame, now if number % 2 else None, [1, 2])
+            health.update(grasp("a"), frame, now if number % 2 else None)
     report = health.report(3 * SECOND)
     assert report.switch_hz == pytest.approx(hz, rel=0.02)
     assert report.glove_hz == pytest.approx(hz / 2, rel=0.2)
@@ -154,7 +165,7 @@ def test_rates_are_of_the_last_second_and_fall_with_silence(build: Build, hz: in
 
 
 def test_a_report_counts_answers_and_carries_what_drivers_count(build: Build) -> None:
-    health = Health(build)
+    health = health_of(build)
     for kind, times in (("ok", 3), ("changing", 4), ("degraded", 2), ("unknown", 1)):
         for _ in range(times):
             health.update(grasp(UNKNOWN, kind), None)

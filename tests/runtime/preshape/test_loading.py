@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.recordings.taxonomy import CUTKOSKY_16, KAMAKURA_14
-from thenar.drivers.errors import ThenarError
-from thenar.runtime.preshape import SHIPPED, PreshapeError, load_preshapes
+from thenar.drivers.errors import SettingError, ThenarError
+from thenar.runtime.preshape import SHIPPED, load_preshapes
 from thenar.runtime.preshape.selector import PreshapeTable
 
 OWN = """\
@@ -58,7 +58,7 @@ def own(tmp_path: Path) -> Path:
 def fault(path: Path, old: str, new: str) -> str:
     assert old in OWN
     path.write_text(OWN.replace(old, new, 1))
-    with pytest.raises(PreshapeError) as found:
+    with pytest.raises(SettingError) as found:
         load_preshapes(path)
     return str(found.value)
 
@@ -118,7 +118,7 @@ def test_where_the_literature_gives_nothing_the_table_says_so() -> None:
 
 def test_a_table_for_another_taxonomy_is_refused_with_every_grasp_type() -> None:
     types = [f"own {number}" for number in range(9)]
-    with pytest.raises(PreshapeError, match=re.escape(f"none of the build's grasp types ({', '.join(types)})")):
+    with pytest.raises(SettingError, match=re.escape(f"none of the build's grasp types ({', '.join(types)})")):
         load_preshapes("barrett_bh8").check(types)
 
 
@@ -186,17 +186,17 @@ def test_a_wrong_table_is_told_with_its_line_and_key(own: Path, old: str, new: s
 
 def test_a_table_without_grasp_types_or_joints_is_refused(own: Path) -> None:
     own.write_text('name = "mine"\ntime_from_start_s = 1\njoints = []\npreshapes = []\n')
-    with pytest.raises(PreshapeError, match="line 3: joints: must name at least one joint"):
+    with pytest.raises(SettingError, match="line 3: joints: must name at least one joint"):
         load_preshapes(own)
     own.write_text(OWN.replace('"PoS", "CMF"', "").replace('"Tip"', ""))
-    with pytest.raises(PreshapeError, match="preshapes: must name at least one grasp type"):
+    with pytest.raises(SettingError, match="preshapes: must name at least one grasp type"):
         load_preshapes(own)
 
 
 def test_an_unknown_preshape_table_is_answered_with_the_known_ones(tmp_path: Path) -> None:
-    with pytest.raises(PreshapeError, match="did you mean 'barrett_bh8'"):
+    with pytest.raises(SettingError, match="did you mean 'barrett_bh8'"):
         load_preshapes("barret_bh8")
-    with pytest.raises(PreshapeError, match="cannot be read"):
+    with pytest.raises(SettingError, match="cannot be read"):
         load_preshapes(tmp_path)
 
 

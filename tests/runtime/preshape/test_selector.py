@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from thenar.drivers.errors import SettingError
 from thenar.runtime import Build
-from thenar.runtime.preshape import Preshape, PreshapeError, PreshapeSelector, PreshapeTable, preshape_selector
+from thenar.runtime.preshape import Preshape, PreshapeSelector, PreshapeTable, preshape_selector
 from thenar.runtime.published import NONE, UNKNOWN, Health, LiveGrasp, State
 
 WRAP = Preshape("wrap", ("a",), (0.0,), 1.0)
@@ -76,7 +77,7 @@ def test_the_preshape_is_the_newest_called_for_without_break(frames: list[LiveGr
 
 @pytest.mark.parametrize("wrong", [{"min_probability": 1.5}, {"min_probability": float("nan")}, {"settle_ms": -1}])
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, Any]) -> None:
-    with pytest.raises(PreshapeError):
+    with pytest.raises(SettingError):
         PreshapeSelector(TABLE, **wrong)
 
 

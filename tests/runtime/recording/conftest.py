@@ -8,7 +8,7 @@ import pytest
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.published import LiveGrasp
-from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
 
 Entry = SwitchFrame | GloveFrame | LiveGrasp | Label
@@ -30,7 +30,9 @@ def session() -> Session:
                 SensorCalibration("index", 200, 0.0, 50, 90.0),
             ),
         ),
-        collection=Collection("A", "own", ("cup", "pen"), (Task("cup", ("mug", "jar")), Task("pen", ("biro",))), 3, 7),
+        collection=Collection(
+            "A", "own", ("cup", "pen"), (CollectionTask("cup", ("mug", "jar")), CollectionTask("pen", ("biro",))), 3, 7
+        ),
     )
 
 

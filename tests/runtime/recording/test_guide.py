@@ -7,13 +7,15 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.runtime.frames import OLD_US, GloveFrame, SwitchFrame
-from thenar.runtime.recording.guide import FRESH_US, MOVING_US, Guide, Key, Stage, planned, read_journal
+from thenar.runtime.recording.guide import FRESH_US, MOVING_US, CollectionGuide, Key, Stage, planned, read_journal
 from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
 
 COUNTDOWN_US = 3_000_000
-COLLECTION = Collection("A", "own", ("cup", "pen"), (Task("cup", ("mug",)), Task("pen", ("biro",))), 2, 1)
+COLLECTION = Collection(
+    "A", "own", ("cup", "pen"), (CollectionTask("cup", ("mug",)), CollectionTask("pen", ("biro",))), 2, 1
+)
 
 
 @pytest.fixture
@@ -22,8 +24,8 @@ def recorder(tmp_path: Path, session: Session) -> Recorder:
 
 
 @pytest.fixture
-def guide(recorder: Recorder) -> Guide:
-    return Guide(planned(COLLECTION), recorder, COUNTDOWN_US)
+def guide(recorder: Recorder) -> CollectionGuide:
+    return CollectionGuide(planned(COLLECTION), recorder, COUNTDOWN_US)
 
 
 def whole(time_us: int, closed: int = 1) -> list[SwitchFrame | GloveFrame]:
@@ -42,11 +44,11 @@ def events(recorder: Recorder) -> list[tuple[str, int]]:
     return [(label.event, label.trial) for label in found if label.event != "begun"]
 
 
-def stage(guide: Guide) -> Stage:
+def stage(guide: CollectionGuide) -> Stage:
     return guide.stage
 
 
-def test_one_key_a_trial_leads_through_all(guide: Guide, recorder: Recorder) -> None:
+def test_one_key_a_trial_leads_through_all(guide: CollectionGuide, recorder: Recorder) -> None:
     assert stage(guide) is Stage.READY
     guide.press(0, Key.ACCEPT)
     now = 0
@@ -67,7 +69,9 @@ def test_one_key_a_trial_leads_through_all(guide: Guide, recorder: Recorder) -> 
     assert events(recorder) == [(event, number) for number in (1, 2, 3, 4) for event in ("captured", "accepted")]
 
 
-def test_what_came_when_the_countdown_ended_is_captured_and_nothing_later(guide: Guide, recorder: Recorder) -> None:
+def test_what_came_when_the_countdown_ended_is_captured_and_nothing_later(
+    guide: CollectionGuide, recorder: Recorder
+) -> None:
     guide.press(0, Key.ACCEPT)
     guide.take(COUNTDOWN_US, whole(COUNTDOWN_US, closed=0b101))
     guide.take(COUNTDOWN_US + 1, whole(COUNTDOWN_US + 1, closed=0b010))
@@ -78,7 +82,7 @@ def test_what_came_when_the_countdown_ended_is_captured_and_nothing_later(guide:
     assert before[-2] == SwitchFrame(COUNTDOWN_US, 0b101)
 
 
-def test_a_countdown_may_begin_again_but_is_not_cut_short(guide: Guide) -> None:
+def test_a_countdown_may_begin_again_but_is_not_cut_short(guide: CollectionGuide) -> None:
     guide.press(0, Key.ACCEPT)
     guide.press(1000, Key.ACCEPT)
     assert guide.seconds_left(0) == 3.0
@@ -105,7 +109,7 @@ def test_a_countdown_may_begin_again_but_is_not_cut_short(guide: Guide) -> None:
     ],
 )
 def test_nothing_is_captured_of_devices_that_are_not_all_there(
-    guide: Guide, recorder: Recorder, frames: list[SwitchFrame | GloveFrame], problem: str
+    guide: CollectionGuide, recorder: Recorder, frames: list[SwitchFrame | GloveFrame], problem: str
 ) -> None:
     guide.press(0, Key.ACCEPT)
     guide.take(COUNTDOWN_US, frames)
@@ -117,7 +121,7 @@ def test_nothing_is_captured_of_devices_that_are_not_all_there(
     assert stage(guide) is Stage.REVIEW
 
 
-def test_no_countdown_starts_while_a_device_is_lost(guide: Guide, recorder: Recorder) -> None:
+def test_no_countdown_starts_while_a_device_is_lost(guide: CollectionGuide, recorder: Recorder) -> None:
     guide.take(0, whole(0))
     assert Key.ACCEPT in guide.offered()
     guide.take(1, [], ["bench board"])
@@ -149,7 +153,7 @@ def test_no_countdown_starts_while_a_device_is_lost(guide: Guide, recorder: Reco
     assert (guide.stage, guide.done, guide.lost) == (Stage.READY, 1, "glove, bench board not connected")
 
 
-def test_a_frame_as_old_as_may_be_is_captured(guide: Guide) -> None:
+def test_a_frame_as_old_as_may_be_is_captured(guide: CollectionGuide) -> None:
     guide.press(0, Key.ACCEPT)
     guide.take(COUNTDOWN_US, whole(COUNTDOWN_US - FRESH_US))
     assert stage(guide) is Stage.REVIEW
@@ -159,16 +163,16 @@ def test_a_glove_without_switches_and_switches_without_a_glove_are_enough(tmp_pa
     frames: tuple[SwitchFrame | GloveFrame, ...] = GloveFrame(0, b"12"), SwitchFrame(0, 1)
     for frame, bare in zip(frames, (replace(session, switches=()), replace(session, sensors=())), strict=True):
         recorder = Recorder(tmp_path / f"{len(bare.sensors)}.mcap", replace(bare, collection=COLLECTION))
-        guide = Guide(planned(COLLECTION), recorder, 0)
+        guide = CollectionGuide(planned(COLLECTION), recorder, 0)
         guide.press(0, Key.ACCEPT)
         guide.take(0, [frame])
         assert stage(guide) is Stage.REVIEW
 
 
 def test_an_empty_hand_moves_after_the_countdown_and_is_captured_then(tmp_path: Path, session: Session) -> None:
-    collection = replace(COLLECTION, tasks=(Task("none", ("open hand", "release")),))
+    collection = replace(COLLECTION, tasks=(CollectionTask("none", ("open hand", "release")),))
     with Recorder(tmp_path / "a.mcap", replace(session, collection=collection)) as recorder:
-        guide = Guide(planned(collection), recorder, COUNTDOWN_US)
+        guide = CollectionGuide(planned(collection), recorder, COUNTDOWN_US)
         guide.press(0, Key.ACCEPT)
         assert stage(guide) is Stage.COUNTDOWN
         now = COUNTDOWN_US
@@ -201,7 +205,7 @@ def test_an_empty_hand_moves_after_the_countdown_and_is_captured_then(tmp_path: 
 
 
 def test_where_nothing_is_left_one_may_still_undo(recorder: Recorder) -> None:
-    guide = Guide(planned(COLLECTION), recorder, 0, (3, 1, 2, 4))
+    guide = CollectionGuide(planned(COLLECTION), recorder, 0, (3, 1, 2, 4))
     assert (guide.stage, guide.done) == (Stage.DONE, 4)
     guide.press(0, Key.UNDO)
     assert stage(guide) is Stage.READY
@@ -216,7 +220,7 @@ def test_whatever_is_pressed_each_trial_counts_once_and_in_order(
 ) -> None:
     session = Session(thenar="1", switches=("s",), sensors=(), collection=COLLECTION)
     with Recorder(tmp_path_factory.mktemp("guide") / "a.mcap", session) as recorder:
-        guide = Guide(planned(COLLECTION), recorder, 10)
+        guide = CollectionGuide(planned(COLLECTION), recorder, 10)
         for time_us, press in enumerate(presses):
             if press is None or guide.stage is Stage.OVER:
                 guide.take(20 * time_us, [SwitchFrame(20 * time_us, 1)])
@@ -242,7 +246,7 @@ def test_nothing_is_captured_while_a_taxel_cannot_be_read(tmp_path: Path, sessio
     for switches in (session.switches, ()):
         wired = replace(session, switches=switches, sensors=(), taxels=("p", "q"), collection=COLLECTION)
         with Recorder(tmp_path / f"{len(switches)}.mcap", wired) as recorder:
-            guide = Guide(planned(COLLECTION), recorder, 0)
+            guide = CollectionGuide(planned(COLLECTION), recorder, 0)
             for frames, problem in (
                 ([], "are silent"),
                 ([SwitchFrame(0, 0)], "taxels cannot be read: p, q"),
@@ -256,7 +260,7 @@ def test_nothing_is_captured_while_a_taxel_cannot_be_read(tmp_path: Path, sessio
             assert stage(guide) is Stage.REVIEW
 
 
-def take(guide: Guide, now: int) -> int:
+def take(guide: CollectionGuide, now: int) -> int:
     """Let the countdown end and the grasp be captured; return when."""
     now += COUNTDOWN_US
     guide.take(now, whole(now))
@@ -264,7 +268,7 @@ def take(guide: Guide, now: int) -> int:
     return now
 
 
-def test_the_last_trial_is_undone_and_comes_again_at_once(guide: Guide, recorder: Recorder) -> None:
+def test_the_last_trial_is_undone_and_comes_again_at_once(guide: CollectionGuide, recorder: Recorder) -> None:
     first, second, *_ = planned(COLLECTION)
     assert Key.UNDO not in guide.offered()
     guide.press(0, Key.UNDO)
@@ -295,7 +299,7 @@ def test_the_last_trial_is_undone_and_comes_again_at_once(guide: Guide, recorder
     assert read_journal(recorder.path).accepted == (1, 2)
 
 
-def test_a_trial_is_skipped_at_any_stage(guide: Guide, recorder: Recorder) -> None:
+def test_a_trial_is_skipped_at_any_stage(guide: CollectionGuide, recorder: Recorder) -> None:
     guide.press(0, Key.SKIP)
     assert stage(guide) is Stage.READY
     guide.press(0, Key.ACCEPT)
@@ -317,7 +321,9 @@ def test_a_trial_is_skipped_at_any_stage(guide: Guide, recorder: Recorder) -> No
     assert read_journal(recorder.path).accepted == ()
 
 
-def test_a_pause_ends_the_countdown_and_nothing_is_recorded_meanwhile(guide: Guide, recorder: Recorder) -> None:
+def test_a_pause_ends_the_countdown_and_nothing_is_recorded_meanwhile(
+    guide: CollectionGuide, recorder: Recorder
+) -> None:
     guide.press(0, Key.PAUSE)
     assert stage(guide) is Stage.READY
     guide.press(0, Key.ACCEPT)
@@ -342,7 +348,7 @@ def test_a_pause_ends_the_countdown_and_nothing_is_recorded_meanwhile(guide: Gui
     assert stage(guide) is Stage.REVIEW
 
 
-def test_what_is_offered_does_something_and_nothing_else_does(guide: Guide) -> None:
+def test_what_is_offered_does_something_and_nothing_else_does(guide: CollectionGuide) -> None:
     quiet = {Key.REDO, Key.QUIT, Key.PAUSE}
     now = 0
     for press in (Key.ACCEPT, None, Key.ACCEPT, Key.PAUSE, Key.ACCEPT, None):
@@ -360,12 +366,12 @@ def test_what_is_offered_does_something_and_nothing_else_does(guide: Guide) -> N
 def test_a_later_sitting_may_undo_what_an_earlier_one_accepted(tmp_path: Path, session: Session) -> None:
     wanted = replace(session, collection=COLLECTION)
     with Recorder(tmp_path / "a.mcap", wanted) as recorder:
-        guide = Guide(planned(COLLECTION), recorder, COUNTDOWN_US)
+        guide = CollectionGuide(planned(COLLECTION), recorder, COUNTDOWN_US)
         guide.press(0, Key.ACCEPT)
         guide.press(take(guide, 0), Key.ACCEPT)
     journal = read_journal(recorder.path)
     with Recorder(recorder.path, wanted, tail=journal.tail) as recorder:
-        guide = Guide(planned(COLLECTION), recorder, COUNTDOWN_US, journal.accepted)
+        guide = CollectionGuide(planned(COLLECTION), recorder, COUNTDOWN_US, journal.accepted)
         assert guide.trial == planned(COLLECTION)[1]
         guide.press(0, Key.UNDO)
         assert (stage(guide), guide.trial, guide.done) == (Stage.READY, planned(COLLECTION)[0], 0)

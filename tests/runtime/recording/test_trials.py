@@ -8,13 +8,17 @@ from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.recording.guide import planned, read_journal
-from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
 
-TASKS = (Task("cup", ("mug", "jar")), Task("pen", ("biro",)), Task("rod", ("a", "b", "c")))
+TASKS = (
+    CollectionTask("cup", ("mug", "jar")),
+    CollectionTask("pen", ("biro",)),
+    CollectionTask("rod", ("a", "b", "c")),
+)
 
 
-def collection(repetitions: int = 4, seed: int = 0, tasks: tuple[Task, ...] = TASKS) -> Collection:
+def collection(repetitions: int = 4, seed: int = 0, tasks: tuple[CollectionTask, ...] = TASKS) -> Collection:
     return Collection("A", "own", tuple(task.grasp for task in tasks), tasks, repetitions, seed)
 
 
@@ -29,7 +33,7 @@ def test_every_type_comes_as_often_and_its_objects_by_turns(repetitions: int, se
 
 
 def test_the_papers_protocol_is_1400_samples_a_subject() -> None:
-    tasks = tuple(Task(f"type {number}", ("small", "large")) for number in range(14))
+    tasks = tuple(CollectionTask(f"type {number}", ("small", "large")) for number in range(14))
     trials = planned(collection(100, tasks=tasks))
     assert len(trials) == 1400
     assert set(Counter((trial.grasp, trial.object) for trial in trials).values()) == {50}

@@ -10,7 +10,7 @@ from msgspec.structs import asdict
 
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import HealthReport, LiveGrasp
-from thenar.runtime.sinks import HealthLine, JointAngles, Line
+from thenar.runtime.sinks import GraspLine, HealthLine, JointAngles
 from thenar.runtime.sinks.jsonl import encode, encode_health
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
@@ -27,7 +27,7 @@ def test_a_line_comes_back_as_it_was_published(
     line = encode(grasp, preshape, angle)
     assert line.endswith(b"\n")
     assert line.count(b"\n") == 1
-    assert typed_json.decode(line, type=Line) == Line(**asdict(grasp), preshape=preshape, angles=angle)
+    assert typed_json.decode(line, type=GraspLine) == GraspLine(**asdict(grasp), preshape=preshape, angles=angle)
 
 
 def test_any_json_parser_reads_it(make_grasp: Callable[..., LiveGrasp], preshape: Preshape) -> None:
@@ -48,13 +48,13 @@ def test_a_line_of_before_there_were_segments_is_read_as_one_without(make_grasp:
     told = json.loads(encode(make_grasp(7), None, None))
     older = {name: value for name, value in told.items() if not name.startswith(("state", "segment"))}
     assert len(told) - len(older) == 5
-    assert typed_json.decode(json.dumps(older), type=Line) == Line(**asdict(make_grasp(7)))
+    assert typed_json.decode(json.dumps(older), type=GraspLine) == GraspLine(**asdict(make_grasp(7)))
 
 
 def test_a_reader_tells_grasps_and_health_apart(make_grasp: Callable[..., LiveGrasp], health: HealthReport) -> None:
     lines = [encode(make_grasp(7), None, None), encode_health(health)]
-    grasp, report = (typed_json.decode(line, type=Line | HealthLine) for line in lines)
-    assert isinstance(grasp, Line)
+    grasp, report = (typed_json.decode(line, type=GraspLine | HealthLine) for line in lines)
+    assert isinstance(grasp, GraspLine)
     assert report == HealthLine(**{name: getattr(health, name) for name in health.__struct_fields__})
     assert [json.loads(line)["kind"] for line in lines] == ["grasp", "health"]
     assert lines[1].endswith(b"}\n")

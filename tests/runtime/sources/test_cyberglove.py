@@ -4,8 +4,7 @@ from pathlib import Path
 import pytest
 
 from thenar.drivers.cyberglove_protocol import SENSORS_18
-from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.cyberglove_box import Doubts
+from thenar.drivers.emulated.cyberglove import Doubts, EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime import Build, Glove
 from thenar.runtime.frames import GloveFrame

@@ -14,13 +14,15 @@ from websockets.typing import Origin
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.frames import OLD_US, GloveFrame, SwitchFrame
 from thenar.runtime.live.sources import DeviceState
-from thenar.runtime.recording.guide import Guide, Key, planned
-from thenar.runtime.recording.session import Collection, Session, Task
+from thenar.runtime.recording.guide import CollectionGuide, Key, planned
+from thenar.runtime.recording.session import Collection, CollectionTask, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine
 from thenar.runtime.web.guided import GuidePage
 
-COLLECTION = Collection("A", "own", ("cup", "pen"), (Task("cup", ("mug",)), Task("none", ("open hand",))), 2, 1)
+COLLECTION = Collection(
+    "A", "own", ("cup", "pen"), (CollectionTask("cup", ("mug",)), CollectionTask("none", ("open hand",))), 2, 1
+)
 SESSION = Session(
     thenar="1",
     switches=("a", "b", "c"),
@@ -42,9 +44,9 @@ def page() -> Iterator[GuidePage]:
 
 
 @pytest.fixture
-def guide(tmp_path: Path) -> Iterator[Guide]:
+def guide(tmp_path: Path) -> Iterator[CollectionGuide]:
     with Recorder(tmp_path / "a.mcap", SESSION) as recorder:
-        yield Guide(planned(COLLECTION), recorder, 3_000_000)
+        yield CollectionGuide(planned(COLLECTION), recorder, 3_000_000)
 
 
 def opened(page: GuidePage) -> ClientConnection:
@@ -66,7 +68,7 @@ def frames(time_us: int, taxels: tuple[int | None, ...], lost: int = 0b010) -> l
     return [SwitchFrame(time_us, 0b101, lost=lost, taxels=taxels), GloveFrame(time_us, bytes((70, 0)), 3)]
 
 
-def test_what_the_glove_sees(page: GuidePage, guide: Guide) -> None:
+def test_what_the_glove_sees(page: GuidePage, guide: CollectionGuide) -> None:
     for time_us, taxels in ((0, (500, 40)), (60_000, (2000, 80)), (120_000, (None, 60))):
         guide.take(time_us, frames(time_us, taxels))
         page.show(time_us, guide, DEVICES)
@@ -81,7 +83,7 @@ def test_what_the_glove_sees(page: GuidePage, guide: Guide) -> None:
     assert seen["devices"][1] == {"name": "stream", "connected": False, "error": "is gone"}
 
 
-def test_joints_of_an_old_record_are_not_told_as_measured(page: GuidePage, guide: Guide) -> None:
+def test_joints_of_an_old_record_are_not_told_as_measured(page: GuidePage, guide: CollectionGuide) -> None:
     guide.take(0, frames(0, (500, 40)))
     for now_us, joints in ((OLD_US, [70.0, None]), (2 * OLD_US, [])):
         guide.take(now_us, [SwitchFrame(now_us, 0, lost=0b111)])
@@ -92,7 +94,7 @@ def test_joints_of_an_old_record_are_not_told_as_measured(page: GuidePage, guide
         assert (found["time_us"], found["age_us"]) == (now_us, 0)
 
 
-def test_a_browser_that_comes_late_gets_all_and_presses_at_its_step(page: GuidePage, guide: Guide) -> None:
+def test_a_browser_that_comes_late_gets_all_and_presses_at_its_step(page: GuidePage, guide: CollectionGuide) -> None:
     page.tell({"problem": "not yet"})
     page.show(0, guide, DEVICES)
     found = told(page, "collection", "hands", "guide", "study")
@@ -111,7 +113,7 @@ def test_a_browser_that_comes_late_gets_all_and_presses_at_its_step(page: GuideP
 
 
 def test_stages_are_sent_at_once_movements_20_times_a_second(
-    page: GuidePage, guide: Guide, monkeypatch: pytest.MonkeyPatch
+    page: GuidePage, guide: CollectionGuide, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     published: list[Any] = []
     monkeypatch.setattr(page._server, "publish", lambda _topic, text: published.append(text))
@@ -132,7 +134,7 @@ def test_a_session_without_calibrations_is_shown_by_its_bytes(tmp_path: Path) ->
         GuidePage("127.0.0.1:0", token=None, session=bare, hands={}, shown=lambda _: {}) as page,
         Recorder(tmp_path / "b.mcap", bare) as recorder,
     ):
-        guide = Guide(planned(COLLECTION), recorder, 0)
+        guide = CollectionGuide(planned(COLLECTION), recorder, 0)
         page.show(0, guide, ())
         assert told(page, "guide")["guide"]["joints"] == []
         guide.take(0, [GloveFrame(0, bytes((70, 80)), 6)])

@@ -15,7 +15,7 @@ from thenar.drivers.errors import SettingError
 from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp
 from thenar.runtime.sinks.base import open_sink
 from thenar.runtime.web import monitor
-from thenar.runtime.web.monitor import Source, StreamMonitor
+from thenar.runtime.web.monitor import MonitoredStream, StreamMonitor
 
 NAME = "<script>alert(1)</script>"
 
@@ -40,7 +40,7 @@ HEALTH = HealthReport(1, (), (), (), (), 0.0, 0.0, 1, 0, 0, 0, devices=(DeviceHe
 
 
 @contextmanager
-def shown(where: str, said: list[Source]) -> Iterator[StreamMonitor]:
+def shown(where: str, said: list[MonitoredStream]) -> Iterator[StreamMonitor]:
     stop = Event()
     with StreamMonitor(where, "127.0.0.1:0", token=None) as made:
         thread = Thread(target=made.run, args=(stop, said.append))
@@ -69,7 +69,7 @@ def hear(live: Any, told: Callable[[Any], dict[str, Any]], wanted: Callable[[dic
 def test_a_page_gets_what_the_run_publishes(kind: str, tmp_path: Path, hear_one: Any) -> None:
     sink: Any = open_sink(f"unix:{tmp_path}/run" if kind == "unix" else "tcp:127.0.0.1:0")
     where = f"unix:{tmp_path}/run" if kind == "unix" else f"tcp:127.0.0.1:{sink.address[1]}"
-    said: list[Source] = []
+    said: list[MonitoredStream] = []
     with shown(where, said) as made, page(made) as live:
         first = hear_one(live)
         assert (first["topic"], first["name"], first["records"], first["partial"]) == ("build", where, False, True)
@@ -94,7 +94,7 @@ def test_a_page_gets_what_the_run_publishes(kind: str, tmp_path: Path, hear_one:
         with page(made) as late:
             past = hear(late, hear_one, lambda told: told["topic"] == "past")
             assert past["changes"][0][1:3] == ["PoS", NAME]
-    assert said[0] == Source(where, connected=True)
+    assert said[0] == MonitoredStream(where, connected=True)
 
 
 def test_a_run_that_comes_later_is_found(tmp_path: Path, hear_one: Any, monkeypatch: pytest.MonkeyPatch) -> None:
