@@ -30,6 +30,10 @@ for _signal in (signal.SIGHUP, signal.SIGINT):
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+# Under xdist each worker has a core: where the number of processes is not the point, one does the work.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")
+
 # Every run draws the same examples, on every machine: what failed once fails again.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
