@@ -132,22 +132,3 @@ def test_an_object_overlapping_the_whole_hand_is_marked(by_grasp: dict[str, Cond
     assert (rest.steps == MOST_STEPS).all()
     assert np.isfinite(rest.angles).all()
     assert np.isfinite(rest.presses).all()
-
-
-@pytest.mark.parametrize("n", [1, 2, 7, 64])
-def test_a_repetition_comes_out_the_same_in_any_number(n: int, by_grasp: dict[str, Condition], skin: Skin) -> None:
-    for grasp in ("PoS", "Tip"):
-        case = make_case(by_grasp[grasp], n, seed=5)
-        (together,) = close([case], skin, MOST_STEPS)
-        for one in range(min(n, 4)):
-            own = slice(one, one + 1)
-            alone = SolverCase(case.condition, case.angles[:, own], case.numbers[:, own], case.grip_n[own])
-            assert_same(close([alone], skin, MOST_STEPS)[0], together, one)
-
-
-def test_a_case_comes_out_the_same_in_any_company_and_order(every: list[tuple[SolverCase, Rest]], skin: Skin) -> None:
-    some = [every[number] for number in (0, 11, 23, 30, 45, 59)]
-    for order in ((5, 3, 1), (0, 2), (4, 5, 0, 1, 2, 3)):
-        for number, rest in zip(order, close([some[k][0] for k in order], skin, MOST_STEPS), strict=True):
-            for repetition in range(4):
-                assert_same(some[number][1], rest, repetition, repetition)

@@ -63,16 +63,6 @@ def test_loads_of_several_hands_come_back_in_their_order(conditions: list[Condit
         assert_same(default.solve([one])[0], contact)
 
 
-def test_a_repetition_comes_out_the_same_alone(conditions: list[Condition], default: ContactModel) -> None:
-    for condition in conditions[::3]:
-        whole = load(condition, 7)
-        (together,) = default.solve([whole])
-        for one in (0, 3, 6):
-            own = slice(one, one + 1)
-            part = Load(condition, whole.posture_deg[own], whole.pose[own], whole.grip_n[own])
-            assert_same(default.solve([part])[0], together, own)
-
-
 def test_more_repetitions_than_are_solved_at_a_time_come_out_the_same(
     conditions: list[Condition], default: ContactModel
 ) -> None:

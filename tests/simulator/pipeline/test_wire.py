@@ -175,23 +175,6 @@ def test_arriving_frames_were_sent_and_never_later(seed: int) -> None:
             assert any(np.array_equal(batch.bits[repetition, frame], one) for one in sent)
 
 
-@given(st.integers(0, 2**32))
-def test_a_repetition_is_received_the_same_alone(seed: int) -> None:
-    both, random = make_sent(every_10_ms()), np.random.default_rng(seed)
-    both.traffic = replace(both.traffic, arrives=random.random(both.traffic.data.shape) > 0.02)
-    alone = make_sent(every_10_ms(1))
-    second = (both.bits[1:], both.raw[1:], both.traffic)
-    receive(both)
-    alone.bits, alone.raw, traffic = second
-    alone.traffic = replace(traffic, data=traffic.data[1:], at_us=traffic.at_us[1:], arrives=traffic.arrives[1:])
-    receive(alone)
-    assert np.array_equal(alone.bits[0], both.bits[1])
-    assert np.array_equal(alone.raw[0], both.raw[1])
-    assert alone.lost is not None
-    assert both.lost is not None
-    assert np.array_equal(alone.lost[0], both.lost[1])
-
-
 def test_bytes_are_counted() -> None:
     batch = make_sent(every_10_ms(3))
     draw = make_draw("glove.send", batch)
