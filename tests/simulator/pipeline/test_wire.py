@@ -94,9 +94,9 @@ def test_what_is_lost_leaves_the_frame_before_in_place() -> None:
     expected = bits.copy()
     expected[0, 2] = bits[0, 1]
     assert np.array_equal(batch.bits, expected)
-    expected = raw.copy()
-    expected[1, 3] = raw[1, 2]
-    assert np.array_equal(batch.raw, expected)
+    records = raw.copy()
+    records[1, 3] = raw[1, 2]
+    assert np.array_equal(batch.raw, records)
     assert batch.settled.all()
 
 
