@@ -14,7 +14,7 @@ from types import FrameType
 from typing import Any, NoReturn
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 
 REQUIRE_ALL = os.environ.get("THENAR_REQUIRE_ALL") == "1"
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -30,8 +30,23 @@ for _signal in (signal.SIGHUP, signal.SIGINT):
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+# Under xdist each worker has a core: where the number of processes is not the point, one does the work.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")
+
+
+def _not_waiting(file: int) -> None:
+    os.fstat(file)  # a wrong descriptor is an error all the same
+
+
+# What is written here has to survive no power cut, and no test can tell: nobody waits until it is on the disk.
+for _name in ("fsync", "fdatasync"):
+    setattr(os, _name, _not_waiting)
+
 # Every run draws the same examples, on every machine: what failed once fails again.
-settings.register_profile("repeatable", derandomize=True, deadline=None)
+# Where a fault was made on purpose (tests/mutants), that a test fails is enough: no simpler example is looked for.
+_PHASES = [phase for phase in Phase if phase is not Phase.shrink or "THENAR_MUTATED" not in os.environ]
+settings.register_profile("repeatable", derandomize=True, deadline=None, phases=_PHASES)
 settings.load_profile("repeatable")
 
 WEKA_JAR = Path("/usr/share/java/weka.jar")  # where Debian's package puts it

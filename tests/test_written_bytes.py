@@ -8,6 +8,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -38,11 +39,10 @@ def kept(name: str, written: dict[str, str], update: bool) -> None:
         assert written == golden[name]
 
 
-def builds_of(grasps: Path, folder: Path) -> dict[str, str]:
+def builds_of(grasps: Path, glove: Path, folder: Path) -> dict[str, str]:
     """Compile `grasps` with sums of 16 bits and a wiring, and with tables of 8 bits; return the digest of each file."""
-    whole, small, glove = folder / "whole", folder / "small", folder / "glove.toml"
+    whole, small = folder / "whole", folder / "small"
     common = ["compile", str(grasps), "--folds", "0", "--no-report", "--rounds", "10"]
-    assert run([*common, "-o", str(folder / "first"), "--propose", str(glove)]) == 0
     assert run([*common, "-o", str(whole), "--glove", str(glove)]) == 0
     assert run([*common, "-o", str(small), "--table-bits", "8", "--max-bins", "8"]) == 0
     return {"set.grasps": hashlib.sha256(grasps.read_bytes()).hexdigest()} | {
@@ -54,14 +54,13 @@ def digest(written: object) -> str:
     return hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()
 
 
-def results_of(grasps: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
+def results_of(grasps: Path, glove: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
     """Evaluate and compile `grasps`, replay the build, and specify its glove; return digests of what was written."""
-    build, spec, glove = folder / "build", folder / "spec", str(folder / "glove.toml")
+    build, spec = folder / "build", folder / "spec"
     common = ["compile", str(grasps), "--folds", "0", "--no-report", "--trainer", "logit"]
-    assert run([*common, "-o", str(folder / "first"), "--propose", glove]) == 0
-    assert run([*common, "-o", str(build), "--glove", glove]) == 0
+    assert run([*common, "-o", str(build), "--glove", str(glove)]) == 0
     if Build.load(build).manifest.switches:
-        assert run(["spec", str(build), "--glove", glove, "-o", str(spec)]) == 0
+        assert run(["spec", str(build), "--glove", str(glove), "-o", str(spec)]) == 0
     capsys.readouterr()
     assert run(["run", str(build), "--replay", str(grasps)]) == 0
     replay = capsys.readouterr().out
@@ -74,13 +73,14 @@ def results_of(grasps: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -
     }
 
 
-@pytest.fixture
-def set_of(tmp_path: Path, icub_table: Path, aml_table: Path) -> Callable[[str], Path]:
-    """Return what makes the set of a shipped scene or of a real table."""
+@pytest.fixture(scope="module")
+def set_of(tmp_path_factory: pytest.TempPathFactory, icub_table: Path, aml_table: Path) -> Callable[[str], Path]:
+    """Return what makes the set of a shipped scene or of a real table, once."""
     tables = {"icub": icub_table, "aml": aml_table}
 
+    @cache
     def made(name: str) -> Path:
-        grasps = tmp_path / "set.grasps"
+        grasps = tmp_path_factory.mktemp("set") / "set.grasps"
         if name in tables:
             columns = str(COLUMNS / f"{name}.toml")
             assert run(["import", str(tables[name]), "-o", str(grasps), "--columns", columns]) == 0
@@ -91,16 +91,32 @@ def set_of(tmp_path: Path, icub_table: Path, aml_table: Path) -> Callable[[str],
     return made
 
 
+@pytest.fixture(scope="module")
+def glove_for(set_of: Callable[[str], Path]) -> Callable[[str], Path]:
+    """Return what proposes a glove for a set, once: no choice of a trainer is part of it."""
+
+    @cache
+    def proposed(name: str) -> Path:
+        grasps = set_of(name)
+        glove, build = grasps.with_name("glove.toml"), grasps.with_name("build")
+        quick = ["--folds", "0", "--no-report", "--rounds", "1"]
+        assert run(["compile", str(grasps), "-o", str(build), "--propose", str(glove), *quick]) == 0
+        return glove
+
+    return proposed
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["quick", "kamakura", "cutkosky", "icub", "aml"])
 def test_a_set_gives_the_same_results(
     tmp_path: Path,
     set_of: Callable[[str], Path],
+    glove_for: Callable[[str], Path],
     name: str,
     update_golden: bool,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    kept(f"{name}: results", results_of(set_of(name), tmp_path, capsys), update_golden)
+    kept(f"{name}: results", results_of(set_of(name), glove_for(name), tmp_path, capsys), update_golden)
 
 
 @pytest.mark.slow
@@ -119,9 +135,9 @@ def test_a_search_finds_the_same_accuracies(tmp_path: Path, set_of: Callable[[st
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*SCENES, "icub", "aml"])
 def test_a_set_gives_the_same_builds(
-    tmp_path: Path, set_of: Callable[[str], Path], name: str, update_golden: bool
+    tmp_path: Path, set_of: Callable[[str], Path], glove_for: Callable[[str], Path], name: str, update_golden: bool
 ) -> None:
-    kept(name, builds_of(set_of(name), tmp_path), update_golden)
+    kept(name, builds_of(set_of(name), glove_for(name), tmp_path), update_golden)
 
 
 def test_a_recording_keeps_its_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, update_golden: bool) -> None:

@@ -10,6 +10,7 @@ from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.emulated.cyberglove import Doubts, EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
+from thenar.runtime.live import checkup
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -23,7 +24,8 @@ def glove(tmp_path: Path) -> Iterator[EmulatedCyberGlove]:
 
 
 @pytest.fixture
-def harness(tmp_path: Path, glove: EmulatedCyberGlove) -> Path:
+def harness(tmp_path: Path, glove: EmulatedCyberGlove, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(checkup, "_LISTEN_S", 0.3)  # nearly fifty records
     path = tmp_path / "glove.toml"
     path.write_text(f'[cyberglove]\nport = "{tmp_path}/port"\njoints = {NAMES}\n')
     return path

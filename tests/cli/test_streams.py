@@ -22,6 +22,7 @@ from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime import Build
 from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.live import checkup
 from thenar.runtime.live.replay import replayed
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
@@ -255,8 +256,9 @@ def test_doctor_reports_two_senders_and_late_rows(thenar: Thenar, tmp_path: Path
     ],
 )
 def test_doctor_says_what_is_wrong_with_rows(
-    thenar: Thenar, tmp_path: Path, rate_hz: int, line: str, said: str
+    thenar: Thenar, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rate_hz: int, line: str, said: str
 ) -> None:
+    monkeypatch.setattr(checkup, "_STARTS_S", 0.0)  # no board is reset here
     path, done = tmp_path / "glove.toml", Event()
     with LineServer(tmp_path / "line") as lines:
         text = STREAM.format(port=lines.port, joints="{ j0 = [0, 127.5], j1 = [0, 127.5] }")

@@ -53,11 +53,11 @@ def scan_times(rate_hz: int, seed: int, until: int) -> list[int]:
 
 
 @pytest.mark.parametrize("rate_hz", RATES_HZ)
-@pytest.mark.parametrize("seed", range(40))
-def test_bounce_within_specification_gives_one_press_and_one_release(rate_hz: int, seed: int) -> None:
-    changes = contact(seed, taps=3)
-    seen = reported(scan_times(rate_hz, seed, changes[-1][0] + 60_000), changes)
-    assert [state for _, state in seen] == [1, 0] * 3
+def test_bounce_within_specification_gives_one_press_and_one_release(rate_hz: int) -> None:
+    for seed in range(40):
+        changes = contact(seed, taps=3)
+        seen = reported(scan_times(rate_hz, seed, changes[-1][0] + 60_000), changes)
+        assert [state for _, state in seen] == [1, 0] * 3, seed
 
 
 @given(st.integers(0, 10_000), st.sampled_from(RATES_HZ))

@@ -172,15 +172,6 @@ class Stage:
     def truth(self, inputs: str) -> Truth:
         return Truth(Build.load(self.builds[inputs]), self.performance)
 
-    def row_other_than(self, row: int, truth: Truth) -> int:
-        """Return a row whose switches, joints and answer all differ from those of `row`."""
-        for other in range(len(self.performance)):
-            same_bits = bool((truth.bits[other] == truth.bits[row]).all()) and truth.bits.size > 0
-            same_codes = bool((truth.codes[other] == truth.codes[row]).all()) and truth.codes.size > 0
-            if truth.answer(other) != truth.answer(row) and not same_bits and not same_codes:
-                return other
-        raise AssertionError(f"every row is like row {row}")
-
 
 @pytest.fixture(scope="session")
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Stage:

@@ -13,6 +13,8 @@ import pytest
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
 
+from .soaked import Sample
+
 pytestmark = pytest.mark.slow
 
 SOAKED = Path(__file__).with_name("soaked.py")
@@ -23,16 +25,6 @@ MOST_BYTES = 48 << 20
 WARM_UP = 5
 MOST_KIB = 1024
 MOST_SHARE = 0.02
-
-
-class Sample(msgspec.Struct):
-    frames: int
-    calls: float
-    rss_kib: int
-    threads: int
-    files: int
-    recording: bool
-    failure: str
 
 
 def growth(samples: Sequence[Sample], of: Callable[[Sample], float]) -> float:

@@ -226,7 +226,7 @@ def _failed(tests: Sequence[str], copy: Path, longest_s: float | None = None) ->
         "no:xdist",
         *(["-x"] if longest_s else []),
     ]
-    environment = os.environ | {"PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = os.environ | {"PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1", "THENAR_MUTATED": "1"}
     command = [sys.executable, "-m", "pytest", *options, *tests]
     with subprocess.Popen(
         command,

@@ -156,7 +156,7 @@ def staged(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def run(staged: Path, *tests: str) -> "subprocess.CompletedProcess[str]":
     # No bytecode: what is as long as before and written within the same second would not be compiled again.
-    environment = {**os.environ, "PYTHONPATH": str(staged), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(staged), "PYTHONDONTWRITEBYTECODE": "1", "THENAR_MUTATED": "1"}
     options = ["-x", "-q", "-pno:cacheprovider", "-m", "not slow", "--tb=no"]
     command = [sys.executable, "-m", "pytest", *options, *tests]
     return subprocess.run(command, cwd=staged, env=environment, capture_output=True, text=True, check=False)

@@ -4,7 +4,7 @@ What an effect draws is recorded word by word, with the counter that it was draw
 and another a single one, effects that draw for every frame read on in the same numbers: the shorter begins the longer.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from itertools import combinations
 from typing import Any
 
@@ -16,13 +16,12 @@ from hypothesis import strategies as st
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.pipeline.steps import Ledger, Pipeline, compile_pipeline
-from thenar.simulator.scenes.scene import Scene
 from thenar.simulator.streams import Draw
+
+from .small import make_batch, make_scene
 
 NAMES = tuple(EFFECTS)
 
-SceneMaker = Callable[..., Scene]
-BatchMaker = Callable[..., Batch]
 # An effect and where it drew, (seed, repetition, condition, subject): the words.
 Words = dict[tuple[str, tuple[int, ...]], bytes]
 
@@ -46,28 +45,23 @@ def lively(names: Iterable[str]) -> list[tuple]:
     return [(name, LIVELY.get(name, {})) for name in names]
 
 
-@pytest.fixture(scope="module")
-def record(make_scene: SceneMaker, make_batch: BatchMaker) -> Callable[..., tuple[Pipeline, Words, Batch]]:
-    """Return a function of effects that simulates them on a batch and returns pipeline, all words drawn, and batch."""
+def record(names: Iterable[str], repetitions: Iterable[int] = (0, 3)) -> tuple[Pipeline, Words, Batch]:
+    """Simulate effects on a batch; return the pipeline, all words drawn, and the batch."""
+    pipeline, batch, words = compile_pipeline(make_scene(lively(names))), make_batch(repetitions), Words()
+    plain = Draw._words
 
-    def run(names: Iterable[str], repetitions: Iterable[int] = (0, 3)) -> tuple[Pipeline, Words, Batch]:
-        pipeline, batch, words = compile_pipeline(make_scene(lively(names))), make_batch(repetitions), Words()
-        plain = Draw._words
+    def recorded(draw: Draw, repetitions: list[int], condition: int, subject: int, size: int) -> np.ndarray:
+        drawn = plain(draw, repetitions, condition, subject, size)
+        for repetition, row in zip(repetitions, drawn, strict=True):
+            key = (draw.effect, (draw.seed, repetition, condition, subject))
+            assert key not in words, f"{draw.effect} draws the same numbers twice"
+            words[key] = row.tobytes()
+        return drawn
 
-        def recorded(draw: Draw, repetitions: list[int], condition: int, subject: int, size: int) -> np.ndarray:
-            drawn = plain(draw, repetitions, condition, subject, size)
-            for repetition, row in zip(repetitions, drawn, strict=True):
-                key = (draw.effect, (draw.seed, repetition, condition, subject))
-                assert key not in words, f"{draw.effect} draws the same numbers twice"
-                words[key] = row.tobytes()
-            return drawn
-
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(Draw, "_words", recorded)
-            pipeline.run([batch], Ledger())
-        return pipeline, words, batch
-
-    return run
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Draw, "_words", recorded)
+        pipeline.run([batch], Ledger())
+    return pipeline, words, batch
 
 
 def of(effect: str, words: Words) -> Words:
@@ -87,7 +81,7 @@ def assert_undisturbed(effect: str, one: tuple[Pipeline, Words, Batch], other: t
 
 
 @pytest.fixture(scope="module")
-def alone(record: Callable[..., tuple[Pipeline, Words, Batch]]) -> dict[str, tuple[Pipeline, Words, Batch]]:
+def alone() -> dict[str, tuple[Pipeline, Words, Batch]]:
     """What every effect draws where it is the only one."""
     return {name: record([name]) for name in NAMES}
 
@@ -103,7 +97,7 @@ def test_all_that_can_draw_do(alone: dict[str, tuple[Pipeline, Words, Batch]]) -
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_adding_any_other_effect_leaves_its_draws_as_they_were(
-    name: str, record: Callable[..., tuple[Pipeline, Words, Batch]], alone: dict[str, tuple[Pipeline, Words, Batch]]
+    name: str, alone: dict[str, tuple[Pipeline, Words, Batch]]
 ) -> None:
     for pair in (pair for pair in PAIRS if pair[0] == name):
         both = record(pair)
@@ -117,9 +111,7 @@ SUBSETS = st.sets(st.sampled_from(OTHERS)).map(lambda others: {"contact.quasista
 @settings(max_examples=25, deadline=None)
 @given(names=SUBSETS)
 def test_in_any_company_it_draws_what_it_draws_alone(
-    names: set[str],
-    record: Callable[..., tuple[Pipeline, Words, Batch]],
-    alone: dict[str, tuple[Pipeline, Words, Batch]],
+    names: set[str], alone: dict[str, tuple[Pipeline, Words, Batch]]
 ) -> None:
     together = record(names)
     for effect in names:
@@ -128,9 +120,7 @@ def test_in_any_company_it_draws_what_it_draws_alone(
 
 @settings(max_examples=25, deadline=None)
 @given(names=SUBSETS, repetitions=st.lists(st.integers(0, 99), min_size=2, max_size=4, unique=True))
-def test_a_repetition_made_alone_is_the_one_of_the_full_run(
-    names: set[str], repetitions: list[int], record: Callable[..., tuple[Pipeline, Words, Batch]]
-) -> None:
+def test_a_repetition_made_alone_is_the_one_of_the_full_run(names: set[str], repetitions: list[int]) -> None:
     _, words, batch = record(names, repetitions)
     for row, number in enumerate(repetitions):
         _, few, single = record(names, [number])

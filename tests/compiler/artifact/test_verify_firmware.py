@@ -60,31 +60,6 @@ def few_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(verify_firmware_module, "RANDOM_FRAMES", 400)
 
 
-LINEAR = {"trainer": "logit", "penalty": 1.0, "smoothness": 1.0, "max_bins": 8, "linear": 1}
-
-
-@pytest.mark.usefixtures("few_frames")
-@pytest.mark.parametrize(
-    "options",
-    [
-        {**LINEAR, "table_bits": 8},
-        {**LINEAR, "table_bits": 16},
-        {"rounds": 5, "inputs": "switches"},
-        {"rounds": 5, "inputs": "joints"},
-    ],
-    ids=["linear, a byte", "linear", "switches", "joints"],
-)
-@pytest.mark.parametrize("kind", ["host", "avr"])
-def test_firmware_of_linear_joints_and_single_kinds_matches_python(
-    grasp_set: GraspSet, tool: Tool, tmp_path: Path, options: dict[str, Any], kind: str
-) -> None:
-    for name in TOOLS[kind]:
-        tool(name)
-    made = compile_build(grasp_set, tmp_path / "build", folds=0, **options)
-    assert bool(made.tables.slopes) == ("linear" in options)
-    assert verify_firmware(made.folder, grasp_set, (kind,)).holds
-
-
 def changed(monkeypatch: pytest.MonkeyPatch, path: str, change: Callable[[str], str]) -> None:
     """Let every library have a changed file."""
     files: Callable[[Library], dict[str, str]] = vars(Library)["files"].func

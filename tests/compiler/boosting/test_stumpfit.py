@@ -96,16 +96,16 @@ def _is_looked_at_exactly(X: np.ndarray, weights: np.ndarray, responses: np.ndar
 
 
 @pytest.mark.parametrize("decades", [9, 16, 20])
-@pytest.mark.parametrize("seed", range(30))
-def test_the_rough_search_never_prefers_splits_of_light_branches(decades: int, seed: int) -> None:
+def test_the_rough_search_never_prefers_splits_of_light_branches(decades: int) -> None:
     """Sorted by weight, branches of next to nothing are many: divided by that, what they say looked like much."""
-    random = np.random.default_rng(seed)
-    X = random.integers(0, [3, 5, 9, 20, 40], size=(40, 5)).astype(np.float64)
-    weights = 10.0 ** random.uniform(-decades, 0, size=(4, 40))
-    if seed % 2:
-        weights, X = np.sort(weights, axis=1), np.sort(X, axis=0) + random.integers(0, 2, X.shape)
-    ratios = random.uniform(1, Z_MAX, size=(4, 40)) * random.choice([-1.0, 1.0], size=(4, 40))
-    _is_looked_at_exactly(X, weights, weights * ratios)
+    for seed in range(30):
+        random = np.random.default_rng(seed)
+        X = random.integers(0, [3, 5, 9, 20, 40], size=(40, 5)).astype(np.float64)
+        weights = 10.0 ** random.uniform(-decades, 0, size=(4, 40))
+        if seed % 2:
+            weights, X = np.sort(weights, axis=1), np.sort(X, axis=0) + random.integers(0, 2, X.shape)
+        ratios = random.uniform(1, Z_MAX, size=(4, 40)) * random.choice([-1.0, 1.0], size=(4, 40))
+        _is_looked_at_exactly(X, weights, weights * ratios)
 
 
 @given(problems())
@@ -146,20 +146,20 @@ def _equal_sums(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.stack([first, others]).astype(np.float64), weights, responses
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_columns_of_equal_sums_tie_however_the_grid_rounds_them(seed: int) -> None:
-    branches, weights, responses = _equal_sums(seed)
-    for columns in (branches.T, branches[::-1].T):
-        fitted = fit_stumps(bin_columns(columns), Targets(weights, responses), Z_MAX)
-        assert fitted.columns[0] == 0
+def test_columns_of_equal_sums_tie_however_the_grid_rounds_them() -> None:
+    for seed in range(40):
+        branches, weights, responses = _equal_sums(seed)
+        for columns in (branches.T, branches[::-1].T):
+            fitted = fit_stumps(bin_columns(columns), Targets(weights, responses), Z_MAX)
+            assert fitted.columns[0] == 0, seed
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_splits_of_equal_sums_tie_and_the_lowest_wins(seed: int) -> None:
-    (first, others), weights, responses = _equal_sums(seed)
-    for column in (1 + first - others, 1 - first + others):
-        fitted = fit_stumps(bin_columns(column[:, np.newaxis]), Targets(weights, responses), Z_MAX)
-        assert fitted.thresholds[0] == 0.5
+def test_splits_of_equal_sums_tie_and_the_lowest_wins() -> None:
+    for seed in range(40):
+        (first, others), weights, responses = _equal_sums(seed)
+        for column in (1 + first - others, 1 - first + others):
+            fitted = fit_stumps(bin_columns(column[:, np.newaxis]), Targets(weights, responses), Z_MAX)
+            assert fitted.thresholds[0] == 0.5, seed
 
 
 def test_a_light_branch_keeps_the_bits_that_the_coarse_grid_drops() -> None:

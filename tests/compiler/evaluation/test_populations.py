@@ -121,17 +121,7 @@ def test_a_single_row_can_never_be_recognised_and_that_is_said(make_grasps: Make
 def test_leaving_objects_out_warns_of_types_with_one_object(make_grasps: Make) -> None:
     grasps = make_grasps(subjects="A")
     own_object = np.where(grasps.grasps == "hook", "bag", grasps.objects)
-    grasps = GraspSet(
-        grasps.switches,
-        grasps.switch_names,
-        grasps.codes,
-        grasps.joints,
-        grasps.grasps,
-        grasps.taxonomy,
-        grasps.subjects,
-        own_object,
-        grasps.trials,
-    )
+    grasps = replace(grasps, objects=own_object)
     (text,) = concerns(grasps, populations(grasps, "object", 4, 1, 1), "object", 4)
     assert text.startswith("12 row(s) of hook of subject A")
 

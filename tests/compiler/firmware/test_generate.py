@@ -54,15 +54,6 @@ def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
 
 
 @pytest.mark.parametrize("platform", TARGETS)
-def test_generated_files_are_reproducible_without_paths_or_dates(build: Build, platform: str) -> None:
-    files = classifier(build, platform)
-    assert files == classifier(build, platform)
-    for text in files.values():
-        assert str(Path.cwd()) not in text
-        assert not re.search(r"20\d\d-\d\d-\d\d", text)
-
-
-@pytest.mark.parametrize("platform", TARGETS)
 def test_files_are_called_by_the_name_and_no_name_is_rewritten(build: Build, platform: str) -> None:
     request = Firmware(build.tables, build.manifest, platform, name="anne_2")
     files = request.files()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.firmware import FirmwareError, simavr
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.segments import segment_files
 from thenar.compiler.firmware.targets import TARGETS
@@ -28,15 +28,6 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Return the benchmark's module, which compiles and runs the decoder."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     return import_module("segments")
-
-
-@pytest.fixture
-def avr(tool: Callable[[str], str]) -> None:
-    """Need an AVR's compiler and simulator."""
-    for program in ("avr-gcc", "make"):
-        tool(program)
-    if simavr.missing() is not None:
-        tool("libsimavr-dev")
 
 
 def _random_model(seed: int) -> SegmentModel:

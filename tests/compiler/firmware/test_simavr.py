@@ -4,21 +4,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import thenar.simulator.scenes
-from thenar.compiler import compile_build
-from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.firmware import FirmwareError, simavr
-from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
-from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.targets import TARGETS, Target
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.firmware_templates.rendering import file_text
-from thenar.runtime.build import Build
 from thenar.runtime.model.integers import IntegerTables
-from thenar.simulator import load_scene, simulate
-
-Compare = Callable[[Predictions, IntegerTables, Probes], None]
 
 SMALL, LARGE = TARGETS["avr328p"], TARGETS["avr2560"]
 TABLES = """
@@ -59,15 +49,6 @@ def installed(tool: Callable[[str], str]) -> None:
         tool("libsimavr-dev")
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Build, GraspSet]:
-    """Return a build and the recordings that it was made of."""
-    scene = load_scene(str(Path(thenar.simulator.scenes.__file__).parent / "quick.toml"))
-    grasps = simulate(scene, 1).grasp_set
-    made = compile_build(grasps, tmp_path_factory.mktemp("build") / "build", rounds=20, folds=0)
-    return Build.load(made.folder), grasps
-
-
 def one_switch() -> IntegerTables:
     one = np.ones((1, 2), np.int16)
     return IntegerTables.of(
@@ -79,18 +60,6 @@ def one_switch() -> IntegerTables:
         joint_means=np.empty((0, 2), np.int16),
         scale=1.0,
     )
-
-
-@BOTH
-def test_every_score_of_recordings_is_that_of_the_build(
-    recorded: tuple[Build, GraspSet], same_as_python: Compare, target: Target
-) -> None:
-    build, grasps = recorded
-    frames = Probes(*select_inputs(grasps, build.manifest))
-    layout = Layout(build.tables)
-    files = Library("test", build.manifest, layout).files
-    given = layout.frame_bytes(frames.bits, frames.codes)
-    same_as_python(target.run(files, "test", layout, given), build.tables, frames)
 
 
 @BOTH

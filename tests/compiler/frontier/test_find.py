@@ -4,6 +4,7 @@ import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace as replace_rows
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,16 @@ from numpy.typing import NDArray
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.evaluation.folds import weka_folds
+from thenar.compiler.frontier import find
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.plots import pictures
 from thenar.compiler.frontier.points import Frontier, FrontierError, FrontierPoint, frontier_from_bytes
+from thenar.compiler.frontier.replay import replay_of
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
+from thenar.compiler.frontier.timing import classify_times
+from thenar.compiler.frontier.timing.python_times import fit_here
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.methods.base import METHODS
@@ -40,6 +45,15 @@ Request = dict[str, Any]
 
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _short_streams() -> Iterator[None]:
+    """Let latencies be those of 30 grasps, and this machine be timed once: how long either takes is no matter here."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(find, "replay_of", partial(replay_of, grasps=30))
+        patched.setattr(classify_times, "fit_here", cache(fit_here))
+        yield
 
 
 def asked(folder: Path, grasp_set: GraspSet, **changes: Any) -> Request:

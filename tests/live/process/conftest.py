@@ -67,10 +67,6 @@ class Client:
         files = [file for file in (own / "fd").iterdir() if not str(file.readlink()).startswith("socket:")]
         return len(files), len(list((own / "task").iterdir()))
 
-    def error_of(self, kind: str) -> str:
-        """Return what was wrong last with a device, by the newest report."""
-        return next(device.error for device in self.reports[-1].devices if device.name.startswith(kind))
-
     def count(self, kind: str, name: str) -> int:
         device = next(device for device in self.reports[-1].devices if device.name.startswith(kind))
         return sum(count.value for count in device.counts if count.name.startswith(name))

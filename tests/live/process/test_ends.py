@@ -22,7 +22,6 @@ MakeRun = Callable[..., Any]
 pytestmark = pytest.mark.slow
 
 FRANK = Policy(lead=0.0, dwell_us=0)
-SETTLE_US = 150_000
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 MakeRun = Callable[..., Any]
-Cable = Callable[[bytes], bytes]
 
 pytestmark = pytest.mark.slow
 

@@ -105,17 +105,3 @@ def test_spheres_lie_on_the_axes_of_their_capsules() -> None:
     assert own[:, 0] == pytest.approx(HAND.sphere_offsets)
     assert own[:, 1:] == pytest.approx(0.0, abs=1e-12)
     assert (HAND.sphere_offsets <= HAND.lengths[HAND.sphere_capsules]).all()
-
-
-@given(SIZES, ANGLES, st.sampled_from((2, 7, 64)), st.data())
-def test_a_hand_has_the_same_bits_alone_and_in_any_company(
-    size: Size, angles: np.ndarray, n: int, data: st.DataObject
-) -> None:
-    hand = Hand(size)
-    others = np.random.default_rng(data.draw(st.integers(0, 99))).uniform(-1.0, 1.0, (20, n))
-    place = data.draw(st.integers(0, n - 1))
-    others[:, place] = angles
-    alone, together = hand.skeleton(angles[:, None]), hand.skeleton(others)
-    for field in ("frames", "origins", "axes", "centres"):
-        assert np.array_equal(getattr(alone, field)[..., 0], getattr(together, field)[..., place])
-    assert np.array_equal(hand.spheres(alone)[..., 0], hand.spheres(together)[..., place])

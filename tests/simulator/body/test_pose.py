@@ -87,15 +87,3 @@ def test_distance_ignores_common_motion_of_hand_and_object(
     distance, normal = pose.distance(BALL, pose.outward(off) + pose.position)
     assert distance == pytest.approx(BALL.distance(off)[0], abs=1e-11)
     assert normal == pytest.approx(pose.outward(BALL.distance(off)[1]), abs=1e-11)
-
-
-@given(arrays(np.float64, (6, 5), elements=st.floats(-3.0, 3.0)))
-def test_a_pose_is_the_same_alone_and_in_company(numbers: np.ndarray) -> None:
-    points = np.arange(30.0).reshape(2, 3, 5)
-    pose = Pose.of(numbers)
-    vectors, inward = rotation_vector(pose.rotation), pose.inward(points)
-    for one in range(5):
-        alone = Pose.of(numbers[:, [one]])
-        assert np.array_equal(alone.rotation[..., 0], pose.rotation[..., one])
-        assert np.array_equal(rotation_vector(alone.rotation)[:, 0], vectors[:, one])
-        assert np.array_equal(alone.inward(points[..., [one]])[..., 0], inward[..., one])

@@ -1,7 +1,6 @@
 """Grasps of contact.quasistatic against an independent program: the same hands and objects in MuJoCo."""
 
 import os
-from collections.abc import Callable
 from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -11,9 +10,10 @@ import pytest
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.hand import CAPSULES, LIMITS_DEG, Hand, Size
-from thenar.simulator.contact.balance import SolverCase
 from thenar.simulator.contact.model import Load
 from thenar.simulator.effects.contact_quasistatic import Quasistatic
+
+from ..small import make_case
 
 THRESHOLD_N = 1.0
 
@@ -51,7 +51,7 @@ def jaccard(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def test_two_programs_agree_on_one_grasp_better_than_one_program_on_two(
-    oracle: ModuleType, planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., SolverCase]
+    oracle: ModuleType, planned: dict[str, tuple[Condition, ...]]
 ) -> None:
     loads = []
     for condition in planned["kamakura"]:

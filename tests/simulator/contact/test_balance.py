@@ -1,6 +1,5 @@
 """Forces on hand and object, against sums written out one by one."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,21 +14,17 @@ from thenar.simulator.contact.balance import (
     LIMIT_NMM_PER_RAD,
     Balance,
     Skin,
-    SolverCase,
     command,
 )
 from thenar.simulator.contact.model import STIFFNESS
+
+from ..small import make_case
 
 GRASPS = ("PoS", "PoH", "CMF", "PMF", "PE")
 
 
 @pytest.fixture(scope="module", params=GRASPS)
-def balance(
-    request: pytest.FixtureRequest,
-    by_grasp: dict[str, Condition],
-    make_case: Callable[..., SolverCase],
-    skin: Skin,
-) -> Balance:
+def balance(request: pytest.FixtureRequest, by_grasp: dict[str, Condition], skin: Skin) -> Balance:
     """Hands a little off where they were told to be, so that skin is both pressed and dragged."""
     told = command([make_case(by_grasp[request.param], 4)])
     draw = np.random.default_rng(7)

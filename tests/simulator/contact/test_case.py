@@ -1,7 +1,5 @@
 """What hands are told: how skin gives, what presses, and where skin first touches."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,8 +7,10 @@ from hypothesis import strategies as st
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.shapes import Pose
-from thenar.simulator.contact.balance import Skin, SolverCase, command, turned
+from thenar.simulator.contact.balance import Skin, command, turned
 from thenar.simulator.contact.model import torques
+
+from ..small import make_case
 
 SKINS = st.builds(
     Skin,
@@ -38,7 +38,7 @@ def test_deep_skin_is_a_spring_from_half_the_soft_depth(skin: Skin, deeper: floa
     assert force[0] == pytest.approx(skin.press_n_per_mm * (deeper + skin.soft_mm / 2))
 
 
-def test_skin_first_touches_where_it_is(by_grasp: dict[str, Condition], make_case: Callable[..., SolverCase]) -> None:
+def test_skin_first_touches_where_it_is(by_grasp: dict[str, Condition]) -> None:
     told = command([make_case(by_grasp[grasp]) for grasp in ("PoS", "Tip", "CMF")])
     hand, skeleton = told.hand, told.hand.skeleton(told.angles)
     of_skin = skeleton.origins[hand.sphere_capsules] + turned(skeleton.frames[hand.sphere_capsules], told.skin_points)
@@ -48,13 +48,13 @@ def test_skin_first_touches_where_it_is(by_grasp: dict[str, Condition], make_cas
     assert from_middle == pytest.approx(np.broadcast_to(hand.sphere_radii[:, None], from_middle.shape), rel=1e-9)
 
 
-def test_weight_pulls_down_with_mass(by_grasp: dict[str, Condition], make_case: Callable[..., SolverCase]) -> None:
+def test_weight_pulls_down_with_mass(by_grasp: dict[str, Condition]) -> None:
     condition = by_grasp["PoS"]
     weight = command([make_case(condition, 4)]).weight
     assert weight == pytest.approx(np.tile(condition.held.down[:, None] * condition.thing.mass_kg * 9.80665, 4))
 
 
-def test_torque_is_that_of_the_grip(by_grasp: dict[str, Condition], make_case: Callable[..., SolverCase]) -> None:
+def test_torque_is_that_of_the_grip(by_grasp: dict[str, Condition]) -> None:
     case = make_case(by_grasp["Tip"], 4)
     unit = torques(case.condition, case.condition.hand.skeleton(case.angles), Pose.of(case.numbers))
     assert command([case]).torque == pytest.approx(unit * case.grip_n)

@@ -6,7 +6,7 @@ pressing force, against skin's stiffness). It is held to the differences exactly
 planned grasps.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 
@@ -19,6 +19,8 @@ from thenar.simulator.body.hand import LIMITS_DEG, Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
 from thenar.simulator.contact.balance import Balance, Skin, SolverCase, command
 from thenar.simulator.contact.settle import newton_step, stiffness
+
+from ..small import make_case
 
 HAND = Hand(Size(185.0, 83.0))
 HARD = Skin(press_n_per_mm=3.0, soft_mm=1e-4, drag_n_per_mm=1.5, friction=2.0)
@@ -106,7 +108,7 @@ def test_shifting_an_object_is_resisted_exactly_even_where_its_surface_bends(sha
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["kamakura", "cutkosky"])
 def test_on_planned_grasps_the_matrix_is_near_the_differences(
-    scene: str, planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., SolverCase], skin: Skin
+    scene: str, planned: dict[str, tuple[Condition, ...]], skin: Skin
 ) -> None:
     off = []
     for condition in planned[scene]:
@@ -123,16 +125,14 @@ def test_on_planned_grasps_the_matrix_is_near_the_differences(
 
 
 def test_the_matrix_is_positive_definite_on_planned_grasps(
-    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., SolverCase], skin: Skin
+    planned: dict[str, tuple[Condition, ...]], skin: Skin
 ) -> None:
     for condition in (*planned["kamakura"], *planned["cutkosky"]):
         told = command([make_case(condition, 1)])
         assert np.linalg.eigvalsh(matrix(Balance(told, skin, told.angles, told.pose)))[0] > 0.0
 
 
-def test_a_step_solves_the_matrix_or_a_part_of_it(
-    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., SolverCase], skin: Skin
-) -> None:
+def test_a_step_solves_the_matrix_or_a_part_of_it(planned: dict[str, tuple[Condition, ...]], skin: Skin) -> None:
     for condition in planned["kamakura"]:
         told = command([make_case(condition, 1)])
         balance = Balance(told, skin, told.angles, told.pose)
@@ -144,7 +144,7 @@ def test_a_step_solves_the_matrix_or_a_part_of_it(
 
 
 def test_no_step_is_longer_than_joints_and_objects_may_move_at_once(
-    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., SolverCase], skin: Skin
+    planned: dict[str, tuple[Condition, ...]], skin: Skin
 ) -> None:
     for condition in planned["cutkosky"]:
         told = command([make_case(condition, 8, share=3.0)])

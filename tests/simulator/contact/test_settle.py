@@ -1,6 +1,5 @@
 """Hands closing on objects: at rest everything is in balance, and each repetition is on its own."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +11,9 @@ from thenar.simulator.contact.balance import HOLD_N_PER_MM, USUAL, Skin, SolverC
 from thenar.simulator.contact.model import GRAVITY
 from thenar.simulator.contact.settle import Rest, close
 
+from ..small import make_case
+
 MOST_STEPS = 40
-Cases = Callable[..., SolverCase]
 Planned = dict[str, tuple[Condition, ...]]
 
 
@@ -38,7 +38,7 @@ def assert_same(one: Rest, other: Rest, place: int, first: int = 0) -> None:
 
 
 @pytest.fixture(scope="module")
-def every(planned: Planned, make_case: Cases, skin: Skin) -> list[tuple[SolverCase, Rest]]:
+def every(planned: Planned, skin: Skin) -> list[tuple[SolverCase, Rest]]:
     """Every grasp type and object of both taxonomies, four repetitions each."""
     cases = [make_case(condition, 4, seed) for scene in planned.values() for seed, condition in enumerate(scene)]
     return list(zip(cases, close(cases, skin, MOST_STEPS), strict=True))
@@ -61,7 +61,7 @@ def test_skin_and_weight_balance_but_for_a_small_share_of_the_load(every: list[t
     assert found.max() < 0.10
 
 
-def test_pads_get_most_of_the_grip_in_pinches(by_grasp: dict[str, Condition], make_case: Cases, skin: Skin) -> None:
+def test_pads_get_most_of_the_grip_in_pinches(by_grasp: dict[str, Condition], skin: Skin) -> None:
     for grasp in ("Tip", "PMF", "CMF", "PE"):
         case = make_case(by_grasp[grasp], 16)
         (rest,) = close([case], skin, MOST_STEPS)
@@ -70,7 +70,7 @@ def test_pads_get_most_of_the_grip_in_pinches(by_grasp: dict[str, Condition], ma
         assert share.max() < 1.4, grasp
 
 
-def test_friction_carries_the_weight(by_grasp: dict[str, Condition], make_case: Cases, skin: Skin) -> None:
+def test_friction_carries_the_weight(by_grasp: dict[str, Condition], skin: Skin) -> None:
     # PMF holds a glass upright from its sides: only friction keeps it from falling.
     for grasp in ("PMF", "CMF", "PE"):
         heavy = heavier(by_grasp[grasp], 0.3)
@@ -84,7 +84,7 @@ def test_friction_carries_the_weight(by_grasp: dict[str, Condition], make_case: 
 
 
 def test_a_hand_that_meets_nothing_and_presses_nothing_stays_as_told(
-    by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
+    by_grasp: dict[str, Condition], skin: Skin
 ) -> None:
     case = make_case(heavier(by_grasp["CMF"], 0.0), 3, share=0.0)
     clear = replace(case, numbers=case.numbers + np.array([500.0, 0, 0, 0, 0, 0])[:, None], grip_n=np.zeros(3))
@@ -125,33 +125,10 @@ def test_a_stricter_rest_is_reached_and_leaves_less(every: list[tuple[SolverCase
         assert (np.abs(rest.residual_n - held)[rest.settled] < strict.rest_n).all()
 
 
-def test_an_object_overlapping_the_whole_hand_is_marked(
-    by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
-) -> None:
+def test_an_object_overlapping_the_whole_hand_is_marked(by_grasp: dict[str, Condition], skin: Skin) -> None:
     huge = replace(by_grasp["Tip"], thing=replace(by_grasp["Tip"].thing, shape=Sphere(1500.0), mass_kg=5.0))
     (rest,) = close([make_case(huge, 4)], skin, MOST_STEPS)
     assert not rest.settled.any()
     assert (rest.steps == MOST_STEPS).all()
     assert np.isfinite(rest.angles).all()
     assert np.isfinite(rest.presses).all()
-
-
-@pytest.mark.parametrize("n", [1, 2, 7, 64])
-def test_a_repetition_comes_out_the_same_in_any_number(
-    n: int, by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
-) -> None:
-    for grasp in ("PoS", "Tip"):
-        case = make_case(by_grasp[grasp], n, seed=5)
-        (together,) = close([case], skin, MOST_STEPS)
-        for one in range(min(n, 4)):
-            own = slice(one, one + 1)
-            alone = SolverCase(case.condition, case.angles[:, own], case.numbers[:, own], case.grip_n[own])
-            assert_same(close([alone], skin, MOST_STEPS)[0], together, one)
-
-
-def test_a_case_comes_out_the_same_in_any_company_and_order(every: list[tuple[SolverCase, Rest]], skin: Skin) -> None:
-    some = [every[number] for number in (0, 11, 23, 30, 45, 59)]
-    for order in ((5, 3, 1), (0, 2), (4, 5, 0, 1, 2, 3)):
-        for number, rest in zip(order, close([some[k][0] for k in order], skin, MOST_STEPS), strict=True):
-            for repetition in range(4):
-                assert_same(some[number][1], rest, repetition, repetition)

@@ -1,7 +1,5 @@
 """The default contact model: loads in, contacts out, none depending on the others."""
 
-from collections.abc import Callable
-
 import msgspec
 import numpy as np
 import pytest
@@ -11,10 +9,11 @@ from thenar.simulator.body.shapes import Pose
 from thenar.simulator.contact.balance import Skin
 from thenar.simulator.contact.model import Contact, ContactModel, Load
 from thenar.simulator.effects.contact_quasistatic import MEMBER, USUAL_SKIN, Quasistatic, model
-from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import sessions
 from thenar.simulator.planning.postures import Postures
+
+from ..small import make_setting
 
 FIELDS = ("posture_deg", "pose", "forces_n", "capsules_n", "between_n", "settled", "residual_n", "residual_nmm")
 
@@ -32,7 +31,7 @@ def conditions() -> list[Condition]:
 
 
 @pytest.fixture(scope="module")
-def default(make_setting: Callable[..., SceneSetting]) -> ContactModel:
+def default() -> ContactModel:
     return model(make_setting())
 
 
@@ -64,16 +63,6 @@ def test_loads_of_several_hands_come_back_in_their_order(conditions: list[Condit
         assert_same(default.solve([one])[0], contact)
 
 
-def test_a_repetition_comes_out_the_same_alone(conditions: list[Condition], default: ContactModel) -> None:
-    for condition in conditions[::3]:
-        whole = load(condition, 7)
-        (together,) = default.solve([whole])
-        for one in (0, 3, 6):
-            own = slice(one, one + 1)
-            part = Load(condition, whole.posture_deg[own], whole.pose[own], whole.grip_n[own])
-            assert_same(default.solve([part])[0], together, own)
-
-
 def test_more_repetitions_than_are_solved_at_a_time_come_out_the_same(
     conditions: list[Condition], default: ContactModel
 ) -> None:
@@ -100,9 +89,7 @@ def test_a_pose_at_rest_is_where_the_object_is_felt(conditions: list[Condition],
     assert not found[~touched].any()
 
 
-def test_a_switch_that_reaches_further_feels_more(
-    conditions: list[Condition], make_setting: Callable[..., SceneSetting]
-) -> None:
+def test_a_switch_that_reaches_further_feels_more(conditions: list[Condition]) -> None:
     told = [load(condition) for condition in conditions]
     lost = [
         sum(contact.between_n.sum() for contact in model(make_setting(), reach_mm=reach).solve(told))
@@ -111,9 +98,7 @@ def test_a_switch_that_reaches_further_feels_more(
     assert lost[0] > lost[1] > lost[2]
 
 
-def test_what_does_not_come_to_rest_is_marked(
-    conditions: list[Condition], make_setting: Callable[..., SceneSetting]
-) -> None:
+def test_what_does_not_come_to_rest_is_marked(conditions: list[Condition]) -> None:
     (contact,) = model(make_setting(), most_steps=1).solve([load(conditions[0])])
     assert not contact.settled.any()
     assert contact.steps == 3
@@ -123,10 +108,7 @@ def test_what_does_not_come_to_rest_is_marked(
 @pytest.mark.parametrize("soft_mm", [5e-324, 5.0])
 @pytest.mark.parametrize("drag_n_per_mm", [5e-324, 1000.0])
 def test_skins_at_the_limits_give_finite_results(
-    conditions: list[Condition],
-    press_n_per_mm: float,
-    soft_mm: float,
-    drag_n_per_mm: float,
+    conditions: list[Condition], press_n_per_mm: float, soft_mm: float, drag_n_per_mm: float
 ) -> None:
     skin = Skin(press_n_per_mm, soft_mm, drag_n_per_mm, USUAL_SKIN.friction)
     for contact in Quasistatic(skin).solve([load(condition, 1) for condition in conditions[:3]]):

@@ -12,6 +12,8 @@ from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.ramp import NEVER, crossings
 
+from ..small import make_batch, make_draw, make_setting
+
 RISE_US, HOLD_US, LETS_GO_US = 100_000, 250_000, 260_000
 
 
@@ -32,51 +34,44 @@ class Press:
         return Contact(posture_deg, pose, forces, np.zeros((len(n), 20)), n, settled, grip_n, 30 * grip_n, 3 * len(n))
 
 
-@pytest.fixture(scope="module")
-def ramped(make_batch: Callable, make_draw: Callable, make_setting: Callable) -> Callable[..., Batch]:
-    """Return a function of a contact model, parameters and release: a batch of grips 10 and 20 N on 1 N switches."""
-
-    def make(model: Press, levels: int = 10, release_us: int = 200_000) -> Batch:
-        batch: Batch = make_batch(range(2))
-        batch.commanded_deg, batch.commanded_pose = np.zeros((2, 20)), np.zeros((2, 6))
-        batch.grip_n = np.array([10.0, 20.0])
-        batch.forces_n = model.forces(batch.grip_n[:, None])
-        batch.settled = np.ones(2, dtype=np.bool_)
-        batch.residual_n, batch.residual_nmm = np.full(2, 0.25), np.full(2, 7.5)
-        batch.thresholds_n = np.ones(batch.forces_n.shape[1])
-        closed = batch.forces_n > 1.0
-        batch.on_us = np.where(closed, 0, NEVER)
-        batch.off_us = np.where(closed, LETS_GO_US, NEVER) if release_us else np.full_like(batch.on_us, NEVER)
-        setting = make_setting(timed=True, hold_us=HOLD_US, release_us=release_us)
-        prepare(setting, model, rise_ms=100.0, levels=levels)([batch], [make_draw("contact.ramp", batch)])
-        return batch
-
-    return make
+def ramped(model: Press, levels: int = 10, release_us: int = 200_000) -> Batch:
+    """Return a batch of grips of 10 and 20 N on switches that close at 1 N."""
+    batch: Batch = make_batch(range(2))
+    batch.commanded_deg, batch.commanded_pose = np.zeros((2, 20)), np.zeros((2, 6))
+    batch.grip_n = np.array([10.0, 20.0])
+    batch.forces_n = model.forces(batch.grip_n[:, None])
+    batch.settled = np.ones(2, dtype=np.bool_)
+    batch.residual_n, batch.residual_nmm = np.full(2, 0.25), np.full(2, 7.5)
+    batch.thresholds_n = np.ones(batch.forces_n.shape[1])
+    closed = batch.forces_n > 1.0
+    batch.on_us = np.where(closed, 0, NEVER)
+    batch.off_us = np.where(closed, LETS_GO_US, NEVER) if release_us else np.full_like(batch.on_us, NEVER)
+    setting = make_setting(timed=True, hold_us=HOLD_US, release_us=release_us)
+    prepare(setting, model, rise_ms=100.0, levels=levels)([batch], [make_draw("contact.ramp", batch)])
+    return batch
 
 
-def test_what_was_solved_on_the_way_is_counted(
-    make_batch: Callable, make_draw: Callable, make_setting: Callable, ramped: Callable
-) -> None:
+def test_what_was_solved_on_the_way_is_counted() -> None:
     """Two hands at four levels below the full grip, three steps each."""
     batch, draw = ramped(Press(lambda grip: grip)), make_draw("contact.ramp", make_batch(range(2)))
     prepare(make_setting(), Press(lambda grip: grip), levels=5)([batch], [draw])
     assert draw.draws.counts == {"grips solved": 8, "solver steps": 24}
 
 
-def test_a_switch_closes_when_the_growing_force_passes_its_threshold(ramped: Callable) -> None:
+def test_a_switch_closes_when_the_growing_force_passes_its_threshold() -> None:
     """Forces of 0.05, 0.25 and 1 times the grip: 1 N is reached at 20, 4 and 1 N of 10 and 20 N."""
     batch = ramped(Press(lambda grip: grip * np.array([0.05, 0.25, 1.0])))
     assert batch.on_us.tolist() == [[NEVER, 40_000, 10_000], [NEVER, 20_000, 5_000]]
 
 
-def test_release_is_the_mirror_image(ramped: Callable) -> None:
+def test_release_is_the_mirror_image() -> None:
     batch = ramped(Press(lambda grip: grip * np.array([0.05, 0.25, 1.0])))
     assert batch.off_us.tolist() == [[NEVER, LETS_GO_US + 60_000, LETS_GO_US + 90_000], [NEVER, 340_000, 355_000]]
     batch = ramped(Press(lambda grip: grip * np.array([0.05, 0.25, 1.0])), release_us=0)
     assert (batch.off_us == NEVER).all()
 
 
-def test_a_switch_that_is_pressed_only_in_passing_closes_and_opens(ramped: Callable) -> None:
+def test_a_switch_that_is_pressed_only_in_passing_closes_and_opens() -> None:
     """It bears the grip up to 5 N and then less: 10 N less the grip."""
     batch = ramped(Press(lambda grip: np.maximum(np.minimum(grip, 10.0 - grip), 0.0)))
     assert batch.on_us.tolist() == [[10_000], [5_000]]
@@ -84,9 +79,7 @@ def test_a_switch_that_is_pressed_only_in_passing_closes_and_opens(ramped: Calla
 
 
 @pytest.mark.parametrize("levels", [1, 2, 7])
-def test_the_model_is_solved_at_all_levels_but_the_full_one(
-    make_batch: Callable, ramped: Callable, levels: int
-) -> None:
+def test_the_model_is_solved_at_all_levels_but_the_full_one(levels: int) -> None:
     grips: list[np.ndarray] = []
 
     def forces(grip: np.ndarray) -> np.ndarray:
@@ -98,7 +91,7 @@ def test_the_model_is_solved_at_all_levels_but_the_full_one(
     assert np.allclose(solved, [[level / levels] * 2 for level in range(1, levels)])
 
 
-def test_what_does_not_settle_on_the_way_is_marked(ramped: Callable) -> None:
+def test_what_does_not_settle_on_the_way_is_marked() -> None:
     batch = ramped(Press(lambda grip: grip, settles_n=1.5))
     assert batch.settled.tolist() == [False, True]
     # What was left at 1 N, where the first gave up; the second keeps what was left at its full grip.
@@ -140,6 +133,6 @@ def test_what_is_closed_from_the_first_level_on_closes_at_once() -> None:
     assert (on.tolist(), off.tolist()) == ([[0]], [[1500]])
 
 
-def test_a_row_read_before_the_full_grip_is_refused(make_setting: Callable) -> None:
+def test_a_row_read_before_the_full_grip_is_refused() -> None:
     with pytest.raises(SceneError, match=r"contact\.ramp: .* rise_ms = 300 is longer than recording\.hold_ms = 250"):
         prepare(make_setting(hold_us=250_000), Press(lambda grip: grip), rise_ms=300.0)

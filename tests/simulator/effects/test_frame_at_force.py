@@ -1,29 +1,27 @@
 """Frames at even steps of the force of initial contact."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
-from thenar.simulator.scenes.scene import Recording, Scene, SceneGlove
+from thenar.simulator.scenes.scene import Recording, SceneGlove
+
+from ..small import make_batch, make_scene
 
 PRESSED = Recording(rows="all", rate_hz=20.0, hold_ms=300.0)  # seven frames
 
 
-def simulated(make_scene: Callable[..., Scene], make_batch: Callable[..., Batch], *effects: str) -> Batch:
+def simulated(*effects: str) -> Batch:
     batch = make_batch(range(4))
     scene = make_scene(list(effects), recording=PRESSED, glove=SceneGlove(taxels="all"))
     compile_pipeline(scene).run([batch], Ledger())
     return batch
 
 
-def test_the_hardest_pressed_place_bears_even_steps_of_force(
-    make_scene: Callable[..., Scene], make_batch: Callable[..., Batch]
-) -> None:
-    batch = simulated(make_scene, make_batch, "contact.ramp", "frame.at_force")
+def test_the_hardest_pressed_place_bears_even_steps_of_force() -> None:
+    batch = simulated("contact.ramp", "frame.at_force")
     hardest = batch.taxels_n.max(axis=2)
     assert batch.forces_n.max(axis=1).min() > 1.0
     np.testing.assert_allclose(hardest[:, :-1], np.tile(np.arange(6) / 5, (4, 1)), atol=1e-3)
@@ -31,16 +29,12 @@ def test_the_hardest_pressed_place_bears_even_steps_of_force(
     assert (np.diff(batch.frame_us, axis=1) >= 0).all()
 
 
-def test_without_a_ramp_frames_stay_where_they_are(
-    make_scene: Callable[..., Scene], make_batch: Callable[..., Batch]
-) -> None:
-    batch = simulated(make_scene, make_batch, "frame.at_force")
+def test_without_a_ramp_frames_stay_where_they_are() -> None:
+    batch = simulated("frame.at_force")
     np.testing.assert_array_equal(batch.frame_us[0], 50_000 * np.arange(7))
 
 
-def test_frames_before_contact_and_after_release_stay(
-    make_scene: Callable[..., Scene], make_batch: Callable[..., Batch]
-) -> None:
+def test_frames_before_contact_and_after_release_stay() -> None:
     recording = Recording(rows="all", rate_hz=20.0, lead_ms=100.0, hold_ms=300.0, release_ms=50.0)
     batch = make_batch(range(2))
     compile_pipeline(make_scene(["contact.ramp", "frame.at_force"], recording=recording)).run([batch], Ledger())
@@ -48,6 +42,6 @@ def test_frames_before_contact_and_after_release_stay(
     assert ((batch.frame_us[:, 3:8] > 0) & (batch.frame_us[:, 3:8] < 300_000)).all()
 
 
-def test_fewer_than_three_frames_of_contact_are_refused(make_scene: Callable[..., Scene]) -> None:
+def test_fewer_than_three_frames_of_contact_are_refused() -> None:
     with pytest.raises(SceneError, match=r"^effects\.frame\.at_force: needs three frames"):
         compile_pipeline(make_scene(["frame.at_force"], recording=Recording(hold_ms=60.0, rate_hz=20.0)))

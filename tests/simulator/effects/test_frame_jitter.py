@@ -1,19 +1,14 @@
-from collections.abc import Callable
-
 import msgspec
 import numpy as np
 import pytest
 
 from thenar.simulator.effects.frame_jitter import MEMBER, prepare
-from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting, frame_times
 
-MakeBatch = Callable[..., Batch]
+from ..small import make_batch, make_draw, make_setting
 
 
-def jittered(
-    make_batch: MakeBatch, make_draw: Callable, setting: SceneSetting, sd_us: float, rows: range
-) -> np.ndarray:
+def jittered(setting: SceneSetting, sd_us: float, rows: range) -> np.ndarray:
     batch = make_batch(rows)
     batch.frame_us = np.tile(frame_times(setting), (len(batch), 1))
     prepare(setting, sd_us=sd_us)(batch, make_draw("frame.jitter", batch))
@@ -21,16 +16,14 @@ def jittered(
 
 
 @pytest.mark.parametrize("sd_us", [100.0, 5_000.0, 100_000.0])
-def test_frames_keep_their_order_however_late(
-    make_batch: MakeBatch, make_draw: Callable, make_setting: Callable, sd_us: float
-) -> None:
-    times = jittered(make_batch, make_draw, make_setting(timed=True), sd_us, range(50))
+def test_frames_keep_their_order_however_late(sd_us: float) -> None:
+    times = jittered(make_setting(timed=True), sd_us, range(50))
     assert (np.diff(times, axis=1) >= 0).all()
 
 
-def test_frames_stray_as_much_as_said(make_batch: MakeBatch, make_draw: Callable, make_setting: Callable) -> None:
+def test_frames_stray_as_much_as_said() -> None:
     setting = make_setting(timed=True)
-    late = jittered(make_batch, make_draw, setting, 300.0, range(400)) - frame_times(setting)
+    late = jittered(setting, 300.0, range(400)) - frame_times(setting)
     assert abs(late.mean()) < 10.0
     assert abs(late.std() - 300.0) < 10.0
 

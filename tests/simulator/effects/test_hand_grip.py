@@ -1,18 +1,13 @@
 """Grip force varies from repetition to repetition."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from thenar.simulator.effects.hand_grip import MEMBER, prepare
-from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import SceneSetting
-from thenar.simulator.streams import Draw
+
+from ..small import make_batch, make_draw, make_setting
 
 
-def test_grip_is_lognormal_about_what_was_planned(
-    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., SceneSetting]
-) -> None:
+def test_grip_is_lognormal_about_what_was_planned() -> None:
     batch = make_batch(range(4000))
     batch.grip_n = np.full(4000, 12.0)
     prepare(make_setting(), log_sd=0.25)(batch, make_draw(MEMBER.name, batch))

@@ -1,7 +1,5 @@
 """The object's pose varies from repetition to repetition."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,9 +8,8 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from thenar.simulator.effects.hand_object_pose import MEMBER, prepare, turned
-from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import SceneSetting
-from thenar.simulator.streams import Draw
+
+from ..small import make_batch, make_draw, make_setting
 
 VECTORS = arrays(np.float64, (3, 3), elements=st.floats(-1.8, 1.8))  # up to half a turn
 DIRECTIONS = arrays(np.float64, (3, 3), elements=st.floats(-1.0, 1.0))
@@ -37,9 +34,7 @@ def test_it_holds_next_to_no_rotation_and_about_half_a_turn(length: float) -> No
     assert np.all((got * truth.inv()).magnitude() < (turn**2).sum())
 
 
-def test_places_and_turns_vary_as_much_as_is_asked(
-    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., SceneSetting]
-) -> None:
+def test_places_and_turns_vary_as_much_as_is_asked() -> None:
     batch = make_batch(range(2000))
     held = batch.condition.held.pose
     batch.pose = np.tile(held, (2000, 1))
@@ -53,9 +48,7 @@ def test_places_and_turns_vary_as_much_as_is_asked(
     assert np.abs(turns.std(axis=0) - 3.0).max() < 0.064 * 3.0
 
 
-def test_either_can_be_left_out(
-    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., SceneSetting]
-) -> None:
+def test_either_can_be_left_out() -> None:
     for parameters, still in (({"sd_mm": 0.0}, slice(0, 3)), ({"sd_deg": 0.0}, slice(3, 6))):
         batch = make_batch()
         before = batch.pose = np.tile(batch.condition.held.pose, (4, 1))

@@ -1,5 +1,3 @@
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,10 +7,9 @@ from thenar.simulator.body.cyberglove import sensors_deg
 from thenar.simulator.body.hand import DOF, LIMITS_DEG
 from thenar.simulator.effects.hand_transition import path, prepare
 from thenar.simulator.errors import SceneError
-from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting
 
-MakeBatch = Callable[..., Batch]
+from ..small import make_batch, make_draw, make_setting
 
 SEEDS, OPENINGS = st.integers(0, 2**32), st.floats(0.0, 90.0)
 ABDUCTIONS = [name.endswith("abduction") for name in DOF]
@@ -71,9 +68,7 @@ def test_without_opening_it_is_the_minimum_jerk_path() -> None:
     assert angles[7] == pytest.approx(15.0)
 
 
-def moved(
-    make_batch: MakeBatch, make_draw: Callable, setting: SceneSetting, frame_us: np.ndarray, rows: range
-) -> tuple:
+def moved(setting: SceneSetting, frame_us: np.ndarray, rows: range) -> tuple:
     batch, random = make_batch(rows), np.random.default_rng(1)
     every = random.uniform(0.0, 60.0, (100, 2, 20))
     batch.previous_deg, batch.posture_deg = every[batch.repetitions, 0], every[batch.repetitions, 1]
@@ -83,11 +78,9 @@ def moved(
     return batch, settled
 
 
-def test_sensors_move_before_contact_and_only_then(
-    make_batch: MakeBatch, make_draw: Callable, make_setting: Callable
-) -> None:
+def test_sensors_move_before_contact_and_only_then() -> None:
     frame_us = np.array([[-40_000, -30_000, -10_000, 0, 10_000], [-30_000, -20_000, 5, 10, 20]])
-    batch, settled = moved(make_batch, make_draw, make_setting(timed=True, first_us=-30_000), frame_us, range(2))
+    batch, settled = moved(make_setting(timed=True, first_us=-30_000), frame_us, range(2))
     before = sensors_deg(batch.previous_deg)
     assert np.array_equal(batch.sensors_deg[0, :2], [before[0], before[0]])
     assert np.array_equal(batch.sensors_deg[1, 0], before[1])
@@ -95,6 +88,6 @@ def test_sensors_move_before_contact_and_only_then(
     assert (batch.sensors_deg[0, 2] != settled[0, 2]).any()
 
 
-def test_a_scene_without_time_before_contact_is_refused(make_setting: Callable) -> None:
+def test_a_scene_without_time_before_contact_is_refused() -> None:
     with pytest.raises(SceneError, match=r"hand\.transition: there is no frame before contact.*lead_ms"):
         prepare(make_setting(timed=True, first_us=0))

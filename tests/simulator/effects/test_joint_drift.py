@@ -1,39 +1,22 @@
 """The calibration of the joint sensors drifts as a session goes on."""
 
-from collections.abc import Callable
-
 import numpy as np
-import pytest
 
-from thenar.simulator.body.condition import Condition
 from thenar.simulator.effects.joint_drift import MEMBER, prepare
-from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import SceneSetting
-from thenar.simulator.streams import Draw
 
-Drift = Callable[..., np.ndarray]
+from ..small import make_batch, make_condition, make_draw, make_setting
 
 
-@pytest.fixture(scope="session")
-def drift(
-    make_batch: Callable[..., Batch],
-    make_condition: Callable[..., Condition],
-    make_draw: Callable[..., Draw],
-    make_setting: Callable[..., SceneSetting],
-) -> Drift:
-    """Return a function of subject and trials of 100 that returns what is added (n, 2 frames, 18)."""
-
-    def run(subject: str, trials: list[int], deg_per_session: float = 5.0) -> np.ndarray:
-        batch = make_batch(range(len(trials)), make_condition(subject))
-        batch.trials = np.array(trials)
-        batch.sensors_deg = np.zeros((len(trials), 2, 18))
-        prepare(make_setting(session_trials=100), deg_per_session=deg_per_session)(batch, make_draw(MEMBER.name, batch))
-        return batch.sensors_deg
-
-    return run
+def drift(subject: str, trials: list[int], deg_per_session: float = 5.0) -> np.ndarray:
+    """Return what is added in these trials of 100 (n, 2 frames, 18)."""
+    batch = make_batch(range(len(trials)), make_condition(subject))
+    batch.trials = np.array(trials)
+    batch.sensors_deg = np.zeros((len(trials), 2, 18))
+    prepare(make_setting(session_trials=100), deg_per_session=deg_per_session)(batch, make_draw(MEMBER.name, batch))
+    return batch.sensors_deg
 
 
-def test_it_begins_at_nought_and_goes_on_in_a_straight_line(drift: Drift) -> None:
+def test_it_begins_at_nought_and_goes_on_in_a_straight_line() -> None:
     added = drift("A", [0, 25, 50, 100])
     assert not added[0].any()
     np.testing.assert_allclose(added[2], 2.0 * added[1], rtol=1e-12)
@@ -41,7 +24,7 @@ def test_it_begins_at_nought_and_goes_on_in_a_straight_line(drift: Drift) -> Non
     np.testing.assert_array_equal(added[:, 0], added[:, 1])
 
 
-def test_every_subjects_sensors_drift_independently_by_the_requested_amount(drift: Drift) -> None:
+def test_every_subjects_sensors_drift_independently_by_the_requested_amount() -> None:
     ends = np.stack([drift(f"subject {number}", [100], deg_per_session=8.0)[0, 0] for number in range(200)])
     # 3600 drifts: four standard errors of mean and sd.
     assert abs(ends.mean()) < 4 * 8.0 / 3600**0.5

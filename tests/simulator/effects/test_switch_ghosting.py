@@ -1,5 +1,3 @@
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,6 +6,8 @@ from hypothesis import strategies as st
 from thenar.simulator.effects.switch_ghosting import joined, prepare
 from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import SceneGlove
+
+from ..small import make_batch, make_draw, make_scene, make_setting
 
 
 def searched(bits: np.ndarray) -> np.ndarray:
@@ -35,9 +35,7 @@ def test_the_matrix_reads_what_a_walk_through_it_finds(switches: int, seed: int,
 
 
 @pytest.mark.parametrize("shape", [(2, 3, 160), (1, 1, 5)])
-def test_every_frame_is_a_matrix_of_its_own(
-    make_batch: Callable, make_draw: Callable, make_setting: Callable, shape: tuple[int, ...]
-) -> None:
+def test_every_frame_is_a_matrix_of_its_own(shape: tuple[int, ...]) -> None:
     batch = make_batch(range(shape[0]))
     batch.bits = bits = np.random.default_rng(2).random(shape) < 0.1
     draw = make_draw("switch.ghosting", batch)
@@ -64,9 +62,7 @@ def test_every_frame_is_a_matrix_of_its_own(
         ),
     ],
 )
-def test_current_flows_through_stuck_switches_and_dead_ports(
-    make_scene: Callable, make_batch: Callable, others: list, reads: list[int]
-) -> None:
+def test_current_flows_through_stuck_switches_and_dead_ports(others: list, reads: list[int]) -> None:
     """Row 1, columns 2 and 7, and row 5, column 2; the threshold is so high that the hand closes nothing."""
     batch, effects = make_batch(range(1)), ["switch.ghosting", *others]
     glove = SceneGlove(threshold_n=20.0)

@@ -1,49 +1,32 @@
 """Switches that are stuck, open or closed."""
 
-from collections.abc import Callable
-
 import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.layout import murakami160
 from thenar.simulator.effects import switch_stuck_closed, switch_stuck_open
 from thenar.simulator.errors import SceneError
-from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import SceneSetting
-from thenar.simulator.streams import Draw
+
+from ..small import make_batch, make_condition, make_draw, make_setting
 
 BOTH = [(switch_stuck_open, False), (switch_stuck_closed, True)]
 NAMES = [patch.name for patch in murakami160()]
-Read = Callable[..., np.ndarray]
 
 
-@pytest.fixture(scope="session")
-def read(
-    make_batch: Callable[..., Batch],
-    make_condition: Callable[..., Condition],
-    make_draw: Callable[..., Draw],
-    make_setting: Callable[..., SceneSetting],
-) -> Read:
-    """Return a function of modules with parameters, and of a subject: what is read of random bits (3, 2, 160)."""
-
-    def run(*effects: tuple, subject: str = "A") -> np.ndarray:
-        batch = make_batch(range(3), make_condition(subject))
-        batch.bits = np.random.default_rng(5).random((3, 2, 160)) < 0.5
-        for module, parameters in effects:
-            module.prepare(make_setting(), **parameters)(batch, make_draw(module.MEMBER.name, batch))
-        return batch.bits
-
-    return run
+def read(*effects: tuple, subject: str = "A") -> np.ndarray:
+    """Return what is read of random bits (3, 2, 160) after effects, modules with their parameters."""
+    batch = make_batch(range(3), make_condition(subject))
+    batch.bits = np.random.default_rng(5).random((3, 2, 160)) < 0.5
+    for module, parameters in effects:
+        module.prepare(make_setting(), **parameters)(batch, make_draw(module.MEMBER.name, batch))
+    return batch.bits
 
 
 @pytest.mark.parametrize(("module", "value"), BOTH)
-def test_named_switches_are_stuck_in_every_frame_and_the_others_are_not(
-    read: Read, module: object, value: bool
-) -> None:
+def test_named_switches_are_stuck_in_every_frame_and_the_others_are_not(module: object, value: bool) -> None:
     free, stuck = read(), read((module, {"switches": (3, NAMES[7], 159)}))
     assert (stuck[:, :, [3, 7, 159]] == value).all()
     others = np.delete(np.arange(160), [3, 7, 159])
@@ -52,7 +35,7 @@ def test_named_switches_are_stuck_in_every_frame_and_the_others_are_not(
 
 @pytest.mark.parametrize(("module", "value"), BOTH)
 @given(count=st.integers(1, 160))
-def test_fewer_stuck_switches_are_a_subset_of_more(read: Read, module: object, value: bool, count: int) -> None:
+def test_fewer_stuck_switches_are_a_subset_of_more(module: object, value: bool, count: int) -> None:
     stuck = (read((module, {"count": count})) == value).all(axis=(0, 1))
     # With 6 random bits beside, about 2 of the other switches look stuck by chance: what is counted is what changed.
     by_chance = (read() == value).all(axis=(0, 1))
@@ -62,18 +45,18 @@ def test_fewer_stuck_switches_are_a_subset_of_more(read: Read, module: object, v
 
 
 @pytest.mark.parametrize(("module", "value"), BOTH)
-def test_one_is_drawn_where_nothing_is_said(read: Read, module: object, value: bool) -> None:
+def test_one_is_drawn_where_nothing_is_said(module: object, value: bool) -> None:
     changed = (read((module, {})) != read()).any(axis=(0, 1))
     assert np.count_nonzero(changed) == 1
 
 
 @pytest.mark.parametrize(("module", "value"), BOTH)
-def test_everybody_wears_the_same_glove(read: Read, module: object, value: bool) -> None:
+def test_everybody_wears_the_same_glove(module: object, value: bool) -> None:
     first, second = (read((module, {"count": 20}), subject=subject) for subject in "AB")
     np.testing.assert_array_equal(first, second)
 
 
-def test_open_and_closed_ones_are_drawn_apart_and_closed_wins(read: Read) -> None:
+def test_open_and_closed_ones_are_drawn_apart_and_closed_wins() -> None:
     opened, closed = (
         (read((module, {"count": 40})) != read()).any(axis=(0, 1))
         for module in (switch_stuck_open, switch_stuck_closed)
@@ -95,7 +78,7 @@ def test_open_and_closed_ones_are_drawn_apart_and_closed_wins(read: Read) -> Non
     ],
 )
 def test_switches_that_are_not_there_are_refused_with_the_place(
-    module: object, value: bool, parameters: dict, words: tuple[str, ...], make_setting: Callable[..., SceneSetting]
+    module: object, value: bool, parameters: dict, words: tuple[str, ...]
 ) -> None:
     with pytest.raises(SceneError) as caught:
         module.prepare(make_setting(), **parameters)  # type: ignore[attr-defined]

@@ -1,40 +1,23 @@
 """Each switch closes at a force of its own."""
 
-from collections.abc import Callable
-
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.body.condition import Condition
 from thenar.simulator.effects.switch_threshold import LEAST_N, MEMBER, prepare
-from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import SceneSetting
-from thenar.simulator.streams import Draw
 
-Thresholds = Callable[..., np.ndarray]
+from ..small import make_batch, make_condition, make_draw, make_setting
 
 
-@pytest.fixture(scope="session")
-def thresholds(
-    make_batch: Callable[..., Batch],
-    make_condition: Callable[..., Condition],
-    make_draw: Callable[..., Draw],
-    make_setting: Callable[..., SceneSetting],
-) -> Thresholds:
-    """Return a function of a subject and sd_n that returns the thresholds (160,) about 1 N."""
-
-    def run(subject: str, sd_n: float) -> np.ndarray:
-        batch = make_batch(range(1), make_condition(subject))
-        batch.thresholds_n = np.ones(160)
-        prepare(make_setting(), sd_n=sd_n)(batch, make_draw(MEMBER.name, batch))
-        return batch.thresholds_n
-
-    return run
+def thresholds(subject: str, sd_n: float) -> np.ndarray:
+    """Return the thresholds (160,) about 1 N."""
+    batch = make_batch(range(1), make_condition(subject))
+    batch.thresholds_n = np.ones(160)
+    prepare(make_setting(), sd_n=sd_n)(batch, make_draw(MEMBER.name, batch))
+    return batch.thresholds_n
 
 
-def test_thresholds_spread_about_the_gloves_as_much_as_is_asked(thresholds: Thresholds) -> None:
+def test_thresholds_spread_about_the_gloves_as_much_as_is_asked() -> None:
     found = thresholds("A", 0.15)
     # Four standard errors of mean and sd of 160; 0.2 N is 5 sd away.
     assert abs(found.mean() - 1.0) < 4 * 0.15 / 160**0.5
@@ -42,10 +25,10 @@ def test_thresholds_spread_about_the_gloves_as_much_as_is_asked(thresholds: Thre
     assert len(set(found.tolist())) == 160
 
 
-def test_everybody_wears_the_same_glove(thresholds: Thresholds) -> None:
+def test_everybody_wears_the_same_glove() -> None:
     np.testing.assert_array_equal(thresholds("A", 0.15), thresholds("B", 0.15))
 
 
 @given(sd_n=st.floats(0.0, 5.0))
-def test_no_switch_closes_by_itself(thresholds: Thresholds, sd_n: float) -> None:
+def test_no_switch_closes_by_itself(sd_n: float) -> None:
     assert thresholds("A", sd_n).min() >= LEAST_N

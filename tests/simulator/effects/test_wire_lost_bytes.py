@@ -1,24 +1,15 @@
-from collections.abc import Callable
-
 import msgspec
 import numpy as np
 import pytest
 
 from thenar.simulator.effects.wire_lost_bytes import MEMBER, arrives, prepare
-from thenar.simulator.pipeline.batch import Batch, SerialTraffic
+from thenar.simulator.pipeline.batch import SerialTraffic
 from thenar.simulator.pipeline.effect import SceneSetting
 
-MakeBatch = Callable[..., Batch]
+from ..small import make_batch, make_draw, make_setting
 
 
-def through(
-    make_batch: MakeBatch,
-    make_draw: Callable,
-    setting: SceneSetting,
-    shape: tuple[int, int],
-    rows: range,
-    rate: float = 0.2,
-) -> np.ndarray:
+def through(setting: SceneSetting, shape: tuple[int, int], rows: range, rate: float = 0.2) -> np.ndarray:
     batch = make_batch(rows)
     zeros = np.zeros((len(batch), *shape), dtype=np.uint8)
     batch.traffic = SerialTraffic(zeros, zeros.astype(np.int64), np.ones(zeros.shape, dtype=np.bool_), 26)
@@ -35,12 +26,12 @@ def test_a_byte_is_lost_where_its_number_is_below_the_rate() -> None:
     assert np.arange(4)[arrives(chances, 0.01)].tolist() == [2, 3]
 
 
-def test_the_share_that_is_lost_is_the_rate(make_batch: MakeBatch, make_draw: Callable, make_setting: Callable) -> None:
-    came = through(make_batch, make_draw, make_setting(), (1, 46), range(500), rate=0.2)
+def test_the_share_that_is_lost_is_the_rate() -> None:
+    came = through(make_setting(), (1, 46), range(500), rate=0.2)
     assert abs(1.0 - came.mean() - 0.2) < 0.01
 
 
-def test_what_was_lost_before_stays_lost(make_batch: MakeBatch, make_draw: Callable, make_setting: Callable) -> None:
+def test_what_was_lost_before_stays_lost() -> None:
     batch = make_batch(range(2))
     data = np.zeros((2, 1, 46), dtype=np.uint8)
     batch.traffic = SerialTraffic(data, data.astype(np.int64), np.zeros(data.shape, dtype=np.bool_), 26)

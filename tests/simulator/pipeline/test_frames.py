@@ -1,20 +1,18 @@
 """When frames are scanned: always at the end of holding, whatever else."""
 
-from collections.abc import Callable
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.pipeline.effect import SceneSetting, at_a_time, drawn_rows, frame_times, hold_frame
+from thenar.simulator.pipeline.effect import at_a_time, drawn_rows, frame_times, hold_frame
+
+from ..small import make_setting
 
 PERIODS = st.integers(1_000, 30_000)
 TIMES = st.integers(0, 200_000)
 
 
-def test_without_time_only_the_read_frame_exists(
-    make_setting: Callable[..., SceneSetting],
-) -> None:
+def test_without_time_only_the_read_frame_exists() -> None:
     setting = make_setting(timed=False)
     assert frame_times(setting).tolist() == [setting.hold_us]
     assert hold_frame(setting) == 0
@@ -22,9 +20,7 @@ def test_without_time_only_the_read_frame_exists(
 
 
 @given(period=PERIODS, lead=TIMES, hold=TIMES, release=TIMES)
-def test_frames_are_a_period_apart_and_one_ends_holding(
-    make_setting: Callable[..., SceneSetting], period: int, lead: int, hold: int, release: int
-) -> None:
+def test_frames_are_a_period_apart_and_one_ends_holding(period: int, lead: int, hold: int, release: int) -> None:
     setting = make_setting(timed=True, period_us=period, first_us=-lead, hold_us=hold, release_us=release)
     times = frame_times(setting)
     assert times[hold_frame(setting)] == hold
@@ -34,9 +30,7 @@ def test_frames_are_a_period_apart_and_one_ends_holding(
 
 
 @given(period=PERIODS, lead=TIMES, hold=TIMES, release=TIMES)
-def test_frames_draw_separate_rows_the_read_one_first(
-    make_setting: Callable[..., SceneSetting], period: int, lead: int, hold: int, release: int
-) -> None:
+def test_frames_draw_separate_rows_the_read_one_first(period: int, lead: int, hold: int, release: int) -> None:
     setting = make_setting(timed=True, period_us=period, first_us=-lead, hold_us=hold, release_us=release)
     rows = drawn_rows(setting)
     assert sorted(rows.tolist()) == list(range(len(frame_times(setting))))
@@ -45,7 +39,7 @@ def test_frames_draw_separate_rows_the_read_one_first(
 
 @given(period=PERIODS, hold=st.integers(1, 60_000_000), few=st.integers(1, 1000), more=st.integers(0, 1000))
 def test_the_more_frames_the_fewer_repetitions_at_a_time_but_never_none(
-    make_setting: Callable[..., SceneSetting], period: int, hold: int, few: int, more: int
+    period: int, hold: int, few: int, more: int
 ) -> None:
     setting = make_setting(timed=True, period_us=period, hold_us=hold)
     frames = len(frame_times(setting))

@@ -1,7 +1,5 @@
 """What the glove does in every scene, step by step, against what its definition says of each element."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,32 +11,22 @@ from thenar.simulator.pipeline import glove
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting, frame_times
 from thenar.simulator.pipeline.ramp import NEVER
-from thenar.simulator.streams import Draw
 
-BatchMaker = Callable[..., Batch]
-SettingMaker = Callable[..., SceneSetting]
-DrawMaker = Callable[..., Draw]
+from ..small import make_batch, make_draw, make_setting
+
 FORCES = arrays(np.float64, (2, 5), elements=st.sampled_from([0.0, 0.999, 1.0, 1.001, 4.0]))
 
 
-@pytest.fixture(scope="session")
-def take(make_draw: DrawMaker) -> Callable[..., None]:
-    """Return a function that takes a batch through one of the glove's own steps, which draws nothing."""
-    steps = {effect.name: effect for effect in glove.STEPS}
-
-    def run(name: str, batch: Batch, setting: SceneSetting) -> None:
-        draw = make_draw(name, batch)
-        effect = steps[name]
-        assert effect.prepare is not None
-        effect.prepare(setting)(batch, draw)
-        assert not draw.draws.counts
-
-    return run
+def take(name: str, batch: Batch, setting: SceneSetting) -> None:
+    """Take a batch through one of the glove's own steps, which draws nothing."""
+    draw = make_draw(name, batch)
+    (effect,) = (step for step in glove.STEPS if step.name == name)
+    assert effect.prepare is not None
+    effect.prepare(setting)(batch, draw)
+    assert not draw.draws.counts
 
 
-def test_recall_takes_what_was_planned_for_every_repetition(
-    take: Callable[..., None], make_batch: BatchMaker, make_setting: SettingMaker
-) -> None:
+def test_recall_takes_what_was_planned_for_every_repetition() -> None:
     batch = make_batch(range(3))
     take("glove.recall", batch, make_setting())
     held = batch.condition.held
@@ -50,9 +38,7 @@ def test_recall_takes_what_was_planned_for_every_repetition(
 
 
 @given(forces=FORCES, released=st.booleans())
-def test_switches_close_above_threshold_and_open_after_the_row(
-    take: Callable[..., None], make_batch: BatchMaker, make_setting: SettingMaker, forces: np.ndarray, released: bool
-) -> None:
+def test_switches_close_above_threshold_and_open_after_the_row(forces: np.ndarray, released: bool) -> None:
     batch, setting = make_batch(range(2)), make_setting(threshold_n=1.0, release_us=40_000 if released else 0)
     batch.forces_n = forces
     take("glove.threshold", batch, setting)
@@ -66,9 +52,7 @@ def test_switches_close_above_threshold_and_open_after_the_row(
 
 
 @pytest.mark.parametrize("timed", [False, True])
-def test_frames_are_those_configured_with_equal_sensing(
-    take: Callable[..., None], make_batch: BatchMaker, make_setting: SettingMaker, timed: bool
-) -> None:
+def test_frames_are_those_configured_with_equal_sensing(timed: bool) -> None:
     batch, setting = make_batch(range(3)), make_setting(timed=timed)
     take("glove.recall", batch, setting)
     take("glove.frames", batch, setting)
@@ -78,9 +62,7 @@ def test_frames_are_those_configured_with_equal_sensing(
     assert (batch.sensors_deg == sensors_deg(batch.posture_deg)[:, None]).all()
 
 
-def test_bytes_are_those_of_the_subjects_calibration(
-    take: Callable[..., None], make_batch: BatchMaker, make_setting: SettingMaker
-) -> None:
+def test_bytes_are_those_of_the_subjects_calibration() -> None:
     batch, setting = make_batch(range(2)), make_setting()
     batch.sensors_deg = np.linspace(-200.0, 200.0, 2 * 3 * 18).reshape(2, 3, 18)
     take("glove.encode", batch, setting)
@@ -100,13 +82,7 @@ TIMES = st.sampled_from([-5, 0, 3, 10, 11, NEVER])
     delay=st.none() | arrays(np.int64, (3,), elements=st.integers(0, 9)) | st.just(np.zeros((2, 4, 3), dtype=np.int64)),
 )
 def test_a_bit_is_read_between_closing_and_opening_when_its_turn_comes(
-    take: Callable[..., None],
-    make_batch: BatchMaker,
-    make_setting: SettingMaker,
-    on: np.ndarray,
-    off: np.ndarray,
-    frames: np.ndarray,
-    delay: np.ndarray | None,
+    on: np.ndarray, off: np.ndarray, frames: np.ndarray, delay: np.ndarray | None
 ) -> None:
     batch = make_batch(range(2))
     batch.on_us, batch.off_us, batch.frame_us, batch.delay_us = on, off, frames, delay
@@ -117,9 +93,7 @@ def test_a_bit_is_read_between_closing_and_opening_when_its_turn_comes(
         assert batch.bits[row, frame, switch] == (on[row, switch] <= at < off[row, switch])
 
 
-def test_the_read_row_is_held_the_last_frames_are_not(
-    take: Callable[..., None], make_batch: BatchMaker, make_setting: SettingMaker
-) -> None:
+def test_the_read_row_is_held_the_last_frames_are_not() -> None:
     batch, setting = make_batch(range(1)), make_setting(timed=True)
     batch.forces_n = np.array([[0.5, 2.0]])
     for name in ("glove.threshold", "glove.close", "glove.frames", "glove.sample"):

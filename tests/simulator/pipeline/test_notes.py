@@ -1,10 +1,10 @@
-from collections.abc import Callable
-
 import numpy as np
 
 from thenar.simulator.contact.model import Contact
 from thenar.simulator.pipeline.batch import SLID_OUT_MM, Batch
 from thenar.simulator.pipeline.report import UnsettledGrasp, notes_of
+
+from ..small import make_batch
 
 
 def went_through(batch: Batch) -> Batch:
@@ -17,7 +17,7 @@ def went_through(batch: Batch) -> Batch:
     return batch
 
 
-def test_what_did_not_settle_is_named_and_told_why(make_batch: Callable[..., Batch]) -> None:
+def test_what_did_not_settle_is_named_and_told_why() -> None:
     found = notes_of(went_through(make_batch([10, 11, 12, 13])))
     assert (found.grasp, found.repetitions, found.lost_frames) == ("PoS", 4, 0)
     reason = "the hand did not come to rest; residual on the object: 70 N, 700 N mm"
@@ -25,13 +25,13 @@ def test_what_did_not_settle_is_named_and_told_why(make_batch: Callable[..., Bat
     assert [one.repetition for one in found.unsettled] == [11, 13]
 
 
-def test_an_object_that_slid_out_of_the_hand_is_called_that(make_batch: Callable[..., Batch]) -> None:
+def test_an_object_that_slid_out_of_the_hand_is_called_that() -> None:
     batch = went_through(make_batch())
     batch.pose[1] = [12.0, 16.0, 15.0, 0.0, 0.0, 0.0]
     assert notes_of(batch).unsettled[0].why == "the object slid 25 mm, out of the hand"
 
 
-def test_residuals_are_those_of_settled_repetitions(make_batch: Callable[..., Batch]) -> None:
+def test_residuals_are_those_of_settled_repetitions() -> None:
     batch = went_through(make_batch())
     batch.residual_n[1] = np.nan
     found = notes_of(batch)
@@ -39,9 +39,7 @@ def test_residuals_are_those_of_settled_repetitions(make_batch: Callable[..., Ba
     assert "nan N" in found.unsettled[0].why
 
 
-def test_missing_frames_and_empty_repetitions_are_reported(
-    make_batch: Callable[..., Batch],
-) -> None:
+def test_missing_frames_and_empty_repetitions_are_reported() -> None:
     batch = went_through(make_batch())
     batch.lost = np.array([[True, False, True], [True, True, True], [False, False, True], [False, True, False]])
     found = notes_of(batch)
@@ -50,7 +48,7 @@ def test_missing_frames_and_empty_repetitions_are_reported(
     assert "come to rest" in found.unsettled[1].why
 
 
-def test_an_object_that_slid_out_of_the_hand_has_not_settled(make_batch: Callable[..., Batch]) -> None:
+def test_an_object_that_slid_out_of_the_hand_has_not_settled() -> None:
     batch = make_batch(range(3))
     batch.posture_deg, batch.pose = np.zeros((3, 20)), np.ones((3, 6))
     pose = batch.pose.copy()

@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from random import Random
 
 import numpy as np
@@ -16,17 +15,18 @@ from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.pipeline.ramp import NEVER, Ramp
 from thenar.simulator.pipeline.report import Codes, Rows, grasp_set, joined, rows_of
 
+from ..small import make_batch, make_condition, make_setting
+
 SWITCHES = tuple(patch.name for patch in murakami160())
 FRAMES, HELD = 4, 2
 # Frames before contact, at contact, at read-out, and when the hand has let go.
 FRAME_US = np.array([-10_000, 0, 10_000, 20_000])
-MakeSetting = Callable[..., SceneSetting]
 
 Recorded = tuple[Condition, Batch, Codes]
 
 
 @pytest.fixture(scope="module")
-def recorded(make_condition: Callable[..., Condition], make_batch: Callable[..., Batch]) -> list[Recorded]:
+def recorded() -> list[Recorded]:
     """Return three conditions of two subjects, six repetitions of four frames each, with random bits and codes."""
     random = np.random.default_rng(5)
     found = []
@@ -45,27 +45,24 @@ def recorded(make_condition: Callable[..., Condition], make_batch: Callable[...,
     return found
 
 
-def part_of(batch: Batch, codes: Codes, pick: slice, make_batch: Callable[..., Batch]) -> tuple[Batch, Codes]:
+def part_of(batch: Batch, codes: Codes, pick: slice) -> tuple[Batch, Codes]:
     part = make_batch(batch.repetitions[pick], batch.condition)
     for name in ("trials", "bits", "frame_us"):
         setattr(part, name, getattr(batch, name)[pick])
     return part, codes[pick]
 
 
-@pytest.fixture(scope="session")
-def make(make_setting: MakeSetting) -> MakeSetting:
-    """Return a function of what is to differ of the setting of these frames."""
+def make(**changes: object) -> SceneSetting:
+    """Return the setting of these frames, in which the fields of `changes` differ."""
     times = {"timed": True, "first_us": -10_000, "hold_us": 10_000, "release_us": 10_000}
-    return lambda **changes: make_setting(**(times | changes))
+    return make_setting(**(times | changes))
 
 
-def blocks_of(
-    recorded: list[Recorded], size: int, make_batch: Callable[..., Batch], setting: SceneSetting
-) -> list[Rows]:
+def blocks_of(recorded: list[Recorded], size: int, setting: SceneSetting) -> list[Rows]:
     blocks = []
     for number, (_, whole, all_codes) in enumerate(recorded):
         for first in range(0, len(whole), size):
-            batch, codes = part_of(whole, all_codes, slice(first, first + size), make_batch)
+            batch, codes = part_of(whole, all_codes, slice(first, first + size))
             everyone = np.arange(len(batch))
             blocks.append(rows_of(batch, everyone, number, codes, setting))
     return blocks
@@ -82,23 +79,16 @@ SUBJECTS = np.array([0, 0, 1])
 @settings(max_examples=30, deadline=None)
 @given(size=st.integers(1, 6), order=st.randoms(use_true_random=False), every_frame=st.booleans())
 def test_rows_do_not_depend_on_blocks_or_order(
-    size: int,
-    order: Random,
-    every_frame: bool,
-    recorded: list[Recorded],
-    make_batch: Callable[..., Batch],
-    make: MakeSetting,
+    size: int, order: Random, every_frame: bool, recorded: list[Recorded]
 ) -> None:
-    whole = joined(blocks_of(recorded, 6, make_batch, make(every_frame=every_frame)), SUBJECTS)
-    blocks = blocks_of(recorded, size, make_batch, make(every_frame=every_frame))
+    whole = joined(blocks_of(recorded, 6, make(every_frame=every_frame)), SUBJECTS)
+    blocks = blocks_of(recorded, size, make(every_frame=every_frame))
     order.shuffle(blocks)
     assert set_of(joined(blocks, SUBJECTS), recorded).fingerprint() == set_of(whole, recorded).fingerprint()
 
 
-def test_rows_stand_by_subject_then_trial_then_frame(
-    recorded: list[Recorded], make_batch: Callable[..., Batch], make: MakeSetting
-) -> None:
-    made = set_of(joined(blocks_of(recorded, 4, make_batch, make(every_frame=True)), SUBJECTS), recorded)
+def test_rows_stand_by_subject_then_trial_then_frame(recorded: list[Recorded]) -> None:
+    made = set_of(joined(blocks_of(recorded, 4, make(every_frame=True)), SUBJECTS), recorded)
     assert made.subjects.tolist() == ["B"] * 48 + ["A"] * 24
     assert made.trials[:48].tolist() == np.repeat(np.arange(12), FRAMES).tolist()
     for condition, batch, codes in recorded:
@@ -112,10 +102,8 @@ def test_rows_stand_by_subject_then_trial_then_frame(
             assert set(made.objects[own]) == {condition.thing.name}
 
 
-def test_one_row_a_repetition_is_the_frame_that_is_read_out(
-    recorded: list[Recorded], make_batch: Callable[..., Batch], make: MakeSetting
-) -> None:
-    rows = joined(blocks_of(recorded, 6, make_batch, make()), SUBJECTS)
+def test_one_row_a_repetition_is_the_frame_that_is_read_out(recorded: list[Recorded]) -> None:
+    rows = joined(blocks_of(recorded, 6, make()), SUBJECTS)
     made = set_of(rows, recorded)
     assert rows.read_out.all()
     _, batch, codes = recorded[2]
@@ -124,10 +112,8 @@ def test_one_row_a_repetition_is_the_frame_that_is_read_out(
     np.testing.assert_array_equal(made.codes[12:], codes[order, HELD])
 
 
-def test_a_clock_never_goes_back_and_begins_at_nought(
-    recorded: list[Recorded], make_batch: Callable[..., Batch], make: MakeSetting
-) -> None:
-    blocks = blocks_of(recorded, 6, make_batch, make(every_frame=True))
+def test_a_clock_never_goes_back_and_begins_at_nought(recorded: list[Recorded]) -> None:
+    blocks = blocks_of(recorded, 6, make(every_frame=True))
     for block in blocks:
         block.time_us[:] -= np.tile([25_000, 0, 0, 0], len(block) // FRAMES)
     made = set_of(joined(blocks, SUBJECTS), recorded)
@@ -137,9 +123,7 @@ def test_a_clock_never_goes_back_and_begins_at_nought(
         assert (np.diff(clock) >= 0).all()
 
 
-def test_a_grasp_is_held_until_its_first_pressure_ends(
-    make_batch: Callable[..., Batch],
-) -> None:
+def test_a_grasp_is_held_until_its_first_pressure_ends() -> None:
     batch = make_batch(range(3))
     batch.frame_us = np.tile(FRAME_US, (3, 1))
     assert batch.holds(15_000).tolist() == [[False, True, True, False]] * 3
@@ -152,7 +136,7 @@ def test_a_grasp_is_held_until_its_first_pressure_ends(
     assert batch.holds(None).tolist() == [[False, True, True, True]] * 3
 
 
-def test_a_batch_of_which_nothing_is_kept_has_no_rows(recorded: list[Recorded], make: MakeSetting) -> None:
+def test_a_batch_of_which_nothing_is_kept_has_no_rows(recorded: list[Recorded]) -> None:
     _, batch, codes = recorded[0]
     rows = rows_of(batch, np.array([], dtype=np.intp), 0, codes, make(every_frame=True))
     assert len(rows) == 0

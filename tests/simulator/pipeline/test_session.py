@@ -1,5 +1,3 @@
-from collections.abc import Callable
-
 import msgspec
 import numpy as np
 import pytest
@@ -13,6 +11,8 @@ from thenar.simulator.pipeline.simulation import SubjectSession, sessions
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.scenes.scene import Scene
 from thenar.simulator.streams import Draw, DrawCounts, Site
+
+from ..small import make_scene
 
 QUICK = load_scene("quick")
 POSTURES = Postures.shipped(QUICK.taxonomy)
@@ -85,7 +85,7 @@ def test_the_hand_comes_from_the_posture_planned_for_the_trial_before() -> None:
         assert batch.condition is condition
 
 
-def test_an_object_without_a_planned_posture_is_named_with_its_grasp_type(make_scene: Callable[..., Scene]) -> None:
+def test_an_object_without_a_planned_posture_is_named_with_its_grasp_type() -> None:
     with pytest.raises(SceneError, match=r"no planned posture of grasp type 'PoS' with object 'bar' for a hand of"):
         sessions(make_scene(), Postures("kamakura14", ()))
 

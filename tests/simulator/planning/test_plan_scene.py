@@ -1,6 +1,5 @@
 """A scene's postures: what is planned, what is kept for later, and what is said of what cannot be held."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -24,9 +23,10 @@ from thenar.simulator.planning.plan import (
 )
 from thenar.simulator.planning.planner import Misfit, _start_near
 from thenar.simulator.planning.postures import Entry, Postures
-from thenar.simulator.scenes.scene import Scene, SceneObject, Subject
+from thenar.simulator.scenes.scene import SceneObject, Subject
 
-MakeScene = Callable[..., Scene]
+from ..small import make_scene
+
 SHIPPED = Postures.shipped("kamakura14")
 
 
@@ -144,7 +144,7 @@ def test_the_shipped_postures_are_what_is_planned_today(name: str) -> None:
             check_on_the_same_way_down(entry, known, scene.taxonomy, held.length_mm)
 
 
-def test_only_what_has_no_posture_is_planned_and_once(make_scene: MakeScene, cache: Path) -> None:
+def test_only_what_has_no_posture_is_planned_and_once(cache: Path) -> None:
     reports: list[tuple[int, int]] = []
     scene = make_scene(objects=(PEA, BEAD))
     postures = postures_of(scene, 1, lambda *report: reports.append(report))
@@ -159,24 +159,24 @@ def test_only_what_has_no_posture_is_planned_and_once(make_scene: MakeScene, cac
     assert Postures.load(path).entries == (pea,)
 
 
-def test_without_a_cache_folder_it_is_planned_every_time(make_scene: MakeScene, cache: Path) -> None:
+def test_without_a_cache_folder_it_is_planned_every_time(cache: Path) -> None:
     cache.write_text("a file is in its place")
     assert postures_of(make_scene(objects=(PEA,)), 1).entry("Tip", PEA.thing()) is not None
 
 
-def test_a_changed_shape_is_planned_though_its_name_is_known(make_scene: MakeScene) -> None:
+def test_a_changed_shape_is_planned_though_its_name_is_known() -> None:
     larger = thing("bead", "Tip", msgspec.structs.replace(BEAD.shape, diameter_mm=13.0))
     (work,) = lacking(make_scene(objects=(larger,)), SHIPPED)
     assert work.thing.shape == larger.shape
 
 
-def test_two_objects_of_one_shape_and_type_are_planned_once(make_scene: MakeScene) -> None:
+def test_two_objects_of_one_shape_and_type_are_planned_once() -> None:
     twin = msgspec.structs.replace(PEA, name="twin", mass_g=3.0)
     assert len(list(lacking(make_scene(objects=(PEA, twin)), SHIPPED))) == 1
 
 
 @pytest.mark.slow
-def test_the_result_does_not_depend_on_the_number_of_jobs(make_scene: MakeScene) -> None:
+def test_the_result_does_not_depend_on_the_number_of_jobs() -> None:
     works = list(lacking(make_scene(objects=(PEA, BALL, BEAN)), SHIPPED))  # the ball is done first
     found = [planned(works, jobs) for jobs in (1, 2, 3)]
     assert [entry.object for entry in found[0]] == ["pea", "ball", "bean"]
@@ -185,14 +185,14 @@ def test_the_result_does_not_depend_on_the_number_of_jobs(make_scene: MakeScene)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_unholdable_objects_are_named_and_the_first_explained(make_scene: MakeScene, jobs: int) -> None:
+def test_unholdable_objects_are_named_and_the_first_explained(jobs: int) -> None:
     with pytest.raises(PlanError) as refusal:
         postures_of(make_scene(objects=(PEA, MELON, BALL, MOON), subjects=(hand(160.0),)), jobs)
     assert str(refusal.value).startswith("a hand of 165 mm cannot hold 'melon' with grasp type 'CMF': ")
     assert str(refusal.value).endswith("; nor can these be held: 'moon' (CMF)")
 
 
-def test_what_a_hand_of_the_scene_need_not_hold_is_no_error(make_scene: MakeScene) -> None:
+def test_what_a_hand_of_the_scene_need_not_hold_is_no_error() -> None:
     entry = postures_of(make_scene(objects=(MELON,), subjects=(hand(222.0),)), 1).entry("CMF", MELON.thing())
     assert entry is not None
     assert entry.covers(222.0)
@@ -210,9 +210,7 @@ def test_what_a_hand_of_the_scene_need_not_hold_is_no_error(make_scene: MakeScen
         ([225.1], 150.0, 240.0),
     ],
 )
-def test_lengths_go_as_far_as_the_hands_of_the_scene(
-    make_scene: MakeScene, lengths: list[float], first: float, last: float
-) -> None:
+def test_lengths_go_as_far_as_the_hands_of_the_scene(lengths: list[float], first: float, last: float) -> None:
     hands = tuple(map(hand, lengths))
     postures = postures_of(make_scene(objects=(PEA,), subjects=hands), 1)
     entry = postures.entry("Tip", PEA.thing())
@@ -222,7 +220,7 @@ def test_lengths_go_as_far_as_the_hands_of_the_scene(
         assert postures.held(subject.hand(), "Tip", PEA.thing()).pads
 
 
-def test_known_objects_are_replanned_only_beyond_their_hand_lengths(make_scene: MakeScene) -> None:
+def test_known_objects_are_replanned_only_beyond_their_hand_lengths() -> None:
     far = make_scene(objects=(BEAD,), subjects=(hand(188.0), hand(238.0)))
     entry, known = (postures.entry("Tip", BEAD.thing()) for postures in (postures_of(far, 1), SHIPPED))
     assert entry is not None
@@ -231,18 +229,18 @@ def test_known_objects_are_replanned_only_beyond_their_hand_lengths(make_scene: 
     assert np.abs(figures(entry)[:-1] - figures(known)).max() < ROUNDING
 
 
-def test_a_taxonomy_without_a_table_cannot_be_planned(make_scene: MakeScene) -> None:
+def test_a_taxonomy_without_a_table_cannot_be_planned() -> None:
     item = thing("bead", "Tip Pinch", BEAD.shape)
     with pytest.raises(SceneError, match="no table of prehensions for the grasp types of 'feix33': nothing can be pla"):
         postures_of(make_scene(taxonomy="feix33", objects=(item,)), 1)
 
 
-def test_a_type_that_its_taxonomys_table_lacks_is_named_with_its_object(make_scene: MakeScene) -> None:
+def test_a_type_that_its_taxonomys_table_lacks_is_named_with_its_object() -> None:
     with pytest.raises(SceneError, match="kamakura14 has no prehension for grasp type 'Hold': 'pea' cannot"):
         postures_of(make_scene(objects=(thing("pea", "Hold", PEA.shape),)), 1)
 
 
-def test_an_interrupt_passes_through(make_scene: MakeScene) -> None:
+def test_an_interrupt_passes_through() -> None:
     def interrupt(done: int, total: int) -> None:
         raise KeyboardInterrupt
 

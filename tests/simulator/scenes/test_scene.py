@@ -1,5 +1,4 @@
 from collections import Counter
-from collections.abc import Callable
 
 import pytest
 from hypothesis import given
@@ -9,7 +8,7 @@ from thenar.simulator.body.shapes import Sphere
 from thenar.simulator.pipeline.effect import EFFECTS, SceneSetting
 from thenar.simulator.scenes.scene import Recording, Scene, SceneObject, Subject
 
-MakeScene = Callable[..., Scene]
+from ..small import make_scene
 
 
 def objects(grasps: list[str]) -> tuple[SceneObject, ...]:
@@ -47,7 +46,7 @@ def test_more_repetitions_go_on_where_those_of_the_scene_end(grasps: list[str], 
     assert fresh.origin == f"scene x, seed 1, {more} more after {repetitions} repetitions"
 
 
-def test_a_setting_has_times_in_microseconds_from_the_first_contact(make_scene: MakeScene) -> None:
+def test_a_setting_has_times_in_microseconds_from_the_first_contact() -> None:
     scene = make_scene(recording=Recording(rate_hz=80.0, lead_ms=30.5, hold_ms=250.0, release_ms=40.0))
     setting = SceneSetting.of(scene, [])
     assert (setting.period_us, setting.first_us, setting.hold_us, setting.release_us) == (
@@ -59,7 +58,7 @@ def test_a_setting_has_times_in_microseconds_from_the_first_contact(make_scene: 
     assert (setting.seed, setting.threshold_n) == (scene.seed, scene.glove.threshold_n)
 
 
-def test_a_session_has_the_trials_of_one_subject(make_scene: MakeScene) -> None:
+def test_a_session_has_the_trials_of_one_subject() -> None:
     scene = make_scene(objects=objects(["PoS", "PoS", "Tip"]), repetitions=10)
     assert SceneSetting.of(scene, []).session_trials == 20
 
@@ -75,7 +74,7 @@ def test_a_session_has_the_trials_of_one_subject(make_scene: MakeScene) -> None:
     ],
 )
 def test_frames_and_bytes_exist_if_rows_or_effects_need_them(
-    make_scene: MakeScene, rows: str, effects: list[str], timed: bool, on_wire: bool
+    rows: str, effects: list[str], timed: bool, on_wire: bool
 ) -> None:
     scene = make_scene(recording=Recording(rows=rows))  # type: ignore[arg-type]
     setting = SceneSetting.of(scene, [EFFECTS[name] for name in effects])

@@ -4,7 +4,6 @@ from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,9 +13,6 @@ from thenar.compiler import grow_id3
 from thenar.compiler.placement.gain import gain_bits
 from thenar.compiler.placement.methods.id3 import entropy_brought, error_reduction, weakest_links
 from thenar.compiler.placement.tree import Node, Tree
-
-Bits = npt.NDArray[np.bool_]
-Labels = npt.NDArray[np.intp]
 
 
 @st.composite
