@@ -95,9 +95,9 @@ def command(
     if accepted < len(trials):
         page = None
         if web is not None:
-            from .guided_web import PageAt
+            from .guided_web import StudiedPage
 
-            page = PageAt(web, token_for(web_token))
+            page = partial(StudiedPage, web, token_for(web_token))
         collect(harness, glove, wanted, trials, recording, journal, countdown, write, page)
     else:
         write(accepted)
