@@ -8,7 +8,8 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from io import TextIOWrapper
 from types import FrameType
 
 # A shell reports a command ended by a signal as this plus the signal's number.
@@ -26,9 +27,8 @@ def run(arguments: Sequence[str]) -> int:
         with _ended_like_ctrl_c(came):
             # Imported here, so that Ctrl-C during the imports is handled like any other.
             from .group import run_group
-            from .lines import escape_the_unencodable
 
-            escape_the_unencodable()
+            _escape_the_unencodable()
             return run_group(arguments)
     except KeyboardInterrupt:
         sys.stderr.write("thenar: interrupted\n" if came[-1] == signal.SIGINT else "thenar: terminated\n")
@@ -54,6 +54,14 @@ def _ended_like_ctrl_c(came: list[signal.Signals]) -> Iterator[None]:
     finally:
         for number in heard:
             signal.signal(number, signal.SIG_DFL)
+
+
+def _escape_the_unencodable() -> None:
+    r"""Make stdout and stderr write unencodable characters as "\u2603" instead of failing."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            with suppress(ValueError):  # closed
+                stream.reconfigure(errors="backslashreplace")
 
 
 def main() -> None:

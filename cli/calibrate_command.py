@@ -14,10 +14,19 @@ import click
 from rich.live import Live
 from rich.table import Table
 
-from .common import Number, OutputFile, err, existing_file, keep_apart, overwrite_flag, serial_port
-from .ending import ended_by_signals
-from .lines import echo
-from .web_options import say_page, token_for, web_options
+from .common import (
+    Number,
+    OutputFile,
+    echo,
+    ended_by_signals,
+    err,
+    existing_file,
+    keep_apart,
+    overwrite_flag,
+    say_page,
+    serial_port,
+    web_options,
+)
 
 if TYPE_CHECKING:
     from thenar.drivers.calibration import GloveCalibration
@@ -72,7 +81,7 @@ def command(
     newtons: float | None,
     hold: float,
     web: str | None,
-    web_token: bool,
+    web_token: str | None,
 ) -> None:
     """Calibrate the CyberGlove at PORT (/dev/ttyUSB0, socket://HOST:PORT, ...) for its wearer. Given a glove.toml,
     calibrate the joints of its [[stream]], or its taxels with --taxels.
@@ -115,7 +124,7 @@ def command(
             _lead(guide, take)
             said = write()
         else:
-            said = _lead_on_page(guide, take, wearer, web, token_for(web_token), write)
+            said = _lead_on_page(guide, take, wearer, web, web_token, write)
     echo(said)
 
 

@@ -1,12 +1,20 @@
-"""Shared by the sub-commands: paths, the `--json` flag, consoles, and a progress bar for work longer than a second."""
+"""Shared by the sub-commands: types of options, and what is printed: lines, tables, JSON, and progress.
+
+What is printed is safe for terminals and encodings, whatever the names in it hold.
+"""
 
 import math
 import os
+import re
+import signal
+import sys
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
+from threading import Event, Thread
+from types import FrameType
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import click
@@ -21,8 +29,6 @@ from rich.text import Text, TextType
 
 from thenar.drivers.names import shortened, shown
 
-from .lines import echo, echo_json
-
 if TYPE_CHECKING:
     from thenar.runtime.harness.wiring import Harness
 
@@ -33,6 +39,10 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 _LONGEST_METAVAR = 30
 _UNBOUNDED, _READABLE = 10_000, 24
 _JSON, _OVERWRITE = "thenar.json", "thenar.overwrite"
+# Left unescaped by JSON, but perhaps unsafe for a terminal or an encoding.
+_DOUBTFUL = re.compile(r"[^\n -~]")
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+WEB_ADDRESS = "127.0.0.1:8080"
 
 
 class OutputFile(click.Path):
@@ -224,6 +234,32 @@ dask_option = click.option(
 )
 
 
+def _token(_context: click.Context, _option: click.Parameter, wanted: bool) -> str | None:
+    from thenar.runtime.web.guard import new_token
+
+    return new_token() if wanted else None
+
+
+web_token_option = click.option(
+    "--web-token",
+    is_flag=True,
+    callback=_token,
+    help="Show the page only to those with its full address; required if other machines can reach it.",
+)
+
+
+def web_options(command: Command) -> Command:
+    """Add --web and --web-token: the address of a page, and the token that it needs, or None."""
+    option = click.option(
+        "--web",
+        is_flag=False,
+        flag_value=WEB_ADDRESS,
+        metavar="[ADDRESS]",
+        help=f"Show a page in the browser.  [{WEB_ADDRESS}]",
+    )
+    return option(web_token_option(command))
+
+
 def comma_separated(text: str) -> tuple[str, ...]:
     """Return the comma-separated parts of `text`, each once, in the order given."""
     return tuple(dict.fromkeys(part.strip() for part in text.split(",")))
@@ -254,6 +290,37 @@ def check_devices(harness: "Harness", path: Path) -> None:
     if not (harness.cyberglove or harness.buses or harness.spi or harness.streams):
         takes = "add a [cyberglove], a [[bus]], an [[spi]] or a [[stream]]"
         raise click.UsageError(f"{path.name} names no device: {takes}")
+
+
+def echo(text: str, *, err: bool = False) -> None:
+    """Print `text` and a newline on stdout, or with `err` on stderr."""
+    # By default, click writes UTF-8 to a stream that is ASCII.
+    click.echo(shown(text), file=sys.stderr if err else sys.stdout)
+
+
+def json_shown(text: str, encoding: str) -> str:
+    """Return the JSON document `text`, with JSON escapes for characters without a glyph or outside `encoding`."""
+    return _DOUBTFUL.sub(lambda found: _in_json(found[0], encoding), text)
+
+
+def _in_json(letter: str, encoding: str) -> str:
+    with suppress(UnicodeEncodeError):
+        letter.encode(encoding)
+        if letter.isprintable():
+            return letter
+    units = letter.encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[at]:02x}{units[at + 1]:02x}" for at in range(0, len(units), 2))
+
+
+def say(line: str) -> None:
+    """Print a line on stderr, if that is still open: the terminal may have been closed."""
+    with suppress(OSError):
+        echo(line, err=True)
+
+
+def say_page(url: str) -> None:
+    """Print the address of the page."""
+    echo(f"thenar: the page is at {url}", err=True)
 
 
 class _Console(Console):
@@ -296,7 +363,8 @@ def wants_json() -> bool:
 
 def print_json(result: Any) -> None:
     """Print `result` (msgspec struct, dataclass or builtin) as one indented JSON document on stdout."""
-    echo_json(_json(result).decode())
+    text = _json(result).decode()
+    click.echo(json_shown(text, getattr(sys.stdout, "encoding", None) or "utf-8"), file=sys.stdout)
 
 
 def show(
@@ -384,3 +452,25 @@ def of_device(name: str, state: str) -> str:
     """Return `state` as a sentence about the device `name`, naming its port only once."""
     kind, _, port = name.partition(" at ")
     return f"{kind if port and port in state else name}: {state}"
+
+
+@contextmanager
+def ended_by_signals() -> Iterator[Event]:
+    """Yield an event that SIGINT, SIGTERM and SIGHUP set; a second SIGINT interrupts as usual.
+
+    A signal that the parent process ignores (`nohup`) stays ignored.
+    """
+    stop = Event()
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        signal.signal(number, before[signal.Signals(number)])
+        # In a thread, because this handler may interrupt code that holds the lock of `stop`.
+        Thread(target=stop.set, name="thenar end", daemon=True).start()
+
+    heard = [number for number in _ENDING if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, end) for number in heard}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -9,6 +9,7 @@ from .common import (
     Number,
     OutputFile,
     check_devices,
+    echo,
     err,
     existing_file,
     existing_folder,
@@ -20,7 +21,6 @@ from .common import (
     show,
     table,
 )
-from .lines import echo
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

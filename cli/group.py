@@ -22,7 +22,7 @@ from thenar.drivers.errors import ThenarError
 from thenar.drivers.extras import missing
 from thenar.drivers.names import shortened
 
-from .lines import echo
+from .common import echo
 
 # In the order of work.
 GROUPS = {

@@ -11,6 +11,7 @@ from thenar.compiler.text import counted, inputs_read, trials_of_frames
 
 from .common import (
     OutputFile,
+    echo,
     existing_file,
     json_flag,
     keep_apart,
@@ -23,7 +24,6 @@ from .common import (
     wants_json,
     warning,
 )
-from .lines import echo
 
 if TYPE_CHECKING:
     from thenar.compiler.recordings.graspset import GraspSet

@@ -8,8 +8,7 @@ import click
 from thenar.compiler.text import INDEPENDENT, counted, inputs_read, trials_of_frames
 from thenar.runtime.published import NONE
 
-from .common import existing_file, json_flag, keep_apart, out, overwrite_flag, picture_file, progress, show, table
-from .lines import echo
+from .common import echo, existing_file, json_flag, keep_apart, out, overwrite_flag, picture_file, progress, show, table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,6 +11,7 @@ from thenar.runtime.recipe import AUTO
 
 from .common import (
     OutputFile,
+    echo,
     existing_file,
     jobs_option,
     json_flag,
@@ -24,7 +25,6 @@ from .common import (
     wants_json,
     write_json,
 )
-from .lines import echo
 from .options import (
     CHOOSING,
     Training,

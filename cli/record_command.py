@@ -8,9 +8,18 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import Number, OutputFile, check_devices, existing_file, keep_apart, progress, seed_range, warning
-from .lines import echo
-from .web_options import token_for, web_options
+from .common import (
+    Number,
+    OutputFile,
+    check_devices,
+    echo,
+    existing_file,
+    keep_apart,
+    progress,
+    seed_range,
+    warning,
+    web_options,
+)
 
 if TYPE_CHECKING:
     from thenar.runtime.recording.guide import Journal
@@ -50,7 +59,7 @@ def command(
     none: bool | None,
     seed: int | None,
     web: str | None,
-    web_token: bool,
+    web_token: str | None,
     output: Path,
 ) -> None:
     """Record labelled grasps: the command shows which grasp to take, in random order, with a countdown.
@@ -97,7 +106,7 @@ def command(
         if web is not None:
             from .guided_web import StudiedPage
 
-            page = partial(StudiedPage, web, token_for(web_token))
+            page = partial(StudiedPage, web, web_token)
         collect(harness, glove, wanted, trials, recording, journal, countdown, write, page)
     else:
         write(accepted)

@@ -22,10 +22,11 @@ from .common import (
     of_device,
     out,
     overwrite_flag,
+    say,
+    say_page,
+    web_options,
 )
-from .replaying import replay_recording, replay_set, selecting
-from .sinks import nobody_listens, say, say_what_was_lost, spoilt
-from .web_options import say_page, token_for, web_options
+from .replaying import nobody_listens, replay_recording, replay_set, say_what_was_lost, selecting, spoilt
 
 if TYPE_CHECKING:
     from thenar.runtime import Build, Glove
@@ -120,7 +121,7 @@ def command(
     task: Path | None,
     record: Path | None,
     web: str | None,
-    web_token: bool,
+    web_token: str | None,
     recordings: Path | None,
     status: bool,
     frames: int | None,
@@ -156,7 +157,7 @@ def command(
         asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy, "recordable": web is not None}
         page = None
         if web is not None:
-            page = partial(_page, build, web, token_for(web_token), recordings or Path("recordings"))
+            page = partial(_page, build, web, web_token, recordings or Path("recordings"))
         _run_live(loaded, glove, viewed, page, frames, **asked)
     elif replay.suffix == ".mcap":
         selector = selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
@@ -260,7 +261,7 @@ def _run_live(
     """Run until a signal arrives, or the given number of frames is published."""
     from thenar.runtime import Glove
 
-    from .ending import ended_by_signals
+    from .common import ended_by_signals
     from .live_view import LiveView
     from .notices import unblocked
 

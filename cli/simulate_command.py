@@ -13,6 +13,7 @@ from thenar.compiler.text import counted, interval
 
 from .common import (
     OutputFile,
+    echo,
     err,
     jobs_option,
     json_flag,
@@ -25,7 +26,6 @@ from .common import (
     table,
     warning,
 )
-from .lines import echo
 from .options import scene_name
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from rich.text import Text
 
 from .common import (
     OutputFile,
+    echo,
     existing_file,
     existing_folder,
     json_flag,
@@ -20,7 +21,6 @@ from .common import (
     table,
     warning,
 )
-from .lines import echo
 
 if TYPE_CHECKING:
     from thenar.runtime.task import Task
