@@ -16,10 +16,6 @@ from types import FrameType
 _SIGNALLED = 128
 
 
-class Ended(KeyboardInterrupt):
-    """A signal asked this process to end. It unwinds like Ctrl-C: workers end and no partial file remains."""
-
-
 def run(arguments: Sequence[str]) -> int:
     """Run `thenar` with `arguments` and return its exit code; report a user's mistake in one sentence on stderr."""
     came = [signal.SIGINT]
@@ -37,12 +33,14 @@ def run(arguments: Sequence[str]) -> int:
 
 @contextmanager
 def _ended_like_ctrl_c(came: list[signal.Signals]) -> Iterator[None]:
-    """Make SIGTERM and SIGHUP raise `Ended` in this context and record them; a second one ends the process at once."""
+    """Make SIGTERM and SIGHUP interrupt this context like Ctrl-C, and record them; a second one ends the process at
+    once. So workers end and no partial file remains.
+    """
 
     def end(number: int, _frame: FrameType | None) -> None:
         signal.signal(number, signal.SIG_DFL)
         came.append(signal.Signals(number))
-        raise Ended
+        raise KeyboardInterrupt
 
     is_main = threading.current_thread() is threading.main_thread()
     # A signal that is ignored (nohup) stays ignored.

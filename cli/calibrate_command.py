@@ -14,6 +14,9 @@ import click
 from rich.live import Live
 from rich.table import Table
 
+from thenar.drivers.names import shortened
+from thenar.drivers.ports import port_fault
+
 from .common import (
     Number,
     OutputFile,
@@ -24,7 +27,6 @@ from .common import (
     keep_apart,
     overwrite_flag,
     say_page,
-    serial_port,
     web_options,
 )
 
@@ -57,7 +59,9 @@ def _device(context: click.Context, argument: click.Parameter, text: str) -> str
     """Return the port, or the path of a glove.toml, which --taxels always expects."""
     if context.params.get("taxels") or text.endswith(".toml"):
         return str(existing_file.convert(text, argument, context))
-    return serial_port(context, argument, text)
+    if fault := port_fault(text):
+        raise click.BadParameter(f"{shortened(repr(text))} {fault}")
+    return text
 
 
 @click.command("calibrate")
@@ -97,7 +101,7 @@ def command(
         thenar calibrate glove.toml -o anna.toml
         thenar calibrate /dev/ttyUSB0 -o anna.toml --web
     """
-    from thenar.runtime.names import fault, shortened
+    from thenar.runtime.names import fault
 
     wearer = subject or output.stem
     if reason := fault(wearer):

@@ -265,15 +265,6 @@ def comma_separated(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(part.strip() for part in text.split(",")))
 
 
-def serial_port(context: click.Context, parameter: click.Parameter, text: str) -> str:
-    """Return `text` if it is a valid port, by the same rule as for ports in files."""
-    from thenar.drivers.ports import port_fault
-
-    if fault := port_fault(text):
-        raise click.BadParameter(f"{shortened(repr(text))} {fault}")
-    return text
-
-
 def keep_apart(*paths: Path | None) -> None:
     """Raise UsageError if two of the `paths` of a command are the same file: writing one would destroy the other."""
     seen = set()
@@ -384,6 +375,15 @@ def write_json(path: Path, found: Any) -> None:
     write_atomically(path, _json(found) + b"\n")
 
 
+def write_picture(path: Path, draw: Callable[[str], bytes]) -> None:
+    """Write the picture that `draw` returns for "svg" or "png", the ending of `path`."""
+    from thenar.runtime.files import write_atomically
+
+    with progress(f"drawing {path.name}"):
+        data = draw(path.suffix.lower()[1:])
+    write_atomically(path, data)
+
+
 def _json(found: Any) -> bytes:
     return msgspec.json.format(msgspec.json.encode(found), indent=2)
 
@@ -417,12 +417,19 @@ class _Whole(Table):
         return most - 1
 
 
-def table(columns: Iterable[str], numbers: Container[str] = (), title: TextType | None = None) -> Table:
+def table(
+    columns: Iterable[str],
+    numbers: Container[str] = (),
+    title: TextType | None = None,
+    rows: Iterable[Iterable[RenderableType]] = (),
+) -> Table:
     """Return a table of these columns, with `numbers` aligned right."""
     made = _Whole(title=title)
     for column in columns:
         is_number = column in numbers
         made.add_column(column, justify="right" if is_number else "left", no_wrap=is_number, overflow="fold")
+    for row in rows:
+        made.add_row(*row)
     return made
 
 

@@ -1,11 +1,12 @@
 """`thenar draw`: draw the glove, palm up."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from .common import echo, existing_file, keep_apart, overwrite_flag, picture_file, progress
+from .common import echo, existing_file, keep_apart, overwrite_flag, picture_file, progress, write_picture
 from .options import hand_of, layout_option
 
 if TYPE_CHECKING:
@@ -16,18 +17,17 @@ if TYPE_CHECKING:
 
 def _titled_paths(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> list[tuple[str, Path]]:
     """Return title and path of each [NAME=]PATH; without a NAME, the title is the file's name."""
-    return [_titled_path(text) for text in given]
-
-
-def _titled_path(text: str) -> tuple[str, Path]:
-    title, is_named, rest = text.partition("=")
-    if not is_named or Path(text).exists():
-        title, rest = Path(text).resolve().stem, text
-    if not title or not rest:
-        raise click.BadParameter(f"'{text}' is not NAME=PATH")
-    if not Path(rest).exists():
-        raise click.BadParameter(f"There is no file or folder '{rest}'.")
-    return title, Path(rest)
+    found = []
+    for text in given:
+        title, is_named, rest = text.partition("=")
+        if not is_named or Path(text).exists():
+            title, rest = Path(text).resolve().stem, text
+        if not title or not rest:
+            raise click.BadParameter(f"'{text}' is not NAME=PATH")
+        if not Path(rest).exists():
+            raise click.BadParameter(f"There is no file or folder '{rest}'.")
+        found.append((title, Path(rest)))
+    return found
 
 
 @click.command("draw")
@@ -120,11 +120,8 @@ def _placements(hand: "HandShape", grasp_set: "GraspSet", prune: int) -> "Pictur
 
 
 def _write(picture: "Picture", path: Path) -> None:
-    from thenar.runtime.files import write_atomically
     from thenar.simulator.handmaps.draw import draw
 
-    with progress(f"drawing {path.name}"):
-        data = draw(picture, path.suffix.lower()[1:])
-    write_atomically(path, data)
+    write_picture(path, partial(draw, picture))
     hands = len(picture.panels)
     echo(f"{path}: {hands} hand{'s' if hands > 1 else ''}")

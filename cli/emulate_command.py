@@ -26,7 +26,7 @@ from .common import (
     progress,
     warning,
 )
-from .options import scene_name
+from .options import complete_scene
 
 if TYPE_CHECKING:
     from thenar.runtime.harness.wiring import Harness
@@ -44,7 +44,7 @@ _KILLED = 128
 
 
 @click.command("emulate", context_settings={"ignore_unknown_options": True})
-@click.argument("source", metavar="SCENE|FILE", type=scene_name)
+@click.argument("source", metavar="SCENE|FILE", shell_complete=complete_scene)
 @click.argument("client", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
 @click.option("--glove", metavar="glove.toml", type=existing_file, required=True, help="The harness to emulate.")
 @click.option(

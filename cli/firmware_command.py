@@ -18,6 +18,7 @@ from .common import (
     progress,
     wants_json,
 )
+from .options import Described
 
 if TYPE_CHECKING:
     from thenar.compiler.firmware.choose import Fit
@@ -36,17 +37,13 @@ def _targets() -> Iterable[str]:
 _ANY = " Use `generic` for any other part with a C99 compiler."
 
 
-class _Command(click.Command):
-    """The command; its help ends with a description of each target."""
+def _described() -> dict[str, list[tuple[str, str]]]:
+    from thenar.compiler.firmware.targets import TARGETS
 
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        from thenar.compiler.firmware.targets import TARGETS
-
-        with formatter.section("Targets"):
-            formatter.write_dl([(name, target.help) for name, target in TARGETS.items()])
+    return {"Targets": [(name, target.help) for name, target in TARGETS.items()]}
 
 
-@click.command("firmware", cls=_Command)
+@click.command("firmware", cls=Described, sections=_described)
 @click.argument("build", metavar="BUILD", type=existing_folder)
 @click.option("--target", type=OneOf("target", _targets, _ANY), help="Target of the library: see below.")
 @click.option("-o", "--output", metavar="DIR", type=OutputFolder(), help="Folder to write the firmware into.")

@@ -135,25 +135,19 @@ def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Col
     from msgspec.structs import asdict, replace
 
     from thenar.drivers.errors import SettingError
+    from thenar.runtime.names import shortened
 
     begun = journal.session.collection
     assert begun is not None
     if seed is None:
         wanted = replace(wanted, seed=begun.seed)
     for name, value in asdict(wanted).items():
-        if value != getattr(begun, name):
+        if value != (before := getattr(begun, name)):
             raise SettingError(
-                f"{journal.path} was begun with a different value of {name}{_both(getattr(begun, name), value)}: "
-                "use the original options, or name another --output"
+                f"{journal.path} was begun with a different value of {name} ({shortened(str(before))}, not "
+                f"{shortened(str(value))}): use the original options, or name another --output"
             )
     return wanted
-
-
-def _both(begun: object, wanted: object) -> str:
-    """Return the two values if they are short enough to print."""
-    from thenar.runtime.names import shortened
-
-    return f" ({shortened(str(begun))}, not {shortened(str(wanted))})" if isinstance(begun, str | int) else ""
 
 
 def _write(recording: Path, output: Path, planned: int, accepted: int) -> Sequence[str]:

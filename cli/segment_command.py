@@ -1,5 +1,6 @@
 """`thenar segment`: find when each grasp began and ended."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ from .common import (
     show,
     table,
     warning,
+    write_picture,
 )
 
 if TYPE_CHECKING:
@@ -82,7 +84,7 @@ def command(
     with progress("finding segments") as report:
         found = segment(build, recordings, None if lag_ms is None else round(1000 * lag_ms), report, warning)
     if picture is not None:
-        write_atomically(picture, draw(found, picture.suffix.lower().removeprefix(".")))
+        write_picture(picture, partial(draw, found))
     if transitions is not None:
         write_atomically(transitions, Transitions.of_timelines(found).to_json())
     if output is not None:

@@ -26,7 +26,7 @@ from .common import (
     table,
     warning,
 )
-from .options import scene_name
+from .options import complete_scene
 
 if TYPE_CHECKING:
     from thenar.compiler.evaluation.ablation import Ablation, AccuracyChange, Variant
@@ -41,7 +41,7 @@ _OWN = "dim"  # style of the scene-independent steps
 
 
 @click.command("simulate")
-@click.argument("scene", type=scene_name, required=False)
+@click.argument("scene", shell_complete=complete_scene, required=False)
 @click.option(
     "-o", "--output", type=OutputFile(".grasps"), metavar="SET.grasps", help="Simulate, and write the set here."
 )
