@@ -17,18 +17,9 @@ from rich.table import Table
 from thenar.drivers.names import shortened
 from thenar.drivers.ports import port_fault
 
-from .common import (
-    Number,
-    OutputFile,
-    echo,
-    ended_by_signals,
-    err,
-    existing_file,
-    keep_apart,
-    overwrite_flag,
-    say_page,
-    web_options,
-)
+from . import ended_by_signals
+from .parameters import Number, OutputFile, existing_file, keep_apart, overwrite_flag, web_options
+from .printing import echo, err, say_page
 
 if TYPE_CHECKING:
     from thenar.drivers.calibration import GloveCalibration

@@ -38,7 +38,8 @@ from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.taxels import calibration_of
 from thenar.runtime.toml_source import read_source
 
-from .common import ended_by_signals, err, of_device
+from . import ended_by_signals
+from .printing import err, of_device
 
 if TYPE_CHECKING:
     from .guided_web import StudiedPage

@@ -9,23 +9,6 @@ from click.core import ParameterSource
 
 from thenar.runtime.recipe import AUTO, choices
 
-from .common import (
-    Number,
-    OneOf,
-    OutputFile,
-    OutputFolder,
-    dask_option,
-    existing_file,
-    jobs_option,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    progress,
-    show,
-    table,
-    warning,
-)
 from .options import (
     CHOOSING,
     LIMITS,
@@ -38,6 +21,18 @@ from .options import (
     trainer_option,
     warn_of_budget,
 )
+from .parameters import (
+    Number,
+    OneOf,
+    OutputFile,
+    OutputFolder,
+    dask_option,
+    existing_file,
+    jobs_option,
+    keep_apart,
+    overwrite_flag,
+)
+from .printing import json_flag, out, progress, show, table, warning
 
 if TYPE_CHECKING:
     from thenar.compiler.artifact.documents import BuildReport

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import echo, existing_file, keep_apart, overwrite_flag, picture_file, progress, write_picture
 from .options import hand_of, layout_option
+from .parameters import existing_file, keep_apart, overwrite_flag, picture_file
+from .printing import echo, progress, write_picture
 
 if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape

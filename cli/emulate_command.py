@@ -12,21 +12,19 @@ import msgspec
 
 from thenar.drivers.names import fault
 
-from .common import (
+from . import ended_by_signals
+from .options import complete_scene
+from .parameters import (
     Number,
     OutputFile,
     OutputFolder,
     check_devices,
-    echo,
-    ended_by_signals,
     existing_file,
     keep_apart,
     overwrite_flag,
     overwrites,
-    progress,
-    warning,
 )
-from .options import complete_scene
+from .printing import echo, progress, warning
 
 if TYPE_CHECKING:
     from thenar.runtime.harness.wiring import Harness

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from .common import OutputFile, echo, existing_file, json_flag, keep_apart, overwrite_flag, progress, show
+from .parameters import OutputFile, existing_file, keep_apart, overwrite_flag
+from .printing import echo, json_flag, progress, show
 
 
 @click.command("export")

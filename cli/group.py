@@ -19,7 +19,7 @@ from thenar.drivers.errors import ThenarError
 from thenar.drivers.extras import missing
 from thenar.drivers.names import shortened
 
-from .common import echo
+from .printing import echo
 
 # In the order of work.
 GROUPS = {

@@ -22,7 +22,7 @@ from thenar.runtime.web.posed import posed, posed_hand
 from thenar.simulator.handmaps.handmap import hand_map
 from thenar.simulator.planning.prehension import Prehension, load_prehensions
 
-from .common import say_page
+from .printing import say_page
 
 _OPEN = {"thumb_abduction": 42.0}
 

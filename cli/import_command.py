@@ -9,21 +9,8 @@ import click
 
 from thenar.compiler.text import counted, inputs_read, trials_of_frames
 
-from .common import (
-    OutputFile,
-    echo,
-    existing_file,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    overwrites,
-    progress,
-    show,
-    table,
-    wants_json,
-    warning,
-)
+from .parameters import OutputFile, existing_file, keep_apart, overwrite_flag, overwrites
+from .printing import echo, json_flag, out, progress, show, table, wants_json, warning
 
 if TYPE_CHECKING:
     from thenar.compiler.recordings.graspset import GraspSet

@@ -9,19 +9,8 @@ import click
 from thenar.compiler.text import INDEPENDENT, counted, inputs_read, trials_of_frames
 from thenar.runtime.published import NONE
 
-from .common import (
-    echo,
-    existing_file,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    picture_file,
-    progress,
-    show,
-    table,
-    write_picture,
-)
+from .parameters import existing_file, keep_apart, overwrite_flag, picture_file
+from .printing import echo, json_flag, out, progress, show, table, write_picture
 
 if TYPE_CHECKING:
     from thenar.compiler.recordings.summary import JointRange, Summary

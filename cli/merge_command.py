@@ -6,7 +6,8 @@ import click
 
 from thenar.compiler.text import trials_of_frames
 
-from .common import OutputFile, echo, existing_file, json_flag, keep_apart, overwrite_flag, progress, show
+from .parameters import OutputFile, existing_file, keep_apart, overwrite_flag
+from .printing import echo, json_flag, progress, show
 
 
 @click.command("merge")

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from .common import WEB_ADDRESS, echo, existing_file, existing_folder, say_page, web_token_option
+from .parameters import WEB_ADDRESS, existing_file, existing_folder, web_token_option
+from .printing import echo, say_page
 
 
 @click.command("monitor")
@@ -37,7 +38,7 @@ def command(source: str, build: Path | None, web: str, web_token: str | None) ->
     """
     from thenar.runtime.web.monitor import StreamMonitor
 
-    from .common import ended_by_signals
+    from . import ended_by_signals
 
     if Path(source).is_file() or source.endswith(".mcap"):
         from thenar.runtime.web.replay import ReplayPage

@@ -11,7 +11,8 @@ from click.shell_completion import CompletionItem
 
 from thenar.runtime.recipe import AUTO, Choice, choices
 
-from .common import Command, ListOf, Number, OneOf, comma_separated, existing_file, warning
+from .parameters import Command, ListOf, Number, OneOf, comma_separated, existing_file
+from .printing import warning
 
 if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape

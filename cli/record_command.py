@@ -8,18 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import (
-    Number,
-    OutputFile,
-    check_devices,
-    echo,
-    existing_file,
-    keep_apart,
-    progress,
-    seed_range,
-    warning,
-    web_options,
-)
+from .parameters import Number, OutputFile, check_devices, existing_file, keep_apart, seed_range, web_options
+from .printing import echo, progress, warning
 
 if TYPE_CHECKING:
     from thenar.runtime.recording.guide import Journal

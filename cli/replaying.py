@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import echo, err, say, warning
+from .printing import echo, err, say, warning
 
 if TYPE_CHECKING:
     import numpy as np

@@ -14,21 +14,9 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 from click.core import ParameterSource
 
-from .common import (
-    Number,
-    OutputFile,
-    OutputFolder,
-    err,
-    existing_file,
-    existing_folder,
-    of_device,
-    out,
-    overwrite_flag,
-    say,
-    say_page,
-    web_options,
-)
 from .options import LazyOption
+from .parameters import Number, OutputFile, OutputFolder, existing_file, existing_folder, overwrite_flag, web_options
+from .printing import err, of_device, out, say, say_page
 from .replaying import nobody_listens, replay_recording, replay_set, say_what_was_lost, selecting, spoilt
 
 if TYPE_CHECKING:
@@ -229,7 +217,7 @@ def _run_live(
     """Run until a signal arrives, or the given number of frames is published."""
     from thenar.runtime import Glove
 
-    from .common import ended_by_signals
+    from . import ended_by_signals
     from .live_view import LiveView
 
     with _unblocked("stderr"), _unblocked("stdout", _VIEW_US) if viewed else nullcontext():

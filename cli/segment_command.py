@@ -9,22 +9,8 @@ from rich.text import Text
 
 from thenar.compiler.text import counted
 
-from .common import (
-    Number,
-    OutputFile,
-    echo,
-    existing_file,
-    existing_folder,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    progress,
-    show,
-    table,
-    warning,
-    write_picture,
-)
+from .parameters import Number, OutputFile, existing_file, existing_folder, keep_apart, overwrite_flag
+from .printing import echo, json_flag, out, progress, show, table, warning, write_picture
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,7 +7,8 @@ import click
 
 from thenar.compiler.text import trials_of_frames
 
-from .common import OutputFolder, echo, existing_file, json_flag, progress, show
+from .parameters import OutputFolder, existing_file
+from .printing import echo, json_flag, progress, show
 
 
 @click.command("split")

@@ -8,7 +8,8 @@ import click
 from rich.console import Console
 from rich.text import Text
 
-from .common import OneOf, jobs_option, json_flag, out, progress, show, table
+from .parameters import OneOf, jobs_option
+from .printing import json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
     from thenar.stability.report import CaseReport, Check, Listed, Report

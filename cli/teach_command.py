@@ -6,21 +6,8 @@ from typing import TYPE_CHECKING
 import click
 from rich.text import Text
 
-from .common import (
-    OutputFile,
-    echo,
-    existing_file,
-    existing_folder,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    overwrites,
-    progress,
-    show,
-    table,
-    warning,
-)
+from .parameters import OutputFile, existing_file, existing_folder, keep_apart, overwrite_flag, overwrites
+from .printing import echo, json_flag, out, progress, show, table, warning
 
 if TYPE_CHECKING:
     from thenar.runtime.task import Task

@@ -38,7 +38,8 @@ def test_an_unexpected_error_is_one_sentence_and_a_file_for_its_owner(error: str
     assert (done.returncode, done.stdout) == (2, "")
     (line,) = done.stderr.splitlines()
     said = re.fullmatch(
-        r"thenar: unexpected (\w+) in \S+: this is a bug; please report it with the file (\S+), which holds the traceback",
+        r"thenar: unexpected (\w+) in \S+: this is a bug; please report it with the file (\S+), which holds the "
+        "traceback",
         line,
     )
     assert said is not None
