@@ -285,13 +285,7 @@ def _lead(
 
 
 def _check_same_glove(journal: Journal, session: Session) -> None:
-    begun = journal.session
-    for what, before, now in (
-        ("switches", begun.switches, session.switches),
-        ("sensors", begun.sensors, session.sensors),
-        ("calibration", begun.calibration, session.calibration),
-        ("taxels", begun.taxels, session.taxels),
-        ("calibration of taxels", begun.taxel_calibration, session.taxel_calibration),
-    ):
-        if before != now:
+    for name in ("switches", "sensors", "calibration", "taxels", "taxel_calibration"):
+        if getattr(journal.session, name) != getattr(session, name):
+            what = name.replace("_", " ")
             raise SettingError(f"{journal.path} was begun with different {what}: name another --output for this glove")

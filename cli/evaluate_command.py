@@ -255,8 +255,8 @@ def _print_streams(study: "StreamStudy") -> None:
 def _cell(value: "SubjectMean", times: int) -> str:
     if value.mean is None:
         return DASH
-    known = value.low is not None and value.high is not None
-    return f"{times * value.mean:.1f}" + (f" [{times * value.low:.0f}, {times * value.high:.0f}]" if known else "")
+    ends = [f"{times * end:.0f}" for end in (value.low, value.high) if end is not None]
+    return f"{times * value.mean:.1f}" + (f" [{', '.join(ends)}]" if ends else "")
 
 
 def _print_grid(title: str, grid: "Grid", note: str = "") -> None:
@@ -287,7 +287,9 @@ def _print(study: "Study", *, confusion: bool) -> None:
     if study.learning is not None:
         learning = study.learning
         numbers = [*map(str, learning.repetitions), *(f"{n} expected" for n in learning.further)]
-        curves = ((curve.learner, *map(interval, (*curve.rates, *curve.expected))) for curve in learning.curves)
+        curves = (
+            (curve.learner, *map(interval, curve.rates), *map(interval, curve.expected)) for curve in learning.curves
+        )
         note = learning.note or "Expected: a power law fitted to the points, so an extrapolation."
         _print_grid(learning.title, table(("", *numbers), numbers, rows=curves), note)
     for rated in study.tables if confusion else ():

@@ -79,21 +79,16 @@ class StudiedPage(Closing):
     def show(self, now_us: int, guide: Guide, devices: Any) -> None:
         """Show the guide's state, and start or finish the computation."""
         self._page.show(now_us, guide, devices)
-        self._fetch()
+        try:
+            if (found := self._background.fetch()) is not None:
+                self._page.tell({"problem": "", **to_builtins(found)})
+        except BrokenExecutor as wrong:
+            self._page.tell({"problem": f"the accuracy so far could not be computed: {wrong}"})
         if self._background.busy or guide.done < 2 or guide.done == self._studied:
             return
         if self._studied < 0 or abs(guide.done - self._studied) >= self._round or guide.trial is None:
             self._studied = guide.done
             self._background.start(recording_so_far, self._recording)
-
-    def _fetch(self) -> None:
-        try:
-            found = self._background.fetch()
-        except BrokenExecutor as wrong:
-            self._page.tell({"problem": f"the accuracy so far could not be computed: {wrong}"})
-            return
-        if found is not None:
-            self._page.tell({"problem": "", **to_builtins(found)})
 
     def warn(self, warnings: Sequence[str]) -> None:
         """Show what is odd in the set that was written, instead of the accuracy so far."""

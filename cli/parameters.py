@@ -202,9 +202,11 @@ dask_option = click.option(
 
 
 def _token(_context: click.Context, _option: click.Parameter, wanted: bool) -> str | None:
+    if not wanted:
+        return None
     from thenar.runtime.web.guard import new_token
 
-    return new_token() if wanted else None
+    return new_token()
 
 
 web_token_option = click.option(

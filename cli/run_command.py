@@ -140,10 +140,13 @@ def command(
         asked: dict[str, Any] = {"preshapes": preshape, "record": record, "status": status}
         asked |= {"change_while_held": change_while_held, "task": task}
         asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy, "recordable": web is not None}
-        page = None
+        page_of = None
         if web is not None:
-            page = partial(_page, build, web, web_token, recordings or Path("recordings"))
-        _run_live(loaded, glove, viewed, page, frames, **asked)
+            from thenar.runtime.web.live import LivePage
+
+            folder = recordings or Path("recordings")
+            page_of = partial(LivePage, folder=build, address=web, token=web_token, recordings=folder)
+        _run_live(loaded, glove, viewed, page_of, frames, **asked)
     elif replay.suffix == ".mcap":
         selector = selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
         follower = None if task is None else TaskFollower.of(task, loaded.grasps)
@@ -196,19 +199,11 @@ def _policy(asked: dict[str, Any]) -> "Policy | None":
     return replace(usual, **{"hold_us": max(usual.hold_us, given.get("dwell_us", 0)), **given}) if given else None
 
 
-def _page(folder: Path, address: str, token: str | None, recordings: Path, glove: "Glove") -> "LivePage":
-    from thenar.runtime.web.live import LivePage
-
-    page = LivePage(glove, folder, address, token=token, recordings=recordings)
-    say_page(page.server.url)
-    return page
-
-
 def _run_live(
     build: "Build",
     harness: Path | None,
     viewed: bool,
-    make_page: "Callable[[Glove], LivePage] | None",
+    page_of: "Callable[[Glove], LivePage] | None",
     frames: int | None,
     *,
     status: bool,
@@ -226,7 +221,9 @@ def _run_live(
             glove = Glove(build, str(harness), stop=stop, status=status, **asked)
             for lacking in filter(None, (glove.system.unread, glove.lacking)):
                 err().print(f"thenar: {lacking}")
-            page = None if make_page is None else stack.enter_context(make_page(glove))
+            page = None if page_of is None else stack.enter_context(page_of(glove))
+            if page is not None:
+                say_page(page.server.url)
             stack.enter_context(glove)
             view = stack.enter_context(LiveView(out(), status)) if viewed else None
             recorder = glove.recorder
@@ -279,9 +276,9 @@ class _UnblockedStream:
     """
 
     def __init__(self, stream: TextIO, longest_us: int | None) -> None:
-        self._stream, self._file, self._longest_us = stream, stream.fileno(), longest_us
         from thenar.runtime.writer_thread import WriterThread
 
+        self._stream, self._file, self._longest_us = stream, stream.fileno(), longest_us
         self.thread = WriterThread("notices", _MOST_WAITING)
 
     def write(self, text: str) -> int:

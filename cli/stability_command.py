@@ -12,7 +12,7 @@ from .parameters import OneOf, jobs_option
 from .printing import json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
-    from thenar.stability.report import CaseReport, Check, Listed, Report
+    from thenar.stability.report import CaseReport, Listed, Report
 
 # Packages that a run imports at some point: better reported missing once at the start than in each case.
 _NEEDED = ("mpmath", "joblib", "scipy", "sklearn")
@@ -69,10 +69,9 @@ def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int) -> int
 
 
 def _print_list(cases: "list[Listed]") -> None:
-    shown = table(("case", "subject", "what could go wrong"))
+    rows = ((case.name, case.title, case.danger) for case in cases)
+    shown = table(("case", "subject", "what could go wrong"), rows=rows)
     shown.show_lines = True
-    for case in cases:
-        shown.add_row(Text(case.name), Text(case.title), Text(case.danger))
     out().print(shown)
 
 
@@ -97,23 +96,19 @@ def _print(report: "Report") -> None:
 
 
 def _print_case(console: Console, case: "CaseReport") -> None:
+    from thenar.stability.report import bound_of, figure, verdict
+
     console.print(Text.assemble((case.name, "bold"), f": {case.about.title}"))
     if case.about.danger:
         console.print(Text(f"What could go wrong: {case.about.danger}", "dim"))
     checks = table(_HEADS, _NUMBERS)
     checks.box, checks.padding, checks.pad_edge = None, (0, 2, 0, 0), False
     for check in case.checks:
-        checks.add_row(*_cells(check))
+        finding, style = check.finding, "green" if check.holds else "bold red"
+        error = (f"{finding.tried:,}", figure(finding.error), bound_of(finding))
+        checks.add_row(finding.check, finding.reference, *error, Text(verdict(check), style))
     if case.checks:
         console.print(checks)
     if case.failure is not None:
         console.print(Text(f"FAILED: {case.failure}", "red"))
     console.print()
-
-
-def _cells(check: "Check") -> tuple[Text, ...]:
-    from thenar.stability.report import bound_of, figure, verdict
-
-    finding = check.finding
-    texts = (finding.check, finding.reference, f"{finding.tried:,}", figure(finding.error), bound_of(finding))
-    return (*map(Text, texts), Text(verdict(check), "green" if check.holds else "bold red"))
