@@ -37,7 +37,6 @@ from .printing import json_flag, out, progress, show, table, warning
 if TYPE_CHECKING:
     from thenar.compiler.artifact.documents import BuildReport
     from thenar.runtime.manifest import Manifest
-    from thenar.runtime.scanning.timing import ScanTime
 
 _BOARD = "board"
 # Options that a point of a frontier sets.
@@ -160,13 +159,16 @@ def command(
     from thenar.compiler.artifact.compile import compile_build
     from thenar.compiler.artifact.documents import Documents
     from thenar.compiler.frontier.picked import picked
+    from thenar.compiler.placement.methods.base import METHODS
     from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
 
     _check(context, from_frontier, point, hand_length, report)
     keep_apart(recordings, layout, glove, propose, from_frontier)
-    _leave_out_preset_keep(context, asked)
+    preset_keeps = context.get_parameter_source("keep") is ParameterSource.DEFAULT_MAP
+    if preset_keeps and not METHODS[asked["placement"]].by_number:
+        asked["keep"] = None  # the given --method takes no number of switches
     options = asked_settings(context, asked) | asked
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
@@ -198,15 +200,6 @@ def command(
         )
     _propose(made.manifest, propose, chip)
     show(made.manifest, lambda _: _print(made, output, propose))
-
-
-def _leave_out_preset_keep(context: click.Context, asked: dict[str, Any]) -> None:
-    """Take out a preset's --keep if another --method takes no number of switches."""
-    from thenar.compiler.placement.methods.base import METHODS
-
-    preset = context.get_parameter_source("keep") is ParameterSource.DEFAULT_MAP
-    if preset and not METHODS[asked["placement"]].by_number:
-        asked["keep"] = None
 
 
 def _check(
@@ -257,20 +250,15 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
     console = out()
     for fact in made.facts:
         console.print(f"{folder}: {fact.text}" if fact.label == "build" else str(fact), soft_wrap=True)
-    if made.scan is not None and made.harness is not None:
-        time = scan_us(made.scan, made.harness)
-        if time.chips:
-            _print_chips(time)
+    time = None if made.scan is None or made.harness is None else scan_us(made.scan, made.harness)
+    if time is not None and time.chips:
+        chips = table(("chip", "bus", "reads", "switches", "us"), title="Scan map")
+        for chip in time.chips:
+            chips.add_row(chip.place, chip.device, " ".join(chip.readings), str(chip.switches), f"{chip.us:.1f}")
+        if time.selects:
+            chips.add_row(f"{time.selects} writes to muxes", "", "", "", f"{time.select_us:.1f}")
+        console.print(chips)
     if propose is not None:
         console.print(
             f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
         )
-
-
-def _print_chips(time: "ScanTime") -> None:
-    chips = table(("chip", "bus", "reads", "switches", "us"), title="Scan map")
-    for chip in time.chips:
-        chips.add_row(chip.place, chip.device, " ".join(chip.readings), str(chip.switches), f"{chip.us:.1f}")
-    if time.selects:
-        chips.add_row(f"{time.selects} writes to muxes", "", "", "", f"{time.select_us:.1f}")
-    out().print(chips)

@@ -122,7 +122,10 @@ def command(
         )
         emulated = _write_harness(bench, performance, folder)
         note = stack.enter_context(_noting(log))
-        _tell_how(bench, emulated)
+        echo(f"emulated glove: {emulated}; run it with: thenar run BUILD --glove {emulated}", err=True)
+        if bench.environment:
+            settings = " ".join(f"{name}={value}" for name, value in bench.environment.items())
+            echo(f"for its I2C buses, prefix that command with: {settings}", err=True)
         child = None
         if client:
             arguments = [argument.replace("{glove}", str(emulated)) for argument in client]
@@ -213,14 +216,6 @@ def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> 
         harness = msgspec.structs.replace(harness, taxel_settings=settings)
     write_atomically(folder / _HARNESS, harness_to_toml(harness).encode())
     return folder / _HARNESS
-
-
-def _tell_how(bench: "Bench", emulated: Path) -> None:
-    """Explain on stderr how to connect to the emulated glove."""
-    echo(f"emulated glove: {emulated}; run it with: thenar run BUILD --glove {emulated}", err=True)
-    if bench.environment:
-        settings = " ".join(f"{name}={value}" for name, value in bench.environment.items())
-        echo(f"for its I2C buses, prefix that command with: {settings}", err=True)
 
 
 @contextmanager

@@ -287,19 +287,25 @@ def _print(study: "Study", *, confusion: bool) -> None:
     if study.learning is not None:
         learning = study.learning
         numbers = [*map(str, learning.repetitions), *(f"{n} expected" for n in learning.further)]
-        curves = (
-            (curve.learner, *map(interval, curve.rates), *map(interval, curve.expected)) for curve in learning.curves
-        )
+        grid = table(("", *numbers), numbers)
+        for curve in learning.curves:
+            grid.add_row(curve.learner, *map(interval, curve.rates), *map(interval, curve.expected))
         note = learning.note or "Expected: a power law fitted to the points, so an extrapolation."
-        _print_grid(learning.title, table(("", *numbers), numbers, rows=curves), note)
-    for rated in study.tables if confusion else ():
+        _print_grid(learning.title, grid, note)
+    if confusion:
+        _print_confusions(study)
+
+
+def _print_confusions(study: "Study") -> None:
+    columns = ("true \\ predicted", *study.grasps)
+    for rated in study.tables:
         for row in rated.rows if rated.name == "compositions" else ():
             for name, cell in zip(rated.columns, row.cells, strict=True):
+                grid = table(columns, columns)
+                for grasp, counts in zip(study.grasps, cell.confusion or (), strict=True):
+                    grid.add_row(grasp, *(str(count) if count else "." for count in counts))
                 title = f"{row.name} {row.what}, subject {name}, {rated.protocol} protocol, {cell.rate.what}"
-                columns = ("true \\ predicted", *study.grasps)
-                counts = ([str(count or ".") for count in line] for line in cell.confusion or ())
-                rows = ((grasp, *line) for grasp, line in zip(study.grasps, counts, strict=False))
-                _print_grid(title, table(columns, columns, rows=rows))
+                _print_grid(title, grid)
 
 
 def _rates(rated: "RateTable") -> "Grid":

@@ -65,9 +65,7 @@ class LiveView:
                 if newest is not None and newest is not shown:
                     grasp, devices, health, progress = shown = newest
                     lines = health_lines(health) if self._status else ()
-                    wrong: list[Quarantined | OutputTrouble] = (
-                        [] if health is None else [*health.quarantined, *health.outputs]
-                    )
+                    wrong = () if health is None else (*health.quarantined, *health.outputs)
                     self._live.update(drawn(grasp, devices(), lines, wrong, progress), refresh=True)
 
 

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -39,7 +39,9 @@ class OutputFile(click.Path):
         if not path.name:
             self.fail("The output file needs a name.", param, ctx)
         if not path.name.lower().endswith(self.endings):
-            self.fail(f"{path.name}: the name of the output file must end in {_either(self.endings)}.", param, ctx)
+            *others, last = self.endings
+            either = f"{', '.join(others)} or {last}" if others else last
+            self.fail(f"{path.name}: the name of the output file must end in {either}.", param, ctx)
         if not path.parent.is_dir():
             self.fail(f"There is no folder '{path.parent}' to write '{path.name}' into: create it first.", param, ctx)
         if not os.access(path.parent, os.W_OK):
@@ -94,11 +96,6 @@ class Number(click.FloatRange):
 def overwrites(context: click.Context | None) -> bool:
     """Return whether existing files may be replaced."""
     return context is not None and bool(context.meta.get(_OVERWRITE))
-
-
-def _either(names: Sequence[str]) -> str:
-    """Return "a, b or c"."""
-    return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 class OneOf(click.Choice[str]):

@@ -68,7 +68,7 @@ def command(
     from thenar.compiler.recordings.errors import check_names
     from thenar.compiler.recordings.taxonomy import collected
     from thenar.runtime.harness.loading import load_harness
-    from thenar.runtime.recording.guide import planned
+    from thenar.runtime.recording.guide import planned, read_journal
     from thenar.runtime.recording.session import Collection
 
     from .collecting import collect
@@ -82,7 +82,10 @@ def command(
     harness = load_harness(glove)
     check_devices(harness, glove)
     check_names("subject", [subject])
-    journal = _begun(recording)
+    journal = None
+    if recording.exists():
+        with progress(f"reading {recording.name}"):
+            journal = read_journal(recording)
     types, tasks = collected(taxonomy, objects, _with_none(journal) if none is None else none)
     drawn = secrets.randbits(32) if seed is None else seed
     wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
@@ -100,16 +103,6 @@ def command(
         collect(harness, glove, wanted, trials, recording, journal, countdown, write, page)
     else:
         write(accepted)
-
-
-def _begun(recording: Path) -> "Journal | None":
-    """Return the journal of the collection that was begun in `recording`, if there is one."""
-    from thenar.runtime.recording.guide import read_journal
-
-    if not recording.exists():
-        return None
-    with progress(f"reading {recording.name}"):
-        return read_journal(recording)
 
 
 def _with_none(journal: "Journal | None") -> bool:
