@@ -65,7 +65,9 @@ class LiveView:
                 if newest is not None and newest is not shown:
                     grasp, devices, health, progress = shown = newest
                     lines = health_lines(health) if self._status else ()
-                    wrong = () if health is None else (*health.quarantined, *health.outputs)
+                    wrong = list[Quarantined | OutputTrouble]()
+                    if health is not None:
+                        wrong += [*health.quarantined, *health.outputs]
                     self._live.update(drawn(grasp, devices(), lines, wrong, progress), refresh=True)
 
 
