@@ -1,24 +1,36 @@
-"""A guided collection while it runs: devices, terminal and recording around the guide."""
+"""A guided collection while it runs: devices, terminal and recording around the CollectionGuide."""
 
+import os
+import re
+import select
 import sys
+import termios
+import tty
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING
 
 import click
+from rich.console import Group, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
 
 from thenar.compiler.recordings.errors import check_names
-from thenar.compiler.recordings.taxonomy import Taxonomy
+from thenar.compiler.recordings.taxonomy import MOVEMENTS, Taxonomy
+from thenar.drivers.closing import Closing
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import SwitchFrame, now_us, old_after_us
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.live.sources import NOT_YET, DeviceState, Snapshot, Sources
+from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources
 from thenar.runtime.names import list_names
+from thenar.runtime.published import NONE
 from thenar.runtime.recording.guide import CollectionGuide, Journal, Key, Stage, Trial
 from thenar.runtime.recording.session import Collection, Session
 from thenar.runtime.recording.writer import Recorder
@@ -26,30 +38,22 @@ from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.taxels import calibration_of
 from thenar.runtime.toml_source import read_source
 
-from .common import err, of_device
-from .ending import ended_by_signals
-from .guide_keys import GuideKeys
-from .guide_view import GuideView
+from . import ended_by_signals
+from .printing import err, of_device
 
 if TYPE_CHECKING:
-    from .guided_web import PageAt
+    from .guided_web import StudiedPage
+
+    ServePage = Callable[[Session, Taxonomy, Path], StudiedPage]
 
 _WAIT_US = 50_000
 # Time for a device that is just being plugged in.
 _PATIENCE_US = 3_000_000
-
-
-class Devices(Protocol):
-    """The part of `Sources` that a collection uses."""
-
-    def take(self, at_most_us: int) -> Snapshot:
-        """Wait for new readings and return them."""
-
-    def devices(self) -> tuple[DeviceState, ...]:
-        """Return the state of each device."""
-
-    def raise_settings(self) -> None:
-        """Raise the SettingError of a device that can never work."""
+_REDRAW_US = 100_000
+_LETTERS = {Key.ACCEPT: "Enter", Key.REDO: "r", Key.UNDO: "u", Key.SKIP: "s", Key.PAUSE: "p", Key.QUIT: "q"}
+_MEANT = {letter: key for key, letter in _LETTERS.items()} | dict.fromkeys(("", " ", "a"), Key.ACCEPT)
+# Escape sequences that a terminal sends for arrows, function keys and the like.
+_ESCAPES = re.compile(r"\x1b(?:\[[0-9;?]*[ -/]*[@-~]|O.)?")
 
 
 def collect(
@@ -61,15 +65,16 @@ def collect(
     journal: Journal | None,
     countdown_s: float,
     write: Callable[[int], Sequence[str]],
-    page: "PageAt | None" = None,
+    serve_page: "ServePage | None" = None,
 ) -> None:
     """Lead through the `trials` that the journal lacks, then call `write` with the total number of accepted trials: it
     writes their set and returns warnings, which the page shows.
 
-    Keys come from stdin, or from the `page` alone if stdin is not a terminal. Raises SettingError or DeviceError if a
-    device cannot serve, SinkError if the page cannot be served, click.ClickException if the recording cannot go on.
+    Keys come from stdin, or from the page that `serve_page` makes alone if stdin is not a terminal. Raises SettingError
+    or DeviceError if a device cannot serve, SinkError if the page cannot be served, click.ClickException if the
+    recording cannot go on.
     """
-    typed = page is None or (sys.stdin is not None and sys.stdin.isatty())
+    typed = serve_page is None or (sys.stdin is not None and sys.stdin.isatty())
     if sys.stdin is None and typed:
         raise click.UsageError("stdin is closed, but a collection is led by keys typed there: run it in a terminal")
     if typed and any(stream.port == "-" for stream in harness.streams):
@@ -95,16 +100,16 @@ def collect(
         with ended_by_signals() as stop, Sources(harness, switches, scan) as sources, ExitStack() as entered:
             _meet(sources, len(switches), stop)
             if not stop.is_set():
-                if page is not None:
+                if serve_page is not None:
                     # Before the recording begins: an address that cannot be served leaves no file.
-                    shown = served.enter_context(page.serve(session, taxonomy, recording))
+                    shown = served.enter_context(serve_page(session, taxonomy, recording))
                 recorder = entered.enter_context(Recorder(recording, session, tail=tail))
-                faces: list[Face] = [] if shown is None else [shown]
+                faces: list[Terminal | StudiedPage] = [] if shown is None else [shown]
                 if typed:
-                    faces.append(entered.enter_context(Terminal(taxonomy)))
+                    faces.append(entered.enter_context(Terminal(taxonomy, sys.stdin.fileno())))
                 old_us = old_after_us(sources.switch_period_us, sources.glove_period_us)
                 guide = CollectionGuide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
-                lead(guide, sources, recorder, faces, stop)
+                _lead(guide, sources, recorder, faces, stop)
                 done = guide.done
         if recorder is not None and (recorder.failure is not None or recorder.lost):
             why = recorder.failure or f"{recording}: {recorder.lost} messages were lost"
@@ -140,40 +145,131 @@ def _is_read(frame: SwitchFrame, switches: int) -> bool:
     return bool((1 << switches) - 1 & ~frame.lost) or any(code is not None for code in frame.taxels or ())
 
 
-class Face(Protocol):
-    """Where a collection is shown and keys are pressed: the terminal, or a page."""
+class Terminal(Closing):
+    """Keys from stdin and the view on stderr; a context manager.
 
-    def press(self, now_us: int, guide: CollectionGuide) -> None:
-        """Pass the keys pressed since the last call to the guide."""
+    On a terminal single keys count, and the view is drawn in place, ten times a second and at every change; elsewhere
+    each line is a key, and each change is a line. Enter, space and a accept, other keys are _LETTERS, and the end of
+    the input leaves.
+    """
 
-    def show(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> None:
-        """Show the guide's state."""
+    def __init__(self, taxonomy: Taxonomy, descriptor: int) -> None:
+        self._names = dict(zip(taxonomy.types, taxonomy.full_names, strict=True))
+        self._descriptor, self._raw = descriptor, os.isatty(descriptor)
+        self._rest, self._ended = "", False
+        self._due_us, self._shown, self._said = 0, -1, ""
+        self._console = err()
+        self._opened = ExitStack()
+        if self._raw:
+            self._opened.callback(termios.tcsetattr, descriptor, termios.TCSADRAIN, termios.tcgetattr(descriptor))
+            # Ctrl-C keeps its meaning, and keys pressed a moment too early count as well.
+            tty.setcbreak(descriptor, termios.TCSADRAIN)
+        self._live = Live(console=self._console, auto_refresh=False, transient=True)
+        if self._console.is_terminal:
+            self._opened.enter_context(self._live)
 
-
-class Terminal:
-    """Keys from stdin and the view on stderr; a context manager."""
-
-    def __init__(self, taxonomy: Taxonomy) -> None:
-        self._view = GuideView(err(), taxonomy)
-        self._keys = GuideKeys(sys.stdin.fileno())
-        self.show = self._view.show
-        self._entered = ExitStack()
+    def close(self) -> None:
+        """Leave the terminal as it was."""
+        self._opened.close()
 
     def press(self, now_us: int, guide: CollectionGuide) -> None:
         """Pass the typed keys to the guide."""
-        for key in self._keys.pressed():
+        for key in self.pressed():
             guide.press(now_us, key)
 
-    def __enter__(self) -> Self:
-        self._entered.enter_context(self._keys)
-        self._entered.enter_context(self._view)
-        return self
+    def pressed(self) -> list[Key]:
+        """Return the keys pressed since the last call."""
+        if self._ended or not select.select([self._descriptor], [], [], 0.0)[0]:
+            return []
+        try:
+            typed = os.read(self._descriptor, 4096).decode("utf-8", "replace")
+        except OSError:  # the terminal was closed
+            typed = ""
+        self._ended = not typed
+        if self._ended:
+            return [Key.QUIT]
+        self._rest += typed
+        return [_MEANT[word] for word in self._words() if word in _MEANT]
 
-    def __exit__(self, *of_error: Any) -> None:
-        self._entered.__exit__(*of_error)
+    def _words(self) -> list[str]:
+        if self._raw:
+            keys, self._rest = _ESCAPES.sub("", self._rest), ""
+            return [key.strip("\r\n").lower() for key in keys]
+        *lines, self._rest = self._rest.split("\n")
+        return [line.strip().lower() for line in lines]
+
+    def show(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> None:
+        """Show the guide's state, if it changed or the next refresh is due."""
+        if not self._console.is_terminal:
+            self._say(guide, devices)
+        elif now_us >= self._due_us or self._shown != guide.step:
+            self._due_us, self._shown = now_us + _REDRAW_US, guide.step
+            self._live.update(self._drawn(now_us, guide, devices), refresh=True)
+
+    def _say(self, guide: CollectionGuide, devices: Sequence[DeviceState]) -> None:
+        errors = "; ".join(device.error for device in devices if not device.connected)
+        why = f" ({errors})" if errors else ""
+        problem = f"not captured: {guide.problem}{why}; " if guide.problem else ""
+        waits = f"the countdown waits: {guide.lost}{why}; " if _waits(guide) else ""
+        line = f"{self._task(guide)}: {problem}{waits}{_keys(guide)}"
+        if line != self._said and guide.stage is not Stage.OVER:
+            self._said = line
+            self._console.print(line, soft_wrap=True)
+
+    def _drawn(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> RenderableType:
+        table = Table.grid(padding=(0, 2))
+        skipped = f", {guide.skipped} skipped" if guide.skipped else ""
+        bar = ProgressBar(guide.total, guide.done, width=40)
+        table.add_row("done", Text(f"{guide.done} of {guide.total}{skipped}"), bar)
+        for device in devices:
+            table.add_row(device.name, Text("connected") if device.connected else Text(device.error, style="red"))
+        stage = Text(self._standing(now_us, guide), style="bold")
+        return Group(table, Text(), Text(self._task(guide), style="bold cyan"), stage, Text(_keys(guide)))
+
+    def _task(self, guide: CollectionGuide) -> str:
+        trial = guide.trial
+        if trial is None:
+            return f"{guide.done} of {guide.total}: no trial is left"
+        place = f"{guide.done + guide.skipped + 1} of {guide.total}"
+        if trial.grasp == NONE and NONE not in self._names:
+            return f"{place}: nothing held, {trial.object}: {MOVEMENTS.get(trial.object, 'touch nothing')}"
+        full = self._names[trial.grasp]
+        name = trial.grasp if full == trial.grasp else f"{full} ({trial.grasp})"
+        return f"{place}: {name}, object {trial.object}"
+
+    def _standing(self, now_us: int, guide: CollectionGuide) -> str:
+        if _waits(guide):
+            return f"the countdown waits: {guide.lost}"
+        if guide.stage is Stage.PAUSED:
+            return "paused; nothing is recorded meanwhile"
+        if guide.problem:
+            return f"not captured: {guide.problem}"
+        if guide.stage is Stage.COUNTDOWN:
+            doing = "move so" if guide.trial is not None and guide.trial.grasp == NONE else "hold it"
+            return f"{doing} in {guide.seconds_left(now_us):.1f} s"
+        if guide.stage is Stage.MOVING:
+            return f"move so for {guide.seconds_left(now_us):.1f} s more"
+        if guide.stage is not Stage.REVIEW:
+            return ""
+        switches, glove = guide.captured
+        closed = "" if switches is None else f"{switches.closed.bit_count()} switches closed"
+        sensors = "" if glove is None else "glove " + " ".join(map(str, glove.sensors))
+        return "captured: " + ", ".join(filter(None, (closed, sensors)))
 
 
-def lead(guide: CollectionGuide, devices: Devices, recorder: Recorder, faces: Sequence[Face], stop: Event) -> None:
+def _waits(guide: CollectionGuide) -> bool:
+    """Return whether no countdown can start, because something is not read."""
+    return bool(guide.lost) and guide.stage in (Stage.READY, Stage.PAUSED)
+
+
+def _keys(guide: CollectionGuide) -> str:
+    """Return the keys that are active now: "Enter: start the countdown   q: leave"."""
+    return "   ".join(f"{_LETTERS[key]}: {what}" for key, what in guide.offered().items())
+
+
+def _lead(
+    guide: CollectionGuide, devices: Sources, recorder: Recorder, faces: "Sequence[Terminal | StudiedPage]", stop: Event
+) -> None:
     """Lead through the guide's trials until all are done, the user leaves, `stop` is set, or the recording fails."""
     while guide.stage is not Stage.OVER and not recorder.lost and recorder.failure is None and not stop.is_set():
         arrived = devices.take(_WAIT_US).arrived
@@ -189,13 +285,7 @@ def lead(guide: CollectionGuide, devices: Devices, recorder: Recorder, faces: Se
 
 
 def _check_same_glove(journal: Journal, session: Session) -> None:
-    begun = journal.session
-    for what, before, now in (
-        ("switches", begun.switches, session.switches),
-        ("sensors", begun.sensors, session.sensors),
-        ("calibration", begun.calibration, session.calibration),
-        ("taxels", begun.taxels, session.taxels),
-        ("calibration of taxels", begun.taxel_calibration, session.taxel_calibration),
-    ):
-        if before != now:
+    for name in ("switches", "sensors", "calibration", "taxels", "taxel_calibration"):
+        if getattr(journal.session, name) != getattr(session, name):
+            what = name.replace("_", " ")
             raise SettingError(f"{journal.path} was begun with different {what}: name another --output for this glove")

@@ -1,6 +1,6 @@
 """`thenar compile`: recordings in, a build folder out."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,27 +9,11 @@ from click.core import ParameterSource
 
 from thenar.runtime.recipe import AUTO, choices
 
-from .common import (
-    Number,
-    OneOf,
-    OutputFile,
-    OutputFolder,
-    dask_option,
-    existing_file,
-    jobs_option,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    progress,
-    show,
-    table,
-    warning,
-)
 from .options import (
     CHOOSING,
     LIMITS,
-    Grouped,
+    LazyOption,
+    Training,
     asked_settings,
     fitted_hand,
     layout_option,
@@ -37,14 +21,22 @@ from .options import (
     trainer_option,
     warn_of_budget,
 )
+from .parameters import (
+    Number,
+    OneOf,
+    OutputFile,
+    OutputFolder,
+    dask_option,
+    existing_file,
+    jobs_option,
+    keep_apart,
+    overwrite_flag,
+)
+from .printing import json_flag, out, progress, show, table, warning
 
 if TYPE_CHECKING:
-    from thenar.compiler.artifact.documents import BuildReport, Documents
-    from thenar.compiler.frontier.picked import Picked
-    from thenar.compiler.hand import HandShape
-    from thenar.runtime.harness.wiring import Harness
+    from thenar.compiler.artifact.documents import BuildReport
     from thenar.runtime.manifest import Manifest
-    from thenar.runtime.scanning.timing import ScanTime
 
 _BOARD = "board"
 # Options that a point of a frontier sets.
@@ -81,17 +73,13 @@ def _converters() -> list[str]:
     return [kind for kind in (*CHIPS, *SPI_CHIPS) if kind not in expanders()]
 
 
-class _ChipOption(click.Option):
-    """Its help names the chips, and is only made when requested."""
-
-    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        measuring = _converters()
-        chips = [kind for kind in _chips() if kind != _BOARD and kind not in measuring]
-        self.help = (
-            f"Port expander to propose: {', '.join(chips)}; {_BOARD} for one that prints rows; or a converter for "
-            f"taxels: {', '.join(measuring)}.  [default: {chips[0]}, and ads7828 for taxels]"
-        )
-        return super().get_help_record(ctx)
+def _chips_help() -> str:
+    measuring = _converters()
+    chips = [kind for kind in _chips() if kind != _BOARD and kind not in measuring]
+    return (
+        f"Port expander to propose: {', '.join(chips)}; {_BOARD} for one that prints rows; or a converter for "
+        f"taxels: {', '.join(measuring)}.  [default: {chips[0]}, and ads7828 for taxels]"
+    )
 
 
 def _preset(context: click.Context, _: click.Parameter, name: str | None) -> None:
@@ -101,7 +89,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     context.default_map = {names[option]: value for option, value in given}
 
 
-@click.command("compile", cls=Grouped, groups=_GROUPS)
+@click.command("compile", cls=Training, groups=_GROUPS)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option(
     "-o", "--output", type=OutputFolder(), required=True, help="Build folder to write; an existing build is replaced."
@@ -131,11 +119,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 @layout_option
 @click.option("--glove", type=existing_file, help="A glove.toml: add the scan map of its wiring to the build.")
 @click.option("--propose", type=OutputFile(".toml"), help="Write a glove.toml that wires the kept switches.")
-@click.option(
-    "--chip",
-    type=OneOf("chip", _chips),
-    cls=_ChipOption,
-)
+@click.option("--chip", type=OneOf("chip", _chips), cls=LazyOption, describe=_chips_help)
 @overwrite_flag
 @json_flag
 @click.pass_context
@@ -173,22 +157,27 @@ def command(
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
     from thenar.compiler.artifact.compile import compile_build
+    from thenar.compiler.artifact.documents import Documents
     from thenar.compiler.frontier.picked import picked
+    from thenar.compiler.placement.methods.base import METHODS
     from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
 
-    _check_proposal(propose, chip, glove)
-    _check_point(context, from_frontier, point)
-    _check_hand_length(hand_length, report)
+    _check(context, from_frontier, point, hand_length, report)
     keep_apart(recordings, layout, glove, propose, from_frontier)
-    _leave_out_preset_keep(context, asked)
+    preset_keeps = context.get_parameter_source("keep") is ParameterSource.DEFAULT_MAP
+    if preset_keeps and not METHODS[asked["placement"]].by_number:
+        asked["keep"] = None  # the given --method takes no number of switches
     options = asked_settings(context, asked) | asked
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    hand = _hand(layout, grasp_set.element_names, hand_length)
+    hand = fitted_hand(layout, grasp_set.element_names, None)
+    if hand_length is not None:
+        fitted_hand(layout, grasp_set.element_names, hand_length)  # refuses a length that does not apply
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
     options |= {} if chosen is None else chosen.options
+    marks: dict[str, Any] = {} if chosen is None else {"frontier": chosen.frontier, "point": chosen.point.number}
     with progress("compiling, then the paper's tables" if report and asked["folds"] else "compiling") as report_done:
         made = compile_build(
             grasp_set,
@@ -196,39 +185,12 @@ def command(
             harness=given if chosen is None else chosen.wired(given),
             ports=ports_of_whole_glove(given, grasp_set.element_names, len(grasp_set.taxel_columns)),
             hand=hand,
-            documents=_documents(hand, hand_length, chosen) if report else None,
+            documents=Documents(hand, hand_length, **marks) if report else None,
             jobs=jobs,
             progress=report_done,
             **options,
         )
     warn_of_budget(asked["budget_us"], grasp_set.joint_names, None if given is None else given.cyberglove)
-    _warn(made, chosen, given, glove)
-    _propose(made.manifest, propose, chip)
-    show(made.manifest, lambda _: _print(made, output, propose))
-
-
-def _leave_out_preset_keep(context: click.Context, asked: dict[str, Any]) -> None:
-    """Take out a preset's --keep if another --method takes no number of switches."""
-    from thenar.compiler.placement.methods.base import METHODS
-
-    preset = context.get_parameter_source("keep") is ParameterSource.DEFAULT_MAP
-    if preset and not METHODS[asked["placement"]].by_number:
-        asked["keep"] = None
-
-
-def _documents(hand: "HandShape | None", hand_length: float | None, chosen: "Picked | None") -> "Documents":
-    """Return the report and the spec to write, with the frontier of a chosen point."""
-    from thenar.compiler.artifact.documents import Documents
-
-    if chosen is None:
-        return Documents(hand, hand_length)
-    return Documents(hand, hand_length, frontier=chosen.frontier, point=chosen.point.number)
-
-
-def _warn(made: "BuildReport", chosen: "Picked | None", given: "Harness | None", glove: Path | None) -> None:
-    """Warn of a build that always predicts the same, whose joints the glove does not measure, or that is not wired as
-    `glove`, the file of `given`.
-    """
     for sentence in made.warnings:
         warning(sentence)
     if chosen is not None and given is not None and made.harness != given:
@@ -236,44 +198,30 @@ def _warn(made: "BuildReport", chosen: "Picked | None", given: "Harness | None",
             f"the scan map uses the wiring that point {chosen.point.number} was found with, not {glove}: to run on "
             "that glove, build a point that is read as wired, or compile without --from"
         )
+    _propose(made.manifest, propose, chip)
+    show(made.manifest, lambda _: _print(made, output, propose))
 
 
-def _check_hand_length(hand_length: float | None, report: bool) -> None:
-    """Raise UsageError for a length of a hand that is not drawn."""
-    if hand_length is not None and not report:
-        raise click.UsageError("--hand-length sizes the hand in spec/, which --no-report omits: give one of them.")
-
-
-def _check_proposal(propose: Path | None, chip: str | None, glove: Path | None) -> None:
-    """Raise UsageError for options that conflict with --propose: before the training, not after it."""
-    if propose is None:
-        if chip is not None:
-            raise click.UsageError("--chip sets the chips of a proposed harness: add --propose with a file to write.")
-        return
-    if glove is not None:
-        raise click.UsageError("--glove reads a wiring and --propose writes a new one: give one of them.")
-
-
-def _check_point(context: click.Context, from_frontier: Path | None, point: int | None) -> None:
-    """Raise UsageError for options that conflict with --from."""
+def _check(
+    context: click.Context, from_frontier: Path | None, point: int | None, hand_length: float | None, report: bool
+) -> None:
+    """Raise UsageError for options that conflict, before the training."""
     from thenar.compiler.trainers.base import TRAINERS
 
-    if from_frontier is None:
-        if point is not None:
-            raise click.UsageError("--point picks a point of a frontier: name its file with --from.")
-        return
-    for name in (*_SETTLED, *(setting.name for trainer in TRAINERS.values() for setting in trainer.settings)):
+    given = context.params
+    if given["chip"] is not None and given["propose"] is None:
+        raise click.UsageError("--chip sets the chips of a proposed harness: add --propose with a file to write.")
+    if given["propose"] is not None and given["glove"] is not None:
+        raise click.UsageError("--glove reads a wiring and --propose writes a new one: give one of them.")
+    if hand_length is not None and not report:
+        raise click.UsageError("--hand-length sizes the hand in spec/, which --no-report omits: give one of them.")
+    if point is not None and from_frontier is None:
+        raise click.UsageError("--point picks a point of a frontier: name its file with --from.")
+    settings = (setting.name for trainer in TRAINERS.values() for setting in trainer.settings)
+    for name in () if from_frontier is None else (*_SETTLED, *settings):
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             option = next(param.opts[-1] for param in context.command.get_params(context) if param.name == name)
             raise click.UsageError(f"{option} is set by the point that --from names: leave it out.")
-
-
-def _hand(layout: Path | None, names: Sequence[str], hand_length: float | None) -> "HandShape | None":
-    """Return the recorded glove's hand, whose spec can be made for `hand_length`."""
-    hand = fitted_hand(layout, names, None)
-    if hand_length is not None:
-        fitted_hand(layout, names, hand_length)
-    return hand
 
 
 def _propose(manifest: "Manifest", path: Path | None, chip: str | None) -> None:
@@ -302,20 +250,15 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
     console = out()
     for fact in made.facts:
         console.print(f"{folder}: {fact.text}" if fact.label == "build" else str(fact), soft_wrap=True)
-    if made.scan is not None and made.harness is not None:
-        time = scan_us(made.scan, made.harness)
-        if time.chips:
-            _print_chips(time)
+    time = None if made.scan is None or made.harness is None else scan_us(made.scan, made.harness)
+    if time is not None and time.chips:
+        chips = table(("chip", "bus", "reads", "switches", "us"), title="Scan map")
+        for chip in time.chips:
+            chips.add_row(chip.place, chip.device, " ".join(chip.readings), str(chip.switches), f"{chip.us:.1f}")
+        if time.selects:
+            chips.add_row(f"{time.selects} writes to muxes", "", "", "", f"{time.select_us:.1f}")
+        console.print(chips)
     if propose is not None:
         console.print(
             f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
         )
-
-
-def _print_chips(time: "ScanTime") -> None:
-    chips = table(("chip", "bus", "reads", "switches", "us"), title="Scan map")
-    for chip in time.chips:
-        chips.add_row(chip.place, chip.device, " ".join(chip.readings), str(chip.switches), f"{chip.us:.1f}")
-    if time.selects:
-        chips.add_row(f"{time.selects} writes to muxes", "", "", "", f"{time.select_us:.1f}")
-    out().print(chips)

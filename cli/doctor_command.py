@@ -5,22 +5,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import (
-    Number,
-    OutputFile,
-    check_devices,
-    err,
-    existing_file,
-    existing_folder,
-    json_flag,
-    of_device,
-    out,
-    overwrite_flag,
-    progress,
-    show,
-    table,
-)
-from .lines import echo
+from .parameters import Number, OutputFile, check_devices, existing_file, existing_folder, overwrite_flag
+from .printing import echo, err, json_flag, of_device, out, progress, show, table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -119,11 +105,10 @@ def _listen(port: str, baud: int, seconds: float, columns: "Sequence[str]", prop
     text = harness_to_toml(harness)
 
     def show_heard(_: object) -> None:
-        heard = table(("column", "least", "greatest", "taken for"), ("least", "greatest"), f"{found.rows} rows")
-        for one in found.columns:
-            ends = ("" if end is None else f"{end:g}" for end in (one.least, one.greatest))
-            heard.add_row(one.column, *ends, one.taken_for)
-        err().print(heard)
+        ends = (["" if end is None else f"{end:g}" for end in (one.least, one.greatest)] for one in found.columns)
+        rows = ((one.column, *pair, one.taken_for) for one, pair in zip(found.columns, ends, strict=True))
+        columns = ("column", "least", "greatest", "taken for")
+        err().print(table(columns, columns[1:3], f"{found.rows} rows", rows))
         for remark in found.remarks:
             err().print(of_device(port, remark))
         if propose is None and found.stream.used:
@@ -176,10 +161,8 @@ def _print(found: "Sequence[CheckResult]") -> None:
     for one in found:
         measured = "" if one.measured_us is None else f"{one.measured_us:.0f}"
         there = ("slow" if one.slow else "yes") if one.present else "no"
-        predicted = f"{one.predicted_us:.0f}" if one.predicted_us else ""
-        devices.add_row(one.device, one.part, there, predicted, measured)
-    console = out()
-    console.print(devices)
+        devices.add_row(one.device, one.part, there, f"{one.predicted_us:.0f}" if one.predicted_us else "", measured)
+    out().print(devices)
     for one in found:
         for remark in one.remarks:
-            console.print(of_device(f"{one.device} {one.part}".strip(), remark))
+            out().print(of_device(f"{one.device} {one.part}".strip(), remark))

@@ -1,17 +1,14 @@
 """`thenar draw`: draw the glove, palm up."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-import msgspec
 
-from thenar.drivers.errors import ThenarError
-from thenar.drivers.names import shortened
-
-from .common import existing_file, keep_apart, overwrite_flag, picture_file, progress
-from .lines import echo
 from .options import hand_of, layout_option
+from .parameters import existing_file, keep_apart, overwrite_flag, picture_file
+from .printing import echo, progress, write_picture
 
 if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
@@ -19,24 +16,19 @@ if TYPE_CHECKING:
     from thenar.simulator.handmaps.draw import Picture
 
 
-_LARGEST = 4_000_000  # bytes; a placement of the largest set has fewer
-_WANTED = "name a build folder, a file of `thenar place -o`, or a text file with one name per line"
-
-
 def _titled_paths(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> list[tuple[str, Path]]:
     """Return title and path of each [NAME=]PATH; without a NAME, the title is the file's name."""
-    return [_titled_path(text) for text in given]
-
-
-def _titled_path(text: str) -> tuple[str, Path]:
-    title, is_named, rest = text.partition("=")
-    if not is_named or Path(text).exists():
-        title, rest = Path(text).resolve().stem, text
-    if not title or not rest:
-        raise click.BadParameter(f"'{text}' is not NAME=PATH")
-    if not Path(rest).exists():
-        raise click.BadParameter(f"There is no file or folder '{rest}'.")
-    return title, Path(rest)
+    found = []
+    for text in given:
+        title, is_named, rest = text.partition("=")
+        if not is_named or Path(text).exists():
+            title, rest = Path(text).resolve().stem, text
+        if not title or not rest:
+            raise click.BadParameter(f"'{text}' is not NAME=PATH")
+        if not Path(rest).exists():
+            raise click.BadParameter(f"There is no file or folder '{rest}'.")
+        found.append((title, Path(rest)))
+    return found
 
 
 @click.command("draw")
@@ -110,6 +102,7 @@ def _check_options(
 
 
 def _without_grasps(hand: "HandShape", numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
+    from thenar.compiler.placement.kept import kept_names
     from thenar.simulator.handmaps import draw as handpanels
 
     if not kept:
@@ -127,62 +120,9 @@ def _placements(hand: "HandShape", grasp_set: "GraspSet", prune: int) -> "Pictur
         return kept(hand, [(title, list(found.names)) for title, found in place_by_subject(grasp_set, prune, report)])
 
 
-class KeptError(ThenarError, ValueError):
-    """A file does not list the kept switches."""
-
-
-class _Chosen(msgspec.Struct, frozen=True):
-    name: str
-
-
-class _Placement(msgspec.Struct, frozen=True):
-    """The part of a placement, or of a build's description, that is used here."""
-
-    switches: tuple[_Chosen, ...]
-
-
-def kept_names(path: Path) -> tuple[str, ...]:
-    """Return the names of the kept switches, in the order in which they were chosen.
-
-    path is a build's folder, a JSON file (written by `thenar place -o`, or an array of names), or a text file with one
-    name per line. Raises KeptError if it is none of these or names no switch, BuildError if it is a damaged build.
-    """
-    from thenar.runtime.build import load_manifest
-    from thenar.runtime.names import fault
-
-    names = tuple(kept.name for kept in load_manifest(path).switches) if path.is_dir() else _of_file(path)
-    for name in names:
-        if reason := fault(name):
-            raise KeptError(f"{path}: switch {shortened(repr(name))} {reason}")
-    if not names:
-        raise KeptError(f"{path} keeps no switches: there is nothing to draw")
-    return names
-
-
-def _of_file(path: Path) -> tuple[str, ...]:
-    from thenar.runtime.files import read_file
-    from thenar.runtime.nesting import check_json
-
-    try:
-        text = read_file(path, _LARGEST, KeptError).decode()
-    except UnicodeDecodeError:
-        raise KeptError(f"{path} is not a text file: {_WANTED}") from None
-    if text.lstrip()[:1] not in ("{", "["):
-        return tuple(filter(None, map(str.strip, text.splitlines())))
-    try:
-        check_json(text.encode())
-        found = msgspec.json.decode(text, type=_Placement | tuple[str, ...])
-    except ValueError as reason:
-        raise KeptError(f"{path} is not a list of switches ({shortened(str(reason))}): {_WANTED}") from None
-    return tuple(chosen.name for chosen in found.switches) if isinstance(found, _Placement) else found
-
-
 def _write(picture: "Picture", path: Path) -> None:
-    from thenar.runtime.files import write_atomically
     from thenar.simulator.handmaps.draw import draw
 
-    with progress(f"drawing {path.name}"):
-        data = draw(picture, path.suffix.lower()[1:])
-    write_atomically(path, data)
+    write_picture(path, partial(draw, picture))
     hands = len(picture.panels)
     echo(f"{path}: {hands} hand{'s' if hands > 1 else ''}")

@@ -1,15 +1,10 @@
 """`thenar emulate`: emulate a glove on real ports, playing a scene or a recording."""
 
-import ctypes
 import os
 import shutil
-import signal
-import subprocess
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from threading import Event, Thread
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -17,7 +12,9 @@ import msgspec
 
 from thenar.drivers.names import fault
 
-from .common import (
+from . import ended_by_signals
+from .options import complete_scene
+from .parameters import (
     Number,
     OutputFile,
     OutputFolder,
@@ -26,12 +23,8 @@ from .common import (
     keep_apart,
     overwrite_flag,
     overwrites,
-    progress,
-    warning,
 )
-from .ending import ended_by_signals
-from .lines import echo
-from .options import scene_name
+from .printing import echo, progress, warning
 
 if TYPE_CHECKING:
     from thenar.runtime.harness.wiring import Harness
@@ -41,29 +34,15 @@ if TYPE_CHECKING:
     CableOf = Callable[[int], Cable | None]
 
 _ADAPTERS = ("any", "bcm2835", "designware", "i2c-gpio", "smbus-only")
-_GRACE_S = 5.0
-# The command receives Ctrl-C too: it gets this long to end before it is asked to.
-_BY_ITSELF_S = 1.0
 _FRAME_US = 10_000
 _HARNESS, _CALIBRATION, _TAXELS = "glove.toml", "calibration.toml", "taxels.toml"
 _LONGEST_PATH = 4095  # of Linux
 # A shell reports a command ended by a signal as this plus the signal's number.
 _KILLED = 128
-_PROCESSES = Path("/proc")
-_SET_CHILD_SUBREAPER = 36
-_LOOK_S = 0.02
-
-
-class Played(msgspec.Struct, frozen=True):
-    """A line of --log: the frame with this number is shown from this monotonic time on."""
-
-    time_us: int
-    row: int
-    grasp: str
 
 
 @click.command("emulate", context_settings={"ignore_unknown_options": True})
-@click.argument("source", metavar="SCENE|FILE", type=scene_name)
+@click.argument("source", metavar="SCENE|FILE", shell_complete=complete_scene)
 @click.argument("client", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
 @click.option("--glove", metavar="glove.toml", type=existing_file, required=True, help="The harness to emulate.")
 @click.option(
@@ -116,6 +95,7 @@ def command(
     """
     from thenar.runtime.harness.loading import load_harness
     from thenar.simulator.playing.bench import Bench
+    from thenar.simulator.playing.client import running
 
     harness = load_harness(glove)
     check_devices(harness, glove)
@@ -142,9 +122,19 @@ def command(
         )
         emulated = _write_harness(bench, performance, folder)
         note = stack.enter_context(_noting(log))
-        _tell_how(bench, emulated)
-        child = stack.enter_context(_beside(client, emulated, bench, stop)) if client else None
-        _play(bench, performance, note, stop, repeat=repeat)
+        echo(f"emulated glove: {emulated}; run it with: thenar run BUILD --glove {emulated}", err=True)
+        if bench.environment:
+            settings = " ".join(f"{name}={value}" for name, value in bench.environment.items())
+            echo(f"for its I2C buses, prefix that command with: {settings}", err=True)
+        child = None
+        if client:
+            arguments = [argument.replace("{glove}", str(emulated)) for argument in client]
+            try:
+                child = stack.enter_context(running(arguments, {**os.environ, **bench.environment}, stop))
+            except OSError as wrong:
+                raise click.UsageError(f"{arguments[0]} cannot be run: {wrong.strerror}") from None
+        while performance.play(bench.show, note, stop) and repeat:
+            pass
     if child is not None:
         code = child.returncode
         click.get_current_context().exit(code if code >= 0 else _KILLED - code)
@@ -170,45 +160,44 @@ def _performance(
 
     given_us, rest_us = (None if given is None else round(given * 1000) for given in (period_ms, rest_ms))
     path = Path(source)
-    if path.suffix in (".grasps", ".mcap"):
-        if not path.exists():
-            raise click.BadParameter(f"there is no file {path}", param_hint="SOURCE")
-        if subject is not None:
-            raise click.UsageError(
-                "--subject picks a subject of a scene, and a recording has only its own: leave it out"
-            )
-        if path.suffix == ".mcap":
-            if rest_ms is not None:
-                raise click.UsageError(
-                    "--rest-ms is for scenes and sets of grasps, and a recording has its rests: leave it out"
-                )
-            return performance.of_recording(path, given_us or _FRAME_US, warning), lambda _line: None
+    if path.suffix not in (".grasps", ".mcap"):
+        from thenar.simulator.pipeline.scene_file import load_scene
+        from thenar.simulator.playing.bench import cable_of
+
+        scene = load_scene(source)
+        with progress("simulating") as report:
+            played = performance.of_scene(scene, subject, progress=report, period_us=given_us, rest_us=rest_us)
+        return played, lambda line: cable_of(scene, line)
+    if not path.exists():
+        raise click.BadParameter(f"there is no file {path}", param_hint="SOURCE")
+    if subject is not None:
+        raise click.UsageError("--subject picks a subject of a scene, and a recording has only its own: leave it out")
+    period_us = given_us or _FRAME_US
+    if path.suffix == ".grasps":
         from thenar.compiler.recordings.graspset import GraspSet
 
-        played_set = GraspSet.load(path)
-        return performance.of_set(
-            played_set, given_us or _FRAME_US, rest_us=rest_us, cyberglove=cyberglove
-        ), lambda _line: None
-    from thenar.simulator.pipeline.scene_file import load_scene
-    from thenar.simulator.playing.bench import cable_of
-
-    scene = load_scene(source)
-    with progress("simulating") as report:
-        played = performance.of_scene(scene, subject, progress=report, period_us=given_us, rest_us=rest_us)
-    return played, lambda line: cable_of(scene, line)
+        played = performance.of_set(GraspSet.load(path), period_us, rest_us=rest_us, cyberglove=cyberglove)
+    elif rest_ms is not None:
+        raise click.UsageError(
+            "--rest-ms is for scenes and sets of grasps, and a recording has its rests: leave it out"
+        )
+    else:
+        played = performance.of_recording(path, period_us, warning)
+    return played, lambda _line: None
 
 
 def _warn_of_missing(source: str, harness: "Harness", performance: "Performance") -> None:
     """Warn of inputs of the harness that the source does not have."""
     from thenar.runtime.names import list_names
 
-    if missing := [name for name in harness.switches if name not in performance.switch_names]:
-        warning(f"{source} has no switch {list_names(missing)}: always open")
-    if missing := [name for name in harness.taxel_names if name not in performance.taxel_names]:
-        warning(f"{source} has no taxel {list_names(missing)}: always 0 counts")
-    streamed = [name for stream in harness.streams for name in stream.joints]
-    if missing := [name for name in streamed if name not in performance.joint_names]:
-        warning(f"{source} has no joint {list_names(missing)}: always 0")
+    joints = [name for stream in harness.streams for name in stream.joints]
+    for kind, names, known, instead in (
+        ("switch", harness.switches, performance.switch_names, "open"),
+        ("taxel", harness.taxel_names, performance.taxel_names, "0 counts"),
+        ("joint", joints, performance.joint_names, "0"),
+    ):
+        if missing := [name for name in names if name not in known]:
+            warning(f"{source} has no {kind} {list_names(missing)}: always {instead}")
 
 
 def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> Path:
@@ -229,136 +218,15 @@ def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> 
     return folder / _HARNESS
 
 
-def _tell_how(bench: "Bench", emulated: Path) -> None:
-    """Explain on stderr how to connect to the emulated glove."""
-    echo(f"emulated glove: {emulated}; run it with: thenar run BUILD --glove {emulated}", err=True)
-    if bench.environment:
-        settings = " ".join(f"{name}={value}" for name, value in bench.environment.items())
-        echo(f"for its I2C buses, prefix that command with: {settings}", err=True)
-
-
 @contextmanager
 def _noting(log: Path | None) -> Iterator["Log"]:
-    """Yield a function that logs every frame to `log`, one line each, as soon as it is shown."""
+    """Yield a function that logs every frame to `log` as it is shown, one line each, with its monotonic time."""
     if log is None:
         yield lambda row, grasp, time_us: None
         return
     with log.open("wb", buffering=0) as file:
 
         def note(row: int, grasp: str, time_us: int) -> None:
-            file.write(msgspec.json.encode(Played(time_us, row, grasp)) + b"\n")
+            file.write(msgspec.json.encode({"time_us": time_us, "row": row, "grasp": grasp}) + b"\n")
 
         yield note
-
-
-@contextmanager
-def _beside(client: tuple[str, ...], emulated: Path, bench: "Bench", stop: Event) -> Iterator[subprocess.Popen[bytes]]:
-    """Run the command, and what it starts, within this context only; `stop` is set when the command ends."""
-    arguments = [argument.replace("{glove}", str(emulated)) for argument in client]
-    try:
-        family = Family(arguments, {**os.environ, **bench.environment})
-    except OSError as wrong:
-        raise click.UsageError(f"{arguments[0]} cannot be run: {wrong.strerror}") from None
-
-    def watch() -> None:
-        family.command.wait()
-        stop.set()
-
-    Thread(target=watch, name="thenar client", daemon=True).start()
-    try:
-        yield family.command
-    finally:
-        family.end(_BY_ITSELF_S if stop.is_set() else 0.0, _GRACE_S)
-
-
-def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, *, repeat: bool) -> None:
-    while performance.play(bench.show, note, stop) and repeat:
-        pass
-
-
-class Family:
-    """A command that runs with `environment`, in our process group: it shares the terminal and may read keys.
-
-    On Linux this process adopts the command's orphans and so finds them; elsewhere it knows only the command itself.
-    Raises OSError if the command cannot be run.
-    """
-
-    def __init__(self, arguments: Sequence[str], environment: Mapping[str, str]) -> None:
-        _adopt_orphans()
-        self._others = _children().get(os.getpid(), set())
-        self.command = subprocess.Popen(arguments, env=environment)
-
-    def end(self, patience_s: float, grace_s: float) -> None:
-        """End the command and all its children; none outlives this call.
-
-        patience_s  time for the command to end by itself
-        grace_s     time for it after a SIGINT, and for its children after a SIGTERM
-        """
-        try:
-            with suppress(subprocess.TimeoutExpired):
-                self.command.wait(patience_s)
-            if self.command.poll() is None:
-                self._signal(signal.SIGINT)
-                with suppress(subprocess.TimeoutExpired):
-                    self.command.wait(grace_s)
-            if self._signal(signal.SIGTERM):
-                self._wait(grace_s)
-        finally:
-            while self._signal(signal.SIGKILL):
-                self._wait(_LOOK_S)
-            self.command.wait()
-
-    def _wait(self, limit_s: float) -> None:
-        end = time.monotonic() + limit_s
-        while self._alive() and time.monotonic() < end:
-            time.sleep(_LOOK_S)
-
-    def _signal(self, number: signal.Signals) -> bool:
-        """Send the signal to all running processes; return whether there are any."""
-        alive = self._alive()
-        for process in alive:
-            with suppress(ProcessLookupError, PermissionError):
-                os.kill(process, number)
-        return bool(alive)
-
-    def _alive(self) -> set[int]:
-        alive = set() if self.command.poll() is not None else {self.command.pid}
-        children = _children()
-        unseen = children.get(os.getpid(), set()) - self._others
-        for orphan in unseen - {self.command.pid}:
-            with suppress(ChildProcessError):
-                os.waitpid(orphan, os.WNOHANG)
-        while unseen:
-            process = unseen.pop()
-            if _runs(process):
-                alive.add(process)
-            unseen |= children.get(process, set())
-        return alive
-
-
-def _adopt_orphans() -> None:
-    prctl = getattr(ctypes.CDLL(None), "prctl", None)
-    if prctl is not None:
-        prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
-
-
-def _children() -> dict[int, set[int]]:
-    """Return the children of each process, where /proc exists."""
-    found: dict[int, set[int]] = {}
-    for folder in _PROCESSES.glob("[0-9]*"):
-        if fields := _fields(int(folder.name)):
-            found.setdefault(int(fields[1]), set()).add(int(folder.name))
-    return found
-
-
-def _runs(process: int) -> bool:
-    fields = _fields(process)
-    return bool(fields) and fields[0] != "Z"
-
-
-def _fields(process: int) -> list[str]:
-    """Return state, parent and so on; nothing if the process has ended."""
-    try:
-        return (_PROCESSES / str(process) / "stat").read_text(errors="replace").rpartition(")")[2].split()
-    except OSError:
-        return []

@@ -6,24 +6,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.text import Text
 
-from .common import (
-    ListOf,
-    OutputFile,
-    OutputFolder,
-    comma_separated,
-    dask_option,
-    existing_file,
-    jobs_option,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    progress,
-    show,
-    table,
-    warning,
-    write_json,
-)
+from thenar.compiler.text import DASH, counted, interval
+
 from .options import (
     CHOOSING,
     LIMITS,
@@ -36,14 +20,25 @@ from .options import (
     terms_of,
     trainer_option,
 )
+from .parameters import (
+    ListOf,
+    OutputFile,
+    OutputFolder,
+    comma_separated,
+    dask_option,
+    existing_file,
+    jobs_option,
+    keep_apart,
+    overwrite_flag,
+)
+from .printing import json_flag, out, progress, show, table, warning, write_json
 
 if TYPE_CHECKING:
     from rich.table import Table as Grid
 
-    from thenar.compiler.artifact.stream_study import StreamStudy
-    from thenar.compiler.evaluation.learning import Learning
+    from thenar.compiler.artifact.stream_study import StreamStudy, SubjectMean
     from thenar.compiler.evaluation.study import Study
-    from thenar.compiler.evaluation.tables import Cell, RateTable
+    from thenar.compiler.evaluation.tables import RateTable
     from thenar.runtime.recipe import Recipe
 
 _USUAL = ("compositions", "generality", "pruning", "baselines", "trainers")
@@ -240,29 +235,37 @@ def _evaluate_streams(
 
 def _print_streams(study: "StreamStudy") -> None:
     from thenar.compiler.artifact.stream_study import FALSE, SHARES, TIMES
-    from thenar.compiler.text import DASH, counted
 
     console = out()
     for inputs in dict.fromkeys(row.inputs for row in study.rows):
-        rows = [row for row in study.rows if row.inputs == inputs]
         for columns in (SHARES, (*TIMES, FALSE)):
             grid = table(("", "", *columns), columns)
-            for row in rows:
-                cells = []
-                for name in columns:
-                    value, times = row.values[name], 100 if name in SHARES else 1
-                    ends = "" if value.low is None or value.high is None else f" [{times * value.low:.0f}, "
-                    ends += f"{times * value.high:.0f}]" if ends and value.high is not None else ""
-                    cells.append(DASH if value.mean is None else f"{times * value.mean:.1f}{ends}")
-                grid.add_row(Text(row.method), Text(row.what), *cells)
-            console.print()
-            console.print(Text(f"inputs: {inputs}; {study.recipe}", "bold"))
-            console.print(grid)
+            for row in study.rows:
+                if row.inputs == inputs:
+                    cells = (_cell(row.values[name], 100 if name in SHARES else 1) for name in columns)
+                    grid.add_row(row.method, row.what, *cells)
+            _print_grid(f"inputs: {inputs}; {study.recipe}", grid)
     console.print(
         f"{counted(study.movements, 'movement')} of {counted(len(study.subjects), 'subject')}, {study.seconds:,.0f} s; "
         "each subject left out in turn; shares in %, means over subjects with 95 % intervals (Student). Nothing held "
         "counts as background. False: segments announced while nothing is held, per hundred movements."
     )
+
+
+def _cell(value: "SubjectMean", times: int) -> str:
+    if value.mean is None:
+        return DASH
+    ends = [f"{times * end:.0f}" for end in (value.low, value.high) if end is not None]
+    return f"{times * value.mean:.1f}" + (f" [{', '.join(ends)}]" if ends else "")
+
+
+def _print_grid(title: str, grid: "Grid", note: str = "") -> None:
+    console = out()
+    console.print()
+    console.print(Text(title, "bold"))
+    console.print(grid)
+    if note:
+        console.print(note)
 
 
 def _print(study: "Study", *, confusion: bool) -> None:
@@ -273,12 +276,8 @@ def _print(study: "Study", *, confusion: bool) -> None:
     for protocol in PROTOCOLS:
         if protocol.name in study.options.protocols:
             console.print(f"Protocol {protocol.name}: {protocol.meaning}")
-    for each in study.tables:
-        console.print()
-        console.print(Text(each.title, "bold"))
-        console.print(_rates(each))
-        if each.note:
-            console.print(each.note)
+    for rated in study.tables:
+        _print_grid(rated.title, _rates(rated), rated.note)
     console.print()
     for missing in study.left_out:
         console.print(f"no table of {missing.name}: {missing.reason}")
@@ -286,54 +285,38 @@ def _print(study: "Study", *, confusion: bool) -> None:
     if study.permuted is not None:
         console.print(str(study.permuted))
     if study.learning is not None:
-        _print_learning(study.learning)
+        learning = study.learning
+        numbers = [*map(str, learning.repetitions), *(f"{n} expected" for n in learning.further)]
+        grid = table(("", *numbers), numbers)
+        for curve in learning.curves:
+            grid.add_row(curve.learner, *map(interval, curve.rates), *map(interval, curve.expected))
+        note = learning.note or "Expected: a power law fitted to the points, so an extrapolation."
+        _print_grid(learning.title, grid, note)
     if confusion:
         _print_confusions(study)
 
 
-def _print_learning(learning: "Learning") -> None:
-    from thenar.compiler.text import interval
-
-    console, numbers = out(), [*map(str, learning.repetitions), *(f"{n} expected" for n in learning.further)]
-    grid = table(("", *numbers), numbers)
-    for curve in learning.curves:
-        grid.add_row(Text(curve.learner), *map(interval, curve.rates), *map(interval, curve.expected))
-    console.print()
-    console.print(Text(learning.title, "bold"))
-    console.print(grid)
-    console.print(learning.note or "Expected: a power law fitted to the points, so an extrapolation.")
-
-
 def _print_confusions(study: "Study") -> None:
-    console = out()
-    for each in study.tables:
-        for row in each.rows if each.name == "compositions" else ():
-            for name, cell in zip(each.columns, row.cells, strict=True):
-                console.print()
-                console.print(
-                    Text(f"{row.name} {row.what}, subject {name}, {each.protocol} protocol, {cell.rate.what}", "bold")
-                )
-                console.print(_matrix(study.grasps, cell))
+    columns = ("true \\ predicted", *study.grasps)
+    for rated in study.tables:
+        for row in rated.rows if rated.name == "compositions" else ():
+            for name, cell in zip(rated.columns, row.cells, strict=True):
+                grid = table(columns, columns)
+                for grasp, counts in zip(study.grasps, cell.confusion or (), strict=True):
+                    grid.add_row(grasp, *(str(count) if count else "." for count in counts))
+                title = f"{row.name} {row.what}, subject {name}, {rated.protocol} protocol, {cell.rate.what}"
+                _print_grid(title, grid)
 
 
 def _rates(rated: "RateTable") -> "Grid":
+    from thenar.compiler.evaluation.tables import both
+
     averaged = ["all"] if len(rated.columns) > 1 else []
     paired = [f"against {row.paired.than}" for row in rated.rows if row.paired is not None][:1]
     numbers = ("switches", *rated.columns, *averaged, *paired)
-    from thenar.compiler.evaluation.tables import both
-
     grid = table(("", "", *numbers), numbers)
     for row in rated.rows:
-        average = [Text(both(row.rate, row.frames))] if averaged else []
-        rates = [Text(str(cell)) for cell in row.cells]
-        compared = [Text(str(row.paired or ""))] if paired else []
-        grid.add_row(Text(row.name), Text(row.what), str(row.switches), *rates, *average, *compared)
-    return grid
-
-
-def _matrix(grasps: tuple[str, ...], cell: "Cell") -> "Grid":
-    columns = ("true \\ predicted", *grasps)
-    grid = table(columns, columns)
-    for grasp, counts in zip(grasps, cell.confusion or (), strict=True):
-        grid.add_row(Text(grasp), *(str(count) if count else "." for count in counts))
+        average = [both(row.rate, row.frames)] if averaged else []
+        compared = [str(row.paired or "")] if paired else []
+        grid.add_row(row.name, row.what, str(row.switches), *map(str, row.cells), *average, *compared)
     return grid

@@ -3,19 +3,9 @@
 from pathlib import Path
 
 import click
-from msgspec import Struct
 
-from .common import OutputFile, existing_file, json_flag, keep_apart, overwrite_flag, progress, show
-from .lines import echo
-
-
-class Exported(Struct, frozen=True):
-    """The written table, the columns.toml that reads it back if requested, and the numbers of trials and frames."""
-
-    output: str
-    columns: str | None
-    trials: int
-    frames: int
+from .parameters import OutputFile, existing_file, keep_apart, overwrite_flag
+from .printing import echo, json_flag, progress, show
 
 
 @click.command("export")
@@ -50,6 +40,6 @@ def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path |
     grasp_set = GraspSet.load(grasps)
     with progress(f"exporting {grasps.name}"):
         export(grasp_set, output, codes, meta, columns)
-    kept = None if columns is None else str(columns)
-    written = Exported(str(output), kept, grasp_set.n_trials, len(grasp_set))
-    show(written, lambda _: echo(f"{output}: {grasp_set.size}"))
+    columns_file = None if columns is None else str(columns)
+    counts = {"trials": grasp_set.n_trials, "frames": len(grasp_set)}
+    show({"output": str(output), "columns": columns_file, **counts}, lambda _: echo(f"{output}: {grasp_set.size}"))

@@ -7,24 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import (
-    OneOf,
-    OutputFolder,
-    existing_file,
-    existing_folder,
-    json_flag,
-    out,
-    print_json,
-    progress,
-    wants_json,
-)
+from .options import Described
+from .parameters import OneOf, OutputFolder, existing_file, existing_folder
+from .printing import echo, json_flag, progress, show
 
 if TYPE_CHECKING:
-    from thenar.compiler.firmware.choose import Fit
     from thenar.compiler.firmware.generate import Firmware
     from thenar.compiler.firmware.measuring import Measured
-    from thenar.compiler.firmware.sensors import Sensors
-    from thenar.runtime.build import Build
 
 
 def _targets() -> Iterable[str]:
@@ -36,17 +25,13 @@ def _targets() -> Iterable[str]:
 _ANY = " Use `generic` for any other part with a C99 compiler."
 
 
-class _Command(click.Command):
-    """The command; its help ends with a description of each target."""
+def _described() -> dict[str, list[tuple[str, str]]]:
+    from thenar.compiler.firmware.targets import TARGETS
 
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        from thenar.compiler.firmware.targets import TARGETS
-
-        with formatter.section("Targets"):
-            formatter.write_dl([(name, target.help) for name, target in TARGETS.items()])
+    return {"Targets": [(name, target.help) for name, target in TARGETS.items()]}
 
 
-@click.command("firmware", cls=_Command)
+@click.command("firmware", cls=Described, sections=_described)
 @click.argument("build", metavar="BUILD", type=existing_folder)
 @click.option("--target", type=OneOf("target", _targets, _ANY), help="Target of the library: see below.")
 @click.option("-o", "--output", metavar="DIR", type=OutputFolder(), help="Folder to write the firmware into.")
@@ -114,18 +99,22 @@ def command(
     """
     from thenar.compiler.firmware.generate import Firmware, write_folder
     from thenar.compiler.firmware.measuring import measure as measured_of
+    from thenar.compiler.firmware.sensors import sensors_of
     from thenar.runtime.build import Build
+    from thenar.runtime.calibration import load_calibration
+    from thenar.runtime.harness.loading import load_harness
 
     if mode == "rows":
-        _check_rows(**{"target": target, "calibration": calibration, "flash-limit": flash_limit, "measure": measure})
+        libraries = {"target": target, "calibration": calibration, "flash-limit": flash_limit, "measure": measure}
+        if given := [option for option, value in libraries.items() if value]:
+            raise click.UsageError(f"--{given[0]} is for libraries, not for sketches that print rows: leave it out.")
         return _write_sketches(build, glove, output, name, overwrite=overwrite)
-    if target is None:
-        raise click.UsageError("A library needs a target: name one with --target.")
-    _check(target, writes=output is not None, measures=measure)
-    if glove is not None and calibration is not None:
-        raise click.UsageError("glove.toml names its calibration: leave out --calibration, or --glove.")
-    loaded = Build.load(build)
-    sensors = _sensors(loaded, calibration, glove)
+    _check(target, output is not None, measure, glove is not None and calibration is not None)
+    assert target is not None
+    loaded, sensors = Build.load(build), None
+    if glove is not None or calibration is not None:
+        hand = None if calibration is None else load_calibration(calibration)
+        sensors = sensors_of(loaded.manifest, None if glove is None else load_harness(glove), hand)
     firmware = Firmware(loaded.tables, loaded.manifest, target, name, flash_limit, sensors)
     fit = firmware.fit
     measured = None
@@ -135,19 +124,12 @@ def command(
     files = firmware.files(None if measured is None else fit.notes(measured.note))
     if output is not None:
         write_folder(files, output, overwrite=overwrite)
-    if wants_json():
-        print_json(_document(fit, measured, sorted(files)))
-    else:
-        _print(fit, measured)
-        if output is not None:
-            _print_next_step(firmware, target, output)
+    # The host has no cycle counts and so no cost.
+    cost = fit.cost
+    costs = cost and {"time": cost.cycles, "unit": fit.target.unit, "flash": cost.flash, "ram": cost.ram}
+    document = {"part": fit.target.part, "layout": fit.words, "cost": costs, "measured": measured}
+    show(document | {"files": sorted(files)}, lambda _: _print(firmware, measured, output))
     return 0
-
-
-def _check_rows(**options: object) -> None:
-    """Raise UsageError if an option was given that is for libraries."""
-    if given := [option for option, value in options.items() if value]:
-        raise click.UsageError(f"--{given[0]} is for libraries, not for sketches that print rows: leave it out.")
 
 
 def _write_sketches(build: Path, glove: Path | None, output: Path | None, name: str, *, overwrite: bool) -> int:
@@ -162,54 +144,35 @@ def _write_sketches(build: Path, glove: Path | None, output: Path | None, name: 
         )
     files = rows_files(name, Build.load(build).manifest, load_harness(glove))
     write_folder(files, output, overwrite=overwrite)
-    if wants_json():
-        print_json({"files": sorted(files)})
-    else:
-        readme = shlex.quote(str(output / "README.md"))
-        out().print(f"{output}: a sketch for Arduino's cores; {readme} explains how to compile it", soft_wrap=True)
+    readme = shlex.quote(str(output / "README.md"))
+    line = f"{output}: a sketch for Arduino's cores; {readme} explains how to compile it"
+    show({"files": sorted(files)}, lambda _: echo(line))
     return 0
 
 
-def _sensors(build: "Build", calibration: Path | None, glove: Path | None) -> "Sensors | None":
-    """Return how a library converts raw readings to its codes, if a calibration or a glove is known."""
-    from thenar.compiler.firmware.sensors import sensors_of
-    from thenar.runtime.calibration import load_calibration
-    from thenar.runtime.harness.loading import load_harness
-
-    hand = None if calibration is None else load_calibration(calibration)
-    if glove is None and hand is None:
-        return None
-    return sensors_of(build.manifest, None if glove is None else load_harness(glove), hand)
-
-
-def _check(target: str, *, writes: bool, measures: bool) -> None:
-    """Raise UsageError for options that conflict."""
+def _check(target: str | None, writes: bool, measures: bool, names_both: bool) -> None:
+    """Raise UsageError for options of a library that conflict, or are missing."""
     from thenar.compiler.firmware.targets import TARGETS
 
+    if target is None:
+        raise click.UsageError("A library needs a target: name one with --target.")
     if TARGETS[target].kind == "host" and measures:
         raise click.UsageError("The host has no cycle counts: --measure is for microcontrollers.")
     if not writes and not measures:
         raise click.UsageError("Nothing to do: name a folder to write with -o, or add --measure.")
+    if names_both:
+        raise click.UsageError("glove.toml names its calibration: leave out --calibration, or --glove.")
 
 
-def _print(fit: "Fit", measured: "Measured | None") -> None:
-    console = out()
-    console.print(f"layout {fit.words}", soft_wrap=True)
-    if measured is not None:
-        console.print(measured.note, soft_wrap=True)
-
-
-def _print_next_step(firmware: "Firmware", target: str, output: Path) -> None:
+def _print(firmware: "Firmware", measured: "Measured | None", output: Path | None) -> None:
     from thenar.compiler.firmware.targets import TARGETS
 
-    if said := TARGETS[target].said(firmware.library()):
-        out().print(f"{said}.", soft_wrap=True)
-    next_step = TARGETS[target].next_step.format(folder=shlex.quote(str(output)))
-    out().print(f"{output}: firmware for {target}; {next_step}", soft_wrap=True)
-
-
-def _document(fit: "Fit", measured: "Measured | None", files: list[str]) -> dict[str, object]:
-    """Return the document of --json; the host target has no cycle counts and so no cost."""
-    cost = fit.cost
-    costs = cost and {"time": cost.cycles, "unit": fit.target.unit, "flash": cost.flash, "ram": cost.ram}
-    return {"part": fit.target.part, "layout": fit.words, "cost": costs, "measured": measured, "files": files}
+    echo(f"layout {firmware.fit.words}")
+    if measured is not None:
+        echo(measured.note)
+    if output is not None:
+        target = TARGETS[firmware.target]
+        if said := target.said(firmware.library()):
+            echo(f"{said}.")
+        next_step = target.next_step.format(folder=shlex.quote(str(output)))
+        echo(f"{output}: firmware for {firmware.target}; {next_step}")

@@ -1,6 +1,5 @@
 """`thenar frontier`: the trade-off between accuracy and time."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,29 +10,21 @@ from thenar.compiler.text import duration, interval
 from thenar.drivers.names import printable
 from thenar.runtime.recipe import AUTO
 
-from .common import (
+from .options import Training, asked_settings, method_list, trainer_option
+from .parameters import (
     Number,
     OneOf,
     OutputFolder,
     dask_option,
-    err,
     existing_file,
     existing_folder,
     jobs_option,
-    json_flag,
-    out,
-    progress,
     seed_range,
-    show,
-    table,
 )
-from .options import Training, asked_settings, method_list, trainer_option
+from .printing import err, json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from thenar.compiler.frontier.points import Frontier, FrontierPoint
-    from thenar.compiler.frontier.search import Search
+    from thenar.compiler.frontier.points import Frontier
 
 
 _SEARCHED = ("repeats", "finalists", "seed", "by")
@@ -130,6 +121,7 @@ def command(
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
     from thenar.compiler.frontier.find import PointGoal, find_frontier
+    from thenar.compiler.frontier.search import Search
     from thenar.compiler.placement.methods.base import usual
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
@@ -139,7 +131,15 @@ def command(
     wanted, harness = PointGoal(budget_us, rate), None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
     methods = methods or usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns))
-    search = _search(context, methods, usual(ours=False) if baselines is None else baselines, asked)
+    rounds, training = asked["rounds"], asked_settings(context, asked)
+    search = Search(
+        methods=methods,
+        baselines=usual(ours=False) if baselines is None else baselines,
+        rounds=rounds,
+        trainer=training.pop("trainer"),
+        settings={name: value for name, value in training.items() if name != "rounds"},
+        **{name: asked.pop(name) for name in _SEARCHED},
+    )
     with progress("frontier") as report:
         found = find_frontier(
             grasp_set,
@@ -159,24 +159,6 @@ def command(
     return 0
 
 
-def _search(
-    context: click.Context, methods: tuple[str, ...], baselines: tuple[str, ...], asked: dict[str, Any]
-) -> "Search":
-    """Return the search that is `asked` for, whose options are removed from it."""
-    from thenar.compiler.frontier.search import Search
-
-    rounds = asked["rounds"]
-    training = asked_settings(context, asked)
-    return Search(
-        methods=methods,
-        baselines=baselines,
-        rounds=rounds,
-        trainer=training.pop("trainer"),
-        settings={name: value for name, value in training.items() if name != "rounds"},
-        **{name: asked.pop(name) for name in _SEARCHED},
-    )
-
-
 def _print(found: "Frontier", output: Path) -> None:
     from thenar.compiler.frontier.words import featured
 
@@ -189,50 +171,29 @@ def _print(found: "Frontier", output: Path) -> None:
 
 def print_frontier(frontier: "Frontier") -> None:
     """Print the points, the picked one bold; then the omissions, and the caption of the picture."""
-    from thenar.compiler.frontier.words import LUCK, folds_of, summary
+    from thenar.compiler.frontier import words
 
-    console = out()
-    console.print(_grid(frontier))
-    console.print(Text(f"{folds_of(frontier)}. Accuracy in % with 95 % intervals. {LUCK} Flash, RAM: bytes.", "dim"))
+    rates, elements = words.rates_of(frontier), words.elements_of(frontier)
+    numbers = (*(f"{what} %" for what in rates), *(words.of_time(frontier, what) for what in _TIMES), *_SIZES)
+    wanted = f"; {frontier.wanted}: point {frontier.picked}" if frontier.picked is not None else ""
+    title = f"The best of {frontier.combinations:,} combinations, {frontier.source} on {frontier.machine}{wanted}"
+    grid = table(("point", elements, *_WORDS, *numbers), ("point", elements, *numbers), title)
+    for point in frontier.points:
+        setting = point.setting
+        trained = setting.rounds if words.is_usual(setting) else words.training_of(setting)
+        grid.add_row(
+            *(str(point.number), str(len(point.switches)), setting.inputs, words.way_of(setting)),
+            *(f"{trained}, {setting.width}", words.wiring_of(setting), setting.decision),
+            *(interval(rate(point)) for rate in rates.values()),
+            f"{duration(point.frame.us)} {point.frame.how}",
+            f"{duration(point.latency.mean_us)}, {duration(point.latency.p99_us)}",
+            *(f"{point.flash:,}", f"{point.ram:,}"),
+            style="bold" if point.number == frontier.picked else None,
+        )
+    console, folds = out(), words.folds_of(frontier)
+    console.print(grid)
+    console.print(Text(f"{folds}. Accuracy in % with 95 % intervals. {words.LUCK} Flash, RAM: bytes.", "dim"))
     for missing in frontier.skipped:
         console.print(Text(missing, "yellow"))
     console.print()
-    console.print(Text(summary(frontier), "bold"))
-
-
-def _grid(frontier: "Frontier") -> "Table":
-    from thenar.compiler.frontier.words import elements_of, of_time, rates_of
-
-    counts, rates = ("point", elements_of(frontier)), rates_of(frontier)
-    numbers = (*(f"{what} %" for what in rates), *(of_time(frontier, what) for what in _TIMES), *_SIZES)
-    grid = table((*counts, *_WORDS, *numbers), (*counts, *numbers), Text(_title(frontier)))
-    for point in frontier.points:
-        rated = [interval(rate(point)) for rate in rates.values()]
-        grid.add_row(*_cells(point, rated), style="bold" if point.number == frontier.picked else None)
-    return grid
-
-
-def _title(frontier: "Frontier") -> str:
-    wanted = f"; {frontier.wanted}: point {frontier.picked}" if frontier.picked is not None else ""
-    return f"The best of {frontier.combinations:,} combinations, {frontier.source} on {frontier.machine}{wanted}"
-
-
-def _cells(point: "FrontierPoint", rated: Sequence[str]) -> tuple[Text, ...]:
-    from thenar.compiler.frontier.words import is_usual, training_of, way_of, wiring_of
-
-    setting = point.setting
-    texts = (
-        str(point.number),
-        str(len(point.switches)),
-        setting.inputs,
-        way_of(setting),
-        f"{setting.rounds if is_usual(setting) else training_of(setting)}, {setting.width}",
-        wiring_of(setting),
-        setting.decision,
-        *rated,
-        f"{duration(point.frame.us)} {point.frame.how}",
-        f"{duration(point.latency.mean_us)}, {duration(point.latency.p99_us)}",
-        f"{point.flash:,}",
-        f"{point.ram:,}",
-    )
-    return tuple(map(Text, texts))
+    console.print(Text(words.summary(frontier), "bold"))

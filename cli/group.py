@@ -7,14 +7,11 @@ silently with click's exit code 1.
 import errno
 import os
 import re
-import sys
 import tempfile
 import traceback
 from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
 from importlib import import_module
-from importlib.metadata import entry_points
-from pathlib import Path
 
 import click
 
@@ -22,7 +19,7 @@ from thenar.drivers.errors import ThenarError
 from thenar.drivers.extras import missing
 from thenar.drivers.names import shortened
 
-from .lines import echo
+from .printing import echo
 
 # In the order of work.
 GROUPS = {
@@ -128,46 +125,21 @@ def _sentence(fault: BaseException, arguments: Sequence[str]) -> str:
             return f"{fault.filename}: {reason}" if fault.filename else reason
         case MemoryError():
             return f"not enough memory ({fault}): use fewer rows or columns"
-        case SystemExit():
-            return f"the module {_raised_in(fault)} called sys.exit({fault.code!r}): fix or uninstall its package"
         case ModuleNotFoundError():
             return missing(fault.name or "", *arguments[:1])
     return _kept(fault)
 
 
-def _raised_in(fault: BaseException) -> str:
-    """Return the name of the module in which an exception was raised."""
-    *_, (frame, _) = traceback.walk_tb(fault.__traceback__)
-    return str(frame.f_globals.get("__name__"))
-
-
 def _kept(fault: BaseException) -> str:
-    """Write the traceback of an unexpected error to a file that only its owner can read; return the message."""
-    trace = "".join(traceback.format_exception(fault))
-    plug_in = _plug_in(trace)
-    whose = f"in {shortened(plug_in)}, a package that extends thenar" if plug_in else "this is a bug in thenar"
-    what = f"unexpected {type(fault).__name__}: {whose}"
-    report = "please report it to its authors" if plug_in else "please report it"
+    """Write the traceback of an unexpected error to a file that only its owner can read; return the message, with the
+    module that raised it: it may be that of another package.
+    """
+    *_, (frame, _) = traceback.walk_tb(fault.__traceback__)
+    what = f"unexpected {type(fault).__name__} in {frame.f_globals.get('__name__')}: this is a bug"
     try:
         descriptor, path = tempfile.mkstemp(prefix="thenar-", suffix=".txt")
         with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
-            file.write(trace)
+            file.write("".join(traceback.format_exception(fault)))
     except OSError as reason:
-        return f"{what}, and its traceback could not be written ({reason.strerror}); {report}"
-    return f"{what}; {report} with the file {path}, which holds the traceback"
-
-
-def _plug_in(trace: str) -> str:
-    """Return the name of the package with an entry point of thenar whose code is in a traceback; "" for none.
-
-    The text is searched, because the traceback of a worker process is only a text.
-    """
-    groups = (group for group in entry_points().groups if group.startswith("thenar."))
-    for point in (point for group in groups for point in entry_points(group=group)):
-        module = sys.modules.get(point.module.partition(".")[0])
-        file = getattr(module, "__file__", None)
-        if module is not None and file is not None:
-            place = f"{Path(file).parent}{os.sep}" if hasattr(module, "__path__") else f'{file}"'
-            if f'File "{place}' in trace:
-                return module.__name__ if point.dist is None else point.dist.name
-    return ""
+        return f"{what}, and its traceback could not be written ({reason.strerror}); please report it"
+    return f"{what}; please report it with the file {path}, which holds the traceback"

@@ -3,27 +3,14 @@
 import os
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from thenar.compiler.text import counted, inputs_read, trials_of_frames
 
-from .common import (
-    OutputFile,
-    existing_file,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    overwrites,
-    progress,
-    show,
-    table,
-    wants_json,
-    warning,
-)
-from .lines import echo
+from .parameters import OutputFile, existing_file, keep_apart, overwrite_flag, overwrites
+from .printing import echo, json_flag, out, progress, show, table, wants_json, warning
 
 if TYPE_CHECKING:
     from thenar.compiler.recordings.graspset import GraspSet
@@ -31,20 +18,20 @@ if TYPE_CHECKING:
     from thenar.compiler.recordings.propose import ColumnProposal
 
 
-class _Table(click.Path):
-    """A file, a folder, or a pattern of files: a path with fields in braces."""
+_PATH = click.Path(path_type=Path)
 
-    def __init__(self) -> None:
-        super().__init__(exists=True, path_type=Path)
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """Return the path. Raises BadParameter if it is no pattern and nothing is there."""
-        is_pattern = "{" in os.fsdecode(value) and not Path(os.fsdecode(value)).exists()
-        return Path(os.fsdecode(value if is_pattern else super().convert(value, param, ctx)))
+def _existing(context: click.Context, argument: click.Parameter, paths: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Return the paths, each of which is there, or is a pattern of files: a path with fields in braces."""
+    is_there = click.Path(exists=True)
+    for path in paths:
+        if "{" not in str(path):
+            is_there.convert(path, argument, context)
+    return paths
 
 
 @click.command("import")
-@click.argument("tables", metavar="TABLE", type=_Table(), nargs=-1, required=True)
+@click.argument("tables", metavar="TABLE", type=_PATH, callback=_existing, nargs=-1, required=True)
 @click.option("-o", "--output", type=OutputFile(".grasps"), required=True, help="The .grasps file to write.")
 @overwrite_flag
 @click.option("--columns", type=existing_file, help="columns.toml: the meaning of each column of the table.")

@@ -1,5 +1,6 @@
 """`thenar info`: summarise a .grasps file."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,13 +9,10 @@ import click
 from thenar.compiler.text import INDEPENDENT, counted, inputs_read, trials_of_frames
 from thenar.runtime.published import NONE
 
-from .common import existing_file, json_flag, keep_apart, out, overwrite_flag, picture_file, progress, show, table
-from .lines import echo
+from .parameters import existing_file, keep_apart, overwrite_flag, picture_file
+from .printing import echo, json_flag, out, progress, show, table, write_picture
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from thenar.compiler.recordings.graspset import GraspSet
     from thenar.compiler.recordings.summary import JointRange, Summary
 
 
@@ -34,6 +32,7 @@ def command(grasps: Path, plot: Path | None) -> None:
         thenar info set.grasps --plot set.png
     """
     from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.compiler.recordings.picture import draw
     from thenar.compiler.recordings.summary import summarise
 
     keep_apart(grasps, plot)
@@ -41,16 +40,8 @@ def command(grasps: Path, plot: Path | None) -> None:
     with progress(f"comparing the rows of {grasps.name}"):
         summary = summarise(grasp_set)
     if plot is not None:
-        with progress(f"drawing {plot.name}"):
-            _draw(grasp_set, plot)
+        write_picture(plot, partial(draw, grasp_set))
     show(summary, _print, grasps)
-
-
-def _draw(grasp_set: "GraspSet", path: Path) -> None:
-    from thenar.compiler.recordings.picture import draw
-    from thenar.runtime.files import write_atomically
-
-    write_atomically(path, draw(grasp_set, path.suffix.lower()[1:]))
 
 
 def _print(summary: "Summary", path: Path) -> None:
@@ -66,31 +57,21 @@ def _print(summary: "Summary", path: Path) -> None:
         echo(f"simulated: {summary.simulated}")
     if summary.independent:
         echo(INDEPENDENT)
-    _print_counts(summary)
+    counts = [(grasp.name, grasp.frames) for grasp in summary.grasps]
+    counts += [(NONE, summary.none)] if summary.none else []
+    rows = ((name, str(frames), f"{frames / summary.frames:.1%}") for name, frames in counts)
+    out().print(table(("grasp type", "frames", "share"), ("frames", "share"), "Grasp types", rows))
+    echo(f"balance (rarest type over commonest): {summary.balance:.2f}")
+    for what, people in (("subjects", summary.subjects), ("objects", summary.objects)):
+        echo(f"{what}: " + ", ".join(f"{count.name} ({count.frames})" for count in people))
     for kind, ranges in (("taxel", summary.taxels), ("joint", summary.joints)):
-        _print_ranges(kind, ranges)
+        if ranges:
+            numbers = ("least", "largest", "distinct codes")
+            out().print(table((kind, "unit", *numbers), numbers, f"{kind.capitalize()}s", map(_range, ranges)))
     for warning in summary.warnings:
         echo(f"warning: {warning.message}")
 
 
-def _print_counts(summary: "Summary") -> None:
-    grasps = table(("grasp type", "frames", "share"), ("frames", "share"), "Grasp types")
-    for grasp in summary.grasps:
-        grasps.add_row(grasp.name, str(grasp.frames), f"{grasp.frames / summary.frames:.1%}")
-    if summary.none:
-        grasps.add_row(NONE, str(summary.none), f"{summary.none / summary.frames:.1%}")
-    out().print(grasps)
-    echo(f"balance (rarest type over commonest): {summary.balance:.2f}")
-    for what, counts in (("subjects", summary.subjects), ("objects", summary.objects)):
-        echo(f"{what}: " + ", ".join(f"{count.name} ({count.frames})" for count in counts))
-
-
-def _print_ranges(kind: str, ranges: "Sequence[JointRange]") -> None:
-    if not ranges:
-        return
-    numbers = ("least", "largest", "distinct codes")
-    lines = table((kind, "unit", *numbers), numbers, f"{kind.capitalize()}s")
-    for each in ranges:
-        ends = ("-" if end is None else f"{end:g}" for end in (each.least, each.largest))
-        lines.add_row(each.name, each.unit, *ends, str(each.codes))
-    out().print(lines)
+def _range(line: "JointRange") -> tuple[str, ...]:
+    ends = ("-" if end is None else f"{end:g}" for end in (line.least, line.largest))
+    return (line.name, line.unit, *ends, str(line.codes))

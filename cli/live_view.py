@@ -14,8 +14,6 @@ from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, Outp
 from thenar.runtime.task import Progress
 
 Devices = Callable[[], Sequence[DeviceHealth]]
-_Wrong = Quarantined | OutputTrouble
-_Shown = tuple[LiveGrasp, Devices, HealthReport | None, Progress | None]
 
 _REDRAW_S = 0.1
 _STYLES = {"ok": "bold green", "changing": "bold cyan", "degraded": "bold yellow", "unknown": "bold red"}
@@ -33,7 +31,7 @@ class LiveView:
         """Draw health reports of the glove below the devices if `status`."""
         self._status = status
         self._live = Live(console=console, transient=True, auto_refresh=False)
-        self._newest: _Shown | None = None
+        self._newest: tuple[LiveGrasp, Devices, HealthReport | None, Progress | None] | None = None
         self._closing = Event()
         self._thread = Thread(target=self._draw, name="thenar view", daemon=True)
 
@@ -67,7 +65,9 @@ class LiveView:
                 if newest is not None and newest is not shown:
                     grasp, devices, health, progress = shown = newest
                     lines = health_lines(health) if self._status else ()
-                    wrong: list[_Wrong] = [] if health is None else [*health.quarantined, *health.outputs]
+                    wrong = list[Quarantined | OutputTrouble]()
+                    if health is not None:
+                        wrong += [*health.quarantined, *health.outputs]
                     self._live.update(drawn(grasp, devices(), lines, wrong, progress), refresh=True)
 
 
@@ -75,7 +75,7 @@ def drawn(
     grasp: LiveGrasp,
     devices: Sequence[DeviceHealth],
     lines: Sequence[str] = (),
-    wrong: Sequence[_Wrong] = (),
+    wrong: Sequence[Quarantined | OutputTrouble] = (),
     progress: Progress | None = None,
 ) -> RenderableType:
     """Return the view of one moment."""

@@ -3,24 +3,11 @@
 from pathlib import Path
 
 import click
-from msgspec import Struct
 
 from thenar.compiler.text import trials_of_frames
 
-from .common import OutputFile, existing_file, json_flag, keep_apart, overwrite_flag, progress, show
-from .lines import echo
-
-
-class Merged(Struct, frozen=True):
-    """The written set, and its counts."""
-
-    output: str
-    sets: int
-    frames: int
-    trials: int
-    rests: int
-    subjects: int
-    sessions: int
+from .parameters import OutputFile, existing_file, keep_apart, overwrite_flag
+from .printing import echo, json_flag, progress, show
 
 
 @click.command("merge")
@@ -51,17 +38,17 @@ def command(sets: tuple[Path, ...], output: Path, each: str | None) -> None:
     with progress(f"merging {len(sets)} sets"):
         merged = merge({str(path): GraspSet.load(path) for path in sets}, each)  # type: ignore[arg-type]
     merged.save(output)
-    trials, subjects, sessions = (
-        len({*column.tolist()}) for column in (merged.trial_ids, merged.subjects, merged.sessions)
-    )
-    written = Merged(str(output), len(sets), len(merged), trials, merged.rests, subjects, sessions)
-    show(written, _print, merged.simulated)
+    columns = {"trials": merged.trial_ids, "subjects": merged.subjects, "sessions": merged.sessions}
+    counts = {name: len({*column.tolist()}) for name, column in columns.items()}
+    size = {"frames": len(merged), "trials": counts["trials"], "rests": merged.rests}
+    written = {"output": str(output), "sets": len(sets), **size, **counts}
 
+    def people(_: object) -> None:
+        echo(
+            f"{output}: {trials_of_frames(**size)} from {len(sets)} sets; "
+            f"subjects {counts['subjects']}, sessions {counts['sessions']}"
+        )
+        if merged.simulated:
+            echo(f"simulated: {merged.simulated}")
 
-def _print(merged: Merged, simulated: str) -> None:
-    echo(
-        f"{merged.output}: {trials_of_frames(merged.frames, merged.trials, merged.rests)} from {merged.sets} sets; "
-        f"subjects {merged.subjects}, sessions {merged.sessions}"
-    )
-    if simulated:
-        echo(f"simulated: {simulated}")
+    show(written, people)

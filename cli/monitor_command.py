@@ -4,9 +4,8 @@ from pathlib import Path
 
 import click
 
-from .common import existing_file, existing_folder
-from .lines import echo
-from .web_options import HERE, say_page, token_for, web_token_option
+from .parameters import WEB_ADDRESS, existing_file, existing_folder, web_token_option
+from .printing import echo, say_page
 
 
 @click.command("monitor")
@@ -18,9 +17,9 @@ from .web_options import HERE, say_page, token_for, web_token_option
     type=existing_folder,
     help="The build used by that run, or to score the recording with.",
 )
-@click.option("--web", metavar="ADDRESS", default=HERE, show_default=True, help="Address of the page.")
+@click.option("--web", metavar="ADDRESS", default=WEB_ADDRESS, show_default=True, help="Address of the page.")
 @web_token_option
-def command(source: str, build: Path | None, web: str, web_token: bool) -> None:
+def command(source: str, build: Path | None, web: str, web_token: str | None) -> None:
     """Show a run elsewhere, or a recording, on a page in the browser.
 
     ADDRESS is where that run publishes: tcp:HOST:PORT or unix:PATH, as in its --sink. With ?detail there and --build
@@ -39,16 +38,16 @@ def command(source: str, build: Path | None, web: str, web_token: bool) -> None:
     """
     from thenar.runtime.web.monitor import StreamMonitor
 
-    from .ending import ended_by_signals
+    from . import ended_by_signals
 
     if Path(source).is_file() or source.endswith(".mcap"):
         from thenar.runtime.web.replay import ReplayPage
 
         path = existing_file.convert(source, None, None)
-        with ended_by_signals() as stop, ReplayPage(path, web, token=token_for(web_token), build=build) as page:
+        with ended_by_signals() as stop, ReplayPage(path, web, token=web_token, build=build) as page:
             say_page(page.server.url)
             page.run(stop)
         return
-    with ended_by_signals() as stop, StreamMonitor(source, web, token=token_for(web_token), build=build) as monitor:
+    with ended_by_signals() as stop, StreamMonitor(source, web, token=web_token, build=build) as monitor:
         say_page(monitor.server.url)
         monitor.run(stop, lambda source: echo(source.error or f"{source.where}: connected", err=True))

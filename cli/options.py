@@ -11,15 +11,17 @@ from click.shell_completion import CompletionItem
 
 from thenar.runtime.recipe import AUTO, Choice, choices
 
-from .common import Command, ListOf, Number, OneOf, comma_separated, existing_file, warning
+from .parameters import Command, ListOf, Number, OneOf, comma_separated, existing_file
+from .printing import warning
 
 if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
-    from thenar.compiler.placement.methods.base import Method
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.compiler.trainers.base import Setting
     from thenar.runtime.harness.wiring import GloveWiring
     from thenar.runtime.recipe import Recipe
+
+    Sections = dict[str, list[tuple[str, str]]]
 
 
 def _methods() -> Iterable[str]:
@@ -38,20 +40,12 @@ method_name = OneOf("method", _methods)
 method_list = ListOf("method", _methods, none=True)
 
 
-class _Scene(click.ParamType[str]):
-    """The name of a shipped scene, or a file."""
+def complete_scene(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the names of shipped scenes and of files."""
+    from thenar.simulator.scenes import shipped
 
-    name = "scene"
-
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Complete the names of shipped scenes and of files."""
-        from thenar.simulator.scenes import shipped
-
-        names = [CompletionItem(name) for name in shipped() if name.startswith(incomplete)]
-        return [*names, CompletionItem(incomplete, type="file")]
-
-
-scene_name = _Scene()
+    names = [CompletionItem(name) for name in shipped() if name.startswith(incomplete)]
+    return [*names, CompletionItem(incomplete, type="file")]
 
 
 def _names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str, ...]:
@@ -154,40 +148,16 @@ def warn_of_budget(budget_us: float | None, joints: Sequence[str], glove: "Glove
         )
 
 
-class WithMethods(click.Command):
-    """A command whose help ends with all placement methods, grouped by the option that sets how many they keep."""
+class LazyOption(click.Option):
+    """An option whose help is only made when requested, by `describe`."""
 
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write each method's name and description."""
-        from thenar.compiler.placement.methods.base import METHODS
-
-        super().format_epilog(ctx, formatter)
-        for takes, by_number in (("--prune S", False), ("--keep M", True)):
-            lines = [
-                (name, f"{method.help}{_remarks(method)}.")
-                for name, method in METHODS.items()
-                if method.by_number == by_number
-            ]
-            with formatter.section(f"Placement methods that take {takes}"):
-                formatter.write_dl(lines)
-
-
-def _remarks(method: "Method") -> str:
-    """Return further remarks for the user, in brackets."""
-    remarks = [] if method.ours else ["baseline"]
-    remarks += [f"pip install {method.install}"] if method.install else []
-    return f" ({'; '.join(remarks)})" if remarks else ""
-
-
-class _TrainerOption(click.Option):
-    """Its help describes each trainer, and is only made when requested."""
+    def __init__(self, *args: Any, describe: Callable[[], str], **named: Any) -> None:
+        super().__init__(*args, **named)
+        self._describe = describe
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        from thenar.compiler.trainers.base import TRAINERS
-
-        names = ", ".join(f"{trainer.name} ({trainer.what})" for trainer in TRAINERS.values())
-        chosen = f"; {AUTO}: chosen by folds of the training rows, among those that take the given settings"
-        self.help = f"What trains the model: {names}{chosen}."
+        """Return the option and its help."""
+        self.help = self._describe()
         return super().get_help_record(ctx)
 
 
@@ -199,16 +169,62 @@ class _SettingOption(click.Option):
         return record and (record[0], record[1].replace(f"({self.show_default})", str(self.show_default)))
 
 
+def _trainers_help() -> str:
+    from thenar.compiler.trainers.base import TRAINERS
+
+    names = ", ".join(f"{trainer.name} ({trainer.what})" for trainer in TRAINERS.values())
+    chosen = f"{AUTO}: chosen by folds of the training rows, among those that take the given settings"
+    return f"What trains the model: {names}; {chosen}."
+
+
 def trainer_option(default: str) -> Callable[[Command], Command]:
     """Return the option --trainer; if its default is AUTO, so are the defaults of the settings."""
     kind = OneOf("trainer", lambda: (AUTO, *_trainers()))
-    return click.option("--trainer", type=kind, default=default, show_default=True, cls=_TrainerOption)
+    about: dict[str, Any] = {"default": default, "show_default": True, "describe": _trainers_help}
+    return click.option("--trainer", type=kind, cls=LazyOption, **about)
 
 
-class Training(WithMethods):
+class Described(click.Command):
+    """A command whose help ends with `sections`, a title and names with descriptions each, read when requested."""
+
+    def __init__(self, *args: Any, sections: "Callable[[], Sections]", **named: Any) -> None:
+        super().__init__(*args, **named)
+        self._sections = sections
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the sections."""
+        super().format_epilog(ctx, formatter)
+        for title, lines in self._sections().items():
+            with formatter.section(title):
+                formatter.write_dl(lines)
+
+
+def _methods_by_number() -> "Sections":
+    """Return all placement methods, by the option that sets how many they keep, with remarks in brackets."""
+    from thenar.compiler.placement.methods.base import METHODS
+
+    sections: Sections = {}
+    for takes, by_number in (("--prune S", False), ("--keep M", True)):
+        lines = sections[f"Placement methods that take {takes}"] = list[tuple[str, str]]()
+        for name, method in METHODS.items():
+            remarks = [] if method.ours else ["baseline"]
+            remarks += [f"pip install {method.install}"] if method.install else []
+            if method.by_number == by_number:
+                lines.append((name, f"{method.help} ({'; '.join(remarks)})." if remarks else f"{method.help}."))
+    return sections
+
+
+class Training(Described):
     """A command with `trainer_option`, followed by an option for each setting of a trainer that the command does not
     define itself. The trainers are imported when the options are needed, not when the command is defined.
+
+    Its help ends with the placement methods. With `groups` it shows the options group by group, by title: the settings
+    follow the trainer, and a last group holds the rest.
     """
+
+    def __init__(self, *args: Any, groups: Mapping[str, tuple[str, ...]] | None = None, **named: Any) -> None:
+        super().__init__(*args, sections=_methods_by_number, **named)
+        self.groups = groups
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Return the options of the command, and those of the trainers."""
@@ -226,18 +242,11 @@ class Training(WithMethods):
         chosen = {name for trainer in TRAINERS.values() for tried in trainer.tried for name in tried if self._auto}
         return tuple(_option(setting, name in chosen) for name, setting in settings.items())
 
-
-class Grouped(Training):
-    """A command whose help shows its options in `groups`, by title: the settings follow the trainer, and a last group
-    holds the rest.
-    """
-
-    def __init__(self, *args: Any, groups: Mapping[str, tuple[str, ...]], **named: Any) -> None:
-        super().__init__(*args, **named)
-        self.groups = groups
-
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options group by group."""
+        """Write the options."""
+        if self.groups is None:
+            super().format_options(ctx, formatter)
+            return
         params = {str(param.name): param for param in self.get_params(ctx) if isinstance(param, click.Option)}
         settings = tuple(str(each.name) for each in self._settings)
         groups = {title: names + settings * ("trainer" in names) for title, names in self.groups.items()}

@@ -1,6 +1,5 @@
 """`thenar place`: choose the switches to keep."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,22 +8,6 @@ from click.core import ParameterSource
 
 from thenar.runtime.recipe import AUTO
 
-from .common import (
-    OutputFile,
-    existing_file,
-    jobs_option,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    picture_file,
-    print_json,
-    progress,
-    table,
-    wants_json,
-    write_json,
-)
-from .lines import echo
 from .options import (
     CHOOSING,
     Training,
@@ -35,10 +18,11 @@ from .options import (
     terms_of,
     trainer_option,
 )
+from .parameters import OutputFile, existing_file, jobs_option, keep_apart, overwrite_flag, picture_file
+from .printing import echo, json_flag, out, print_json, progress, table, wants_json, write_json
 
 if TYPE_CHECKING:
     from thenar.compiler.placement.placement import Placement
-    from thenar.compiler.placement.tree import Tree
     from thenar.runtime.recipe import Recipe
 
 
@@ -93,8 +77,7 @@ def command(
 
     training = asked_settings(context, chosen)
     recipe = changed(Recipe(), chosen | training)
-    _check(recipe, show_tree, draw)
-    _check_measured(context, recipe, training)
+    _check(context, recipe, training, show_tree, draw)
     keep_apart(grasps, glove, layout, draw, output)
     grasp_set = GraspSet.load(grasps)
     terms = terms_of(recipe, grasp_set, layout, glove)
@@ -118,64 +101,46 @@ def command(
         out().print(f"accuracy, {rate}")
 
 
-def _check_measured(context: click.Context, recipe: "Recipe", training: dict[str, Any]) -> None:
-    """Raise UsageError for options of an accuracy that is not measured."""
+def _check(
+    context: click.Context, recipe: "Recipe", training: dict[str, Any], show_tree: bool, draw: Path | None
+) -> None:
+    """Raise UsageError if options conflict, or are for an accuracy that is not measured."""
+    from thenar.compiler.placement.methods.base import PAPERS
+
+    if wants_json() and show_tree:
+        raise click.UsageError("--tree is for people and --json for machines: give one of them")
+    if show_tree and recipe.placement != PAPERS:
+        raise click.UsageError("--tree prints the tree of the paper's ID3 only: leave it out")
+    if draw is not None and recipe.placement != PAPERS:
+        raise click.UsageError("--draw draws the tree of the paper's ID3 only: leave it out")
     for name in () if recipe.folds else ("by", "seed", *training):
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             raise click.UsageError(f"--{name.replace('_', '-')} is for an accuracy: add --folds, or leave it out.")
 
 
-def _check(recipe: "Recipe", show_tree: bool, draw: Path | None) -> None:
-    """Raise UsageError if options conflict."""
-    from thenar.compiler.placement.methods.base import PAPERS
-
-    for wrong, reason in (
-        (wants_json() and show_tree, "--tree is for people and --json for machines: give one of them"),
-        (show_tree and recipe.placement != PAPERS, "--tree prints the tree of the paper's ID3 only: leave it out"),
-        (
-            draw is not None and recipe.placement != PAPERS,
-            "--draw draws the tree of the paper's ID3 only: leave it out",
-        ),
-    ):
-        if wrong:
-            raise click.UsageError(reason)
-
-
 def _print(placement: "Placement") -> None:
     """Print the table of switches, their value, and remarks on how they were found."""
-    if placement.tree is not None:
+    tree, sensors = placement.tree, str(placement.sensors)
+    if tree is None:
+        rows = ((str(order), str(kept.number), kept.name) for order, kept in enumerate(placement.switches, 1))
+        out().print(table(("order", "column", "name"), title="Placement", rows=rows))
+        echo(f"{sensors}{', in addition to the joints' if placement.joints else ''}. {placement.how}")
+    else:
         switches = table(("column", "name", "gain, bits", "cumulative share"), title="Placement")
         for kept in placement.switches:
             switches.add_row(str(kept.number), kept.name, f"{kept.gain_bits:.4f}", f"{kept.cumulative_share:.1%}")
-    else:
-        switches = table(("order", "column", "name"), title="Placement")
-        for order, kept in enumerate(placement.switches, 1):
-            switches.add_row(str(order), str(kept.number), kept.name)
-    out().print(switches)
-    for sentence in _sentences(placement):
-        echo(sentence)
-
-
-def _sentences(placement: "Placement") -> Iterator[str]:
-    kept = str(placement.sensors)
-    if placement.tree is not None:
-        tree, prune = placement.tree, placement.tree.min_samples
-        yield (
-            f"{kept}: {placement.gain_bits:.3f} of {placement.entropy_bits:.3f} bits of the grasp type; the tree has "
-            f"{len(tree.nodes) - tree.n_leaves} decisions, {tree.n_leaves} leaves, depth {tree.depth}"
-            + (f", pruned at S = {prune}" if prune else "")
+        out().print(switches)
+        pruned = f", pruned at S = {tree.min_samples}" if tree.min_samples else ""
+        bits = f"{placement.gain_bits:.3f} of {placement.entropy_bits:.3f} bits of the grasp type"
+        echo(
+            f"{sensors}: {bits}; the tree has "
+            f"{len(tree.nodes) - tree.n_leaves} decisions, {tree.n_leaves} leaves, depth {tree.depth}{pruned}"
         )
-        yield from _of_tree(placement, tree)
-    else:
-        yield f"{kept}{', in addition to the joints' if placement.joints else ''}. {placement.how}"
+        if placement.entropy_bits == 0:
+            echo("all rows are of one grasp type: there is nothing to distinguish")
+        elif placement.rows < tree.min_samples:
+            echo(f"no decision was made: the {placement.rows} rows are fewer than S = {tree.min_samples}")
+        for remark in tree.remarks("switch"):
+            echo(remark)
     if placement.kept_joints:
-        yield f"the kept joints, in addition: {', '.join(placement.kept_joints)}"
-
-
-def _of_tree(placement: "Placement", tree: "Tree") -> Iterator[str]:
-    """Yield the reasons if nothing was decided, or something was decided without a gain."""
-    if placement.entropy_bits == 0:
-        yield "all rows are of one grasp type: there is nothing to distinguish"
-    elif placement.rows < tree.min_samples:
-        yield f"no decision was made: the {placement.rows} rows are fewer than S = {tree.min_samples}"
-    yield from tree.remarks("switch")
+        echo(f"the kept joints, in addition: {', '.join(placement.kept_joints)}")

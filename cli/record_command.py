@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import Number, OutputFile, check_devices, existing_file, keep_apart, progress, seed_range, warning
-from .lines import echo
-from .web_options import token_for, web_options
+from .parameters import Number, OutputFile, check_devices, existing_file, keep_apart, seed_range, web_options
+from .printing import echo, progress, warning
 
 if TYPE_CHECKING:
     from thenar.runtime.recording.guide import Journal
@@ -50,7 +49,7 @@ def command(
     none: bool | None,
     seed: int | None,
     web: str | None,
-    web_token: bool,
+    web_token: str | None,
     output: Path,
 ) -> None:
     """Record labelled grasps: the command shows which grasp to take, in random order, with a countdown.
@@ -69,7 +68,7 @@ def command(
     from thenar.compiler.recordings.errors import check_names
     from thenar.compiler.recordings.taxonomy import collected
     from thenar.runtime.harness.loading import load_harness
-    from thenar.runtime.recording.guide import planned
+    from thenar.runtime.recording.guide import planned, read_journal
     from thenar.runtime.recording.session import Collection
 
     from .collecting import collect
@@ -83,7 +82,10 @@ def command(
     harness = load_harness(glove)
     check_devices(harness, glove)
     check_names("subject", [subject])
-    journal = _begun(recording)
+    journal = None
+    if recording.exists():
+        with progress(f"reading {recording.name}"):
+            journal = read_journal(recording)
     types, tasks = collected(taxonomy, objects, _with_none(journal) if none is None else none)
     drawn = secrets.randbits(32) if seed is None else seed
     wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
@@ -95,22 +97,12 @@ def command(
     if accepted < len(trials):
         page = None
         if web is not None:
-            from .guided_web import PageAt
+            from .guided_web import StudiedPage
 
-            page = PageAt(web, token_for(web_token))
+            page = partial(StudiedPage, web, web_token)
         collect(harness, glove, wanted, trials, recording, journal, countdown, write, page)
     else:
         write(accepted)
-
-
-def _begun(recording: Path) -> "Journal | None":
-    """Return the journal of the collection that was begun in `recording`, if there is one."""
-    from thenar.runtime.recording.guide import read_journal
-
-    if not recording.exists():
-        return None
-    with progress(f"reading {recording.name}"):
-        return read_journal(recording)
 
 
 def _with_none(journal: "Journal | None") -> bool:
@@ -126,25 +118,19 @@ def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Col
     from msgspec.structs import asdict, replace
 
     from thenar.drivers.errors import SettingError
+    from thenar.runtime.names import shortened
 
     begun = journal.session.collection
     assert begun is not None
     if seed is None:
         wanted = replace(wanted, seed=begun.seed)
     for name, value in asdict(wanted).items():
-        if value != getattr(begun, name):
+        if value != (before := getattr(begun, name)):
             raise SettingError(
-                f"{journal.path} was begun with a different value of {name}{_both(getattr(begun, name), value)}: "
-                "use the original options, or name another --output"
+                f"{journal.path} was begun with a different value of {name} ({shortened(str(before))}, not "
+                f"{shortened(str(value))}): use the original options, or name another --output"
             )
     return wanted
-
-
-def _both(begun: object, wanted: object) -> str:
-    """Return the two values if they are short enough to print."""
-    from thenar.runtime.names import shortened
-
-    return f" ({shortened(str(begun))}, not {shortened(str(wanted))})" if isinstance(begun, str | int) else ""
 
 
 def _write(recording: Path, output: Path, planned: int, accepted: int) -> Sequence[str]:

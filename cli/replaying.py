@@ -1,4 +1,4 @@
-"""`thenar run --replay`: recorded frames, recognised again."""
+"""`thenar run --replay`: recorded frames, recognised again; and what is printed about sinks."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import err, warning
-from .lines import echo
-from .sinks import say_what_was_lost, spoilt
+from .printing import echo, err, say, warning
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,6 +21,7 @@ if TYPE_CHECKING:
     from thenar.runtime.policy import Policy
     from thenar.runtime.preshape import Preshape, PreshapeSelector
     from thenar.runtime.published import LiveGrasp
+    from thenar.runtime.sinks import SinkReport
     from thenar.runtime.task import TaskFollower
 
 
@@ -164,3 +163,22 @@ def _published(
     say_what_was_lost(fanout.reports())
     if spoilt(fanout.reports()):
         click.get_current_context().exit(1)
+
+
+def nobody_listens(reports: Sequence["SinkReport"]) -> bool:
+    """Return whether every reader has gone for good (`| head`)."""
+    return bool(reports) and all(report.gone for report in reports)
+
+
+def say_what_was_lost(reports: Sequence["SinkReport"]) -> None:
+    """Print on stderr what was not sent."""
+    for report in reports:
+        if report.lost or report.error:
+            why = f": {report.error}" if report.error else ""
+            dropped = f", {report.dropped} readers dropped" if report.dropped else ""
+            say(f"{report.where}: {report.sent} frames sent, {report.lost} lost{dropped}{why}")
+
+
+def spoilt(reports: Sequence["SinkReport"]) -> bool:
+    """Return whether a sink failed, other than by a reader's leaving."""
+    return any(report.error and not report.gone and report.readers is None for report in reports)

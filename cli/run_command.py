@@ -1,31 +1,23 @@
 """`thenar run`: recognise grasps live on a glove, or in recorded frames."""
 
+import os
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from functools import partial
+from io import UnsupportedOperation
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 from click.core import ParameterSource
 
-from .common import (
-    Number,
-    OutputFile,
-    OutputFolder,
-    err,
-    existing_file,
-    existing_folder,
-    of_device,
-    out,
-    overwrite_flag,
-)
-from .replaying import replay_recording, replay_set, selecting
-from .sinks import nobody_listens, say, say_what_was_lost, spoilt
-from .web_options import say_page, token_for, web_options
+from .options import LazyOption
+from .parameters import Number, OutputFile, OutputFolder, existing_file, existing_folder, overwrite_flag, web_options
+from .printing import err, of_device, out, say, say_page
+from .replaying import nobody_listens, replay_recording, replay_set, say_what_was_lost, selecting, spoilt
 
 if TYPE_CHECKING:
     from thenar.runtime import Build, Glove
@@ -38,17 +30,15 @@ if TYPE_CHECKING:
 
 # A drawing of the live view that waited for longer is not shown.
 _VIEW_US = 500_000
+# Lines, or drawings of the live view, that wait for a slow reader.
+_MOST_WAITING = 1024
 
 
-class _SinkOption(click.Option):
-    """Its help lists all kinds of sinks, including those of other packages, and is only made when requested."""
+def _sinks_help() -> str:
+    from thenar.runtime.sinks import SINKS
 
-    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        from thenar.runtime.sinks import SINKS
-
-        kinds = "; ".join(f"{kind.spelling}, {kind.help}" for kind in SINKS.values())
-        self.help = f"Where grasps are sent: {kinds}. Repeatable."
-        return super().get_help_record(ctx)
+    kinds = "; ".join(f"{kind.spelling}, {kind.help}" for kind in SINKS.values())
+    return f"Where grasps are sent: {kinds}. Repeatable."
 
 
 @click.command("run")
@@ -64,13 +54,7 @@ class _SinkOption(click.Option):
     show_default=True,
     help="Time between two rows of a .grasps set.",
 )
-@click.option(
-    "--sink",
-    "sinks",
-    metavar="SINK",
-    multiple=True,
-    cls=_SinkOption,
-)
+@click.option("--sink", "sinks", metavar="SINK", multiple=True, cls=LazyOption, describe=_sinks_help)
 @click.option(
     "--preshape", metavar="NAME", help="Preshapes to send with grasps: barrett_bh8, parallel_gripper or a .toml file."
 )
@@ -120,7 +104,7 @@ def command(
     task: Path | None,
     record: Path | None,
     web: str | None,
-    web_token: bool,
+    web_token: str | None,
     recordings: Path | None,
     status: bool,
     frames: int | None,
@@ -148,16 +132,21 @@ def command(
 
     _refuse_idle(glove, replay)
     loaded = Build.load(build)
-    policy = _policy(**deciding)
+    policy = _policy(deciding)
     if replay is None:
-        viewed = _is_viewed(sinks)
+        if sys.stdout is None and not sinks:
+            raise click.UsageError("stdout is closed: name a --sink to send grasps to")
+        viewed = sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
         asked: dict[str, Any] = {"preshapes": preshape, "record": record, "status": status}
         asked |= {"change_while_held": change_while_held, "task": task}
         asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy, "recordable": web is not None}
-        page = None
+        page_of = None
         if web is not None:
-            page = partial(_page, build, web, token_for(web_token), recordings or Path("recordings"))
-        _run_live(loaded, glove, viewed, page, frames, **asked)
+            from thenar.runtime.web.live import LivePage
+
+            folder = recordings or Path("recordings")
+            page_of = partial(LivePage, folder=build, address=web, token=web_token, recordings=folder)
+        _run_live(loaded, glove, viewed, page_of, frames, **asked)
     elif replay.suffix == ".mcap":
         selector = selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
         follower = None if task is None else TaskFollower.of(task, loaded.grasps)
@@ -197,61 +186,24 @@ def _refuse(where: str, *names: str) -> None:
             raise click.UsageError(f"{option.opts[0]} has no effect {where}: leave it out")
 
 
-def _is_viewed(sinks: Sequence[str]) -> bool:
-    """Return whether the terminal shows the grasps. Raises UsageError if nothing receives them."""
-    if sys.stdout is None and not sinks:
-        raise click.UsageError("stdout is closed: name a --sink to send grasps to")
-    return sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
-
-
-def _us(ms: float | None) -> int | None:
-    return None if ms is None else round(1000 * ms)
-
-
-def _policy(
-    *,
-    lead: float | None,
-    dwell_ms: float | None,
-    max_lost: float | None,
-    grace_ms: float | None,
-    no_quarantine: bool,
-    error_rate: float | None,
-    spacing_ms: float | None,
-    lag_ms: float | None,
-) -> "Policy | None":
+def _policy(asked: dict[str, Any]) -> "Policy | None":
     """Return the usual policy with the given values in it, or None if there are none."""
     from thenar.runtime.policy import Policy
 
-    asked = {
-        "lead": lead,
-        "dwell_us": _us(dwell_ms),
-        "max_lost": max_lost,
-        "grace_us": _us(grace_ms),
-        "quarantine": False if no_quarantine else None,
-        "error_rate": error_rate,
-        "spacing_us": _us(spacing_ms),
-        "lag_us": _us(lag_ms),
-    }
-    given: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
-    if not given:
-        return None
+    given: dict[str, Any] = {"quarantine": False} if asked.pop("no_quarantine") else {}
+    for name, value in asked.items():
+        if value is not None:
+            milliseconds = name.endswith("_ms")
+            given[name.replace("_ms", "_us")] = round(1000 * value) if milliseconds else value
     usual = Policy()
-    return replace(usual, **{"hold_us": max(usual.hold_us, given.get("dwell_us", 0)), **given})
-
-
-def _page(folder: Path, address: str, token: str | None, recordings: Path, glove: "Glove") -> "LivePage":
-    from thenar.runtime.web.live import LivePage
-
-    page = LivePage(glove, folder, address, token=token, recordings=recordings)
-    say_page(page.server.url)
-    return page
+    return replace(usual, **{"hold_us": max(usual.hold_us, given.get("dwell_us", 0)), **given}) if given else None
 
 
 def _run_live(
     build: "Build",
     harness: Path | None,
     viewed: bool,
-    make_page: "Callable[[Glove], LivePage] | None",
+    page_of: "Callable[[Glove], LivePage] | None",
     frames: int | None,
     *,
     status: bool,
@@ -260,17 +212,18 @@ def _run_live(
     """Run until a signal arrives, or the given number of frames is published."""
     from thenar.runtime import Glove
 
-    from .ending import ended_by_signals
+    from . import ended_by_signals
     from .live_view import LiveView
-    from .notices import unblocked
 
-    with unblocked("stderr"), unblocked("stdout", _VIEW_US) if viewed else nullcontext():
+    with _unblocked("stderr"), _unblocked("stdout", _VIEW_US) if viewed else nullcontext():
         with ExitStack() as stack:
             stop = stack.enter_context(ended_by_signals())
             glove = Glove(build, str(harness), stop=stop, status=status, **asked)
             for lacking in filter(None, (glove.system.unread, glove.lacking)):
                 err().print(f"thenar: {lacking}")
-            page = None if make_page is None else stack.enter_context(make_page(glove))
+            page = None if page_of is None else stack.enter_context(page_of(glove))
+            if page is not None:
+                say_page(page.server.url)
             stack.enter_context(glove)
             view = stack.enter_context(LiveView(out(), status)) if viewed else None
             recorder = glove.recorder
@@ -314,3 +267,54 @@ def _say_news(glove: "Glove", health: "HealthReport", said: dict[str, str]) -> N
         if said.get(name) != state and state != NOT_YET:
             say(of_device(name, state))
             said[name] = state
+
+
+class _UnblockedStream:
+    """Writes to the descriptor of a stream on a separate thread; what its reader does not take in time is lost.
+
+    It writes past the stream, whose lock a hanging write would hold when the program ends.
+    """
+
+    def __init__(self, stream: TextIO, longest_us: int | None) -> None:
+        from thenar.runtime.writer_thread import WriterThread
+
+        self._stream, self._file, self._longest_us = stream, stream.fileno(), longest_us
+        self.thread = WriterThread("notices", _MOST_WAITING)
+
+    def write(self, text: str) -> int:
+        data = text.encode(self._stream.encoding, self._stream.errors or "strict")
+        self.thread.put(partial(_write_all, self._file, data), self._longest_us)
+        return len(text)
+
+    def flush(self) -> None:
+        """Do nothing: the thread writes at once."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def _write_all(file: int, data: bytes) -> None:
+    with suppress(OSError):  # nobody can read it: the terminal was closed, or the disk is full
+        while data:
+            data = data[os.write(file, data) :]
+
+
+@contextmanager
+def _unblocked(name: str, longest_us: int | None = None) -> Iterator[None]:
+    """Let nothing that is printed on sys.`name` wait for its reader; what waits for more than `longest_us` is lost.
+
+    If the reader hangs at the end, the stream stays so: the rest of the program can end.
+    """
+    stream = getattr(sys, name)
+    try:
+        ours = _UnblockedStream(stream, longest_us)
+    except (AttributeError, UnsupportedOperation):  # closed, or held in memory
+        yield
+        return
+    stream.flush()
+    setattr(sys, name, ours)
+    try:
+        yield
+    finally:
+        if ours.thread.close():
+            setattr(sys, name, stream)

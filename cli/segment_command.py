@@ -1,44 +1,24 @@
 """`thenar segment`: find when each grasp began and ended."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from msgspec import Struct
 from rich.text import Text
 
-from .common import (
-    Number,
-    OutputFile,
-    existing_file,
-    existing_folder,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    progress,
-    show,
-    table,
-    warning,
-)
-from .lines import echo
+from thenar.compiler.text import counted
+
+from .parameters import Number, OutputFile, existing_file, existing_folder, keep_apart, overwrite_flag
+from .printing import echo, json_flag, out, progress, show, table, warning, write_picture
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from thenar.compiler.movements.timeline import FoundSegment, Timeline
+    from thenar.compiler.movements.timeline import FoundSegment
 
 _ENDINGS = (".csv", ".eaf", ".mcap")
 _SHOWN = 20
-
-
-class Segmented(Struct, frozen=True):
-    """The segments, the streams and their seconds, and F1 at 10, 25 and 50 % of overlap if the truth is known."""
-
-    segments: "tuple[FoundSegment, ...]"
-    streams: int
-    seconds: float
-    f1: tuple[float, ...] | None
 
 
 @click.command("segment")
@@ -82,6 +62,7 @@ def command(
     from thenar.compiler.artifact.segments import segment
     from thenar.compiler.movements.files import write
     from thenar.compiler.movements.picture import draw
+    from thenar.compiler.movements.timeline import overlap_f1
     from thenar.compiler.movements.transitions import Transitions
     from thenar.runtime.files import write_atomically
 
@@ -89,43 +70,27 @@ def command(
     with progress("finding segments") as report:
         found = segment(build, recordings, None if lag_ms is None else round(1000 * lag_ms), report, warning)
     if picture is not None:
-        write_atomically(picture, draw(found, picture.suffix.lower().removeprefix(".")))
+        write_picture(picture, partial(draw, found))
     if transitions is not None:
         write_atomically(transitions, Transitions.of_timelines(found).to_json())
     if output is not None:
         write(output, found)
-    show(_summary(found), _print)
+    segments = [one for timeline in found for one in timeline.segments()]
+    seconds, f1 = sum(len(one.states) * one.tick_us for one in found) / 1e6, overlap_f1(found)
+    summary = {"segments": segments, "streams": len(found), "seconds": seconds, "f1": f1}
+    show(summary, lambda _: _print(segments, f"{seconds:,.1f} s of {counted(len(found), 'stream')}", f1))
 
 
-def _summary(timelines: "Sequence[Timeline]") -> Segmented:
-    from thenar.compiler.movements.scores import OVERLAPS, score_streams
-
-    known = [(each.continued, each.truth, each.states, None) for each in timelines if each.truth is not None]
-    none, f1 = len(timelines[0].types), None
-    if len(known) == len(timelines) and any((truth < none).any() for _, truth, *_ in known):
-        total = score_streams(known, none)
-        f1 = tuple(total.f1(place) for place in range(len(OVERLAPS)))
-    return Segmented(
-        segments=tuple(one for each in timelines for one in each.segments()),
-        streams=len(timelines),
-        seconds=sum(len(each.states) * each.tick_us for each in timelines) / 1e6,
-        f1=f1,
-    )
-
-
-def _print(found: Segmented) -> None:
-    from thenar.compiler.text import counted
-
+def _print(segments: "Sequence[FoundSegment]", length: str, f1: "Sequence[float] | None") -> None:
     grid = table(("start s", "end s", "type", "confidence", "stream"), ("start s", "end s", "confidence"))
-    for one in found.segments[:_SHOWN]:
+    for one in segments[:_SHOWN]:
         stream = one.subject if one.session == "1" else f"{one.subject} {one.session}"
         grid.add_row(f"{one.start_s:.2f}", f"{one.end_s:.2f}", Text(one.type), f"{one.confidence:.3f}", Text(stream))
-    if found.segments:
+    if segments:
         out().print(grid)
-    more = len(found.segments) - _SHOWN
+    more = len(segments) - _SHOWN
     if more > 0:
         echo(f"and {more:,} more: list them all with -o FILE.csv or --json")
-    streams = counted(found.streams, "stream")
-    echo(f"{counted(len(found.segments), 'segment')} in {found.seconds:,.1f} s of {streams}")
-    if found.f1 is not None:
-        echo("F1 at overlaps of 10, 25 and 50 %: " + ", ".join(f"{100 * each:.1f}" for each in found.f1))
+    echo(f"{counted(len(segments), 'segment')} in {length}")
+    if f1 is not None:
+        echo("F1 at overlaps of 10, 25 and 50 %: " + ", ".join(f"{100 * score:.1f}" for score in f1))

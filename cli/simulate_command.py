@@ -1,7 +1,5 @@
 """`thenar simulate`: a scene in, a set of grasps out, with the effect and cost of each simulation step."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,29 +9,15 @@ from rich.text import Text
 
 from thenar.compiler.text import counted, interval
 
-from .common import (
-    OutputFile,
-    err,
-    jobs_option,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    progress,
-    seed_range,
-    show,
-    table,
-    warning,
-)
-from .lines import echo
-from .options import scene_name
+from .options import complete_scene
+from .parameters import OutputFile, jobs_option, keep_apart, overwrite_flag, seed_range
+from .printing import echo, json_flag, out, progress, show, table, warning
 
 if TYPE_CHECKING:
-    from thenar.compiler.evaluation.ablation import Ablation, AccuracyChange, Variant
+    from thenar.compiler.evaluation.ablation import Ablation, AccuracyChange
     from thenar.simulator.pipeline.explain import Explanation
-    from thenar.simulator.pipeline.report import SimulationReport, StepReport
-    from thenar.simulator.pipeline.scene_file import Shipped
-    from thenar.simulator.scenes.scene import Rest, Scene
+    from thenar.simulator.pipeline.report import SimulationReport
+    from thenar.simulator.scenes.scene import Rest
 
 _MODES = ("--output", "--explain", "--ablate", "--list")
 _SHOWN = 10  # unsettled repetitions that are listed individually
@@ -41,7 +25,7 @@ _OWN = "dim"  # style of the scene-independent steps
 
 
 @click.command("simulate")
-@click.argument("scene", type=scene_name, required=False)
+@click.argument("scene", shell_complete=complete_scene, required=False)
 @click.option(
     "-o", "--output", type=OutputFile(".grasps"), metavar="SET.grasps", help="Simulate, and write the set here."
 )
@@ -99,17 +83,23 @@ def command(
         thenar simulate crowd --subjects 20 --repetitions 6 -o hands.grasps
         thenar simulate continuous --rest flat -o flat.grasps
     """
-    from thenar.simulator.pipeline.scene_file import load_scene, own_file, shipped_scenes
+    from thenar.simulator.errors import SceneError
+    from thenar.simulator.pipeline.scene_file import load_scene, located, own_file, shipped_scenes
 
     _check_modes(scene, (output, explain, ablate, listing), keep_unsettled=keep_unsettled)
     if scene is None:
-        show(shipped_scenes(), _print_scenes)
+        show(scenes := shipped_scenes(), lambda _: echo("\n".join(f"{each.name:<16}{each.what}" for each in scenes)))
         return
     loaded = load_scene(scene).varied(repetitions, seed, names, more, rest, subjects)
-    with _located(scene):
+    try:
         if output is not None:
+            from thenar.simulator.pipeline.simulation import simulate
+
             keep_apart(own_file(scene), output)
-            _simulate(loaded, output, jobs, keep_unsettled=keep_unsettled)
+            with progress(f"simulating {loaded.name}") as report:
+                simulated = simulate(loaded, jobs, report, keep_unsettled=keep_unsettled)
+            simulated.grasp_set.save(output)
+            show(simulated.report, _print_report, output, simulated.grasp_set.size)
         elif explain:
             from thenar.simulator.pipeline.explain import explain as explained
 
@@ -120,6 +110,8 @@ def command(
             with progress(f"removing the effects of {loaded.name}") as report:
                 ablation = ablated(loaded, jobs, report)
             show(ablation, _print_ablation)
+    except SceneError as fault:
+        raise located(scene, fault) from fault
 
 
 def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled: bool) -> None:
@@ -137,32 +129,6 @@ def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled
         raise click.UsageError("--keep-unsettled changes the set that --output writes: name it, or leave this out")
 
 
-@contextmanager
-def _located(name: str) -> Iterator[None]:
-    """Add file and line to errors of a scene."""
-    from thenar.simulator.errors import SceneError
-    from thenar.simulator.pipeline.scene_file import located
-
-    try:
-        yield
-    except SceneError as fault:
-        raise located(name, fault) from fault
-
-
-def _simulate(scene: "Scene", output: Path, jobs: int, *, keep_unsettled: bool) -> None:
-    from thenar.simulator.pipeline.simulation import simulate
-
-    with progress(f"simulating {scene.name}") as report:
-        simulated = simulate(scene, jobs, report, keep_unsettled=keep_unsettled)
-    simulated.grasp_set.save(output)
-    show(simulated.report, _print_report, output, simulated.grasp_set.size)
-
-
-def _print_scenes(scenes: "list[Shipped]") -> None:
-    for scene in scenes:
-        echo(f"{scene.name:<16}{scene.what}")
-
-
 def _print_report(report: "SimulationReport", path: Path, size: str) -> None:
     """Print the grasps by type and the cost of each step, and warn of grasps that did not settle."""
     console = out()
@@ -172,12 +138,41 @@ def _print_report(report: "SimulationReport", path: Path, size: str) -> None:
         f"{counted(len(report.subjects), 'subject')}, {counted(report.repetitions, 'grasp')} in {report.seconds:.1f} s"
     )
     console.print()
-    console.print(_grasps(report))
+    grasps = _table(
+        "Grasps, simulated",
+        *("grasp type", "grasps", "frames", "switches ON", "from - to", "distinct patterns", "no contact", "unsettled"),
+        *("N between switches", "largest residual N", "N mm"),
+    )
+    for grasp in report.grasps:
+        counts = (grasp.patterns, grasp.no_contact, grasp.unsettled)
+        grasps.add_row(
+            *(grasp.grasp, str(grasp.repetitions), str(grasp.rows)),
+            *(f"{grasp.switches_mean:.1f}", f"{grasp.switches_least} - {grasp.switches_most}", *map(str, counts)),
+            *(f"{grasp.between_n:.1f}", f"{grasp.residual_n:.2f}", f"{grasp.residual_nmm:.1f}"),
+        )
+    console.print(grasps)
     if report.lost_frames:
         console.print(f"{report.lost_frames} frames were lost; the frame received before is used in their place")
     console.print()
-    console.print(_steps(report.steps))
-    _warn_of_unsettled(report)
+    columns = ("step", "whose", "calls", "grasps", "draws", "seconds", "us a grasp", "share")
+    costs = _table("Cost of every effect (own: a step that every scene has)", *columns)
+    for step in report.steps:
+        counts = (step.calls, step.grasps, step.draws)
+        times = (f"{step.seconds:.3f}", f"{step.us_a_grasp:.1f}", f"{step.share:.1%}")
+        costs.add_row(step.name, _whose(step.own), *map(str, counts), *times, style=_OWN if step.own else "")
+    costs.add_section()
+    draws, us = sum(step.draws for step in report.steps), sum(step.us_a_grasp for step in report.steps)
+    total = sum(step.seconds for step in report.steps)
+    costs.add_row("all", "", "", "", str(draws), f"{total:.3f}", f"{us:.1f}", "")
+    console.print(costs)
+    if report.unsettled:
+        what = "kept as requested" if report.kept_unsettled else "left out of the set (--keep-unsettled keeps them)"
+        warning(f"{len(report.unsettled)} of {report.repetitions} grasps did not settle, and are {what}:")
+        for one in report.unsettled[:_SHOWN]:
+            place = f"subject {one.subject}, {one.grasp} with {one.object}, repetition {one.repetition}"
+            echo(f"  {place}: {one.why}", err=True)
+        if len(report.unsettled) > _SHOWN:
+            echo(f"  and {len(report.unsettled) - _SHOWN} more: --json lists them all", err=True)
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -188,66 +183,6 @@ def _table(title: str, *columns: str) -> Table:
     return made
 
 
-def _grasps(report: "SimulationReport") -> Table:
-    grasps = _table(
-        "Grasps, simulated",
-        *("grasp type", "grasps", "frames", "switches ON", "from - to", "distinct patterns", "no contact", "unsettled"),
-        *("N between switches", "largest residual N", "N mm"),
-    )
-    for grasp in report.grasps:
-        grasps.add_row(
-            Text(grasp.grasp),
-            str(grasp.repetitions),
-            str(grasp.rows),
-            f"{grasp.switches_mean:.1f}",
-            f"{grasp.switches_least} - {grasp.switches_most}",
-            str(grasp.patterns),
-            str(grasp.no_contact),
-            str(grasp.unsettled),
-            f"{grasp.between_n:.1f}",
-            f"{grasp.residual_n:.2f}",
-            f"{grasp.residual_nmm:.1f}",
-        )
-    return grasps
-
-
-def _steps(steps: "tuple[StepReport, ...]") -> Table:
-    columns = ("step", "whose", "calls", "grasps", "draws", "seconds", "us a grasp", "share")
-    costs = _table("Cost of every effect (own: a step that every scene has)", *columns)
-    for step in steps:
-        costs.add_row(
-            Text(step.name),
-            "own" if step.own else "effect",
-            str(step.calls),
-            str(step.grasps),
-            str(step.draws),
-            f"{step.seconds:.3f}",
-            f"{step.us_a_grasp:.1f}",
-            f"{step.share:.1%}",
-            style=_OWN if step.own else "",
-        )
-    costs.add_section()
-    draws, total, us = (sum(getattr(step, each) for step in steps) for each in ("draws", "seconds", "us_a_grasp"))
-    costs.add_row("all", "", "", "", str(draws), f"{total:.3f}", f"{us:.1f}", "")
-    return costs
-
-
-def _warn_of_unsettled(report: "SimulationReport") -> None:
-    if not report.unsettled:
-        return
-    what = "kept as requested" if report.kept_unsettled else "left out of the set (--keep-unsettled keeps them)"
-    console = err()
-    count = f"{len(report.unsettled)} of {report.repetitions} grasps"
-    warning(f"{count} did not settle, and are {what}:")
-    for one in report.unsettled[:_SHOWN]:
-        console.print(
-            f"  subject {one.subject}, {one.grasp} with {one.object}, repetition {one.repetition}: {one.why}",
-            soft_wrap=True,
-        )
-    if len(report.unsettled) > _SHOWN:
-        console.print(f"  and {len(report.unsettled) - _SHOWN} more: --json lists them all")
-
-
 def _print_explanation(explanation: "Explanation") -> None:
     """Print the steps of a scene in order, the function and cost of each, and the expected run time."""
     console = out()
@@ -256,38 +191,30 @@ def _print_explanation(explanation: "Explanation") -> None:
         *("step", "whose", "acts", "draws a grasp", "us a grasp", "share"),
     )
     for step in explanation.steps:
-        steps.add_row(
-            Text(step.name),
-            "own" if step.own else "effect",
-            "on bytes" if step.on_wire else "in time" if step.timed else "",
-            f"{step.draws_a_grasp:.1f}",
-            f"{step.us_a_grasp:.1f}",
-            f"{step.share:.1%}",
-            style=_OWN if step.own else "",
-        )
+        acts = "on bytes" if step.on_wire else "in time" if step.timed else ""
+        costs = (f"{step.draws_a_grasp:.1f}", f"{step.us_a_grasp:.1f}", f"{step.share:.1%}")
+        steps.add_row(step.name, _whose(step.own), acts, *costs, style=_OWN if step.own else "")
     console.print(steps)
     console.print()
     for step in explanation.steps:
         text = Text(f"{step.name}: {step.summary}\n", _OWN if step.own else "")
         console.print(text.append(f"    {', '.join(step.reads) or 'nothing'} -> {', '.join(step.writes)}"))
-    console.print()
-    console.print(_expected(explanation))
-
-
-def _expected(explanation: "Explanation") -> str:
     frames = "every frame" if explanation.timed else "one frame per grasp, since no effect depends on time"
     wire = ", sent and received as bytes" if explanation.on_wire else ""
-    return (
-        f"simulated: {frames}{wire}\n"
+    console.print(
+        f"\nsimulated: {frames}{wire}\n"
         f"measured here on {explanation.measured} grasps of {explanation.conditions} conditions: "
         f"{explanation.us_a_grasp:.0f} us a grasp on one core; {explanation.repetitions} grasps on "
         f"{explanation.workers} core(s) should take about {explanation.expected_s:.1f} s plus the start of processes"
     )
 
 
+def _whose(own: bool) -> str:
+    return "own" if own else "effect"
+
+
 def _print_ablation(ablation: "Ablation") -> None:
     """Print the effect of each step on accuracy and time."""
-    console = out()
     whole = ablation.variants[0]
     columns = [f"{one.inputs}{what}" for one in whole.rates for what in ("", ", change")]
     variants = _table(
@@ -296,7 +223,10 @@ def _print_ablation(ablation: "Ablation") -> None:
     )
     for variant in ablation.variants:
         cells = [cell for one in variant.rates for cell in (interval(one.rate), _change(one.change))]
-        variants.add_row(Text(variant.without or "(nothing)"), *cells, *_times(variant, whole), str(variant.unsettled))
+        slower = "" if variant is whole else f"{variant.us_a_grasp - whole.us_a_grasp:+.0f}"
+        times = (f"{variant.us_a_grasp:.0f}", slower)
+        variants.add_row(variant.without or "(nothing)", *cells, *times, str(variant.unsettled))
+    console = out()
     console.print(variants)
     console.print(
         f"LogitBoost with {ablation.rounds} rounds on all switches, all joints and both, {ablation.folds} folds within "
@@ -307,8 +237,3 @@ def _print_ablation(ablation: "Ablation") -> None:
 
 def _change(change: "AccuracyChange | None") -> str:
     return "" if change is None else f"{100 * change.mean:+z.1f} [{100 * change.low:+z.1f}, {100 * change.high:+z.1f}]"
-
-
-def _times(variant: "Variant", whole: "Variant") -> tuple[str, str]:
-    change = "" if variant is whole else f"{variant.us_a_grasp - whole.us_a_grasp:+.0f}"
-    return f"{variant.us_a_grasp:.0f}", change

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import Number, OutputFolder, existing_file, existing_folder, json_flag, out, show, table
 from .options import fitted_hand, layout_option
+from .parameters import Number, OutputFolder, existing_file, existing_folder
+from .printing import json_flag, out, show, table
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -56,7 +57,7 @@ def command(
         check_output(output)
     hand = fitted_hand(layout, list(dict.fromkeys(switch.source for switch in loaded.manifest.switches)), hand_length)
     spec = glove_spec(loaded.manifest, loaded.scan, _harness(build, loaded, glove), hand)
-    written = ""
+    written = None
     if output is not None:
         files = files_of(spec)
         write_spec(files, output)
@@ -74,40 +75,25 @@ def _harness(folder: Path, loaded: "Build", glove: Path | None) -> "Harness | No
     return load_harness(own) if loaded.scan is not None and own.is_file() else None
 
 
-def _print(spec: "SpecSummary", expected: "Iterable[str]", written: str) -> None:
+def _print(spec: "SpecSummary", expected: "Iterable[str]", written: str | None) -> None:
     """Print the content of `spec.json` for people, and the names of the written files."""
+    from thenar.compiler.glove.layout import counted_sensors
+
     console = out()
     hand = "" if spec.hand_length_mm is None else f", for a right hand of {spec.hand_length_mm:g} mm"
     wired = "a proposed wiring" if spec.proposed else f"wired as {spec.glove}"
     console.print(f"{spec.kept}; {wired}{hand}")
-    _print_sensors(spec)
-    _print_wires(spec)
-    _print_materials(spec)
-    if spec.print_on:
-        console.print(f"the pattern is for {spec.print_on}")
-    for sentence in (*expected, *spec.remarks):
-        console.print(sentence)
-    if written:
-        console.print(written, soft_wrap=True)
-
-
-def _print_sensors(spec: "SpecSummary") -> None:
-    from thenar.compiler.glove.layout import counted_sensors
-
     pins = {
         n: f"{reader.ref} {pin}" for reader in spec.readers for n, pin in zip(reader.switches, reader.pins, strict=True)
     }
     sensors = table(("sensor", "name", "part", "side", "x, mm", "y, mm", "read by"), title="Sensors")
     for sensor in spec.sensors:
-        place = ("", "") if sensor.x_mm is None or sensor.y_mm is None else (f"{sensor.x_mm:.1f}", f"{sensor.y_mm:.1f}")
+        place = ("" if mm is None else f"{mm:.1f}" for mm in (sensor.x_mm, sensor.y_mm))
         sensors.add_row(sensor.ref, sensor.name, sensor.part or "", sensor.side or "", *place, pins[sensor.number])
-    out().print(sensors)
+    console.print(sensors)
     for reader in spec.readers:
         words = counted_sensors([spec.sensors[number - 1] for number in reader.switches])
-        out().print(f"{reader.ref}: {reader.place}, {words}")
-
-
-def _print_wires(spec: "SpecSummary") -> None:
+        console.print(f"{reader.ref}: {reader.place}, {words}")
     bundles = table(("bundle", "connector", "signals", "returns", "wire, m"), title="Bundles")
     for connector in dict.fromkeys(wire.connector for wire in spec.wires):
         wires = [wire for wire in spec.wires if wire.connector == connector]
@@ -115,12 +101,15 @@ def _print_wires(spec: "SpecSummary") -> None:
         lengths = [wire.length_mm for wire in wires if wire.length_mm is not None]
         metres = f"{sum(lengths) / 1000:.2f}" if lengths else ""
         bundles.add_row(wires[0].bundle, connector, str(signals), str(len(wires) - signals), metres)
-    out().print(bundles)
-
-
-def _print_materials(spec: "SpecSummary") -> None:
+    console.print(bundles)
     materials = table(("quantity", "what", "part number", "note"), title="Materials")
     for line in spec.materials:
         part = line.part if line.sure else f"{line.part} (not confirmed)"
         materials.add_row(f"{line.quantity:g} {line.unit}", line.what, part, line.note)
-    out().print(materials)
+    console.print(materials)
+    if spec.print_on:
+        console.print(f"the pattern is for {spec.print_on}")
+    for sentence in (*expected, *spec.remarks):
+        console.print(sentence)
+    if written is not None:
+        console.print(written, soft_wrap=True)

@@ -1,28 +1,14 @@
 """`thenar split`: split a .grasps file by subject, object or session."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
-from msgspec import Struct
 
 from thenar.compiler.text import trials_of_frames
 
-from .common import OutputFolder, existing_file, json_flag, progress, show
-from .lines import echo
-
-if TYPE_CHECKING:
-    from thenar.compiler.recordings.graspset import GraspSet
-
-
-class Part(Struct, frozen=True):
-    """A written file: its subject, object or session, and its numbers of frames, trials, and rests among these."""
-
-    name: str
-    output: str
-    frames: int
-    trials: int
-    rests: int
+from .parameters import OutputFolder, existing_file
+from .printing import echo, json_flag, progress, show
 
 
 @click.command("split")
@@ -47,14 +33,15 @@ def command(grasps: Path, by: str, output: Path, overwrite: bool) -> None:
     with progress(f"splitting {grasps.name}"):
         files = split_into(grasp_set, by, output, overwrite=overwrite)  # type: ignore[arg-type]
     column = getattr(grasp_set, f"{by}s")
-    parts = [_part(name, path, grasp_set.rows(column == name)) for name, path in files.items()]
+    parts = []
+    for name, path in files.items():
+        part = grasp_set.rows(column == name)
+        counts = {"frames": len(part), "trials": part.n_trials, "rests": part.rests}
+        parts.append({"name": name, "output": str(path), **counts})
     show(parts, _print, by)
 
 
-def _part(name: str, path: Path, found: "GraspSet") -> Part:
-    return Part(name, str(path), len(found), found.n_trials, found.rests)
-
-
-def _print(parts: list[Part], by: str) -> None:
+def _print(parts: list[dict[str, Any]], by: str) -> None:
     for part in parts:
-        echo(f"{part.output}: {by} {part.name}, {trials_of_frames(part.frames, part.trials, part.rests)}")
+        size = trials_of_frames(part["frames"], part["trials"], part["rests"])
+        echo(f"{part['output']}: {by} {part['name']}, {size}")

@@ -5,22 +5,19 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import click
-from rich.console import Console, JustifyMethod
-from rich.table import Table
+from rich.console import Console
 from rich.text import Text
 
-from .common import OneOf, jobs_option, json_flag, out, progress, show, table
+from .parameters import OneOf, jobs_option
+from .printing import json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
-    from thenar.stability.report import CaseReport, Check, Listed, Report
+    from thenar.stability.report import CaseReport, Listed, Report
 
 # Packages that a run imports at some point: better reported missing once at the start than in each case.
 _NEEDED = ("mpmath", "joblib", "scipy", "sklearn")
 _HEADS = ("check", "reference", "tried", "worst error", "bound", "verdict")
 _NUMBERS = ("tried", "worst error")
-_CHECK, _REFERENCE = 0, 1  # the columns of words, which share the remaining width
-_NARROWEST = 8
-_GAP = 2
 
 
 def _names() -> Iterable[str]:
@@ -72,10 +69,9 @@ def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int) -> int
 
 
 def _print_list(cases: "list[Listed]") -> None:
-    shown = table(("case", "subject", "what could go wrong"))
+    rows = ((case.name, case.title, case.danger) for case in cases)
+    shown = table(("case", "subject", "what could go wrong"), rows=rows)
     shown.show_lines = True
-    for case in cases:
-        shown.add_row(Text(case.name), Text(case.title), Text(case.danger))
     out().print(shown)
 
 
@@ -84,9 +80,8 @@ def _print(report: "Report") -> None:
     from thenar.stability.report import failures, legend, summary, weka_lines
 
     console = out()
-    widths = _widths(report, console.width)
     for case in report.cases:
-        _print_case(console, case, widths)
+        _print_case(console, case)
     if report.weka is not None:
         console.print(Text("compared with Weka", "bold"))
         for line in weka_lines(report.weka):
@@ -100,47 +95,20 @@ def _print(report: "Report") -> None:
     console.print(Text(summary(report), "bold green" if report.holds else "bold red"))
 
 
-def _print_case(console: Console, case: "CaseReport", widths: tuple[int, ...]) -> None:
+def _print_case(console: Console, case: "CaseReport") -> None:
+    from thenar.stability.report import bound_of, figure, verdict
+
     console.print(Text.assemble((case.name, "bold"), f": {case.about.title}"))
     if case.about.danger:
         console.print(Text(f"What could go wrong: {case.about.danger}", "dim"))
-    checks = Table(box=None, padding=(0, _GAP, 0, 0), pad_edge=False)
-    for head, width in zip(_HEADS, widths, strict=True):
-        justify: JustifyMethod = "right" if head in _NUMBERS else "left"
-        checks.add_column(head, width=width, justify=justify, header_style="dim", overflow="fold")
+    checks = table(_HEADS, _NUMBERS)
+    checks.box, checks.padding, checks.pad_edge = None, (0, 2, 0, 0), False
     for check in case.checks:
-        checks.add_row(*_cells(check))
+        finding, style = check.finding, "green" if check.holds else "bold red"
+        error = (f"{finding.tried:,}", figure(finding.error), bound_of(finding))
+        checks.add_row(finding.check, finding.reference, *error, Text(verdict(check), style))
     if case.checks:
         console.print(checks)
     if case.failure is not None:
         console.print(Text(f"FAILED: {case.failure}", "red"))
     console.print()
-
-
-def _cells(check: "Check") -> tuple[Text, ...]:
-    from thenar.stability.report import bound_of, figure, verdict
-
-    finding = check.finding
-    texts = (finding.check, finding.reference, f"{finding.tried:,}", figure(finding.error), bound_of(finding))
-    return (*map(Text, texts), Text(verdict(check), "green" if check.holds else "bold red"))
-
-
-def _widths(report: "Report", room: int) -> tuple[int, ...]:
-    """Return the widths of the columns, the same for all cases: words wrap, and nothing is truncated."""
-    columns = list(
-        zip(_HEADS, *(map(str, _cells(check)) for case in report.cases for check in case.checks), strict=True)
-    )
-    whole = [max(map(len, column)) for column in columns]
-    words = [max(len(word) for cell in column for word in cell.split()) for column in columns]
-    widths = [min(_NARROWEST, words[_CHECK]), min(_NARROWEST, words[_REFERENCE]), *words[2:]]
-    others = range(_REFERENCE + 1, len(_HEADS))
-    left = room - _GAP * (len(_HEADS) - 1) - sum(widths)
-    # First break no word, then no number; the rest goes to the words, three fifths of it to the check.
-    aims = [(_CHECK, words[_CHECK]), (_REFERENCE, words[_REFERENCE]), *((column, whole[column]) for column in others)]
-    spare = max(0, left - sum(max(0, aim - widths[column]) for column, aim in aims))
-    aims += [(_CHECK, words[_CHECK] + 3 * spare // 5), (_REFERENCE, whole[_REFERENCE]), (_CHECK, whole[_CHECK])]
-    for column, aim in aims:
-        more = max(0, min(aim, whole[column]) - widths[column])
-        widths[column] += min(more, max(0, left))
-        left -= more
-    return tuple(widths)

@@ -4,23 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from rich.text import Text
 
-from .common import (
-    OutputFile,
-    existing_file,
-    existing_folder,
-    json_flag,
-    keep_apart,
-    out,
-    overwrite_flag,
-    overwrites,
-    progress,
-    show,
-    table,
-    warning,
-)
-from .lines import echo
+from thenar.compiler.text import counted
+
+from .parameters import OutputFile, existing_file, existing_folder, keep_apart, overwrite_flag, overwrites
+from .printing import echo, json_flag, out, progress, show, table, warning
 
 if TYPE_CHECKING:
     from thenar.runtime.task import Task
@@ -84,13 +72,11 @@ def command(
 
 
 def _print(task: "Task", output: Path, tree: Path) -> None:
-    from thenar.compiler.text import counted
-
     total = len(task.demonstrations)
     grid = table(("step", "grasp", "shown", "preshape", "held s", "then"), ("step", "held s"), title=task.name)
     for number, step in enumerate(task.steps, 1):
         held = f"{step.median_s:.2f} +- {step.spread_s:.2f}"
-        words = (Text(step.grasp), f"{step.shown} of {total}", Text(step.preshape or ""), held)
-        grid.add_row(str(number), *words, Text(", ".join(step.then)))
+        shown = f"{step.shown} of {total}"
+        grid.add_row(str(number), step.grasp, shown, step.preshape or "", held, ", ".join(step.then))
     out().print(grid)
     echo(f"{counted(len(task.steps), 'step')} of {counted(total, 'demonstration')}: {output} and {tree}")

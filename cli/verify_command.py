@@ -7,11 +7,10 @@ import click
 
 from thenar.compiler.text import INDEPENDENT, counted
 
-from .common import ListOf, existing_file, existing_folder, json_flag, out, progress, show, table
+from .parameters import ListOf, existing_file, existing_folder
+from .printing import echo, json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from thenar.compiler.artifact.verify import FaultCheck, Verification
     from thenar.compiler.artifact.verify_firmware import Difference, FirmwareVerification, TargetCheck
     from thenar.compiler.model.compare import WorstCase
@@ -34,11 +33,7 @@ def _kinds() -> tuple[str, ...]:
     default=(),
     help="Also compile the classifier for these targets, and run it there or in a simulator.",
 )
-@click.option(
-    "--faults",
-    is_flag=True,
-    help="Print the accuracy under each fault: lost or stuck inputs, dead ports.",
-)
+@click.option("--faults", is_flag=True, help="Print the accuracy under each fault: lost or stuck inputs, dead ports.")
 @json_flag
 def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bool) -> int:
     """Classify every row with ensemble, float tables and integer tables, and check the differences against bounds.
@@ -79,45 +74,47 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bo
 
 
 def _print(found: "Verification") -> None:
-    console = out()
-    trials = counted(found.trials, "trial")
-    console.print(
-        f"{counted(found.rows, 'row')} of {trials}; the build was trained on {found.trained_on:,} of these trials"
+    trials, worst = counted(found.trials, "trial"), found.worst
+    echo(f"{counted(found.rows, 'row')} of {trials}; the build was trained on {found.trained_on:,} of these trials")
+    collapse = f"at most {found.collapse_difference:.3g} of a unit, allowed {found.collapse_bound:.3g}"
+    echo(f"ensemble to float tables: {collapse}")
+    echo(f"float tables to integers: at most {found.integer_difference:.3f} steps, allowed {found.integer_bound:g}")
+    _print_margin(f"{found.safe_margin:g} steps", found)
+    frame = f"{len(worst.closed)} switches closed, codes {' '.join(map(str, worst.codes)) or 'none'}"
+    echo(
+        f"worst possible frame: {worst.leader} loses {worst.loss:.3f} steps of its lead over {worst.competitor}, "
+        f"allowed {worst.bound:.3f} ({frame})"
     )
-    console.print(
-        f"ensemble to float tables: at most {found.collapse_difference:.3g} of a unit, "
-        f"allowed {found.collapse_bound:.3g}"
+    _print_margin(f"{worst.safe_margin:.3f} steps, which covers the worst frames", worst)
+    echo(
+        "largest possible sum, with or without missing inputs: "
+        f"{worst.reach} for {worst.reaching}, allowed {worst.limit}"
     )
-    console.print(
-        f"float tables to integers: at most {found.integer_difference:.3f} steps, allowed {found.integer_bound:g}"
-    )
-    console.print(
-        f"margin above {found.safe_margin:g} steps: {found.covered} rows, of which {found.covered_changed} change class"
-    )
-    _print_worst(console, found.worst)
     whose = {0: "trials not trained on", found.trials: "trials trained on"}.get(
         found.trained_on, f"{found.trained_on} of {trials} trained on"
     )
     for each in found.recognised:
         rate = f"{100 * each.rate:.1f} % [{100 * each.low:.1f}, {100 * each.high:.1f}]"
-        console.print(
-            f"accuracy of the integers, {whose}: {rate}, {each.integers:,} of {each.total:,} {each.unit}; "
-            f"of the ensemble {each.ensemble:,}"
-        )
+        hits = f"{each.integers:,} of {each.total:,} {each.unit}; of the ensemble {each.ensemble:,}"
+        echo(f"accuracy of the integers, {whose}: {rate}, {hits}")
     if (none := found.nothing_held) is not None:
         empty = f", and for {none.detected:,} of {none.empty:,} rows of nothing held" if none.empty else ""
-        console.print(f"nothing held, predicted for {none.missed:,} of {none.grasps:,} rows of grasps{empty}")
+        echo(f"nothing held, predicted for {none.missed:,} of {none.grasps:,} rows of grasps{empty}")
     if found.independent:
-        console.print(INDEPENDENT)
-    console.print(f"rows that change class: {len(found.changed)}")
+        echo(INDEPENDENT)
+    echo(f"rows that change class: {len(found.changed)}")
     for row in found.changed[:_SHOWN]:
         line = f"  row {row.row}: {row.ensemble} becomes {row.integers}, recorded {row.recorded}"
-        console.print(f"{line} (margin {row.margin:.1f} steps)")
+        echo(f"{line} (margin {row.margin:.1f} steps)")
     if len(found.changed) > _SHOWN:
-        console.print(f"  and {len(found.changed) - _SHOWN} more: --json lists them all")
+        echo(f"  and {len(found.changed) - _SHOWN} more: --json lists them all")
     if found.firmware is not None:
         print_firmware(found.firmware)
-    console.print("holds" if found.holds else verdict(found.firmware))
+    echo("holds" if found.holds else verdict(found.firmware))
+
+
+def _print_margin(margin: str, found: "Verification | WorstCase") -> None:
+    echo(f"margin above {margin}: {found.covered} rows, of which {found.covered_changed} change class")
 
 
 def _print_faults(found: "FaultCheck") -> None:
@@ -128,28 +125,10 @@ def _print_faults(found: "FaultCheck") -> None:
         rates = (f"{100 * count / worst.total:.1f}" for count in (each.lost, worst.correct - each.lost, each.stuck))
         lines.add_row(each.name, *rates, each.value)
     out().print(lines)
-    out().print(
-        f"without a fault: {100 * worst.correct / worst.total:.1f} %, {worst.correct:,} of {worst.total:,} trials"
-    )
-    out().print("the worst of each kind:")
+    echo(f"without a fault: {100 * worst.correct / worst.total:.1f} %, {worst.correct:,} of {worst.total:,} trials")
+    echo("the worst of each kind:")
     for sentence in worst.sentences:
-        out().print(f"  {sentence}", soft_wrap=True)
-
-
-def _print_worst(console: "Console", worst: "WorstCase") -> None:
-    frame = f"{len(worst.closed)} switches closed, codes {' '.join(map(str, worst.codes)) or 'none'}"
-    console.print(
-        f"worst possible frame: {worst.leader} loses {worst.loss:.3f} steps of its lead over {worst.competitor}, "
-        f"allowed {worst.bound:.3f} ({frame})"
-    )
-    console.print(
-        f"margin above {worst.safe_margin:.3f} steps, which covers the worst frames: "
-        f"{worst.covered} rows, of which {worst.covered_changed} change class"
-    )
-    console.print(
-        "largest possible sum, with or without missing inputs: "
-        f"{worst.reach} for {worst.reaching}, allowed {worst.limit}"
-    )
+        echo(f"  {sentence}")
 
 
 def verdict(found: "FirmwareVerification | None") -> str:
@@ -162,24 +141,20 @@ def verdict(found: "FirmwareVerification | None") -> str:
 
 def print_firmware(found: "FirmwareVerification") -> None:
     """Print for each part whether its results match Python's, and the first frame in which they do not."""
-    console = out()
-    console.print(f"firmware, on {found.rows} rows, {found.extreme} extreme and {found.random} random frames:")
+    echo(f"firmware, on {found.rows} rows, {found.extreme} extreme and {found.random} random frames:")
     for check in found.checks:
-        console.print(f"  {check.part}, {check.layout}{_MISSING[check.missing]}: {_outcome(check)}")
+        echo(f"  {check.part}, {check.layout}{', inputs missing' if check.missing else ''}: {_outcome(check)}")
         if check.misnamed:
-            console.print(f"    {check.misnamed} of the grasp types have ANOTHER NAME")
+            echo(f"    {check.misnamed} of the grasp types have ANOTHER NAME")
         if check.first is not None:
             _print_difference(check.first)
     if not found.carried.present:
-        console.print("  the build carries no firmware")
+        echo("  the build carries no firmware")
     elif found.carried.outdated:
         outdated = ", ".join(found.carried.outdated)
-        console.print(f"  {outdated}: not what thenar makes of the build now; compile it again")
+        echo(f"  {outdated}: not what thenar makes of the build now; compile it again")
     else:
-        console.print("  the build carries the firmware that thenar makes of it now")
-
-
-_MISSING = {False: "", True: ", inputs missing"}
+        echo("  the build carries the firmware that thenar makes of it now")
 
 
 def _outcome(check: "TargetCheck") -> str:
@@ -194,13 +169,12 @@ def _outcome(check: "TargetCheck") -> str:
 
 
 def _print_difference(first: "Difference") -> None:
-    console = out()
     codes = " ".join(map(str, first.codes)) or "none"
-    console.print(f"    {first.frame}: closed {', '.join(first.closed) or 'none'}; codes {codes}")
+    echo(f"    {first.frame}: closed {', '.join(first.closed) or 'none'}; codes {codes}")
     for who, grasp, scores, said in (
         ("Python", first.grasp, first.scores, first.said),
         ("compiled", first.compiled_grasp, first.compiled_scores, first.compiled_said),
     ):
         more = f", margin {said[0]}, probability {said[1]} of 65535" if said else ""
         more += f", segment state {said[2]}" if len(said) > 2 else ""
-        console.print(f"    {who}: {grasp}, scores {' '.join(map(str, scores))}{more}")
+        echo(f"    {who}: {grasp}, scores {' '.join(map(str, scores))}{more}")

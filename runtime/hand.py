@@ -25,7 +25,7 @@ HAND_NAME = "hand.json"
 SCHEMA = 1
 MAX_BYTES = 4 << 20
 # Spacing of the grid: it leaves room for a name under each place.
-_COLUMNS, _PITCH_MM, _RADIUS_MM = 4, (50.0, 22.0), 3.0
+_COLUMNS, _PITCH_MM, GRID_RADIUS_MM = 4, (50.0, 22.0), 3.0
 _MOST_POINTS = 1 << 16
 
 Length = Annotated[float, Meta(ge=-20_000.0, le=20_000.0)]
@@ -163,17 +163,22 @@ def _contradictions(hand: HandDrawing, manifest: Manifest) -> Iterator[str]:
 def grid_hand(manifest: Manifest, ranges: Sequence[tuple[int, int]] | None = None) -> HandDrawing:
     """Return the kept switches and taxels of a build in a grid, and its joints: `ranges` of their codes, if known."""
     names = list(dict.fromkeys(switch.source for switch in manifest.switches))
-    wide, high = _PITCH_MM
-    places = {name: (wide * (at % _COLUMNS), -high * (at // _COLUMNS)) for at, name in enumerate(names)}
+    places = grid_places(names)
     taxels = tuple(switch.source for switch in manifest.switches if switch.threshold is not None)
     return HandDrawing(
         view="switches and taxels in the order of the build; their positions on the hand are unknown" if names else "",
         placed=False,
-        radius_mm=_RADIUS_MM,
+        radius_mm=GRID_RADIUS_MM,
         switches=drawn_switches(manifest, {name: at for name, at in places.items() if name not in taxels}),
         taxels=drawn_taxels(manifest, {name: places[name] for name in dict.fromkeys(taxels)}),
         joints=drawn_joints(manifest.joints, ranges),
     )
+
+
+def grid_places(names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return a place in a grid for each name, for inputs whose positions are unknown."""
+    wide, high = _PITCH_MM
+    return {name: (wide * (at % _COLUMNS), -high * (at // _COLUMNS)) for at, name in enumerate(names)}
 
 
 def drawn_switches(manifest: Manifest, places: dict[str, tuple[float, float]]) -> tuple[DrawnSwitch, ...]:

@@ -1,12 +1,13 @@
 """Timelines: the states found in a stream, and its segments with their confidence."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from .scores import segments_of
+from .scores import OVERLAPS, score_streams, segments_of
 
 
 class FoundSegment(msgspec.Struct, frozen=True):
@@ -78,3 +79,13 @@ def probabilities(scores: NDArray[np.integer], states: NDArray[np.intp], scale: 
     behind = np.exp((scores - scores.max(axis=1, keepdims=True)) / scale)
     shares = behind[np.arange(len(states)), np.minimum(states, scores.shape[1] - 1)] / behind.sum(axis=1)
     return np.asarray(np.where(states < scores.shape[1], shares, 0.0))
+
+
+def overlap_f1(timelines: Sequence[Timeline]) -> tuple[float, ...] | None:
+    """Return F1 at each of OVERLAPS, or None unless the truth of all streams is known and holds a grasp."""
+    none = len(timelines[0].types)
+    known = [(line.continued, line.truth, line.states, None) for line in timelines if line.truth is not None]
+    if len(known) < len(timelines) or not any((truth < none).any() for _, truth, *_ in known):
+        return None
+    total = score_streams(known, none)
+    return tuple(total.f1(place) for place in range(len(OVERLAPS)))

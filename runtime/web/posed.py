@@ -3,12 +3,40 @@
 from collections.abc import Mapping
 
 from thenar.drivers.closing import Closing
+from thenar.drivers.cyberglove_protocol import SENSORS_22
 
+from ..hand import HandDrawing, drawn_joints
+from ..manifest import Calibration
 from ..posing import PoseGuide, PoseKey, PoseStage
 from .presses import Presses
 from .server import Server, message
 
 _PERIOD_US = 50_000
+
+# The pose in which hand.js draws an idle hand, and further angles that a pose needs to be recognisable, in degrees.
+_RELAXED = {
+    "thumb_rotation": 20.0,
+    "thumb_abduction": 25.0,
+    "middle_index_abduction": 5.0,
+    "ring_middle_abduction": 5.0,
+    "little_ring_abduction": 6.0,
+}
+_BESIDES = {
+    "fist": {"thumb_rotation": 75.0, "thumb_abduction": 30.0, "thumb_mpj": 45.0, "thumb_ij": 45.0},
+    "thumb across": {"thumb_abduction": 15.0, "thumb_mpj": 45.0, "thumb_ij": 25.0},
+}
+
+
+def posed_hand() -> HandDrawing:
+    """Return the drawing of a hand that shows poses: the joints of a CyberGlove with 22 sensors, and no switch."""
+    joints = [Calibration(at, name, "deg", 0, 0.0, 90, 90.0) for at, name in enumerate(SENSORS_22)]
+    return HandDrawing(view="", placed=False, radius_mm=1.0, switches=(), taxels=(), joints=drawn_joints(joints))
+
+
+def posed(degrees: Mapping[str, float]) -> list[float]:
+    """Return the angles of all joints of `posed_hand` in a pose that sets some, by their names; the rest is relaxed."""
+    angles = {**_RELAXED, **degrees}
+    return [angles.get(name, 0.0) for name in SENSORS_22]
 
 
 class PosePage(Closing):
@@ -20,10 +48,8 @@ class PosePage(Closing):
         As for `Server`.
     guide : PoseGuide
         The guide that it shows.
-    hand : object
-        The drawing on which hand.js shows a pose.
-    pictures : mapping
-        The values of that drawing's joints, by the name of the pose.
+    subject : str
+        Whose hand it is.
 
     Raises
     ------
@@ -31,20 +57,11 @@ class PosePage(Closing):
         As `Server` does.
     """
 
-    def __init__(
-        self,
-        address: str,
-        *,
-        token: str | None,
-        guide: PoseGuide,
-        hand: object,
-        pictures: Mapping[str, object],
-        subject: str,
-    ) -> None:
-        self._guide, self._pictures = guide, pictures
+    def __init__(self, address: str, *, token: str | None, guide: PoseGuide, subject: str) -> None:
+        self._guide = guide
         self._presses = Presses(PoseKey)
         self._due_us, self._step = 0, -1
-        first = (message("sensors", names=guide.names, subject=subject), message("hand", hand))
+        first = (message("sensors", names=guide.names, subject=subject), message("hand", posed_hand()))
         self._server = Server("calibrate", address, token=token, on_message=self._presses.take, hello=lambda: first)
         self.url = self._server.url
 
@@ -68,7 +85,7 @@ class PosePage(Closing):
                 total=len(guide.poses),
                 name=pose.name,
                 instruction=pose.instruction,
-                picture=self._pictures.get(pose.name),
+                picture=posed(_BESIDES.get(pose.name, {}) | pose.degrees),
                 left_s=guide.seconds_left(now_us),
                 problems=guide.problems if guide.stage is PoseStage.DOUBTED else [],
                 offered={key.value: what for key, what in guide.offered(now_us).items()},

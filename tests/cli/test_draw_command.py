@@ -111,7 +111,7 @@ def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(
     [
         (b"", "keeps no switches"),
         (b"[]", "keeps no switches"),
-        (b'{"rates": []}', "is not a list of switches (Object missing required field `switches`)"),
+        (b'{"rates": []}', "is not a list of switches (Expected `array`, got `null`)"),
         (b'["a", "\\u001b[2J"]', r"switch '\x1b[2J' holds a control character (U+001B)"),
         (b"palm_heel_1\n\x1b[2J", r"switch '\x1b[2J' holds a control character (U+001B)"),
         (b"[1, 2]", "is not a list of switches (Expected `str`, got `int` - at `$[0]`)"),

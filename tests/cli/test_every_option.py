@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from thenar.cli import collecting, run
-from thenar.cli.common import OutputFile, OutputFolder
 from thenar.cli.group import COMMANDS, thenar
+from thenar.cli.parameters import OutputFile, OutputFolder
 from thenar.compiler import GraspSet
 
 # Arguments and options of a small run of each command. Its devices are not there.

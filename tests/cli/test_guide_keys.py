@@ -5,9 +5,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from thenar.cli.guide_keys import GuideKeys
+from thenar.cli.collecting import Terminal
+from thenar.compiler.recordings.taxonomy import Taxonomy
 from thenar.runtime.recording.guide import Key
 
+TAXONOMY = Taxonomy("own", ("A",))
 A, R, Q = Key.ACCEPT, Key.REDO, Key.QUIT
 
 
@@ -39,7 +41,7 @@ def terminal() -> Iterator[tuple[int, int]]:
 )
 def test_on_a_terminal_every_key_counts_by_itself(terminal: tuple[int, int], typed: bytes, keys: list[Key]) -> None:
     master, slave = terminal
-    with GuideKeys(slave) as reader:
+    with Terminal(TAXONOMY, slave) as reader:
         assert reader.pressed() == []
         os.write(master, typed)
         assert reader.pressed() == keys
@@ -49,20 +51,20 @@ def test_on_a_terminal_every_key_counts_by_itself(terminal: tuple[int, int], typ
 def test_the_terminal_is_left_as_it_was(terminal: tuple[int, int]) -> None:
     _, slave = terminal
     before = termios.tcgetattr(slave)
-    with GuideKeys(slave):
+    with Terminal(TAXONOMY, slave):
         assert termios.tcgetattr(slave) != before
     assert termios.tcgetattr(slave) == before
 
 
 def test_ctrl_c_stays_what_it_is(terminal: tuple[int, int]) -> None:
     _, slave = terminal
-    with GuideKeys(slave):
+    with Terminal(TAXONOMY, slave):
         assert termios.tcgetattr(slave)[3] & termios.ISIG
 
 
 def test_a_terminal_that_is_closed_leaves(terminal: tuple[int, int]) -> None:
     master, slave = terminal
-    reader = GuideKeys(slave)
+    reader = Terminal(TAXONOMY, slave)
     os.close(master)
     assert reader.pressed() == [Q]
     assert reader.pressed() == []
@@ -70,7 +72,7 @@ def test_a_terminal_that_is_closed_leaves(terminal: tuple[int, int]) -> None:
 
 def test_elsewhere_a_line_is_a_key() -> None:
     here, there = os.pipe()
-    with GuideKeys(here) as reader:
+    with Terminal(TAXONOMY, here) as reader:
         assert reader.pressed() == []
         os.write(there, b"\na\nR")
         assert reader.pressed() == [A, A]

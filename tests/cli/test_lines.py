@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from rich.table import Table
 from rich.text import Text
 
-from thenar.cli.common import err, out, print_json
-from thenar.cli.lines import echo, json_shown
+from thenar.cli.printing import echo, err, json_shown, out, print_json
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.taxonomy import own
 from thenar.drivers.names import shown

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from thenar.cli import run
-from thenar.cli.common import out, table
+from thenar.cli.printing import out, table
 from thenar.compiler import GraspSet
 
 GLOVE = '[[bus]]\ndevice = "/dev/i2c-1"\n[[bus.chip]]\nkind = "mcp23017"\naddress = 0x20\n[bus.chip.pins]\n'

@@ -15,13 +15,13 @@ from thenar.cli import run
 # Touches the file "ready" when the work of a command has made its first step, or has handed out its first piece.
 PROGRAM = """
 import pathlib, sys
-import thenar.cli.common as common
+import thenar.cli.printing as printing
 from contextlib import contextmanager
 ready = pathlib.Path("ready")
 @contextmanager
 def telling(what):
     yield lambda done, total: ready.touch()
-common.progress = telling
+printing.progress = telling
 import thenar.compiler.workers as workers
 held = workers._interrupts_held
 @contextmanager

@@ -38,7 +38,9 @@ def test_an_unexpected_error_is_one_sentence_and_a_file_for_its_owner(error: str
     assert (done.returncode, done.stdout) == (2, "")
     (line,) = done.stderr.splitlines()
     said = re.fullmatch(
-        r"thenar: unexpected (\w+): .*please report it with the file (\S+), which holds the traceback", line
+        r"thenar: unexpected (\w+) in \S+: this is a bug; please report it with the file (\S+), which holds the "
+        "traceback",
+        line,
     )
     assert said is not None
     kept = Path(said[2])
@@ -54,7 +56,7 @@ def test_where_no_file_can_be_written_the_sentence_says_so(tmp_path: Path) -> No
     program = f"import tempfile\ntempfile.tempdir = {str(tmp_path / 'gone')!r}\n{program}"
     done = _run(program)
     assert done.returncode == 2
-    assert done.stderr.startswith("thenar: unexpected SystemError: ")
+    assert done.stderr.startswith("thenar: unexpected SystemError in __main__: ")
     assert "could not be written (No such file or directory)" in done.stderr
 
 

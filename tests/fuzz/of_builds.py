@@ -16,7 +16,6 @@ from example_frontier import example_frontier
 from material import GRASPS, SWITCHES, Format, build_files, grasp_set, harness, make_folder
 from mutating import Mutate, altered, json_file, npz_file, sealed
 
-from thenar.cli.draw_command import kept_names
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.firmware.generate import Firmware, sums, write_folder
 from thenar.compiler.frontier.cache import Store
@@ -24,6 +23,7 @@ from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.points import frontier_to_bytes
 from thenar.compiler.frontier.words import csv_bytes
 from thenar.compiler.glove.files import spec_files
+from thenar.compiler.placement.kept import kept_names
 from thenar.compiler.placement.placement import place
 from thenar.compiler.report.frontier import frontier_view
 from thenar.drivers.errors import ThenarError

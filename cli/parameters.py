@@ -1,38 +1,23 @@
-"""Shared by the sub-commands: paths, the `--json` flag, consoles, and a progress bar for work longer than a second."""
+"""Types of options, and options that several commands share."""
 
 import math
 import os
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from copy import copy
-from dataclasses import replace
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
-import msgspec
 from click.shell_completion import CompletionItem
-from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
-from rich.measure import Measurement
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.segment import Segment
-from rich.table import Column, Table
-from rich.text import Text, TextType
 
-from thenar.drivers.names import shortened, shown
-
-from .lines import echo, echo_json
+from thenar.drivers.names import shortened
 
 if TYPE_CHECKING:
     from thenar.runtime.harness.wiring import Harness
 
-Found = TypeVar("Found")
-Rest = ParamSpec("Rest")
 Command = TypeVar("Command", bound=Callable[..., Any])
-
 _LONGEST_METAVAR = 30
-_UNBOUNDED, _READABLE = 10_000, 24
-_JSON, _OVERWRITE = "thenar.json", "thenar.overwrite"
+_OVERWRITE = "thenar.overwrite"
+WEB_ADDRESS = "127.0.0.1:8080"
 
 
 class OutputFile(click.Path):
@@ -54,7 +39,9 @@ class OutputFile(click.Path):
         if not path.name:
             self.fail("The output file needs a name.", param, ctx)
         if not path.name.lower().endswith(self.endings):
-            self.fail(f"{path.name}: the name of the output file must end in {_either(self.endings)}.", param, ctx)
+            *others, last = self.endings
+            either = f"{', '.join(others)} or {last}" if others else last
+            self.fail(f"{path.name}: the name of the output file must end in {either}.", param, ctx)
         if not path.parent.is_dir():
             self.fail(f"There is no folder '{path.parent}' to write '{path.name}' into: create it first.", param, ctx)
         if not os.access(path.parent, os.W_OK):
@@ -109,11 +96,6 @@ class Number(click.FloatRange):
 def overwrites(context: click.Context | None) -> bool:
     """Return whether existing files may be replaced."""
     return context is not None and bool(context.meta.get(_OVERWRITE))
-
-
-def _either(names: Sequence[str]) -> str:
-    """Return "a, b or c"."""
-    return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 class OneOf(click.Choice[str]):
@@ -175,14 +157,6 @@ existing_folder = click.Path(exists=True, file_okay=False, path_type=Path)
 picture_file = OutputFile(".svg", ".png")
 seed_range = click.IntRange(0, 2**63 - 1)
 
-json_flag = click.option(
-    "--json",
-    is_flag=True,
-    expose_value=False,
-    callback=lambda context, _option, wanted: context.meta.update({_JSON: wanted}),
-    help="Print one JSON document for machines instead.",
-)
-
 # Eager: the file's own check must know whether it may be replaced.
 overwrite_flag = click.option(
     "--overwrite",
@@ -224,18 +198,37 @@ dask_option = click.option(
 )
 
 
+def _token(_context: click.Context, _option: click.Parameter, wanted: bool) -> str | None:
+    if not wanted:
+        return None
+    from thenar.runtime.web.guard import new_token
+
+    return new_token()
+
+
+web_token_option = click.option(
+    "--web-token",
+    is_flag=True,
+    callback=_token,
+    help="Show the page only to those with its full address; required if other machines can reach it.",
+)
+
+
+def web_options(command: Command) -> Command:
+    """Add --web and --web-token: the address of a page, and the token that it needs, or None."""
+    option = click.option(
+        "--web",
+        is_flag=False,
+        flag_value=WEB_ADDRESS,
+        metavar="[ADDRESS]",
+        help=f"Show a page in the browser.  [{WEB_ADDRESS}]",
+    )
+    return option(web_token_option(command))
+
+
 def comma_separated(text: str) -> tuple[str, ...]:
     """Return the comma-separated parts of `text`, each once, in the order given."""
     return tuple(dict.fromkeys(part.strip() for part in text.split(",")))
-
-
-def serial_port(context: click.Context, parameter: click.Parameter, text: str) -> str:
-    """Return `text` if it is a valid port, by the same rule as for ports in files."""
-    from thenar.drivers.ports import port_fault
-
-    if fault := port_fault(text):
-        raise click.BadParameter(f"{shortened(repr(text))} {fault}")
-    return text
 
 
 def keep_apart(*paths: Path | None) -> None:
@@ -254,133 +247,3 @@ def check_devices(harness: "Harness", path: Path) -> None:
     if not (harness.cyberglove or harness.buses or harness.spi or harness.streams):
         takes = "add a [cyberglove], a [[bus]], an [[spi]] or a [[stream]]"
         raise click.UsageError(f"{path.name} names no device: {takes}")
-
-
-class _Console(Console):
-    """A console that escapes control characters in names; styles are rich's."""
-
-    def render_str(self, text: str, **options: Any) -> Text:
-        # Escaped before it is measured, so that column widths fit.
-        return super().render_str(shown(text), **options)
-
-    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
-        for segment in super().render(renderable, options):
-            yield segment if segment.control else Segment(shown(segment.text), segment.style)
-
-
-def out() -> Console:
-    """Return the console for results; its lines are 200 characters wide outside a terminal."""
-    console = _console()
-    return console if console.is_terminal else _console(width=200)
-
-
-def err() -> Console:
-    """Return the console for warnings and progress."""
-    return _console(stderr=True)
-
-
-def warning(sentence: str) -> None:
-    """Print a warning on stderr."""
-    echo(f"warning: {sentence}", err=True)
-
-
-def _console(stderr: bool = False, width: int | None = None) -> Console:
-    # Names of the user's columns and files may hold brackets and colons: they are not markup.
-    return _Console(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
-
-
-def wants_json() -> bool:
-    """Return whether --json was given."""
-    return bool(click.get_current_context().meta[_JSON])
-
-
-def print_json(result: Any) -> None:
-    """Print `result` (msgspec struct, dataclass or builtin) as one indented JSON document on stdout."""
-    echo_json(_json(result).decode())
-
-
-def show(
-    found: Found, people: Callable[Concatenate[Found, Rest], None], *rest: Rest.args, **named: Rest.kwargs
-) -> None:
-    """Print `found` as JSON if --json is given, otherwise by `people`."""
-    if wants_json():
-        print_json(found)
-    else:
-        people(found, *rest, **named)
-
-
-def write_json(path: Path, found: Any) -> None:
-    """Write `found` as one indented JSON document."""
-    from thenar.runtime.files import write_atomically
-
-    write_atomically(path, _json(found) + b"\n")
-
-
-def _json(found: Any) -> bytes:
-    return msgspec.json.format(msgspec.json.encode(found), indent=2)
-
-
-class _Whole(Table):
-    """A table that truncates nothing: one that is too wide is split into several, each with the first column."""
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Yield the lines of each part."""
-        room = options.max_width - 1
-        parts: list[list[Column]] = [[]]
-        for column in self.columns:
-            used = [self._width(each, console, options) for each in (*parts[-1], column)]
-            if len(used) > 2 and sum(used) > room:
-                parts.append([self.columns[0]])
-            parts[-1].append(column)
-        for number, columns in enumerate(parts):
-            part = self._part(columns)
-            part.title = self.title if number == 0 else None
-            yield from Table.__rich_console__(part, console, options)
-
-    def _part(self, columns: Sequence[Column]) -> "_Whole":
-        part = copy(self)
-        part.columns = [replace(column, _index=index) for index, column in enumerate(columns)]
-        return part
-
-    def _width(self, column: Column, console: Console, options: ConsoleOptions) -> int:
-        """Return the width that a column needs with one line: words wrap, but not to one word per line."""
-        needed = Measurement.get(console, options.update_width(_UNBOUNDED), self._part([column]))
-        most = needed.maximum if column.no_wrap else max(needed.minimum, min(needed.maximum, _READABLE))
-        return most - 1
-
-
-def table(columns: Iterable[str], numbers: Container[str] = (), title: TextType | None = None) -> Table:
-    """Return a table of these columns, with `numbers` aligned right."""
-    made = _Whole(title=title)
-    for column in columns:
-        is_number = column in numbers
-        made.add_column(column, justify="right" if is_number else "left", no_wrap=is_number, overflow="fold")
-    return made
-
-
-@contextmanager
-def progress(what: str, *, lines: bool = False) -> Iterator[Callable[[int, int], None]]:
-    """Yield report(done, total), which draws a bar on stderr if that is a terminal, and does nothing otherwise; with
-    `lines`, for work of minutes, it prints a line for each step then.
-    """
-    console = err()
-    if lines and not console.is_terminal:
-        echo(f"{what} ...", err=True)
-        yield lambda done, total: echo(f"{what}: {done} of {total} steps", err=True)
-        return
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
-
-
-def of_device(name: str, state: str) -> str:
-    """Return `state` as a sentence about the device `name`, naming its port only once."""
-    kind, _, port = name.partition(" at ")
-    return f"{kind if port and port in state else name}: {state}"

@@ -4,7 +4,8 @@ from pathlib import Path
 import click
 import pytest
 
-from thenar.cli.common import OutputFile, keep_apart, progress
+from thenar.cli.parameters import OutputFile, keep_apart
+from thenar.cli.printing import progress
 
 
 def test_progress_is_drawn_on_a_terminal_with_the_name_as_it_is(
