@@ -85,7 +85,7 @@ class PosePage(Closing):
                 total=len(guide.poses),
                 name=pose.name,
                 instruction=pose.instruction,
-                picture=posed(_BESIDES.get(pose.name, {}) | pose.degrees),
+                picture=posed({**_BESIDES.get(pose.name, {}), **pose.degrees}),
                 left_s=guide.seconds_left(now_us),
                 problems=guide.problems if guide.stage is PoseStage.DOUBTED else [],
                 offered={key.value: what for key, what in guide.offered(now_us).items()},
