@@ -9,7 +9,7 @@ import click
 from rich.table import Table
 from rich.text import Text
 
-from thenar.compiler.text import counted, interval
+from thenar.compiler.text import counted
 
 from .common import (
     OutputFile,
@@ -29,13 +29,12 @@ from .lines import echo
 from .options import scene_name
 
 if TYPE_CHECKING:
-    from thenar.compiler.evaluation.ablation import Ablation, AccuracyChange, Variant
     from thenar.simulator.pipeline.explain import Explanation
     from thenar.simulator.pipeline.report import SimulationReport, StepReport
     from thenar.simulator.pipeline.scene_file import Shipped
     from thenar.simulator.scenes.scene import Rest, Scene
 
-_MODES = ("--output", "--explain", "--ablate", "--list")
+_MODES = ("--output", "--explain", "--list")
 _SHOWN = 10  # unsettled repetitions that are listed individually
 _OWN = "dim"  # style of the scene-independent steps
 
@@ -47,7 +46,6 @@ _OWN = "dim"  # style of the scene-independent steps
 )
 @overwrite_flag
 @click.option("--explain", is_flag=True, help="Only list the steps that would run, in order, and the cost of each.")
-@click.option("--ablate", is_flag=True, help="Remove each effect in turn, and show the change in accuracy and time.")
 @click.option("--list", "listing", is_flag=True, help="Only list the shipped scenes.")
 @click.option("--repetitions", type=click.IntRange(1, 100_000), help="Trials per grasp type and subject.")
 @click.option(
@@ -75,7 +73,6 @@ def command(
     scene: str | None,
     output: Path | None,
     explain: bool,
-    ablate: bool,
     listing: bool,
     repetitions: int | None,
     more: int | None,
@@ -101,7 +98,7 @@ def command(
     """
     from thenar.simulator.pipeline.scene_file import load_scene, own_file, shipped_scenes
 
-    _check_modes(scene, (output, explain, ablate, listing), keep_unsettled=keep_unsettled)
+    _check_modes(scene, (output, explain, listing), keep_unsettled=keep_unsettled)
     if scene is None:
         show(shipped_scenes(), _print_scenes)
         return
@@ -110,16 +107,10 @@ def command(
         if output is not None:
             keep_apart(own_file(scene), output)
             _simulate(loaded, output, jobs, keep_unsettled=keep_unsettled)
-        elif explain:
+        else:
             from thenar.simulator.pipeline.explain import explain as explained
 
             show(explained(loaded, jobs), _print_explanation)
-        else:
-            from thenar.simulator.pipeline.ablation import ablate as ablated
-
-            with progress(f"removing the effects of {loaded.name}") as report:
-                ablation = ablated(loaded, jobs, report)
-            show(ablation, _print_ablation)
 
 
 def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled: bool) -> None:
@@ -283,32 +274,3 @@ def _expected(explanation: "Explanation") -> str:
         f"{explanation.us_a_grasp:.0f} us a grasp on one core; {explanation.repetitions} grasps on "
         f"{explanation.workers} core(s) should take about {explanation.expected_s:.1f} s plus the start of processes"
     )
-
-
-def _print_ablation(ablation: "Ablation") -> None:
-    """Print the effect of each step on accuracy and time."""
-    console = out()
-    whole = ablation.variants[0]
-    columns = [f"{one.inputs}{what}" for one in whole.rates for what in ("", ", change")]
-    variants = _table(
-        f"Scene {ablation.scene} without each of its effects, simulated",
-        *("without", *columns, "us a grasp", "change", "unsettled"),
-    )
-    for variant in ablation.variants:
-        cells = [cell for one in variant.rates for cell in (interval(one.rate), _change(one.change))]
-        variants.add_row(Text(variant.without or "(nothing)"), *cells, *_times(variant, whole), str(variant.unsettled))
-    console.print(variants)
-    console.print(
-        f"LogitBoost with {ablation.rounds} rounds on all switches, all joints and both, {ablation.folds} folds within "
-        "each subject; accuracies in %, with 95 % intervals;\n"
-        "changes in percentage points, of grasps that settled with and without; time of a few grasps, best of several"
-    )
-
-
-def _change(change: "AccuracyChange | None") -> str:
-    return "" if change is None else f"{100 * change.mean:+z.1f} [{100 * change.low:+z.1f}, {100 * change.high:+z.1f}]"
-
-
-def _times(variant: "Variant", whole: "Variant") -> tuple[str, str]:
-    change = "" if variant is whole else f"{variant.us_a_grasp - whole.us_a_grasp:+.0f}"
-    return f"{variant.us_a_grasp:.0f}", change
