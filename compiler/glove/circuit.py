@@ -48,20 +48,14 @@ class Component:
     name: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class ComponentPin:
-    """A pin of a component."""
-
-    ref: str
-    pin: str
-
-
 @dataclass(slots=True)
 class Circuit:
-    """Components in order of insertion, nets by name; built up piece by piece, then only read."""
+    """Components in order of insertion; nets by name, with the designator and the number of each pin. Built up piece by
+    piece, then only read.
+    """
 
     components: list[Component] = field(default_factory=list)
-    nets: dict[str, list[ComponentPin]] = field(default_factory=dict)
+    nets: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
 
     def put(self, ref: str, kind: ComponentKind, *, on_board: bool = True, name: str = "") -> Component:
         """Add a component called `ref`."""
@@ -75,7 +69,7 @@ class Circuit:
 
     def join(self, net: str, ref: str, pin: str) -> None:
         """Connect a pin to a net. A pin is on one net at most."""
-        self.nets.setdefault(net, []).append(ComponentPin(ref, pin))
+        self.nets.setdefault(net, []).append((ref, pin))
 
     def between(self, letter: str, kind: ComponentKind, first: str, second: str) -> str:
         """Add a component with two pins, the first on net `first`; return its designator."""
@@ -376,7 +370,7 @@ def _add_signal(circuit: Circuit, end: WireEnd, switch: PlacedSensor) -> None:
     if end.unit.diodes and not end.taxel:
         circuit.between("D", _DIODE, net, f"{end.unit.ref}_{end.pin}")
         return
-    if ComponentPin(end.unit.ref, end.pad) not in circuit.nets[net]:
+    if (end.unit.ref, end.pad) not in circuit.nets[net]:
         circuit.join(net, end.unit.ref, end.pad)
     _add_pull(circuit, end, net)
 

@@ -158,7 +158,7 @@ def glove_spec(
         kept=kept,
         proposed=harness is None,
         hand_length_mm=None if known is None else known.length_mm,
-        print_on="" if pattern is None else pattern.page.hint,
+        print_on="" if pattern is None else pattern[0].hint,
         sensors=switches,
         readers=_readers(ends),
         wires=wires,
