@@ -13,6 +13,7 @@ The model leaves out movement within a hold: a trial is one frame, so an error i
 and more frames do not correct it. It also leaves out contact bounce, and switches that are touched in passing.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -177,13 +178,13 @@ def composed(
     contacts, rest = np.hstack([switches, pads], dtype=np.uint16), np.append(np.zeros(n_switches, np.uint16), rest)
     random = np.random.default_rng(seed)
     order = _order(labels, grasps, random)
-    legs = _legs(contacts, rest, codes, _open_hand(codes, opens_up), order, random)
-    readings, at_us = np.concatenate([leg.contacts for leg in legs]), np.concatenate([leg.at_us for leg in legs])
-    ends = np.cumsum([len(leg.at_us) for leg in legs])
+    legs = list(_legs(contacts, rest, codes, _open_hand(codes, opens_up), order, random))
+    readings, poses, at_us = map(np.concatenate, zip(*legs, strict=True))
+    ends = np.cumsum([len(leg_us) for _, _, leg_us in legs])
     # A leg ends with the state in which its grasp is complete.
     return Replay(
         readings[:, :n_switches] > 0,
-        np.concatenate([leg.codes for leg in legs]),
+        poses,
         readings[:, n_switches:],
         Stream(np.arange(len(at_us)), at_us, int(at_us[-1]) + HOLD_US[0]),
         tuple(map(Span, (ends - 1).tolist(), ends.tolist(), labels[order].tolist())),
@@ -191,15 +192,6 @@ def composed(
         f"{HOLD_US[1] / 1e6:g} s, up to {TRANSITION_US / 1e6:g} s from one to the next: the recordings hold no whole "
         "movements.",
     )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Leg:
-    """The transition from one grasp to the next: states (t,), of which the last is its hold."""
-
-    contacts: Codes
-    codes: Codes
-    at_us: Times
 
 
 def _order(labels: Rows, grasps: int, random: np.random.Generator) -> list[int]:
@@ -234,8 +226,8 @@ def _legs(
     opened: NDArray[np.float64],
     order: list[int],
     random: np.random.Generator,
-) -> list[_Leg]:
-    legs: list[_Leg] = []
+) -> Iterator[tuple[Codes, Codes, Times]]:
+    """Yield the transition from each grasp to the next: contacts, codes and times of its states, the last its hold."""
     contact, pose, leaves_us = rest, opened, 0
     for row in order:
         lets_go = leaves_us + random.integers(0, RELEASE_US, len(rest))
@@ -244,12 +236,9 @@ def _legs(
         close_us = np.where(contacts[row] != rest, grips, _NEVER)
         at_us, travelled = _changes(leaves_us, open_us, close_us, _path(pose, codes[row].astype(np.float64), opened))
         now = at_us[:, np.newaxis]
-        seen = np.where(now < open_us, contact, np.where(now >= close_us, contacts[row], rest))
-        leg = _Leg(seen, travelled, at_us)
+        yield np.where(now < open_us, contact, np.where(now >= close_us, contacts[row], rest)), travelled, at_us
         contact, pose = contacts[row], codes[row].astype(np.float64)
-        leaves_us = int(leg.at_us[-1]) + int(random.integers(*HOLD_US))
-        legs.append(leg)
-    return legs
+        leaves_us = int(at_us[-1]) + int(random.integers(*HOLD_US))
 
 
 def _path(start: NDArray[np.float64], end: NDArray[np.float64], opened: NDArray[np.float64]) -> Codes:

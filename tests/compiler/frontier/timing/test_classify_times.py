@@ -1,15 +1,13 @@
-import numpy as np
 import pytest
 
 from thenar.compiler.firmware.choose import fit_for
 from thenar.compiler.firmware.targets import TARGETS, timed
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.frontier.timing.classify_times import ClassifyModel
-from thenar.compiler.frontier.timing.python_times import PythonCost, classify_us, fit_here, random_tables
+from thenar.compiler.frontier.timing.classify_times import ClassifyModel, classify_us, fit_here, random_tables
 from thenar.compiler.workers import in_workers
 from thenar.runtime.tables import tables_to_bytes
 
-PYTHON = PythonCost(1.0, 0.1, 0.2, 0.3, 0.01, 0.02, 10.0)
+PYTHON = (1.0, 0.1, 0.2, 0.3, 0.01, 0.02, 10.0)
 TABLES = random_tables(33, 16, 14)
 
 
@@ -65,9 +63,11 @@ def test_there_is_no_other_target() -> None:
 
 def test_what_is_fitted_here_foretells_other_shapes() -> None:
     """Within a factor of two: who else is on the machine is not known."""
-    fitted = fit_here()
+    *weights, yardstick = fitted = fit_here()
+    model = ClassifyModel("host", python=fitted)
     others = [random_tables(*shape) for shape in ((24, 16, 10), (50, 0, 20), (100, 22, 14))]
-    for tables, taken in zip(others, classify_us(others, fitted.yardstick), strict=True):
-        assert 0.5 < fitted.us(tables) / taken < 2.0
-    weights = (fitted.constant, fitted.switch, fitted.joint, fitted.klass, fitted.switch_class, fitted.joint_class)
-    assert np.all(np.array(weights) >= 0)
+    for tables, taken in zip(others, classify_us(others, yardstick), strict=True):
+        found = model.cost(tables)
+        assert found is not None
+        assert 0.5 < found.us / taken < 2.0
+    assert min(weights) >= 0
