@@ -51,27 +51,24 @@ class Classified:
 class ClassifyModel:
     """Predicts the time of classifying on `target`, one of `timed()`.
 
-    AVR       cycles of classify() for the slowest frame, by the target's formula, at `clock_hz`
-    Cortex-M  instructions of classify(), likewise, at `clock_hz` and one cycle each: hardly any such core is faster,
+    AVR       cycles of classify() for the slowest frame, by the target's formula, at its clock
+    Cortex-M  instructions of classify(), likewise, at its clock and one cycle each: hardly any such core is faster,
               and loads, taken branches and slow flash take more cycles, so times are lower bounds
     host      wall time of the runtime's Scorer here, by a linear fit to tables that are timed on construction
-    pi        that times `factor`; the same time if this machine is a Raspberry Pi
+    pi        that times PI_FACTOR; the same time if this machine is a Raspberry Pi
 
-    python is the result of `fit_here`, for reuse; clock_hz replaces the part's default clock; factor is ignored except
-    on pi. Raises FrontierError for another target.
+    python is the result of `fit_here`, for reuse. Raises FrontierError for another target.
     """
 
-    def __init__(
-        self, target: str, *, clock_hz: int | None = None, python: PythonCost | None = None, factor: float = PI_FACTOR
-    ) -> None:
+    def __init__(self, target: str, *, python: PythonCost | None = None) -> None:
         if target not in timed():
             raise FrontierError(f"there is no target {target!r}: choose one of {', '.join(timed())}")
         part = TARGETS.get(target)
         self.target = target
-        self.part: Target | None = None if part is None or part.clock_hz is None else part
-        self.clock_hz = None if self.part is None else clock_hz or self.part.clock_hz
+        self.clock_hz = None if part is None else part.clock_hz
+        self.part: Target | None = None if self.clock_hz is None else part
         self.python = (python or fit_here()) if self.part is None else None
-        self.factor = factor if target == "pi" and not on_a_pi() else 1.0
+        self.factor = PI_FACTOR if target == "pi" and not on_a_pi() else 1.0
 
     @property
     def identity(self) -> tuple[object, ...]:

@@ -42,6 +42,6 @@ def test_on_an_avr_the_time_is_what_was_simulated(tmp_path: Path, tool: Callable
 
 
 def test_what_cannot_be_measured_here_has_no_time(tmp_path: Path) -> None:
-    model = ClassifyModel("pi", python=(5.0, 0.1, 0.5, 0.1, 0.01, 0.01, 10.0), factor=4.0)
+    model = ClassifyModel("pi", python=(5.0, 0.1, 0.5, 0.1, 0.01, 0.01, 10.0))
     with Store(tmp_path / "store", "here") as store:
         assert measured([CONTENT], model, Cache(store, lambda *_: None, jobs=1)) == {}

@@ -41,5 +41,5 @@ def test_a_target_without_tools_names_what_is_missing(
 
 
 def test_a_raspberry_pi_is_not_timed_elsewhere() -> None:
-    assert "no Raspberry Pi" in ClassifyModel("pi", python=PYTHON, factor=4.0).unmeasured
+    assert "no Raspberry Pi" in ClassifyModel("pi", python=PYTHON).unmeasured
     assert not ClassifyModel("host", python=PYTHON).unmeasured
