@@ -21,7 +21,7 @@ from ..text import counted
 from ..trainers.base import Training
 from .folds import EvaluationError
 from .learning import Learning, plan_learning
-from .permutation import Permutations, Permuted
+from .permutation import Permuted, permuted
 from .plan import (
     BASELINES,
     Data,
@@ -206,13 +206,12 @@ def evaluate(
         if progress is not None:
             progress(before + done, before + total + after)
 
-    training, ways = Training.of(recipe), ways_of(recipe)
-    predictions = run_fits(data, fits, training, jobs, partial(report, after=design.permute), ways)
+    after = partial(report, after=design.permute)
+    predictions = run_fits(data, fits, Training.of(recipe), jobs, after, ways_of(recipe))
     test = None
     if design.permute:
-        words, before = _recipe_of("compositions", recipe), len(predictions)
-        evaluation = Permutations(parts, scheme, planner.placer, training, ways, words)
-        test = evaluation.test(chosen, design.permute, jobs, partial(report, before=before))
+        words, before = _recipe_of("compositions", recipe), partial(report, before=len(predictions))
+        test = permuted(chosen, parts, scheme, planner.placer, words, design.permute, jobs, before)
     grasps = tuple(np.unique(chosen.labels).tolist())
     blind = frozenset(fit for fit in predictions if is_blind(data, fit))
     reader = RateReader(chosen.labels, data.trials, grasps, predictions, blind, OF[scheme], data.groups)
