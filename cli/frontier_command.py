@@ -64,15 +64,6 @@ def _timed() -> tuple[str, ...]:
     type=Number(0, 60_000_000, min_open=True),
     help="Time to read all joints.  [default: a CyberGlove's record; unknown and omitted for other joints]",
 )
-@click.option(
-    "--record-time",
-    type=click.Choice(("formula", "wire")),
-    default="formula",
-    show_default=True,
-    help="Record time of a CyberGlove that the glove.toml has no measurement for: the vendor's formula, or only its "
-    "bytes on the line.",
-)
-@click.option("--filter", "filtered", is_flag=True, help="The box's digital filter is on; the formula includes it.")
 @click.option("--stream", type=existing_file, help="Measure decision latency on this set of whole movements.")
 @click.option(
     "--methods",
@@ -120,7 +111,7 @@ def command(
         thenar frontier set.grasps -o frontier/ --budget-us 1500
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
-    from thenar.compiler.frontier.find import PointGoal, find_frontier
+    from thenar.compiler.frontier.find import find_frontier
     from thenar.compiler.frontier.search import Search
     from thenar.compiler.placement.methods.base import usual
     from thenar.compiler.recordings.graspset import GraspSet
@@ -128,7 +119,7 @@ def command(
 
     if budget_us is not None and rate is not None:
         raise click.UsageError("--budget-us and --rate each pick a point: give one of them.")
-    wanted, harness = PointGoal(budget_us, rate), None if glove is None else load_harness(glove)
+    harness = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
     methods = methods or usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns))
     rounds, training = asked["rounds"], asked_settings(context, asked)
@@ -147,14 +138,15 @@ def command(
             source=printable(recordings.name),
             harness=harness,
             search=search,
-            wanted=wanted,
+            budget_us=budget_us,
+            rate=rate,
             stream=None if stream is None else GraspSet.load(stream),
             report=report,
             **asked,
         )
     show(found, _print, output)
-    if wanted.words and found.picked is None:
-        err().print(f"no point qualifies: {wanted.words} is beyond this frontier; relax it, or leave it out")
+    if found.wanted and found.picked is None:
+        err().print(f"no point qualifies: {found.wanted} is beyond this frontier; relax it, or leave it out")
         return 1
     return 0
 

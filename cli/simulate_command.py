@@ -7,19 +7,18 @@ import click
 from rich.table import Table
 from rich.text import Text
 
-from thenar.compiler.text import counted, interval
+from thenar.compiler.text import counted
 
 from .options import complete_scene
 from .parameters import OutputFile, jobs_option, keep_apart, overwrite_flag, seed_range
 from .printing import echo, json_flag, out, progress, show, table, warning
 
 if TYPE_CHECKING:
-    from thenar.compiler.evaluation.ablation import Ablation, AccuracyChange
     from thenar.simulator.pipeline.explain import Explanation
     from thenar.simulator.pipeline.report import SimulationReport
     from thenar.simulator.scenes.scene import Rest
 
-_MODES = ("--output", "--explain", "--ablate", "--list")
+_MODES = ("--output", "--explain", "--list")
 _SHOWN = 10  # unsettled repetitions that are listed individually
 _OWN = "dim"  # style of the scene-independent steps
 
@@ -31,7 +30,6 @@ _OWN = "dim"  # style of the scene-independent steps
 )
 @overwrite_flag
 @click.option("--explain", is_flag=True, help="Only list the steps that would run, in order, and the cost of each.")
-@click.option("--ablate", is_flag=True, help="Remove each effect in turn, and show the change in accuracy and time.")
 @click.option("--list", "listing", is_flag=True, help="Only list the shipped scenes.")
 @click.option("--repetitions", type=click.IntRange(1, 100_000), help="Trials per grasp type and subject.")
 @click.option(
@@ -59,7 +57,6 @@ def command(
     scene: str | None,
     output: Path | None,
     explain: bool,
-    ablate: bool,
     listing: bool,
     repetitions: int | None,
     more: int | None,
@@ -86,7 +83,7 @@ def command(
     from thenar.simulator.errors import SceneError
     from thenar.simulator.pipeline.scene_file import load_scene, located, own_file, shipped_scenes
 
-    _check_modes(scene, (output, explain, ablate, listing), keep_unsettled=keep_unsettled)
+    _check_modes(scene, (output, explain, listing), keep_unsettled=keep_unsettled)
     if scene is None:
         show(scenes := shipped_scenes(), lambda _: echo("\n".join(f"{each.name:<16}{each.what}" for each in scenes)))
         return
@@ -100,16 +97,10 @@ def command(
                 simulated = simulate(loaded, jobs, report, keep_unsettled=keep_unsettled)
             simulated.grasp_set.save(output)
             show(simulated.report, _print_report, output, simulated.grasp_set.size)
-        elif explain:
+        else:
             from thenar.simulator.pipeline.explain import explain as explained
 
             show(explained(loaded, jobs), _print_explanation)
-        else:
-            from thenar.simulator.pipeline.ablation import ablate as ablated
-
-            with progress(f"removing the effects of {loaded.name}") as report:
-                ablation = ablated(loaded, jobs, report)
-            show(ablation, _print_ablation)
     except SceneError as fault:
         raise located(scene, fault) from fault
 
@@ -211,29 +202,3 @@ def _print_explanation(explanation: "Explanation") -> None:
 
 def _whose(own: bool) -> str:
     return "own" if own else "effect"
-
-
-def _print_ablation(ablation: "Ablation") -> None:
-    """Print the effect of each step on accuracy and time."""
-    whole = ablation.variants[0]
-    columns = [f"{one.inputs}{what}" for one in whole.rates for what in ("", ", change")]
-    variants = _table(
-        f"Scene {ablation.scene} without each of its effects, simulated",
-        *("without", *columns, "us a grasp", "change", "unsettled"),
-    )
-    for variant in ablation.variants:
-        cells = [cell for one in variant.rates for cell in (interval(one.rate), _change(one.change))]
-        slower = "" if variant is whole else f"{variant.us_a_grasp - whole.us_a_grasp:+.0f}"
-        times = (f"{variant.us_a_grasp:.0f}", slower)
-        variants.add_row(variant.without or "(nothing)", *cells, *times, str(variant.unsettled))
-    console = out()
-    console.print(variants)
-    console.print(
-        f"LogitBoost with {ablation.rounds} rounds on all switches, all joints and both, {ablation.folds} folds within "
-        "each subject; accuracies in %, with 95 % intervals;\n"
-        "changes in percentage points, of grasps that settled with and without; time of a few grasps, best of several"
-    )
-
-
-def _change(change: "AccuracyChange | None") -> str:
-    return "" if change is None else f"{100 * change.mean:+z.1f} [{100 * change.low:+z.1f}, {100 * change.high:+z.1f}]"

@@ -132,6 +132,11 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
         ),
     ] = 0.01
 
+    def __hash__(self) -> int:
+        # Of what a search varies; settings are a dict.
+        chosen = self.placement, self.prune, self.keep, self.inputs, self.levels, self.keep_joints, self.trainer
+        return hash((*chosen, self.rounds, self.width, self.table_bits))
+
 
 def changed(recipe: Recipe, changes: Mapping[str, Any]) -> Recipe:
     """Return a recipe with other choices, by name; names that are not fields are settings of the trainer."""

@@ -139,7 +139,6 @@ ALLOWED = {
         "compiler.workers",
         "simulator",
     ),
-    "simulator.pipeline.ablation": ("compiler.evaluation.ablation", "simulator"),
     "stability": ("compiler", "drivers", "runtime", "simulator", "stability"),
     "stability.reference": ("stability.reference",),
     "cli": PACKAGES,

@@ -103,12 +103,10 @@ def choose_training(
         tests |= {(one, name): test for one, test in zip(batch, found, strict=True)}
         if report is not None:
             report(done, len(tasks) + 1)
-    scores = [
-        _Score.over(samples, clusters, [tests[one, fold.name] for fold in folds]) for one in range(len(candidates))
-    ]
+    scores = [_joined([tests[one, fold.name] for fold in folds]) for one in range(len(candidates))]
     if not grouped:
         of = "pooled" if np.ptp(samples.subjects) else "within subject"
-    return _fitting(candidates, scores, samples.n_classes, of, len(folds))
+    return _fitting(candidates, scores, clusters, samples.n_classes, of, len(folds))
 
 
 def _spread(samples: Samples) -> Rows:
@@ -132,14 +130,26 @@ def _alike(training: Training) -> tuple[object, ...]:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Test:
     """The result for the trials of a fold: the first rows (T,) of trials with a grasp, and whether each was recognised;
-    the number of trials including those without a grasp, and the sum of their losses.
+    the number of trials including those without a grasp, the sum of their losses, and the rows of its tables.
     """
 
     first: Rows
     hits: NDArray[np.bool_]
     trials: int
     loss: float
-    rows: int
+    rows: float
+
+
+def _joined(tests: list[_Test]) -> _Test:
+    """Return the result over all inner folds: the mean loss, and the mean number of rows."""
+    trials = sum(test.trials for test in tests)
+    return _Test(
+        np.concatenate([test.first for test in tests]),
+        np.concatenate([test.hits for test in tests]),
+        trials,
+        round(fsum(test.loss for test in tests) / trials, 6),
+        sum(test.rows for test in tests) / len(tests),
+    )
 
 
 _Task = tuple[Samples, Fold, list[Training], list[int]]
@@ -180,26 +190,6 @@ def _table_rows(tables: ScoreTables) -> int:
     return sum(term.n_rows for term in tables.terms if isinstance(term, CoreTerm) and term.largest > 0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Score:
-    """A candidate over all inner folds: trials recognised (T,), the cluster of each, mean loss, and rows of tables."""
-
-    hits: NDArray[np.bool_]
-    clusters: Rows
-    loss: float
-    rows: float
-
-    @classmethod
-    def over(cls, samples: Samples, clusters: NDArray[np.generic], tests: list[_Test]) -> "_Score":
-        first = np.concatenate([test.first for test in tests])
-        return cls(
-            np.concatenate([test.hits for test in tests]),
-            np.unique(clusters[first], return_inverse=True)[1],
-            round(fsum(test.loss for test in tests) / sum(test.trials for test in tests), 6),
-            sum(test.rows for test in tests) / len(tests),
-        )
-
-
 def _error(gains: NDArray[np.intp], clusters: Rows) -> float:
     """Return the standard error of the mean of integers (T,) in clusters, robust to correlation within them."""
     sizes, own, total = np.bincount(clusters), np.zeros(clusters.max() + 1, np.int64), int(gains.sum())
@@ -208,7 +198,16 @@ def _error(gains: NDArray[np.intp], clusters: Rows) -> float:
     return sqrt(squares * len(sizes) / max(1, len(sizes) - 1)) / len(gains) ** 2
 
 
-def _fitting(candidates: Sequence[Training], scores: list[_Score], n_classes: int, of: Of, n_folds: int) -> Fitting:
+def _fitting(
+    candidates: Sequence[Training],
+    scores: list[_Test],
+    clusters: NDArray[np.generic],
+    n_classes: int,
+    of: Of,
+    n_folds: int,
+) -> Fitting:
+    # All candidates are tested on the same trials.
+    cluster = np.unique(clusters[scores[0].first], return_inverse=True)[1]
     best = min(range(len(scores)), key=lambda one: (-int(scores[one].hits.sum()), scores[one].loss))
     found = []
     for candidate, score in zip(candidates, scores, strict=True):
@@ -219,10 +218,10 @@ def _fitting(candidates: Sequence[Training], scores: list[_Score], n_classes: in
                 _values(candidate),
                 correct=int(score.hits.sum()),
                 total=len(score.hits),
-                error=round(_error(score.hits.astype(np.intp), score.clusters), 6),
+                error=round(_error(score.hits.astype(np.intp), cluster), 6),
                 loss=score.loss,
                 behind=round(int(lost.sum()) / len(lost), 6),
-                behind_error=round(_error(lost, score.clusters), 6),
+                behind_error=round(_error(lost, cluster), 6),
                 rows=score.rows,
             )
         )

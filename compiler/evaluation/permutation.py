@@ -12,7 +12,7 @@ from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..trainers.base import Training
 from ..workers import in_workers
-from .plan import ANGLE, ANGLE_SELECTED, SELECTED, Composition, Data, Planner, Progress, Ways, predictions
+from .plan import ANGLE, ANGLE_SELECTED, SELECTED, Composition, Data, Planner, Progress, predictions, ways_of
 from .populations import NESTED, OF, Population, Scheme, groups_of, populations
 from .rates import RecipeWords
 from .tables import RateReader
@@ -51,54 +51,53 @@ class Permuted:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Permutations:
-    """The evaluation to repeat m times, of a study; parts are the populations of the true labels."""
+def permuted(
+    grasp_set: GraspSet,
+    parts: tuple[Population, ...],
+    scheme: Scheme,
+    placer: Placer,
+    words: RecipeWords,
+    m: int,
+    jobs: int,
+    progress: Progress,
+) -> Permuted:
+    """Return the test of an evaluation, of m > 0 permutations, with selected switches and joints as far as the set has
+    them; `parts` are the populations of the true labels.
+    """
+    kind = ANGLE_SELECTED if grasp_set.joints else SELECTED
+    kind = kind if grasp_set.element_names else ANGLE
+    tasks = [(grasp_set, parts, scheme, placer, kind, number) for number in range(m + 1)]
+    correct, total = _counted(tasks[0])
+    shuffled = []
+    for count, _ in in_workers(_counted, tasks[1:], jobs):
+        shuffled.append(count)
+        progress(len(shuffled), m)
+    return Permuted(
+        composition=f"{kind.name} {kind.what}",
+        recipe=words,
+        of=OF[scheme],
+        unit="trials",
+        rate=correct / total,
+        permutations=m,
+        chance=sum(shuffled) / m / total,
+        highest=max(shuffled) / total,
+        p=(sum(count >= correct for count in shuffled) + 1) / (m + 1),
+    )
 
-    parts: tuple[Population, ...]
-    scheme: Scheme
-    placer: Placer
-    training: Training
-    ways: Ways
-    words: RecipeWords
 
-    def test(self, grasp_set: GraspSet, m: int, jobs: int, progress: Progress | None) -> Permuted:
-        """Return the test with selected switches and joints, as far as the set has them; m > 0."""
-        kind = ANGLE_SELECTED if grasp_set.joints else SELECTED
-        kind = kind if grasp_set.element_names else ANGLE
-        tasks = [(self, grasp_set, kind, number) for number in range(m + 1)]
-        correct, total = _counted(tasks[0])
-        shuffled = []
-        for count, _ in in_workers(_counted, tasks[1:], jobs):
-            shuffled.append(count)
-            if progress is not None:
-                progress(len(shuffled), m)
-        return Permuted(
-            composition=f"{kind.name} {kind.what}",
-            recipe=self.words,
-            of=OF[self.scheme],
-            unit="trials",
-            rate=correct / total,
-            permutations=m,
-            chance=sum(shuffled) / m / total,
-            highest=max(shuffled) / total,
-            p=(sum(count >= correct for count in shuffled) + 1) / (m + 1),
-        )
-
-
-def _counted(task: tuple[Permutations, GraspSet, Composition, int]) -> tuple[int, int]:
+def _counted(task: tuple[GraspSet, tuple[Population, ...], Scheme, Placer, Composition, int]) -> tuple[int, int]:
     """Return the number of trials that a permutation (0: the true labels) predicts correctly, and the total."""
-    how, grasp_set, kind, number = task
-    recipe = how.placer.recipe
+    grasp_set, parts, scheme, placer, kind, number = task
+    recipe = placer.recipe
     made = shuffled_labels(grasp_set, (recipe.seed, number)) if number else grasp_set
-    parts = populations(made, "trial", recipe.folds, 1, recipe.seed) if how.scheme == "trial" else how.parts
-    planner = Planner(parts, Samples.of(made), how.placer)
+    if scheme == "trial":
+        parts = populations(made, scheme, recipe.folds, 1, recipe.seed)
+    planner = Planner(parts, Samples.of(made), placer)
     cells = [planner.cell(part, kind, partial(planner.own, NESTED)) for part in parts]
     cells = [replace(cell, runs=cell.runs[:1]) for cell in cells]
-    data = Data.of(made)
-    found = {fit: predictions(data, fit, how.training, how.ways) for cell in cells for fit in cell.fits}
+    data, training, ways = Data.of(made), Training.of(recipe), ways_of(recipe)
+    found = {fit: predictions(data, fit, training, ways) for cell in cells for fit in cell.fits}
     grasps = tuple(np.unique(made.labels).tolist())
-    scheme = how.scheme
     groups = groups_of(made, scheme)
     reader = RateReader(made.labels, made.trial_ids, grasps, found, frozenset(), OF[scheme], groups)
     rate, _ = reader.rates(cells)

@@ -311,7 +311,7 @@ class Planner:
         return [
             self._row(recipe.title, what, SELECTED, partial(self.own, protocol)),
             *(self._row(each.title, each.help, SELECTED, partial(baseline, each.name)) for each in baselines),
-            _joined(draws),
+            replace(draws[0], cells=tuple(map(_joined, zip(*(draw.cells for draw in draws), strict=True)))),
         ]
 
     def _trainers(self, protocol: Protocol) -> list[RowPlan]:
@@ -338,10 +338,6 @@ class Planner:
     @property
     def _n_switches(self) -> int:
         return self.samples.n_switches + int(self.samples.taxels.shape[1])
-
-    @property
-    def _learner(self) -> str:
-        return AUTO if self.recipe.trainer == AUTO else ""
 
     def own(self, protocol: Protocol, part: Population, fold: Fold) -> Elements:
         """Return the recipe's placement for a fold, chosen from the population's own rows as the protocol allows."""
@@ -387,17 +383,17 @@ class Planner:
 
         `select` returns the placement for a fold, and `most` is the number of joints kept, None: the recipe's.
         """
+        learner = learner or (AUTO if self.recipe.trainer == AUTO else "")
 
         def fit(fold: Fold) -> FoldFit:
             placement = select(part, fold) if kind.needs_placement else ()
             elements = kind.elements(placement, self.elements(fold.train) if kind.others else ())
             joints = self.joints(fold.train, elements, most or self.recipe.keep_joints) if kind.angle else ()
-            return FoldFit(fold, elements, joints, part.grasps, learner or self._learner)
+            return FoldFit(fold, elements, joints, part.grasps, learner)
 
         return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
 
 
-def _joined(rows: list[RowPlan]) -> RowPlan:
-    """Return one row whose cells hold the runs of all `rows`."""
-    cells = zip(*(row.cells for row in rows), strict=True)
-    return replace(rows[0], cells=tuple(CellPlan(same[0].part, sum((c.runs for c in same), ())) for same in cells))
+def _joined(cells: tuple[CellPlan, ...]) -> CellPlan:
+    """Return one cell that holds the runs of all."""
+    return CellPlan(cells[0].part, tuple(run for cell in cells for run in cell.runs))

@@ -1,6 +1,6 @@
 """Populations: the rows behind a column of the tables, their folds, and the rows from which a placement is chosen."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -58,27 +58,32 @@ def populations(grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int,
     subject: the rows of all others are trained on. Only `trial` has a seed, and so repeats (seed, seed + 1, ...). No
     scheme has rows of one trial on both sides of a fold. Raises EvaluationError naming a subject that cannot be split.
     """
+    subjects, everyone = grasp_set.subjects, np.arange(len(grasp_set))
+
+    def population(name: str, rows: Rows, repeats: Sequence[Sequence[Fold]]) -> Population:
+        grasps = tuple(np.unique(grasp_set.labels[rows]).tolist())
+        return Population(name, rows, grasps, tuple(tuple(fold.of(rows) for fold in folds) for folds in repeats))
+
+    def cut(rows: Rows) -> list[list[Fold]]:
+        """Return the repeats of folds of one subject's rows, numbered within these."""
+        if scheme in ("object", "session"):
+            groups = grasp_set.objects if scheme == "object" else grasp_set.sessions
+            return [leave_one_out(groups[rows], scheme)]
+        if scheme == "block":
+            return [block_folds(grasp_set.trials[rows], n_folds)]
+        labels, trials = grasp_set.labels[rows], grasp_set.trial_ids[rows]
+        return [trial_folds(labels, trials, n_folds, seed + repeat) for repeat in range(repeats)]
+
     if scheme == "subject":
-        everyone = np.arange(len(grasp_set))
-        folds = leave_one_out(grasp_set.subjects, "subject")
-        return tuple(_population(grasp_set, fold.name, everyone, ((fold,),)) for fold in folds)
-    cut = _cutter(grasp_set, scheme, n_folds, repeats, seed)
-    names = np.unique(grasp_set.subjects).tolist()
-    return tuple(_of_subject(grasp_set, name, cut) for name in names)
-
-
-_Cut = Callable[[Rows], list[list[Fold]]]
-
-
-def _cutter(grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int, seed: int) -> _Cut:
-    """Return a function that splits rows into repeats of folds, numbered within the rows."""
-    if scheme in ("object", "session"):
-        groups = grasp_set.objects if scheme == "object" else grasp_set.sessions
-        return lambda rows: [leave_one_out(groups[rows], scheme)]
-    if scheme == "block":
-        return lambda rows: [block_folds(grasp_set.trials[rows], n_folds)]
-    labels, trials = grasp_set.labels, grasp_set.trial_ids
-    return lambda rows: [trial_folds(labels[rows], trials[rows], n_folds, seed + repeat) for repeat in range(repeats)]
+        return tuple(population(fold.name, everyone, [[fold]]) for fold in leave_one_out(subjects, "subject"))
+    found = []
+    for name in np.unique(subjects).tolist():
+        rows = np.flatnonzero(subjects == name)
+        try:
+            found.append(population(name, rows, cut(rows)))
+        except EvaluationError as reason:
+            raise EvaluationError(f"subject {name}: {reason}") from reason
+    return tuple(found)
 
 
 def groups_of(grasp_set: GraspSet, scheme: Scheme) -> NDArray[np.str_] | None:
@@ -86,19 +91,6 @@ def groups_of(grasp_set: GraspSet, scheme: Scheme) -> NDArray[np.str_] | None:
     if scheme == "session":
         return np.char.add(np.char.add(grasp_set.subjects, "\n"), grasp_set.sessions)
     return {"subject": grasp_set.subjects, "object": grasp_set.objects}.get(scheme)
-
-
-def _of_subject(grasp_set: GraspSet, name: str, cut: _Cut) -> Population:
-    rows = np.flatnonzero(grasp_set.subjects == name)
-    try:
-        repeats = tuple(tuple(fold.of(rows) for fold in folds) for folds in cut(rows))
-    except EvaluationError as reason:
-        raise EvaluationError(f"subject {name}: {reason}") from reason
-    return _population(grasp_set, name, rows, repeats)
-
-
-def _population(grasp_set: GraspSet, name: str, rows: Rows, repeats: tuple[tuple[Fold, ...], ...]) -> Population:
-    return Population(name, rows, tuple(np.unique(grasp_set.labels[rows]).tolist()), repeats)
 
 
 ProtocolName = Literal["paper", "nested"]

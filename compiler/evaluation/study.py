@@ -1,7 +1,7 @@
 """An evaluation: the paper's tables for the user's own recordings, with each distinct fit run once."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -20,16 +20,13 @@ from ..samples import Samples
 from ..text import counted
 from ..trainers.base import Training
 from .folds import EvaluationError
-from .learning import Learning, LearningPlan, plan_learning
-from .permutation import Permutations, Permuted
+from .learning import Learning, plan_learning
+from .permutation import Permuted, permuted
 from .plan import (
     BASELINES,
     Data,
-    FoldFit,
-    Labels,
     Planner,
     Progress,
-    RowPlan,
     TableName,
     is_blind,
     run_fits,
@@ -185,90 +182,57 @@ def evaluate(
     True
     """
     design = (design or StudyDesign()).changed(**changes)
-    training, ways = Training.of(design.recipe), ways_of(design.recipe)
+    recipe, scheme = design.recipe, design.scheme
     chosen = _of_subjects(grasp_set.without_none(), design.subjects)
-    planned = _Planned.of(chosen, design, Placer(design.recipe, ports, limits))
-    before = None if progress is None else _before(progress, design.permute)
-    predictions = run_fits(planned.data, planned.fits, training, jobs, before, ways)
-    permuted = None
-    if m := design.permute:
-        words = _recipe_of("compositions", design.recipe)
-        how = Permutations(planned.parts, design.scheme, planned.placer, training, ways, words)
-        permuted = how.test(chosen, m, jobs, None if progress is None else _after(progress, len(predictions)))
-    found = planned.study(grasp_set.fingerprint(), predictions, permuted)
+    parts = populations(chosen, scheme, recipe.folds, design.repeats, recipe.seed)
+    reasons = {name: _why_not(name, chosen, parts, design) for name in design.tables}
+    if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
+        _check_all_switches(chosen, parts)
+    planner = Planner(parts, Samples.of(chosen), Placer(recipe, ports, limits), design.prune_list, design.baselines)
+    plans = {
+        (name, each.name): planner.table(name, each)
+        for name, reason in reasons.items()
+        if reason is None
+        for each in PROTOCOLS
+        if each.name in design.protocols and (each is NESTED or name not in _NESTED)
+    }
+    data, curves = Data.of(chosen, scheme), None
+    if design.learning:
+        curves = plan_learning(data, chosen.subjects, planner, scheme, recipe.folds, design.repeats)
+    cells = [cell for rows in plans.values() for row in rows for cell in row.cells]
+    fits = [fit for cell in (*cells, *(curves.every if curves else ())) for fit in cell.fits]
+
+    def report(done: int, total: int, before: int = 0, after: int = 0) -> None:
+        if progress is not None:
+            progress(before + done, before + total + after)
+
+    after = partial(report, after=design.permute)
+    predictions = run_fits(data, fits, Training.of(recipe), jobs, after, ways_of(recipe))
+    test = None
+    if design.permute:
+        words, before = _recipe_of("compositions", recipe), partial(report, before=len(predictions))
+        test = permuted(chosen, parts, scheme, planner.placer, words, design.permute, jobs, before)
+    grasps = tuple(np.unique(chosen.labels).tolist())
+    blind = frozenset(fit for fit in predictions if is_blind(data, fit))
+    reader = RateReader(chosen.labels, data.trials, grasps, predictions, blind, OF[scheme], data.groups)
+    learning = None
+    if curves is not None:
+        words = _recipe_of("trainers", recipe)
+        learning = curves.read(replace(reader, of=curves.of), data.groups, recipe.seed, words)
     empty = grasp_set.is_none & np.isin(grasp_set.subjects, np.unique(chosen.subjects))
-    return replace(found, rests=len(np.unique(grasp_set.trial_ids[empty])))
-
-
-@dataclass(frozen=True, slots=True)
-class _Planned:
-    """An evaluation before its fits are run: the tables' rows and the learning curves of `grasp_set`."""
-
-    grasp_set: GraspSet
-    design: StudyDesign
-    placer: Placer
-    parts: tuple[Population, ...]
-    data: Data
-    left_out: tuple[LeftOut, ...]
-    tables: Mapping[tuple[TableName, ProtocolName], list[RowPlan]]
-    curves: LearningPlan | None
-
-    @classmethod
-    def of(cls, grasp_set: GraspSet, design: StudyDesign, placer: Placer) -> Self:
-        """Plan the tables that `design` requests and the set has inputs for."""
-        recipe = design.recipe
-        parts = populations(grasp_set, design.scheme, recipe.folds, design.repeats, recipe.seed)
-        reasons = {name: _why_not(name, grasp_set, parts, design) for name in design.tables}
-        if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
-            _check_all_switches(grasp_set, parts)
-        planner = Planner(parts, Samples.of(grasp_set), placer, design.prune_list, design.baselines)
-        tables = {
-            (name, each.name): planner.table(name, each)
-            for name, reason in reasons.items()
-            if reason is None
-            for each in PROTOCOLS
-            if each.name in design.protocols and (each is NESTED or name not in _NESTED)
-        }
-        data, curves = Data.of(grasp_set, design.scheme), None
-        if design.learning:
-            curves = plan_learning(data, grasp_set.subjects, planner, design.scheme, recipe.folds, design.repeats)
-        left_out = tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None)
-        return cls(grasp_set, design, placer, parts, data, left_out, tables, curves)
-
-    @property
-    def fits(self) -> list[FoldFit]:
-        """The fits of all cells."""
-        cells = [cell for rows in self.tables.values() for row in rows for cell in row.cells]
-        return [fit for cell in (*cells, *(self.curves.every if self.curves else ())) for fit in cell.fits]
-
-    def study(self, fingerprint: str, predictions: dict[FoldFit, Labels], permuted: Permuted | None) -> Study:
-        """Read the accuracies off the predictions."""
-        grasp_set, design, data, curves = self.grasp_set, self.design, self.data, self.curves
-        grasps = tuple(np.unique(grasp_set.labels).tolist())
-        blind = frozenset(fit for fit in predictions if is_blind(data, fit))
-        of = OF[design.scheme]
-        reader = RateReader(grasp_set.labels, data.trials, grasps, predictions, blind, of, data.groups)
-        return Study(
-            fingerprint=fingerprint,
-            rows=len(grasp_set),
-            trials=int(data.trials.max()) + 1,
-            options=design,
-            grasps=tuple(grasp_set.taxonomy.types[label] for label in grasps),
-            warnings=concerns(grasp_set, self.parts, design.scheme, design.recipe.folds),
-            left_out=self.left_out,
-            tables=tuple(
-                reader.table(*which, rows, _recipe_of(which[0], design.recipe)) for which, rows in self.tables.items()
-            ),
-            permuted=permuted,
-            learning=None
-            if curves is None
-            else curves.read(
-                replace(reader, of=curves.of),
-                data.groups,
-                design.recipe.seed,
-                _recipe_of("trainers", design.recipe),
-            ),
-        )
+    return Study(
+        fingerprint=grasp_set.fingerprint(),
+        rows=len(chosen),
+        trials=int(data.trials.max()) + 1,
+        options=design,
+        grasps=tuple(chosen.taxonomy.types[label] for label in grasps),
+        warnings=concerns(chosen, parts, scheme, recipe.folds),
+        left_out=tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None),
+        tables=tuple(reader.table(*which, rows, _recipe_of(which[0], recipe)) for which, rows in plans.items()),
+        permuted=test,
+        learning=learning,
+        rests=len(np.unique(grasp_set.trial_ids[empty])),
+    )
 
 
 def recipe_words(recipe: Recipe) -> RecipeWords:
@@ -289,14 +253,6 @@ def _recipe_of(name: TableName, recipe: Recipe) -> RecipeWords:
     }
     chosen = "that of the row, its settings chosen from the training rows"
     return RecipeWords(methods.get(name, same.method), chosen if name == "trainers" else same.trainer)
-
-
-def _before(progress: Progress, permutations: int) -> Progress:
-    return lambda done, total: progress(done, total + permutations)
-
-
-def _after(progress: Progress, fits: int) -> Progress:
-    return lambda done, total: progress(fits + done, fits + total)
 
 
 def _of_subjects(grasp_set: GraspSet, subjects: tuple[str, ...]) -> GraspSet:

@@ -6,6 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace as changed_to
+
+from thenar.runtime.recipe import Recipe
 
 from ..evaluation.luck import Draws
 from ..evaluation.rates import Rate
@@ -13,12 +16,12 @@ from ..trainers.base import TRAINERS, Training
 from .finalists import EvaluatedFinalist
 from .latency import POLICIES
 from .points import DecisionKind, FrontierPoint, Latency, PointSetting, PointTime, front
-from .price import PricedTables, Wired
+from .price import PricedTables
 from .screen import Screened
-from .search import Candidate, Shape
-from .survey import Cuts, TrialAccuracy
+from .search import placement_of
+from .survey import Cuts, Survey, TrialAccuracy
 from .timing.classify_times import Classified
-from .timing.scan_times import NO_TIME
+from .timing.scan_times import NO_TIME, ScanTimes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,14 +35,14 @@ class Design:
     close: EvaluatedFinalist
     tables: PricedTables
     classified: Classified
-    wired: Wired | None
+    wired: ScanTimes | None
     transfer: PointTime
     measured: PointTime | None = None
 
     @property
     def judged(self) -> TrialAccuracy:
         """The evaluation of these tables by which points are chosen."""
-        return self.close.tables[self.tables.tabled]
+        return self.close.tables[self.tables.recipe]
 
     @property
     def rate(self) -> float:
@@ -54,7 +57,7 @@ class Design:
     @property
     def scan(self) -> PointTime:
         """Time of reading the switches."""
-        return PointTime(0.0, "wire") if self.wired is None else PointTime(self.wired.scan.us, self.wired.scan.how)
+        return NO_TIME if self.wired is None else PointTime(self.wired.us, self.wired.how)
 
     @property
     def classify(self) -> PointTime:
@@ -74,8 +77,8 @@ def designs(close: EvaluatedFinalist, read: PointTime = NO_TIME) -> Iterator[Des
     """Yield all designs of a finalist, whose joints take `read`."""
     for tables in close.priced:
         if tables.classified is not None:
-            wirings = tables.wired if close.screened.elements else (None, *tables.wired)
-            yield from (Design(close, tables, tables.classified, wired, read) for wired in wirings)
+            scans = tables.scans if close.screened.elements else (None, *tables.scans)
+            yield from (Design(close, tables, tables.classified, scan, read) for scan in scans)
 
 
 def best_designs(several: Sequence[Design]) -> tuple[list[Design], list[Design]]:
@@ -102,17 +105,18 @@ def lucks(
     A point is the best of everything cheaper than the next point of its front: tables of finalists, and placements that
     were only screened. Of two fronts the greater optimism counts.
     """
-    quickest: dict[tuple[EvaluatedFinalist, Shape], float] = {}
+    # Not all tables were priced: those of the same shape take nearly the same time.
+    quickest: dict[tuple[EvaluatedFinalist, Recipe], float] = {}
     for design in several:
-        key = (design.close, design.tables.tabled.shape)
+        key = (design.close, changed_to(design.tables.recipe, rounds=None))
         quickest[key] = min(design.frame.us, quickest.get(key, np.inf))
     closes = list(dict.fromkeys(design.close for design in several))
     chosen = {close.screened.choice for close in closes}
     picked_from = [
-        (judged, quickest[close, tabled.shape], len(close.screened.elements))
+        (judged, us, len(close.screened.elements))
         for close in closes
-        for tabled, judged in close.tables.items()
-        if (close, tabled.shape) in quickest
+        for recipe, judged in close.tables.items()
+        if (us := quickest.get((close, changed_to(recipe, rounds=None)))) is not None
     ]
     picked_from += [(one.judged, one.frame_us, len(one.elements)) for one in screened if one.choice not in chosen]
     judged, *costs = zip(*picked_from, strict=True)
@@ -130,42 +134,44 @@ def lucks(
 
 
 def _effort(design: Design) -> tuple[float, ...]:
-    parts = (design.wired.scan.chips, design.wired.scan.ports) if design.wired else (0, 0)
-    return (*parts, design.scan.us, design.classified.flash, design.tables.tabled.rounds)
+    parts = (design.wired.chips, design.wired.ports) if design.wired else (0, 0)
+    return (*parts, design.scan.us, design.classified.flash, design.tables.recipe.rounds or 1)
 
 
 def points_of(
-    several: Sequence[Design],
-    latencies: Latencies,
-    luck: Mapping[TrialAccuracy, float],
-    names: Callable[[Candidate], Sequence[str]],
-    training: Callable[[Candidate], Training],
-    joints: Callable[[Candidate], Sequence[str]] = lambda _: (),
+    several: Sequence[Design], latencies: Latencies, luck: Mapping[TrialAccuracy, float], survey: Survey
 ) -> tuple[FrontierPoint, ...]:
-    """Return the points on a front, numbered from the fastest frame on.
-
-    luck   the optimism to subtract from each rate
-    names  of the elements of a choice
-    training  of a choice
-    joints    the names of its joints, if not all or none
-    """
+    """Return the points on a front, numbered from the fastest frame on; `luck` is subtracted from each rate."""
     fronts = _fronts(several, latencies)
     ordered = sorted(several, key=lambda design: (design.frame.us, design.n_switches))
     found = [(design, kind) for design in ordered for kind in POLICIES if fronts[design, kind]]
-    return tuple(
-        _point(
-            number,
-            design,
-            kind,
-            latencies[design, kind],
-            luck[design.judged],
-            fronts[design, kind],
-            tuple(names(design.close.screened.choice)),
-            training(design.close.screened.choice),
-            tuple(joints(design.close.screened.choice)),
+    points = []
+    for number, (design, kind) in enumerate(found, 1):
+        wired, close, recipe = design.wired, design.close, design.tables.recipe
+        choice, lucky = close.screened.choice, luck[design.judged]
+        points.append(
+            FrontierPoint(
+                number=number,
+                setting=_setting(recipe, kind, wired, survey.training(choice)),
+                switches=survey.names(choice),
+                rate=corrected(design.judged.rate, lucky),
+                luck=lucky,
+                frames=close.frames.get(recipe),
+                other_rate=close.other.get(recipe),
+                scan=design.scan,
+                transfer=design.transfer,
+                classify=design.classify,
+                frame=design.frame,
+                latency=latencies[design, kind],
+                flash=design.classified.flash,
+                ram=design.classified.ram,
+                ports=0 if wired is None else wired.ports,
+                chips=0 if wired is None else wired.chips,
+                fronts=fronts[design, kind],
+                joints=survey.some_joints(choice),
+            )
         )
-        for number, (design, kind) in enumerate(found, 1)
-    )
+    return tuple(points)
 
 
 def _fronts(several: Sequence[Design], latencies: Latencies) -> dict[tuple[Design, DecisionKind], tuple[str, ...]]:
@@ -187,57 +193,24 @@ def corrected(rate: Rate, luck: float) -> Rate:
     return replace(rate, mean=max(rate.mean - luck, 0.0), low=max(rate.low - luck, 0.0))
 
 
-def _trained(training: Training) -> dict[str, Any]:
-    """Return the `PointSetting` fields of the trainer, except for rounds."""
-    usual = {setting.name: setting.default for setting in TRAINERS.named(training.trainer).settings}
-    own = {name: value for name, value in training.settings.items() if value not in (usual[name], None)}
-    # msgspec omits a name that equals the default only if it is the very same string.
-    return {"trainer": sys.intern(training.trainer), "max_bins": own.pop("max_bins", None), "settings": own}
-
-
-def _point(
-    number: int,
-    design: Design,
-    kind: DecisionKind,
-    latency: Latency,
-    luck: float,
-    fronts: tuple[str, ...],
-    names: tuple[str, ...],
-    training: Training,
-    joints: tuple[str, ...],
-) -> FrontierPoint:
-    wired, tabled, close = design.wired, design.tables.tabled, design.close
-    choice = close.screened.choice
-    return FrontierPoint(
-        number=number,
-        setting=PointSetting(
-            placement=choice.placement,
-            inputs=choice.inputs,
-            rounds=tabled.rounds if TRAINERS.named(training.trainer).staged else None,
-            width=tabled.shape.width,
-            decision=kind,
-            wiring="" if wired is None else wired.wiring,
-            clock_hz=0 if wired is None else wired.clock_hz,
-            table_bits=tabled.shape.table_bits,
-            keep_joints=choice.keep_joints,
-            levels=choice.levels,
-            **_trained(training),
-        ),
-        switches=names,
-        rate=corrected(design.judged.rate, luck),
-        luck=luck,
-        frames=close.frames.get(tabled),
-        other_rate=close.other.get(tabled),
-        scan=design.scan,
-        transfer=design.transfer,
-        classify=design.classify,
-        frame=design.frame,
-        latency=latency,
-        flash=design.classified.flash,
-        ram=design.classified.ram,
-        ports=0 if wired is None else wired.scan.ports,
-        chips=0 if wired is None else wired.scan.chips,
-        compile_s=round(close.choosing_s + design.tables.seconds, 2),
-        fronts=fronts,
-        joints=joints,
+def _setting(recipe: Recipe, kind: DecisionKind, wired: ScanTimes | None, training: Training) -> PointSetting:
+    """Return the choices of a point: of its recipe, and what the recipe leaves open."""
+    trainer = TRAINERS.named(training.trainer)
+    usual = {setting.name: setting.default for setting in trainer.settings}
+    own: dict[str, Any] = {name: value for name, value in training.settings.items() if value not in (usual[name], None)}
+    return PointSetting(
+        placement=placement_of(recipe),
+        inputs=recipe.inputs,
+        rounds=recipe.rounds if trainer.staged else None,
+        width=recipe.width,
+        decision=kind,
+        wiring="" if wired is None else wired.wiring,
+        clock_hz=0 if wired is None else wired.clock_hz,
+        table_bits=recipe.table_bits,
+        max_bins=own.pop("max_bins", None),
+        # msgspec omits a name that equals the default only if it is the very same string.
+        trainer=sys.intern(training.trainer),
+        settings=own,
+        keep_joints=recipe.keep_joints,
+        levels=recipe.levels,
     )

@@ -1,19 +1,25 @@
 """Finalists: select the placements worth full evaluation, and evaluate all their rounds and tables in all folds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from math import log
 
-from thenar.runtime.recipe import Inputs
+from msgspec.structs import replace as changed_to
+
+from thenar.runtime.recipe import Inputs, Recipe
 
 from ..evaluation.folds import Fold
 from ..evaluation.rates import Rate
-from .points import STEP, By, front
-from .price import PricedTables, Tabled, price
+from ..placement.methods.base import BEST, PAPERS
+from .points import STEP, By, ReferencePoint, front
+from .price import PricedTables
 from .screen import Screened
-from .search import NO_SWITCHES, SHAPES, Candidate, Search, Shape
+from .search import SHAPES, Search, placed, tabled
 from .survey import Cuts, FoldHits, Survey, TrialAccuracy
+
+# The paper's S.
+_PAPERS = 62
 
 # Share of the best accuracy; the least gain that counts on a front of screened rates; the threshold of a tie.
 _USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
@@ -27,19 +33,18 @@ _DEEPER = 0.002
 class EvaluatedFinalist:
     """A finalist: its evaluation after every stage (by the ensemble) and with each of the tables; with the same tables,
     its accuracy on single frames (none: a trial has one), and on trials in the other folds (none: only one subject);
-    the costs of the tables worth building; the time of choosing its switches.
+    the costs of the tables worth building. The tables are those of recipes.
     """
 
     screened: Screened
     stages: dict[int, Rate]
-    tables: dict[Tabled, TrialAccuracy]
-    frames: dict[Tabled, Rate]
-    other: dict[Tabled, Rate]
+    tables: dict[Recipe, TrialAccuracy]
+    frames: dict[Recipe, Rate]
+    other: dict[Recipe, Rate]
     priced: tuple[PricedTables, ...]
-    choosing_s: float
 
 
-def finalists(screened: Sequence[Screened], wanted: Sequence[Candidate], most: int) -> tuple[Screened, ...]:
+def finalists(screened: Sequence[Screened], wanted: Collection[Recipe], most: int) -> tuple[Screened, ...]:
     """Return at most `most` of `screened`, in their order, plus the `wanted` ones.
 
     They are on a front of accuracy against frame time or, among the same inputs, against the number of switches, and
@@ -95,7 +100,10 @@ def _errors(one: Screened) -> float:
 
 def _different(screened: Sequence[Screened]) -> list[Screened]:
     """Return the first of those that keep the same inputs."""
-    first = {(replace(one.choice, placement=NO_SWITCHES), *sorted(one.elements)): one for one in reversed(screened)}
+    first = {}
+    for one in reversed(screened):
+        rest = changed_to(one.choice, placement=PAPERS, keep=None, prune=0)
+        first[rest, *sorted(one.elements)] = one
     return list(first.values())[::-1]
 
 
@@ -116,32 +124,53 @@ def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[Eval
     depths = {one: depth_of(searches[one], [fits[one, fold] for fold in cuts.screening], rows) for one in choices}
     fits |= survey.fit(choices, cuts.others, lambda one: (depths[one].stages, depths[one].tabled))
     judged = {
-        choice: _judged(cuts, depth, {fold: fits[choice, fold] for fold in (*cuts.screening, *cuts.others)})
+        choice: _judged(cuts, choice, depth, {fold: fits[choice, fold] for fold in (*cuts.screening, *cuts.others)})
         for choice, depth in depths.items()
     }
-    calls = [
-        (
-            survey.samples,
-            survey.names(one.choice),
-            cuts.everything.train,
-            survey.selection(one.choice),
-            tuple(dict.fromkeys([*worthwhile(judged[one.choice][1]), papers_tables(searches[one.choice])])),
-            survey.training(one.choice),
-            survey.equipment,
-            True,
-        )
-        for one in chosen
+    worth = [
+        (choice, tuple(dict.fromkeys([*worthwhile(judged[choice][1]), papers_tables(choice, searches[choice])])))
+        for choice in choices
     ]
-    prices = survey.cache.ask(price, calls)
+    prices = survey.prices(worth, cuts.everything.train, lost=True)
     return tuple(
-        EvaluatedFinalist(one, *judged[one.choice], priced, survey.choosing_s(one.choice))
-        for one, priced in zip(chosen, prices, strict=True)
+        EvaluatedFinalist(one, *judged[one.choice], priced) for one, priced in zip(chosen, prices, strict=True)
     )
 
 
-def papers_tables(search: Search) -> Tabled:
-    """Return the tables that represent the paper's: of its hundred rounds, at the required width."""
-    return Tabled(papers_depth(search).tabled[-1], Shape(16))
+def choices_to_mark(n_elements: int, n_joints: int, trainer: str, levels: int | None = None) -> dict[Recipe, str]:
+    """Return the choices to mark, with their names: the paper's placement and all switches, alone and with the joints;
+    with `levels` levels of each taxel.
+    """
+    # Keeping all switches is the same by any method.
+    marked = ((PAPERS, _PAPERS, f"paper, S = {_PAPERS}"), (BEST, n_elements, f"all of {n_elements}"))
+    kinds: dict[Inputs, str] = {"switches": "", "both": ", joints"} if n_joints else {"switches": ""}
+    return {
+        placed(method, number, trainer, inputs, levels): f"{name}{joints}"
+        for inputs, joints in kinds.items()
+        for method, number, name in marked
+        if n_elements
+    }
+
+
+def marks_of(
+    named: Mapping[Recipe, str], closes: Sequence[EvaluatedFinalist], survey: Survey
+) -> tuple[ReferencePoint, ...]:
+    """Return the marks of those choices that were fully evaluated, with the paper's rounds."""
+    found = []
+    for close in closes:
+        choice, size = close.screened.choice, len(close.screened.elements)
+        if choice in named:
+            recipe = papers_tables(choice, survey.search)
+            priced = next(tables for tables in close.priced if tables.recipe == recipe)
+            us = priced.fastest_us(survey.transfer(choice).us)
+            if us is not None:
+                found.append(ReferencePoint(named[choice], size, close.tables[recipe].rate, us))
+    return tuple(found)
+
+
+def papers_tables(choice: Recipe, search: Search) -> Recipe:
+    """Return the recipe of a choice with tables like the paper's: of its hundred rounds, at the required width."""
+    return tabled(choice, papers_depth(search).tabled[-1])
 
 
 def papers_depth(search: Search) -> Search:
@@ -159,29 +188,32 @@ def depth_of(search: Search, fits: Sequence[FoldHits], rows: int) -> Search:
     return search if gained > _DEEPER * rows else few
 
 
-def worthwhile(tables: Mapping[Tabled, TrialAccuracy]) -> tuple[Tabled, ...]:
+def worthwhile(tables: Mapping[Recipe, TrialAccuracy]) -> tuple[Recipe, ...]:
     """Return, for each shape, the tables of the fewest rounds that reach that shape's best accuracy."""
+    alike: dict[Recipe, list[Recipe]] = {}
+    for recipe in tables:
+        alike.setdefault(changed_to(recipe, rounds=None), []).append(recipe)
     found = []
-    for shape in dict.fromkeys(tabled.shape for tabled in tables):
-        mine = {tabled: judged.rate.mean for tabled, judged in tables.items() if tabled.shape == shape}
-        best = max(mine.values())
-        found.append(min((tabled for tabled in mine if mine[tabled] >= best - STEP), key=lambda tabled: tabled.rounds))
+    for mine in alike.values():
+        best = max(tables[recipe].rate.mean for recipe in mine)
+        level = [recipe for recipe in mine if tables[recipe].rate.mean >= best - STEP]
+        found.append(min(level, key=lambda recipe: recipe.rounds or 1))
     return tuple(found)
 
 
 def _judged(
-    cuts: Cuts, search: Search, fits: Mapping[Fold, FoldHits]
-) -> tuple[dict[int, Rate], dict[Tabled, TrialAccuracy], dict[Tabled, Rate], dict[Tabled, Rate]]:
+    cuts: Cuts, choice: Recipe, search: Search, fits: Mapping[Fold, FoldHits]
+) -> tuple[dict[int, Rate], dict[Recipe, TrialAccuracy], dict[Recipe, Rate], dict[Recipe, Rate]]:
     """Return the rates of an EvaluatedFinalist: after every stage; with each of the tables, by trials and frames; and
     with them in the other folds.
     """
     places = {
-        Tabled(rounds, Shape(*shape)): (row, column)
+        tabled(choice, rounds, shape): (row, column)
         for row, rounds in enumerate(search.tabled)
         for column, shape in enumerate(SHAPES)
     }
 
-    def tables(by: By) -> dict[Tabled, TrialAccuracy]:
+    def tables(by: By) -> dict[Recipe, TrialAccuracy]:
         return {
             each: cuts.judged(by, {fold: fit.tables[row][column] for fold, fit in fits.items()})
             for each, (row, column) in places.items()

@@ -3,21 +3,23 @@
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import version
 from itertools import filterfalse
 from os.path import lexists
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal
 
 import numpy as np
 
+from thenar.runtime.build import Build
 from thenar.runtime.errors import BuildError, HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.names import list_names
 from thenar.runtime.published import NONE
+from thenar.runtime.recipe import Recipe
 
+from ..evaluation.rates import Rate
 from ..limits import check_inputs, check_memory, check_types
 from ..placement.methods.base import METHODS, usual
 from ..placement.ports import ports_of_whole_glove
@@ -28,23 +30,19 @@ from ..samples import Samples
 from ..text import INDEPENDENT, sentence
 from .cache import Cache, Report, Store
 from .designs import Design, Latencies, best_designs, designs, lucks, points_of
-from .equipment import equipment_for
-from .finalists import EvaluatedFinalist, evaluate_finalists, finalists
-from .latency import POLICIES, Pace, latencies
-from .marks import choices_to_mark, marks_of, own_build
-from .measure import measured
+from .finalists import EvaluatedFinalist, choices_to_mark, evaluate_finalists, finalists, marks_of
+from .latency import POLICIES, latencies, movements_of
 from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, FrontierPoint, ReferencePoint, Tried, frontier_to_bytes
+from .price import Equipment, equipment_for, measured
 from .replay import Replay, replay_of
 from .screen import Screened, screen, screen_fewer, screen_others
-from .search import TAXEL_LEVELS, Candidate, Search
-from .segments import MovementSamples
+from .search import TAXEL_LEVELS, Search, placement_of
 from .survey import Cuts, Survey
-from .timing.scan_times import Records, records_of
-from .timing.wirings import WiringOption, is_avr, wirings
+from .timing.scan_times import records_of
+from .timing.wirings import is_avr, wirings
 from .words import csv_bytes
 
-RecordTime = Literal["formula", "wire"]
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.sqlite"
 _DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in PICTURES)})
 # Placements to screen with the other trainers, as a multiple of the finalists.
@@ -60,31 +58,6 @@ _UNTIMED = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class PointGoal:
-    """Requirement for a point: the best within a time, or the fastest with an accuracy; None: no selection."""
-
-    budget_us: float | None = None
-    rate: float | None = None
-
-    @property
-    def words(self) -> str:
-        """The requirement in words, "" for none."""
-        if self.budget_us is not None:
-            return f"the best within {self.budget_us:g} us a frame"
-        return "" if self.rate is None else f"the fastest that recognises {100 * self.rate:g} %"
-
-    def pick(self, points: Sequence[FrontierPoint]) -> FrontierPoint | None:
-        """Return the selected point, or None."""
-        single = [point for point in points if point.setting.decision == "single"]
-        if self.budget_us is not None:
-            quick = [point for point in single if point.frame.us <= self.budget_us]
-            # By the rates that points were chosen by, for which their luck was estimated.
-            return max(quick, key=lambda point: (point.rate.mean + point.luck, -point.frame.us), default=None)
-        good = [point for point in single if self.rate is not None and point.rate.mean >= self.rate]
-        return min(good, key=lambda point: (point.frame.us, -point.rate.mean), default=None)
-
-
 def find_frontier(
     grasp_set: GraspSet,
     output: Path | None = None,
@@ -93,11 +66,10 @@ def find_frontier(
     harness: Harness | None = None,
     target: str = "host",
     search: Search | None = None,
-    wanted: PointGoal | None = None,
+    budget_us: float | None = None,
+    rate: float | None = None,
     build: Path | None = None,
     joint_us: float | None = None,
-    record_time: RecordTime = "formula",
-    filtered: bool = False,
     stream: GraspSet | None = None,
     jobs: int = -1,
     report: Report | None = None,
@@ -123,18 +95,14 @@ def find_frontier(
         Deployment target, one of `thenar.compiler.frontier.targets.TARGETS`.
     search : Search, optional
         Size of the search. Baselines that are not installed are left out.
-    wanted : PointGoal, optional
-        Which point to pick.
+    budget_us, rate : float, optional
+        Pick the best point within this time of a frame, or the fastest of this accuracy.
     build : Path, optional
         A build folder, to be marked on the pictures.
     joint_us : float, optional
-        Time of reading all joints, in microseconds, if they are not a CyberGlove's. By default that time is left out
-        of every frame, and a sentence of `skipped` says so.
-    record_time : {"formula", "wire"}
-        The time of a CyberGlove's record, if the harness has no measured one: the vendor's formula, or only its bytes
-        on the line.
-    filtered : bool
-        Whether the formula is with the box's digital filter on.
+        Time of reading all joints, in microseconds. By default it is that of a CyberGlove's record, as measured for
+        the harness, else by the vendor's formula; of other joints it is left out of every frame, and a sentence of
+        `skipped` says so.
     stream : GraspSet, optional
         Other recordings of the same glove, to measure decision latency on; usually the test rows of the first fold.
     jobs : int
@@ -170,13 +138,20 @@ def find_frontier(
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
         cache = Cache(store, report or _no_progress, _ROUNDS, jobs=jobs)
         with _remove_created_on_error(made, store):
-            records = _records(grasp_set, harness, target, joint_us, record_time, filtered)
-            equipment = equipment_for(target, _wirings(grasp_set, harness, target), cache, records)
+            records = records_of(
+                grasp_set.joint_names,
+                joint_us,
+                None if harness is None else harness.cyberglove,
+                masked=not is_avr(target),
+            )
+            switches, taxels = bool(grasp_set.switch_names), bool(grasp_set.taxel_columns)
+            options = wirings(harness, target, switches=switches or not taxels, taxels=taxels)
+            equipment = equipment_for(target, options, cache, records)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
             played = _replay(survey, stream)
             own = () if build is None else (own_build(build, grasp_set, equipment),)
         untimed = (_UNTIMED.format(list_names(grasp_set.joint_names)),) if records.how == "unknown" else ()
-        found = _found(survey, played, wanted or PointGoal(), own, (*untimed, *lacking))
+        found = _found(survey, played, (budget_us, rate), own, (*untimed, *lacking))
         if output is not None:
             # The store moves into the new folder as the same file, and stays locked meanwhile.
             store.finish()
@@ -197,25 +172,6 @@ def _remove_created_on_error(made: Sequence[Path], store: Store) -> Iterator[Non
         raise
 
 
-def _records(
-    grasp_set: GraspSet,
-    harness: Harness | None,
-    target: str,
-    joint_us: float | None,
-    record_time: RecordTime,
-    filtered: bool,
-) -> Records:
-    """Return the time of reading the joints, by the best available source."""
-    return records_of(
-        grasp_set.joint_names,
-        joint_us,
-        None if harness is None else harness.cyberglove,
-        wire_only=record_time == "wire",
-        filtered=filtered,
-        masked=not is_avr(target),
-    )
-
-
 def _samples(grasp_set: GraspSet) -> Samples:
     """Return the rows of a set in which something is held, checked before any work."""
     n_types = len(np.unique(grasp_set.labels))
@@ -228,15 +184,6 @@ def _samples(grasp_set: GraspSet) -> Samples:
     check_memory(len(grasp_set), n_types, FrontierError)
     check_trials(grasp_set, FrontierError)
     return Samples.of(grasp_set)
-
-
-def _wirings(grasp_set: GraspSet, harness: Harness | None, target: str) -> tuple[WiringOption, ...]:
-    return wirings(
-        harness,
-        target,
-        switches=bool(grasp_set.switch_names) or not grasp_set.taxel_columns,
-        taxels=bool(grasp_set.taxel_columns),
-    )
 
 
 def _installed(search: Search) -> tuple[Search, tuple[str, ...]]:
@@ -295,29 +242,68 @@ def _replay(survey: Survey, given: GraspSet | None) -> Replay:
     return replay_of(given, labels, seed=seed)
 
 
+def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> ReferencePoint:
+    """Return the user's build as a mark: its recorded rate, and its frame in the fastest wiring for its switches.
+
+    Raises FrontierError if it has no rate, or is not for these recordings or this equipment.
+    """
+    build = Build.load(folder)
+    manifest = build.manifest
+    names = [switch.name for switch in manifest.switches]
+    # Comparable with the frontier's rates.
+    pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
+    if not pooled:
+        raise FrontierError(f"{folder} has no accuracy: compile it with ``folds`` 4, or leave ``build`` out")
+    cost, scans = equipment.model.cost(build.tables), equipment.scans(names)
+    if cost is None or (names and not scans):
+        raise FrontierError(
+            f"{folder} cannot be built for {equipment.model.target}: leave ``build`` out, or ``target``"
+        )
+    joints = [joint.name for joint in manifest.joints]
+    inputs = {*grasp_set.element_names, *grasp_set.joint_names}
+    for name in (*(switch.source for switch in manifest.switches), *joints):
+        if name not in inputs:
+            raise FrontierError(
+                f"{folder} reads {name!r}, which the recordings do not hold: it was compiled from others"
+            )
+    scan_us = min((scan.us for scan in scans), default=0.0)
+    rate = Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled")
+    frame_us = max(scan_us, equipment.records.of(len(joints)).us) + cost.us
+    return ReferencePoint(f"build {folder.name}", len(names), rate, frame_us)
+
+
 def _found(
-    survey: Survey, replay: Replay, wanted: PointGoal, own: tuple[ReferencePoint, ...], lacking: tuple[str, ...]
+    survey: Survey,
+    replay: Replay,
+    goal: tuple[float | None, float | None],
+    own: tuple[ReferencePoint, ...],
+    lacking: tuple[str, ...],
 ) -> Frontier:
-    search, n_switches, most = survey.search, survey.samples.n_switches, survey.levels[-1]
-    n_elements = survey.size(most)
+    search, equipment, most = survey.search, survey.equipment, survey.levels[-1]
+    n_switches, n_elements = survey.samples.n_switches, survey.size(most)
     screened, curves = screen(survey)
     if not screened:
         raise FrontierError(
-            f"no placement that was tried can be built for {survey.equipment.model.target}: name other ``methods`` or "
+            f"no placement that was tried can be built for {equipment.model.target}: name other ``methods`` or "
             "another ``target``"
         )
     several = finalists(screened, (), _WIDER * search.finalists)
-    screened += screen_fewer(survey, finalists([one for one in screened if one.choice.joints], (), _FEWER))
+    with_joints = [one for one in screened if one.choice.inputs != "switches"]
+    screened += screen_fewer(survey, finalists(with_joints, (), _FEWER))
     screened += screen_others(survey, several)
     named = choices_to_mark(n_elements, survey.n_joints, search.trainers[0], most)
-    closes = evaluate_finalists(survey, finalists(screened, list(named), search.finalists))
+    closes = evaluate_finalists(survey, finalists(screened, named, search.finalists))
     every = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
     by_time, by_switches = best_designs(every)
-    kept, skipped = measured(list(dict.fromkeys([*by_time, *by_switches])), survey.equipment, survey.cache)
+    best = list(dict.fromkeys([*by_time, *by_switches]))
+    times = measured([design.tables.content for design in best], equipment.model, survey.cache)
+    kept = [replace(design, measured=times.get(design.tables.content)) for design in best]
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
-    points = points_of(kept, _latencies(survey, replay, kept), luck, survey.names, survey.training, survey.some_joints)
-    picked, tried = wanted.pick(points), _tried(screened, closes, search)
+    points = points_of(kept, _latencies(survey, replay, kept), luck, survey)
+    tried = _tried(screened, closes, search)
     claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
+    model = equipment.model
+    notes = filter(None, (model.unmeasured, model.note, equipment.overhead.what, equipment.records.what))
     return Frontier(
         schema=SCHEMA,
         thenar=version("thenar"),
@@ -332,8 +318,8 @@ def _found(
         n_levels=n_elements - n_switches,
         n_joints=survey.n_joints,
         grasps=survey.samples.grasps,
-        target=survey.equipment.model.target,
-        machine=survey.equipment.model.machine,
+        target=model.target,
+        machine=model.machine,
         folds=search.folds,
         repeats=len(survey.cuts.repeats),
         combinations=len(POLICIES) * len(every) + len(tried),
@@ -341,18 +327,38 @@ def _found(
         tried=tried,
         curves=curves,
         marks=(*marks_of(named, closes, survey), *own),
-        skipped=(*lacking, *claimed, *skipped, replay.what),
-        picked=None if picked is None else picked.number,
-        wanted=wanted.words,
+        skipped=(*lacking, *claimed, *notes, replay.what),
+        picked=_picked(points, *goal),
+        wanted=_in_words(*goal),
     )
+
+
+def _picked(points: Sequence[FrontierPoint], budget_us: float | None, rate: float | None) -> int | None:
+    """Return the number of the selected point: the best within a time, or the fastest of an accuracy; None: none."""
+    single = [point for point in points if point.setting.decision == "single"]
+    if budget_us is not None:
+        quick = [point for point in single if point.frame.us <= budget_us]
+        # By the rates that points were chosen by, for which their luck was estimated.
+        chosen = max(quick, key=lambda point: (point.rate.mean + point.luck, -point.frame.us), default=None)
+    else:
+        good = [point for point in single if rate is not None and point.rate.mean >= rate]
+        chosen = min(good, key=lambda point: (point.frame.us, -point.rate.mean), default=None)
+    return None if chosen is None else chosen.number
+
+
+def _in_words(budget_us: float | None, rate: float | None) -> str:
+    """Return what a point is to be picked for, "" for nothing."""
+    if budget_us is not None:
+        return f"the best within {budget_us:g} us a frame"
+    return "" if rate is None else f"the fastest that recognises {100 * rate:g} %"
 
 
 def _latencies(survey: Survey, replay: Replay, kept: Sequence[Design]) -> Latencies:
     """Return the latency of every design with every decision, by tables trained on rows outside the
     replay of held-out rows.
     """
-    fold, grouped = survey.cuts.screening[0], dict[Candidate, list[Design]]()
-    movements = MovementSamples.of(survey.grasp_set, fold.train, survey.search.seed)
+    fold, seed, grouped = survey.cuts.screening[0], survey.search.seed, dict[Recipe, list[Design]]()
+    movements = movements_of(survey.grasp_set, fold.train)
     for design in kept:
         grouped.setdefault(design.close.screened.choice, []).append(design)
     calls = [
@@ -361,9 +367,10 @@ def _latencies(survey: Survey, replay: Replay, kept: Sequence[Design]) -> Latenc
             fold.train,
             survey.selection(choice, fold),
             replay,
-            tuple(Pace(design.tables.tabled, design.frame.us) for design in mine),
+            tuple((design.tables.recipe, design.frame.us) for design in mine),
             survey.training(choice, fold),
             movements,
+            seed,
         )
         for choice, mine in grouped.items()
     ]
@@ -382,15 +389,16 @@ def _tried(screened: Sequence[Screened], closes: Sequence[EvaluatedFinalist], se
     then = [(close.screened, rounds, rate) for close in closes for rounds, rate in close.stages.items()]
     return tuple(
         Tried(
-            one.choice.placement,
-            one.choice.inputs,
-            len(one.elements),
-            rounds if searches[one.choice.trainer].staged else None,
-            rate,
-            one.frame_us,
-            sys.intern(one.choice.trainer),
-            one.choice.keep_joints,
-            one.choice.levels,
+            placement=placement_of(one.choice),
+            inputs=one.choice.inputs,
+            n_switches=len(one.elements),
+            rounds=rounds if searches[one.choice.trainer].staged else None,
+            rate=rate,
+            frame_us=one.frame_us,
+            # msgspec omits a name that equals the default only if it is the very same string.
+            trainer=sys.intern(one.choice.trainer),
+            keep_joints=one.choice.keep_joints,
+            levels=one.choice.levels,
         )
         for one, rounds, rate in (*first, *then)
     )

@@ -1,34 +1,37 @@
 """Decision latency: the time from a hand's arrival in a grasp until `thenar run` decides on it.
 
-The runtime's `Decision`, `SequentialTest` and `LiveSegments` decide on a stream, played at 1 kHz at most.
+The runtime's `Decision`, `SequentialTest` and `LiveSegments` decide on a stream, played at 1 kHz at most. Segments are
+trained on whole movements: tables with a class for nothing held, and the costs of segments with them.
 """
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
-from msgspec import Struct
 from numpy.typing import NDArray
 
 from thenar.runtime.live.decision import Decision, Ranking, SequentialTest
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.policy import Policy
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.segmenting.live import LiveSegments
 from thenar.runtime.segmenting.model import SegmentModel
 
-from ..evaluation.folds import Rows
+from ..evaluation.folds import Rows, leave_groups_out, trial_folds
+from ..movements.learning import learnt
+from ..movements.streams import TICK_US, MovementError, Stream, Times, streams_of
 from ..placement.placement import InputSelection
+from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..trainers.base import Training
 from .cache import stored
 from .points import DecisionKind, FrontierError, Latency
-from .price import Tabled, tables_of
+from .price import tables_of
 from .replay import Replay
-from .segments import MovementSamples
 
 NOTHING = -1
 # The shortest time between two frames that are played.
@@ -38,93 +41,8 @@ LEAST_STEP_US = 1_000
 Deciding = Policy | SegmentModel | None
 # Takes a frame's time and standing; returns what is decided on, None for nothing.
 Decide = Callable[[int, Ranking], int | None]
-
-
-@dataclass(frozen=True, slots=True)
-class Stretches:
-    """Frames step_us apart in stretches without changes: stretch i is frames first[i] to first[i + 1] - 1, and its
-    scores are scores[i] (K,); first has one more entry, the number of frames.
-    """
-
-    scores: NDArray[np.int32]
-    first: NDArray[np.int64]
-    step_us: int
-
-    @property
-    def times(self) -> Iterator[range]:
-        """The times of the frames of each stretch, in microseconds; the first frame is at 0."""
-        bounds = (self.first * self.step_us).tolist()
-        return (range(a, b, self.step_us) for a, b in pairwise(bounds))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Decisions:
-    """From frame frames[i] (c,) on class types[i] (c,) is decided on; NOTHING means no class."""
-
-    frames: NDArray[np.int64]
-    types: NDArray[np.intp]
-
-    def at(self, frames: NDArray[np.int64]) -> NDArray[np.intp]:
-        """Return the decisions at some frames, none before the first."""
-        return self.types[np.searchsorted(self.frames, frames, side="right") - 1]
-
-
-def stretches(scores: NDArray[np.int32], at_us: NDArray[np.int64], step_us: int) -> Stretches:
-    """Return the frames, one every step_us from at_us[0] on, of states with scores (T, K)
-    that begin at at_us[:-1]; at_us[-1] is the end.
-    """
-    due = -((at_us[0] - at_us) // step_us)
-    seen = np.flatnonzero(due[1:] > due[:-1])
-    alike = np.zeros(len(seen), np.bool_)
-    alike[1:] = (scores[seen[1:]] == scores[seen[:-1]]).all(axis=1)
-    kept = seen[~alike]
-    return Stretches(scores[kept], np.append(due[kept], due[-1]), step_us)
-
-
-def decisions(tables: IntegerTables, frames: Stretches, policy: Deciding) -> Decisions:
-    """Return the decisions of `thenar run` under `policy` on these frames, each whole and seen once, by both devices at
-    the same time; by segments: the held types.
-    """
-    decide = decider_of(tables, policy)
-    changes: list[int] = []
-    types: list[int | None] = []
-    lanes = map(tuple, (frames.scores + LANE_OFFSET).tolist())
-    for stretch, row in zip(frames.times, lanes, strict=True):
-        standing = Ranking(row)
-        for time_us in stretch:
-            decided = decide(time_us, standing)
-            if not types or decided != types[-1]:
-                changes.append(time_us)
-                types.append(decided)
-    return Decisions(
-        np.array(changes, np.int64) // frames.step_us,
-        np.array([NOTHING if one is None else one for one in types], np.intp),
-    )
-
-
-def decider_of(tables: IntegerTables, policy: Deciding) -> Decide:
-    """Return the live recogniser's decider under `policy`."""
-    if policy is None or isinstance(policy, SegmentModel):
-        return _by_segments(tables, policy)
-    if policy.error_rate is None:
-        return Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us).update
-    test = SequentialTest(tables.n_classes, tables.scale, policy.error_rate, policy.hold_us, policy.spacing_us)
-    return test.update
-
-
-def _by_segments(tables: IntegerTables, model: SegmentModel | None) -> Decide:
-    """Return the decider by segments of a model, None: the default, with the default lag: the held type."""
-    model = model or SegmentModel.usual(tables.n_classes, has_none=False, scale=tables.scale)
-    live = LiveSegments(model, [str(number) for number in range(tables.n_classes)], Policy().lag_us or 0)
-
-    def decide(time_us: int, standing: Ranking) -> int | None:
-        segment = live.update(time_us, standing.lanes)
-        return None if segment.state == "forming" else segment.label
-
-    return decide
-
-
-Times = NDArray[np.int64]
+# Rows of movements, with those in which nothing is held, and their streams.
+Movements = tuple[Samples, tuple[Stream, ...]]
 
 # The policies of `thenar run`.
 POLICIES: Mapping[DecisionKind, Policy | None] = MappingProxyType(
@@ -137,49 +55,81 @@ POLICIES: Mapping[DecisionKind, Policy | None] = MappingProxyType(
 )
 
 
-class Pace(Struct, frozen=True):
-    """Tables that predict every `frame_us`."""
-
-    tabled: Tabled
-    frame_us: float
-
-
-@stored(8)
+@stored(9)
 def latencies(
     samples: Samples,
     rows: Rows,
     selection: InputSelection,
     replay: Replay,
-    paces: tuple[Pace, ...],
+    frames: tuple[tuple[Recipe, float], ...],
     training: Training,
-    movements: MovementSamples | None = None,
+    movements: Movements | None = None,
+    seed: int = 1,
 ) -> tuple[tuple[Latency, ...], ...]:
-    """Train on some rows, on the selected inputs; return the latencies on a replay for every pace
-    and each of POLICIES. The replay holds none of the rows.
+    """Train on some rows, on the selected inputs; return the latencies on a replay for the tables of each recipe, with
+    its frame time in microseconds, and each of POLICIES. The replay holds none of the rows.
 
     movements  the same rows with those in which nothing is held: segments use tables trained with these rows, and costs
-               learnt from them. None: segments have the default costs
+               learnt from them. None: segments have the default costs; seed: of the folds for that
     """
     replay, columns = replay.reading(selection.kept, selection.joints), range(len(selection.kept))
-    shapes = tuple(dict.fromkeys(pace.tabled for pace in paces))
-    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, selection, shapes, training)}
-    learnt = movements.segment_tables(selection, shapes, training) if movements else {}
+    recipes = tuple(dict.fromkeys(recipe for recipe, _ in frames))
+    tables = dict(tables_of(samples, rows, selection, recipes, training))
+    segments = segment_tables(movements, seed, selection, recipes, training) if movements else {}
 
-    def of(pace: Pace, kind: DecisionKind) -> Latency:
-        if kind == "segments" and pace.tabled in learnt:
-            return latency(learnt[pace.tabled][0], columns, replay, pace.frame_us, learnt[pace.tabled][1])
-        return latency(tables[pace.tabled], columns, replay, pace.frame_us, POLICIES[kind])
+    def of(recipe: Recipe, frame_us: float, kind: DecisionKind) -> Latency:
+        if kind == "segments" and recipe in segments:
+            made, model = segments[recipe]
+            return latency(made, columns, replay, frame_us, model)
+        return latency(tables[recipe], columns, replay, frame_us, POLICIES[kind])
 
-    return tuple(tuple(of(pace, kind) for kind in POLICIES) for pace in paces)
+    return tuple(tuple(of(recipe, frame_us, kind) for kind in POLICIES) for recipe, frame_us in frames)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Grasps:
-    """Grasps (g,): when each was complete, and when it ended, in microseconds of the stream; and its class."""
+def movements_of(grasp_set: GraspSet, rows: Rows) -> Movements | None:
+    """Return the movements of some of the rows with a grasp; None if the set has no streams, or all rows have one.
 
-    arrived_us: Times
-    ended_us: Times
-    types: NDArray[np.intp]
+    A stream goes from one of these movements to the next only if no other lies between them.
+    """
+    none = grasp_set.is_none
+    try:
+        recorded = streams_of(grasp_set) if none.any() else ()
+    except MovementError:
+        return None
+    movements = grasp_set.movement_ids
+    inside = np.isin(movements, movements[np.flatnonzero(~none)[rows]])
+    if not (none & inside).any():
+        return None
+    place, streams = np.cumsum(inside) - 1, list[Stream]()
+    for stream in recorded:
+        cuts = (np.flatnonzero(np.diff(inside[stream.rows])) + 1).tolist()
+        parts = [stream.part(*ends) for ends in pairwise([0, *cuts, len(stream)])]
+        streams += [replace(part, rows=place[part.rows]) for part in parts if inside[part.rows[0]]]
+    return Samples.of(grasp_set).rows(inside), tuple(streams)
+
+
+def segment_tables(
+    movements: Movements, seed: int, selection: InputSelection, recipes: Sequence[Recipe], training: Training
+) -> dict[Recipe, tuple[IntegerTables, SegmentModel]]:
+    """Return tables of these rows with a class for nothing held, and the costs of segments, for each recipe.
+
+    The costs are selected on the scores of two folds of these rows, which split no movement, and no subject if there
+    are several.
+    """
+    samples, streams = movements
+    if np.ptp(samples.subjects):
+        folds = leave_groups_out(samples.subjects, "subject", 2)
+    else:
+        folds = trial_folds(samples.labels, samples.movements, 2, seed)
+    scores = {recipe: np.zeros((len(samples.labels), samples.n_classes)) for recipe in recipes}
+    for fold in folds:
+        test = selection.read(samples.rows(fold.test))
+        for recipe, made in tables_of(samples, fold.train, selection, recipes, training):
+            scores[recipe][fold.test] = made.scores(test.switches, test.codes) / made.scale
+    return {
+        recipe: (made, learnt(streams, samples.labels, scores[recipe], samples.n_types, made.scale, TICK_US))
+        for recipe, made in tables_of(samples, np.arange(len(samples.labels)), selection, recipes, training)
+    }
 
 
 def latency(
@@ -203,13 +153,44 @@ def latency(
     _check(tables, columns, replay, frame_us)
     takes_us = max(round(frame_us), 1)
     step_us = max(takes_us, LEAST_STEP_US)
-    decided = decided_on(tables, columns, replay, step_us, policy)
-    arrivals, ends, types = np.array(replay.grasps, np.intp).T
-    another = np.concatenate([[True], types[1:] != types[:-1]])
-    begun_us = _bounds_us(replay) - replay.stream.start_us
-    grasps = _Grasps(begun_us[arrivals[another]], begun_us[ends[another]], types[another])
-    predicted_us = decided.frames * step_us + takes_us
-    return _measured(grasps, *_waits_and_errors(predicted_us, decided.types, grasps), takes_us)
+    frames, types = decided_on(tables, columns, replay, step_us, policy)
+    # From predicted_us[i] on types[i] is predicted.
+    predicted_us = frames * step_us + takes_us
+    counted = list(_grasps(replay))
+    standing = np.searchsorted(predicted_us, [arrived_us for arrived_us, _, _ in counted], side="right") - 1
+    beyond = np.searchsorted(predicted_us, [ended_us for _, ended_us, _ in counted], side="right")
+    waits_us, wrong_us, left_us = list[int](), 0, 0
+    for (arrived_us, ended_us, right), first, last in zip(
+        counted, np.maximum(standing, 0).tolist(), beyond.tolist(), strict=True
+    ):
+        hits = np.flatnonzero(types[first:last] == right)
+        if len(hits):
+            since_us = np.maximum(predicted_us[first + hits[0] : last], arrived_us)
+            lasted_us = np.diff(since_us, append=ended_us)
+            waits_us.append(int(since_us[0]) - arrived_us)
+            wrong_us += int(lasted_us[~np.isin(types[first + hits[0] : last], (right, NOTHING))].sum())
+            left_us += ended_us - int(since_us[0])
+    if not waits_us:
+        longest_us = float(max(ended_us - arrived_us for arrived_us, ended_us, _ in counted))
+        return Latency(longest_us, longest_us, 1.0)
+    waits = sorted(max(wait_us, takes_us) for wait_us in waits_us)
+    return Latency(
+        mean_us=sum(waits) / len(waits),
+        p99_us=float(waits[math.ceil(0.99 * len(waits)) - 1]),
+        missed=(len(counted) - len(waits)) / len(counted),
+        wrong=wrong_us / left_us if left_us else 0.0,
+    )
+
+
+def _grasps(replay: Replay) -> Iterator[tuple[int, int, int]]:
+    """Yield when each grasp of another type than the one before was complete and when it ended, in microseconds of the
+    stream, and its class.
+    """
+    at_us, before = (_bounds_us(replay) - replay.stream.start_us).tolist(), NOTHING
+    for arrival, end, right in replay.grasps:
+        if right != before:
+            yield at_us[arrival], at_us[end], right
+        before = right
 
 
 def _bounds_us(replay: Replay) -> Times:
@@ -219,43 +200,53 @@ def _bounds_us(replay: Replay) -> Times:
 
 def decided_on(
     tables: IntegerTables, columns: Sequence[int], replay: Replay, step_us: int, policy: Deciding
-) -> Decisions:
-    """Return the decisions under `policy` on a replay with a frame every step_us, the first at its start."""
+) -> tuple[Times, NDArray[np.intp]]:
+    """Return the decisions under `policy` on a replay with a frame every step_us, the first at its start; of segments,
+    the held types. Both devices show each frame whole, at the same time.
+    """
     rows, codes = replay.stream.rows, replay.codes[:, : None if tables.n_joints else 0]
     scores = tables.scores(replay.bits[rows][:, list(columns)], codes[rows])
-    return decisions(tables, stretches(scores, _bounds_us(replay), step_us), policy)
+    return decisions(scores, _bounds_us(replay), step_us, decider_of(tables, policy))
 
 
-def _waits_and_errors(predicted_us: Times, types: NDArray[np.intp], grasps: _Grasps) -> tuple[Times, Times]:
-    """Return how long (g,) after arrival each grasp was first predicted rightly, -1 if not before its end; and for how
-    much of its remaining time (g,) another type was predicted. From predicted_us[i] on types[i] is predicted.
+def decisions(scores: NDArray[np.int32], at_us: Times, step_us: int, decide: Decide) -> tuple[Times, NDArray[np.intp]]:
+    """Return the frames (c,) from which on other types (c,) are decided on, NOTHING for none.
+
+    Of states with scores (T, K) that begin at at_us[:-1], and end at at_us[-1], a frame is seen every step_us.
     """
-    standing = np.maximum(np.searchsorted(predicted_us, grasps.arrived_us, side="right") - 1, 0).tolist()
-    beyond = np.searchsorted(predicted_us, grasps.ended_us, side="right").tolist()
-    waits_us, wrong_us = np.full(len(grasps.types), -1, np.int64), np.zeros(len(grasps.types), np.int64)
-    for grasp, (first, last, right) in enumerate(zip(standing, beyond, grasps.types.tolist(), strict=True)):
-        predictions = types[first:last]
-        hits = np.flatnonzero(predictions == right)
-        if len(hits):
-            since_us = np.maximum(predicted_us[first + hits[0] : last], grasps.arrived_us[grasp])
-            waits_us[grasp] = since_us[0] - grasps.arrived_us[grasp]
-            lasted_us = np.diff(since_us, append=grasps.ended_us[grasp])
-            wrong_us[grasp] = lasted_us[~np.isin(predictions[hits[0] :], (right, NOTHING))].sum()
-    return waits_us, wrong_us
+    due = -((at_us[0] - at_us) // step_us)
+    changes, types = list[int](), list[int]()
+    for lanes, (first, beyond) in zip((scores + LANE_OFFSET).tolist(), pairwise(due.tolist()), strict=True):
+        standing = Ranking(tuple(lanes))
+        for frame in range(first, beyond):
+            decided = decide(frame * step_us, standing)
+            decided = NOTHING if decided is None else decided
+            if not types or decided != types[-1]:
+                changes.append(frame)
+                types.append(decided)
+    return np.array(changes, np.int64), np.array(types, np.intp)
 
 
-def _measured(grasps: _Grasps, waits_us: Times, wrong_us: Times, step_us: int) -> Latency:
-    lasted_us, predicted = grasps.ended_us - grasps.arrived_us, waits_us >= 0
-    waits = np.sort(np.maximum(waits_us[predicted], step_us))
-    if not len(waits):
-        return Latency(float(lasted_us.max()), float(lasted_us.max()), 1.0)
-    left_us = int((lasted_us - waits_us)[predicted].sum())
-    return Latency(
-        mean_us=int(waits.sum()) / len(waits),
-        p99_us=float(waits[math.ceil(0.99 * len(waits)) - 1]),
-        missed=(len(waits_us) - len(waits)) / len(waits_us),
-        wrong=int(wrong_us.sum()) / left_us if left_us else 0.0,
-    )
+def decider_of(tables: IntegerTables, policy: Deciding) -> Decide:
+    """Return the live recogniser's decider under `policy`."""
+    if policy is None or isinstance(policy, SegmentModel):
+        return _by_segments(tables, policy)
+    if policy.error_rate is None:
+        return Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us).update
+    test = SequentialTest(tables.n_classes, tables.scale, policy.error_rate, policy.hold_us, policy.spacing_us)
+    return test.update
+
+
+def _by_segments(tables: IntegerTables, model: SegmentModel | None) -> Decide:
+    """Return the decider by segments of a model, None: the default, with the default lag: the held type."""
+    model = model or SegmentModel.usual(tables.n_classes, has_none=False, scale=tables.scale)
+    live = LiveSegments(model, [str(number) for number in range(tables.n_classes)], Policy().lag_us or 0)
+
+    def decide(time_us: int, standing: Ranking) -> int | None:
+        segment = live.update(time_us, standing.lanes)
+        return None if segment.state == "forming" else segment.label
+
+    return decide
 
 
 def _check(tables: IntegerTables, columns: Sequence[int], replay: Replay, frame_us: float) -> None:

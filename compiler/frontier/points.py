@@ -27,7 +27,6 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Count = Annotated[int, Meta(ge=0, le=2**53)]
 # Microseconds; a day has 1e11 of them.
 Microseconds = Annotated[float, Meta(ge=0.0, le=1e12)]
-Amount = Annotated[float, Meta(ge=0.0, le=1e12)]
 _T = TypeVar("_T")
 WIDEST: TableBits = 16
 
@@ -125,7 +124,6 @@ class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     ram: Count
     ports: Count
     chips: Count
-    compile_s: Amount
     fronts: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
 
@@ -152,7 +150,7 @@ class Curve(Struct, frozen=True, forbid_unknown_fields=True):
     method: str
     what: str
     ours: bool
-    sizes: tuple[Amount, ...]
+    sizes: tuple[Annotated[float, Meta(ge=0.0, le=1e12)], ...]
     rates: tuple[Rate, ...]
 
 
@@ -163,7 +161,6 @@ class ReferencePoint(Struct, frozen=True, forbid_unknown_fields=True):
     n_switches: Count
     rate: Rate
     frame_us: Microseconds
-    latency_us: Microseconds | None = None
 
 
 class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -241,10 +238,6 @@ def front(
     return best
 
 
-class _Version(Struct, frozen=True):
-    schema: int
-
-
 def frontier_to_bytes(frontier: Frontier) -> bytes:
     """Return the content of `frontier.json`."""
     return msgspec.json.format(msgspec.json.encode(frontier), indent=2) + b"\n"
@@ -257,7 +250,7 @@ def frontier_from_bytes(data: bytes, what: str = "frontier.json") -> Frontier:
     """
     if len(data) > MAX_BYTES:
         raise FrontierError(f"{what} has {len(data)} bytes, a frontier has at most {MAX_BYTES}")
-    schema = _decode(data, _Version, what).schema
+    schema = _decode(data, dict[str, object], what).get("schema")
     if schema != SCHEMA:
         raise FrontierError(f"{what} has schema {schema}, this thenar reads {SCHEMA}: run thenar frontier again")
     frontier = _decode(data, Frontier, what)

@@ -13,6 +13,7 @@ The model leaves out movement within a hold: a trial is one frame, so an error i
 and more frames do not correct it. It also leaves out contact bounce, and switches that are touched in passing.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +32,7 @@ from ..movements.streams import (
     movements_of,
 )
 from ..placement.elements import Elements, above
-from ..recordings.graspset import GraspSet
+from ..recordings.graspset import GraspSet, Joint
 from ..samples import Columns
 from .points import FrontierError
 
@@ -81,7 +82,6 @@ def replay_of(
     *,
     seed: int,
     grasps: int = GRASPS,
-    period_us: int = PERIOD_US,
 ) -> Replay:
     """Return a replay of rows of a set: of its movements if its frames are dense, else composed of its trials.
 
@@ -92,32 +92,16 @@ def replay_of(
     Raises FrontierError if no replay can be made of the rows.
     """
     if frames_are_dense(grasp_set):
-        return recorded(grasp_set, labels, rows, grasps=grasps, period_us=period_us)
+        return recorded(grasp_set, labels, rows, grasps=grasps)
     chosen = np.arange(len(grasp_set)) if rows is None else rows
     chosen = chosen[labels[chosen] >= 0]
-    return composed(
-        grasp_set.switches[chosen],
-        grasp_set.codes[chosen],
-        labels[chosen],
-        seed=seed,
-        grasps=grasps,
-        opens_up=np.array([joint.step < 0 for joint in grasp_set.joints], np.bool_),
-        taxels=grasp_set.taxels[chosen],
-        eases_up=np.array([taxel.step < 0 for taxel in grasp_set.taxel_columns], np.bool_),
-    )
+    return composed(grasp_set.rows(chosen), labels[chosen], seed=seed, grasps=grasps)
 
 
-def recorded(
-    grasp_set: GraspSet,
-    labels: Rows,
-    rows: Rows | None = None,
-    *,
-    grasps: int = GRASPS,
-    period_us: int = PERIOD_US,
-) -> Replay:
+def recorded(grasp_set: GraspSet, labels: Rows, rows: Rows | None = None, *, grasps: int = GRASPS) -> Replay:
     """Return the movements of a set with a grasp and at least LEAST_FRAMES rows, one after the other.
 
-    Rows of a set without times are taken to be `period_us` apart. Two movements are separated by a period plus a
+    Rows of a set without times are taken to be PERIOD_US apart. Two movements are separated by a period plus a
     varying fraction, so that no frame time stays in step with the rows. If there are more than `grasps` movements, that
     many of them are taken, evenly spread.
 
@@ -136,54 +120,41 @@ def recorded(
     complete, released = (begins + frame for frame in holds_of(grasp_set, movements))
     number = np.repeat(np.arange(len(begins)), movements.sizes)
     shown = movements.rows[np.arange(len(number)) - begins[number] + movements.first[number]]
-    times_us = grasp_set.times_us[shown] if grasp_set.times_us.size else np.arange(len(shown)) * period_us
+    times_us = grasp_set.times_us[shown] if grasp_set.times_us.size else np.arange(len(shown)) * PERIOD_US
     steps_us = np.maximum(np.diff(times_us, prepend=times_us[:1]), 0)
-    steps_us[begins[1:]] = period_us + round(_GOLDEN * period_us)
+    steps_us[begins[1:]] = PERIOD_US + round(_GOLDEN * PERIOD_US)
     at_us = np.cumsum(steps_us, dtype=np.int64)
-    apart = "when they were recorded" if grasp_set.times_us.size else f"taken to be {period_us / 1000:g} ms apart"
+    apart = "when they were recorded" if grasp_set.times_us.size else f"taken to be {PERIOD_US / 1000:g} ms apart"
     return Replay(
         grasp_set.switches[shown],
         grasp_set.codes[shown],
         grasp_set.taxels[shown],
-        Stream(np.arange(len(shown)), at_us, int(at_us[-1]) + period_us),
+        Stream(np.arange(len(shown)), at_us, int(at_us[-1]) + PERIOD_US),
         tuple(map(Span, complete.tolist(), released.tolist(), labels[shown[complete]].tolist())),
         f"Latencies are over {len(movements)} recorded movements, frames {apart}: "
         "neighbouring rows of a trial resemble each other, as the frames of a whole movement do.",
     )
 
 
-def composed(
-    switches: Bits,
-    codes: Codes,
-    labels: Rows,
-    *,
-    seed: int,
-    grasps: int = GRASPS,
-    opens_up: Bits | None = None,
-    taxels: Codes | None = None,
-    eases_up: Bits | None = None,
-) -> Replay:
-    """Return a replay composed of single trials (n, s), (n, j) of classes `labels` (n,): see this module.
-
-    opens_up  (j,) the joints whose codes rise as the hand opens; None: the codes of all fall
-    taxels    (n, t) codes; eases_up (t,): those that rise as the taxel is released; None: all fall
+def composed(trials: GraspSet, labels: Rows, *, seed: int, grasps: int = GRASPS) -> Replay:
+    """Return a replay composed of single trials, the rows of a set, of classes `labels` (n,): see this module.
 
     Raises FrontierError for fewer than two grasp types, which have no transitions.
     """
     if len(np.unique(labels)) < 2:
         raise FrontierError("a latency is measured between grasps of different types, and the rows are of one")
-    pads = np.empty((len(labels), 0), np.uint16) if taxels is None else taxels
-    n_switches, rest = switches.shape[1], _open_hand(pads, eases_up).astype(np.uint16)
-    contacts, rest = np.hstack([switches, pads], dtype=np.uint16), np.append(np.zeros(n_switches, np.uint16), rest)
+    n_switches, rest = len(trials.switch_names), _open_hand(trials.taxels, trials.taxel_columns).astype(np.uint16)
+    rest = np.append(np.zeros(n_switches, np.uint16), rest)
+    contacts = np.hstack([trials.switches, trials.taxels], dtype=np.uint16)
     random = np.random.default_rng(seed)
     order = _order(labels, grasps, random)
-    legs = _legs(contacts, rest, codes, _open_hand(codes, opens_up), order, random)
-    readings, at_us = np.concatenate([leg.contacts for leg in legs]), np.concatenate([leg.at_us for leg in legs])
-    ends = np.cumsum([len(leg.at_us) for leg in legs])
+    legs = list(_legs(contacts, rest, trials.codes, _open_hand(trials.codes, trials.joints), order, random))
+    readings, poses, at_us = map(np.concatenate, zip(*legs, strict=True))
+    ends = np.cumsum([len(leg_us) for _, _, leg_us in legs])
     # A leg ends with the state in which its grasp is complete.
     return Replay(
         readings[:, :n_switches] > 0,
-        np.concatenate([leg.codes for leg in legs]),
+        poses,
         readings[:, n_switches:],
         Stream(np.arange(len(at_us)), at_us, int(at_us[-1]) + HOLD_US[0]),
         tuple(map(Span, (ends - 1).tolist(), ends.tolist(), labels[order].tolist())),
@@ -191,15 +162,6 @@ def composed(
         f"{HOLD_US[1] / 1e6:g} s, up to {TRANSITION_US / 1e6:g} s from one to the next: the recordings hold no whole "
         "movements.",
     )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Leg:
-    """The transition from one grasp to the next: states (t,), of which the last is its hold."""
-
-    contacts: Codes
-    codes: Codes
-    at_us: Times
 
 
 def _order(labels: Rows, grasps: int, random: np.random.Generator) -> list[int]:
@@ -215,15 +177,12 @@ def _order(labels: Rows, grasps: int, random: np.random.Generator) -> list[int]:
     return chosen
 
 
-def _open_hand(codes: Codes, opens_up: Bits | None) -> NDArray[np.float64]:
-    """Return the values of joints or taxels (n, c) while nothing is held; opens_up: see composed_stream."""
-    if not len(codes):
-        return np.zeros(codes.shape[1])
+def _open_hand(codes: Codes, columns: Sequence[Joint]) -> NDArray[np.float64]:
+    """Return the codes of joints or taxels (n, c) while nothing is held: low values, which may have high codes."""
     rising = np.sort(codes, axis=0)
     rank = int(_OPEN * (len(codes) - 1))
-    opened: NDArray[np.float64] = np.where(
-        False if opens_up is None else opens_up, rising[len(codes) - 1 - rank], rising[rank]
-    ).astype(np.float64)
+    falls = np.array([column.step < 0 for column in columns], np.bool_)
+    opened: NDArray[np.float64] = np.where(falls, rising[len(codes) - 1 - rank], rising[rank]).astype(np.float64)
     return opened
 
 
@@ -234,8 +193,8 @@ def _legs(
     opened: NDArray[np.float64],
     order: list[int],
     random: np.random.Generator,
-) -> list[_Leg]:
-    legs: list[_Leg] = []
+) -> Iterator[tuple[Codes, Codes, Times]]:
+    """Yield the transition from each grasp to the next: contacts, codes and times of its states, the last its hold."""
     contact, pose, leaves_us = rest, opened, 0
     for row in order:
         lets_go = leaves_us + random.integers(0, RELEASE_US, len(rest))
@@ -244,12 +203,9 @@ def _legs(
         close_us = np.where(contacts[row] != rest, grips, _NEVER)
         at_us, travelled = _changes(leaves_us, open_us, close_us, _path(pose, codes[row].astype(np.float64), opened))
         now = at_us[:, np.newaxis]
-        seen = np.where(now < open_us, contact, np.where(now >= close_us, contacts[row], rest))
-        leg = _Leg(seen, travelled, at_us)
+        yield np.where(now < open_us, contact, np.where(now >= close_us, contacts[row], rest)), travelled, at_us
         contact, pose = contacts[row], codes[row].astype(np.float64)
-        leaves_us = int(leg.at_us[-1]) + int(random.integers(*HOLD_US))
-        legs.append(leg)
-    return legs
+        leaves_us = int(at_us[-1]) + int(random.integers(*HOLD_US))
 
 
 def _path(start: NDArray[np.float64], end: NDArray[np.float64], opened: NDArray[np.float64]) -> Codes:

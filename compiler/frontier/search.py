@@ -1,10 +1,16 @@
-"""The search space of the frontier: placements and their parameters, inputs, rounds, widths, folds."""
+"""The search space of the frontier: placements and their parameters, inputs, rounds, widths, folds.
 
-from collections.abc import Mapping
+A candidate is a `Recipe`: its placement with its number, its inputs, and its trainer; then its rounds, and the shape of
+its tables.
+"""
+
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from typing import Literal
 
-from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Inputs, Recipe, TableBits, changed
+from msgspec.structs import replace as changed_to
+
+from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Inputs, Recipe, changed
 
 from ..placement.elements import LEVELS
 from ..placement.methods.base import METHODS, usual
@@ -13,24 +19,9 @@ from .points import FrontierError, PlacementChoice
 
 # Baselines are only shown for comparison: their curves have few sizes.
 CURVE_SIZES = (4, 8, 16, 33, 66)
-# The placement of inputs without switches.
-NO_SWITCHES = PlacementChoice("none", 0.0)
 ROUNDS = (1, 2, 3, 5, 8, 12, 20, 30, 50, 75, 100, 150, 200, 300)
-
-
-class Shape(NamedTuple):
-    """Shape of the integer tables: sums need at most `width` bits; with table_bits 8 no lookup spans more than 255."""
-
-    width: int
-    table_bits: TableBits = 16
-
-    @property
-    def recipe(self) -> Recipe:
-        """A recipe of tables of this shape."""
-        return Recipe(width=self.width, table_bits=self.table_bits)
-
-
-SHAPES = (*(Shape(width) for width in (16, 12, 8, 6, 5, 4)), Shape(16, 8))
+# The shapes of integer tables: the bits that every sum fits; and one in which a byte is enough for an entry.
+SHAPES = (*(Recipe(width=width) for width in (16, 12, 8, 6, 5, 4)), Recipe(table_bits=8))
 # The numbers of levels of each taxel to choose from, at most.
 TAXEL_LEVELS = (1, 3, LEVELS)
 # The numbers of joints that are tried in addition to all of them.
@@ -43,32 +34,29 @@ TABLED = (10, 30, 100)
 Choosing = tuple[str, bool, int | None]
 
 
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """A placement choice, the inputs, the trainer, the number of joints that are kept (None: all), and the most levels
-    of a taxel to choose from (None: no taxel is read); inputs "joints" have NO_SWITCHES.
-    """
+def placed(method: str, parameter: int, trainer: str, inputs: Inputs, levels: int | None = None) -> Recipe:
+    """Return the candidate whose elements a method chooses, given its number, of so many levels of a taxel."""
+    named = {"keep" if METHODS[method].by_number else "prune": parameter}
+    return changed(Recipe(placement=method, trainer=trainer, inputs=inputs, levels=levels), named)
 
-    placement: PlacementChoice
-    inputs: Inputs
-    trainer: str = PAPERS_TRAINER
-    keep_joints: int | None = None
-    levels: int | None = None
 
-    @property
-    def joints(self) -> bool:
-        """Whether the joints are read."""
-        return self.inputs != "switches"
+def placement_of(recipe: Recipe) -> PlacementChoice:
+    """Return the placement of a candidate as a frontier writes it; of joints alone, none."""
+    if recipe.inputs == "joints":
+        return PlacementChoice("none", 0.0)
+    by_number = METHODS[recipe.placement].by_number
+    return PlacementChoice(recipe.placement, float(recipe.keep or 0 if by_number else recipe.prune))
 
-    @property
-    def learns_from_joints(self) -> bool:
-        """Whether the choice of its switches depends on the joints."""
-        return self.inputs == "both" and METHODS[self.placement.method].uses_joints
 
-    @property
-    def chosen_by(self) -> Choosing:
-        """The method, whether it uses the joints, and the levels that it chooses from."""
-        return self.placement.method, self.learns_from_joints, self.levels
+def chosen_by(recipe: Recipe) -> Choosing:
+    """Return what the choice of a candidate's elements depends on, but for its number."""
+    joints = recipe.inputs == "both" and METHODS[recipe.placement].uses_joints
+    return placement_of(recipe).method, joints, recipe.levels
+
+
+def tabled(recipe: Recipe, rounds: int, shape: Recipe = SHAPES[0]) -> Recipe:
+    """Return a candidate of so many rounds, and tables of this shape."""
+    return changed_to(recipe, rounds=rounds, width=shape.width, table_bits=shape.table_bits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,21 +168,13 @@ class Search:
         return (*(each for each in rounds if each < self.rounds), self.rounds) if self.staged else (1,)
 
 
-def tried_placements(method: str, n_switches: int) -> tuple[PlacementChoice, ...]:
-    """Return the placements that a frontier tries with a method among `n_switches` switches."""
-    return tuple(PlacementChoice(method, float(parameter)) for parameter in METHODS[method].ladder(n_switches))
+def candidates(method: str, n_elements: int, trainer: str, inputs: Inputs, levels: int | None) -> Iterator[Recipe]:
+    """Yield the candidates that a frontier tries with a method among `n_elements` elements."""
+    return (placed(method, size, trainer, inputs, levels) for size in METHODS[method].ladder(n_elements))
 
 
-def curve_placements(method: str, n_switches: int) -> tuple[PlacementChoice, ...]:
-    """Return the placements on a baseline's curve."""
-    return tuple(PlacementChoice(method, float(size)) for size in CURVE_SIZES if size <= n_switches)
-
-
-def available_inputs(n_switches: int, n_joints: int) -> tuple[Inputs, ...]:
+def available_inputs(n_elements: int, n_joints: int) -> tuple[Inputs, ...]:
     """Return which inputs a set has; joints alone need no placement."""
-    kinds: list[Inputs] = []
-    if n_switches:
-        kinds.append("switches")
-    if n_joints:
-        kinds.append("joints")
-    return ("both", *kinds) if len(kinds) == 2 else tuple(kinds)
+    if not n_elements:
+        return ("joints",) if n_joints else ()
+    return ("both", "switches", "joints") if n_joints else ("switches",)

@@ -1,11 +1,11 @@
 """The rows of a frontier and their folds, in which switches are chosen and classifiers trained."""
 
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace as changed_to
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Fitting
@@ -25,9 +25,9 @@ from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples, decided
 from ..trainers.base import Training
 from .cache import Cache, stored
-from .equipment import Equipment
 from .points import By, PointTime
-from .search import NO_SWITCHES, SHAPES, TAXEL_LEVELS, Candidate, Choosing, Search, Shape
+from .price import Equipment, PricedTables, price
+from .search import SHAPES, TAXEL_LEVELS, Choosing, Search, chosen_by, placement_of
 
 # Settings are selected on the placement whose number of switches is nearest to the paper's.
 _TYPICAL = 33
@@ -129,13 +129,6 @@ class TrialAccuracy:
     repeats: int
 
 
-class PlacementPath(Struct, frozen=True):
-    """The placements of a method, one for each parameter, and their total time."""
-
-    elements: tuple[Elements, ...]
-    seconds: float
-
-
 class FoldHits(Struct, frozen=True):
     """Correctly predicted trials of a fold, by their numbers, eight to the byte.
 
@@ -165,7 +158,6 @@ class Survey:
     equipment: Equipment
     cache: Cache
     _elements: dict[tuple[Choosing, float, Fold], Elements] = field(default_factory=dict, init=False)
-    _seconds: dict[Choosing, float] = field(default_factory=dict, init=False)
     _joints: dict[tuple[Choosing, float, Fold], Columns] = field(default_factory=dict, init=False)
     _trainings: dict[tuple[str, Inputs, Fold], Training] = field(default_factory=dict, init=False)
 
@@ -178,17 +170,24 @@ class Survey:
         """Return how many elements there are to choose from in all rows."""
         return len(elements_of(self.samples, levels))
 
-    def elements(self, choice: Candidate, fold: Fold | None = None) -> Elements:
+    def elements(self, choice: Recipe, fold: Fold | None = None) -> Elements:
         """Return the elements that a choice keeps by the training rows of `fold`, or by all rows, once chosen."""
-        if choice.placement == NO_SWITCHES:
+        if choice.inputs == "joints":
             return ()
-        return self._elements[choice.chosen_by, choice.placement.parameter, fold or self.cuts.everything]
+        return self._elements[chosen_by(choice), placement_of(choice).parameter, fold or self.cuts.everything]
 
-    def selection(self, choice: Candidate, fold: Fold | None = None) -> InputSelection:
+    def joints(self, choice: Recipe, fold: Fold | None = None) -> Columns:
+        """Return the joints of a choice, ascending, once ranked on the training rows of `fold`, or on all rows."""
+        if choice.keep_joints is None or choice.inputs == "switches":
+            return () if choice.inputs == "switches" else tuple(range(self.n_joints))
+        place = chosen_by(choice), placement_of(choice).parameter, fold or self.cuts.everything
+        return tuple(sorted(self._joints[place][: choice.keep_joints]))
+
+    def selection(self, choice: Recipe, fold: Fold | None = None) -> InputSelection:
         """Return the inputs that a choice keeps by the training rows of `fold`, or by all rows."""
-        return InputSelection.of(self.elements(choice, fold), self.joints(choice, fold or self.cuts.everything))
+        return InputSelection.of(self.elements(choice, fold), self.joints(choice, fold))
 
-    def names(self, choice: Candidate) -> tuple[str, ...]:
+    def names(self, choice: Recipe) -> tuple[str, ...]:
         """Return the names of the elements that a choice keeps by all rows."""
         return names_of(self.grasp_set, self.elements(choice))
 
@@ -197,40 +196,29 @@ class Survey:
         """How many joints a frame has."""
         return int(self.samples.codes.shape[1])
 
-    def transfer(self, choice: Candidate) -> PointTime:
+    def transfer(self, choice: Recipe) -> PointTime:
         """Return the time of reading the joints of a choice."""
-        return self.equipment.records.of(len(self.joints(choice, self.cuts.everything)))
+        return self.equipment.records.of(len(self.joints(choice)))
 
-    def joints(self, choice: Candidate, fold: Fold) -> Columns:
-        """Return the joints of a choice, ascending, once chosen from the training rows of `fold`."""
-        if choice.keep_joints is None or not choice.joints:
-            return tuple(range(self.n_joints)) if choice.joints else ()
-        order = self._joints[choice.chosen_by, choice.placement.parameter, fold]
-        return tuple(sorted(order[: choice.keep_joints]))
-
-    def some_joints(self, choice: Candidate) -> tuple[str, ...]:
+    def some_joints(self, choice: Recipe) -> tuple[str, ...]:
         """Return the names of the joints of a choice from all rows, if not all are kept."""
         names = self.grasp_set.joint_names
-        return () if choice.keep_joints is None else tuple(names[n] for n in self.joints(choice, self.cuts.everything))
+        return () if choice.keep_joints is None else tuple(names[joint] for joint in self.joints(choice))
 
-    def training(self, choice: Candidate, fold: Fold | None = None) -> Training:
+    def training(self, choice: Recipe, fold: Fold | None = None) -> Training:
         """Return the training of a choice on the training rows of a fold, or on all rows; call `tune` first."""
-        fold = fold or self.cuts.everything
-        return (
-            self._trainings.get((choice.trainer, choice.inputs, fold))
-            or self.search.alone(choice.trainer).candidates[0]
-        )
+        place = choice.trainer, choice.inputs, fold or self.cuts.everything
+        return self._trainings.get(place) or self.search.alone(choice.trainer).candidates[0]
 
-    def typical(self, choices: Iterable[Candidate]) -> list[Candidate]:
+    def typical(self, choices: Iterable[Recipe]) -> list[Recipe]:
         """Return, for each trainer and kind of inputs with open settings, the choice that selects them."""
-        alike: dict[tuple[str, Inputs], list[Candidate]] = {}
+        alike: dict[tuple[str, Inputs], list[Recipe]] = {}
         for choice in choices:
             if len(self.search.alone(choice.trainer).candidates) > 1:
                 alike.setdefault((choice.trainer, choice.inputs), []).append(choice)
-        kept = {one: len(self.elements(one)) for mine in alike.values() for one in mine}
-        return [min(mine, key=lambda one: abs(kept[one] - _TYPICAL)) for mine in alike.values()]
+        return [min(mine, key=lambda one: abs(len(self.elements(one)) - _TYPICAL)) for mine in alike.values()]
 
-    def tune(self, typical: Sequence[Candidate], folds: Sequence[Fold]) -> None:
+    def tune(self, typical: Sequence[Recipe], folds: Sequence[Fold]) -> None:
         """Select open settings on the training rows of these folds, as `compile` does: by typical choices, once for all
         of the same trainer and inputs.
         """
@@ -239,7 +227,7 @@ class Survey:
             (
                 self.samples,
                 fold.train,
-                self.selection(replace(choice, keep_joints=None), fold),
+                self.selection(changed_to(choice, keep_joints=None), fold),
                 self.search.alone(choice.trainer).candidates,
                 self.search.seed,
                 self.cuts.by == "new subject",
@@ -249,49 +237,36 @@ class Survey:
         for (choice, fold), fitting in zip(places, self.cache.ask(choose_settings, calls), strict=True):
             self._trainings[choice.trainer, choice.inputs, fold] = Training.chosen(fitting)
 
-    def choose(self, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
+    def choose(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
         """Choose the switches and levels of all choices from the training rows of these folds."""
         asked: dict[Choosing, dict[float, None]] = {}
         for choice in choices:
-            if choice.placement != NO_SWITCHES:
-                asked.setdefault(choice.chosen_by, {})[choice.placement.parameter] = None
+            if choice.inputs != "joints":
+                asked.setdefault(chosen_by(choice), {})[placement_of(choice).parameter] = None
         places = [(key, fold) for key in asked for fold in folds]
         calls = [
-            (
-                self.samples,
-                fold.train,
-                method,
-                tuple(asked[method, joints, levels]),
-                joints,
-                levels,
-                self.ports if METHODS[method].uses_ports else None,
-            )
-            for (method, joints, levels), fold in places
+            (self.samples, fold.train, *key, tuple(asked[key]), self.ports if METHODS[key[0]].uses_ports else None)
+            for key, fold in places
         ]
         for (key, fold), path in zip(places, self.cache.ask(choose_path, calls), strict=True):
-            for parameter, elements in zip(asked[key], path.elements, strict=True):
-                self._elements[key, parameter, fold] = elements
-            if fold is self.cuts.everything:
-                self._seconds[key] = path.seconds
+            for number, elements in zip(asked[key], path, strict=True):
+                self._elements[key, number, fold] = elements
 
-    def choose_joints(self, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
+    def choose_joints(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
         """Rank the joints, given the switches, for choices that keep only some, by the training rows of these folds."""
-        alike = {(one.chosen_by, one.placement.parameter): one for one in choices if one.keep_joints is not None}
+        some = (one for one in choices if one.keep_joints is not None)
+        alike = {(chosen_by(one), placement_of(one).parameter): one for one in some}
         places = [(key, fold) for key in alike for fold in folds]
         calls = [(self.samples, fold.train, self.elements(alike[key], fold)) for key, fold in places]
         for (key, fold), order in zip(places, self.cache.ask(rank_joints, calls), strict=True):
             self._joints[(*key, fold)] = order
 
-    def choosing_s(self, choice: Candidate) -> float:
-        """Return the time of choosing the switches of a choice from all rows."""
-        return self._seconds.get(choice.chosen_by, 0.0)
-
     def fit(
         self,
-        choices: Sequence[Candidate],
+        choices: Sequence[Recipe],
         folds: Sequence[Fold],
-        depth: Callable[[Candidate], Depth],
-    ) -> dict[tuple[Candidate, Fold], FoldHits]:
+        depth: Callable[[Recipe], Depth],
+    ) -> dict[tuple[Recipe, Fold], FoldHits]:
         """Return the tallies of every choice in every fold, trained to its `depth`."""
         places = [(choice, fold) for choice in choices for fold in folds]
         calls = [
@@ -307,26 +282,44 @@ class Survey:
         ]
         return dict(zip(places, self.cache.ask(fit_stages, calls), strict=True))
 
+    def prices(
+        self, several: Sequence[tuple[Recipe, tuple[Recipe, ...]]], rows: Rows, *, lost: bool = False
+    ) -> list[tuple[PricedTables, ...]]:
+        """Return the prices of choices trained on these rows, each with the tables of several recipes; see `price`."""
+        calls = [
+            (
+                self.samples,
+                self.names(choice),
+                rows,
+                self.selection(choice),
+                recipes,
+                self.training(choice),
+                self.equipment,
+                lost,
+            )
+            for choice, recipes in several
+        ]
+        return self.cache.ask(price, calls)
 
-@stored(2)
+
+@stored(3)
 def choose_path(
     samples: Samples,
     rows: Rows,
     method: str,
-    parameters: tuple[float, ...],
     joints: bool,
     levels: int | None,
+    numbers: tuple[float, ...],
     ports: PortCosts | None,
-) -> PlacementPath:
-    """Choose from these levels of the taxels, and the switches, in some rows by one method, for all of its parameters;
+) -> tuple[Elements, ...]:
+    """Choose from these levels of the taxels, and the switches, in some rows by one method, for each of its numbers;
     given the joints, or not.
     """
-    began, learning = time.perf_counter(), samples.rows(rows)
+    learning = samples.rows(rows)
     elements = elements_of(learning, levels)
     bits = bits_of(learning if joints else learning.with_joints(()), elements)
     choose = METHODS[method].chooser(bits, None if ports is None else ports_of(ports, elements))
-    kept = tuple(tuple(elements[column] for column in choose(parameter)) for parameter in parameters)
-    return PlacementPath(kept, time.perf_counter() - began)
+    return tuple(tuple(elements[column] for column in choose(number)) for number in numbers)
 
 
 @stored(2)
@@ -349,14 +342,14 @@ def choose_settings(
     return choose_training(learning, candidates, seed=seed, groups=learning.subjects if by_subject else None)
 
 
-@stored(3)
+@stored(4)
 def fit_stages(
     samples: Samples,
     fold: Fold,
     selection: InputSelection,
     stages: tuple[int, ...],
     tabled: tuple[int, ...],
-    shapes: tuple[Shape, ...],
+    shapes: tuple[Recipe, ...],
     training: Training,
 ) -> FoldHits:
     """Train once on a fold's training rows, on the selected inputs; test at every stage.
@@ -375,7 +368,7 @@ def fit_stages(
     found = [
         [
             _packed(predicted_classes(tables, None, test.switches, test.codes), test)
-            for tables in (replace(made[stage], recipe=shape.recipe).integers for shape in shapes)
+            for tables in (replace(made[stage], recipe=shape).integers for shape in shapes)
         ]
         for stage in tabled
     ]

@@ -31,7 +31,7 @@ COLUMNS = (
         "transfer_how",
     ),
     *("classify_us", "classify_how", "frame_us", "frame_how", "latency_mean_us", "latency_p99_us", "missed", "wrong"),
-    *("flash", "ram", "ports", "chips", "compile_s", "switches", "joints"),
+    *("flash", "ram", "ports", "chips", "switches", "joints"),
 )
 
 # Only written if a point's trainer, or one of its settings, is not the default.
@@ -202,7 +202,7 @@ def of_time(frontier: Frontier, what: str) -> str:
 def csv_bytes(frontier: Frontier) -> bytes:
     """Return `frontier.csv`: UTF-8, a line of COLUMNS, perhaps with TRAINER_COLUMNS, and a line for each point.
 
-    Rates are in 0..1, times in microseconds (compile_s: seconds); `frames` and `other_rate` may be empty.
+    Rates are in 0..1, times in microseconds; `frames` and `other_rate` may be empty.
     `fronts`, `switches` and `settings` are lists within a cell, separated by semicolons; names with a semicolon or a
     quote are quoted as in CSV.
     """
@@ -226,7 +226,7 @@ def _values(point: FrontierPoint) -> Iterator[object]:
     for time in (point.scan, point.transfer, point.classify, point.frame):
         yield from _time(time)
     yield from (latency.mean_us, latency.p99_us, latency.missed, latency.wrong)
-    yield from (point.flash, point.ram, point.ports, point.chips, point.compile_s)
+    yield from (point.flash, point.ram, point.ports, point.chips)
     yield from (_list(point.switches), _list(point.joints))
 
 

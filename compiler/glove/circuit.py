@@ -48,20 +48,14 @@ class Component:
     name: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class ComponentPin:
-    """A pin of a component."""
-
-    ref: str
-    pin: str
-
-
 @dataclass(slots=True)
 class Circuit:
-    """Components in order of insertion, nets by name; built up piece by piece, then only read."""
+    """Components in order of insertion; nets by name, with the designator and the number of each pin. Built up piece by
+    piece, then only read.
+    """
 
     components: list[Component] = field(default_factory=list)
-    nets: dict[str, list[ComponentPin]] = field(default_factory=dict)
+    nets: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
 
     def put(self, ref: str, kind: ComponentKind, *, on_board: bool = True, name: str = "") -> Component:
         """Add a component called `ref`."""
@@ -75,7 +69,7 @@ class Circuit:
 
     def join(self, net: str, ref: str, pin: str) -> None:
         """Connect a pin to a net. A pin is on one net at most."""
-        self.nets.setdefault(net, []).append(ComponentPin(ref, pin))
+        self.nets.setdefault(net, []).append((ref, pin))
 
     def between(self, letter: str, kind: ComponentKind, first: str, second: str) -> str:
         """Add a component with two pins, the first on net `first`; return its designator."""
@@ -110,7 +104,6 @@ def capacitor(value: str, note: str = "") -> ComponentKind:
     return ComponentKind(value, "Device", "C", footprint, two_pins(), note=note)
 
 
-_HOST = ("VCC", "GND", "SDA", "SCL")
 _TYPES = {
     **{"SDA": "bidirectional", "SCL": "input", "INT": "open_collector", "NC": "no_connect", RESET: "input"},
     **{"ALERT": "open_collector", "DOUT": "tri_state", cd74hc4067.COMMON: "passive"},
@@ -126,36 +119,36 @@ _RESET_PULL = resistor("10k", "holds RESET high")
 
 
 def _add_expanders(circuit: Circuit, units: Sequence[Unit], ends: Sequence[WireEnd], harness: Harness) -> None:
-    """Add the expanders `units` and the muxes in front of them, and a plug and pull-ups for each bus."""
+    """Add the expanders among `units` and the muxes in front of them, and a plug and pull-ups for each bus."""
+    channels: dict[int, set[tuple[int, int]]] = {}
     for unit in units:
-        _add_expander(circuit, unit, [end for end in ends if end.unit == unit])
-    for bus in dict.fromkeys(unit.bus for unit in units):
-        mine = [unit.wiring.mux for unit in units if unit.bus == bus and isinstance(unit.wiring, ChipWiring)]
-        channels = sorted({(mux.address, mux.channel) for mux in mine if mux is not None})
+        wiring = unit.wiring
+        if not isinstance(wiring, ChipWiring):
+            continue
+        chip, package = wiring.chip, wiring.chip.package
+        circuit.put(unit.ref, _kind(package, chip.pins), name=unit.place)
+        sda, scl = _wires(unit.bus, wiring.mux)
+        _add_power(circuit, unit.ref, package, wiring.address - chip.addresses[0], (sda, scl))
+        circuit.join(sda, unit.ref, package.number("SDA"))
+        circuit.join(scl, unit.ref, package.number("SCL"))
+        if not chip.pulls_up:
+            _ground_unused(circuit, unit, package, chip.pins, ends)
+        muxes = channels.setdefault(unit.bus, set())
+        muxes |= set() if wiring.mux is None else {(wiring.mux.address, wiring.mux.channel)}
+    for bus, muxes in channels.items():
         clock_hz = harness.buses[bus].clock_hz
-        _add_muxes(circuit, bus, channels, clock_hz)
-        _add_plug(circuit, bus, clock_hz)
-
-
-def _add_expander(circuit: Circuit, unit: Unit, ends: Sequence[WireEnd]) -> None:
-    wiring = unit.wiring
-    if not isinstance(wiring, ChipWiring):
-        return
-    chip, package = wiring.chip, wiring.chip.package
-    circuit.put(unit.ref, _kind(package, chip.pins), name=unit.place)
-    sda, scl = _wires(unit.bus, wiring.mux)
-    _add_power(circuit, unit.ref, package, wiring.address - chip.addresses[0], (sda, scl))
-    circuit.join(sda, unit.ref, package.number("SDA"))
-    circuit.join(scl, unit.ref, package.number("SCL"))
-    if not chip.pulls_up:
-        _ground_unused(circuit, unit, package, chip.pins, ends)
+        _add_muxes(circuit, bus, sorted(muxes), clock_hz)
+        wires = _wires(bus, None)
+        _add_plug(circuit, (SUPPLY, GROUND, *wires))
+        for wire in wires:
+            circuit.between("R", _pull_up(clock_hz), SUPPLY, wire)
 
 
 def _ground_unused(
     circuit: Circuit, unit: Unit, package: ChipPackage, pins: Sequence[str], ends: Sequence[WireEnd]
 ) -> None:
     """Ground unconnected inputs: a floating one draws current, or disturbs its neighbours."""
-    used = {end.pin for end in ends}
+    used = {end.pin for end in ends if end.unit == unit}
     for pin in pins:
         if pin not in used:
             circuit.join(GROUND, unit.ref, package.number(pin))
@@ -174,14 +167,10 @@ def _add_spi(circuit: Circuit, units: Sequence[Unit], ends: Sequence[WireEnd]) -
         select = f"CS{bus}_{chip}"
         for pin, net in (*((pin, f"{name}{bus}") for pin, name in _SPI.items()), ("CS", select)):
             circuit.join(net, unit.ref, package.number(pin))
-        _ground_unused(circuit, unit, package, unit.wiring.chip.pins, [end for end in ends if end.unit == unit])
+        _ground_unused(circuit, unit, package, unit.wiring.chip.pins, ends)
         lines.setdefault(bus, []).append(select)
     for bus, selects in lines.items():
-        nets = (SUPPLY, GROUND, *(f"{name}{bus}" for name in _SPI.values()), *selects)
-        ref = circuit.next("J", header(len(nets)))
-        for number, net in enumerate(nets, start=1):
-            circuit.join(net, ref, str(number))
-        circuit.between("C", _BULK, SUPPLY, GROUND)
+        _add_plug(circuit, (SUPPLY, GROUND, *(f"{name}{bus}" for name in _SPI.values()), *selects))
 
 
 def _add_multiplexers(circuit: Circuit, units: Sequence[Unit], ends: Sequence[WireEnd]) -> None:
@@ -195,7 +184,7 @@ def _add_multiplexers(circuit: Circuit, units: Sequence[Unit], ends: Sequence[Wi
         for pin in cd74hc4067.SELECTS:
             circuit.join(f"{unit.board}_{pin}", unit.ref, package.number(pin))
         circuit.join(f"{unit.board}_{cd74hc4067.COMMON}{unit.bus}", unit.ref, package.number(cd74hc4067.COMMON))
-        _ground_unused(circuit, unit, package, inputs, [end for end in ends if end.unit == unit])
+        _ground_unused(circuit, unit, package, inputs, ends)
 
 
 def _add_power(circuit: Circuit, ref: str, package: ChipPackage, above: int, bus: tuple[str, str]) -> None:
@@ -227,14 +216,12 @@ def _add_muxes(circuit: Circuit, bus: int, channels: Sequence[tuple[int, int]], 
                 circuit.between("R", _pull_up(clock_hz), SUPPLY, wire)
 
 
-def _add_plug(circuit: Circuit, bus: int, clock_hz: int) -> None:
-    sda, scl = _wires(bus, None)
-    ref = circuit.next("J", header(len(_HOST)))
-    for number, net in enumerate((SUPPLY, GROUND, sda, scl), start=1):
+def _add_plug(circuit: Circuit, nets: Sequence[str]) -> None:
+    """Add a plug of the host with a pin for each of these nets."""
+    ref = circuit.next("J", header(len(nets)))
+    for number, net in enumerate(nets, start=1):
         circuit.join(net, ref, str(number))
     circuit.between("C", _BULK, SUPPLY, GROUND)
-    for wire in (sda, scl):
-        circuit.between("R", _pull_up(clock_hz), SUPPLY, wire)
 
 
 def _wires(bus: int, mux: MuxChannel | None) -> tuple[str, str]:
@@ -329,8 +316,15 @@ def glove_circuit(
     pad = _PAD if any(sensor.kind == "switch" for sensor in switches) else replace(_PAD, part=part_number)
     for sensor in switches:
         circuit.put(sensor.ref, pad if sensor.kind == "pad" else kind, on_board=False, name=sensor.name)
-    _add_connectors(circuit, wires)
-    units = _units(ends)
+    bundles: dict[tuple[str, str], list[GloveWire]] = {}
+    for wire in wires:
+        bundles.setdefault((wire.connector, wire.bundle), []).append(wire)
+    for (ref, bundle), group in bundles.items():
+        circuit.put(ref, header(len(group)), name=f"{bundle} bundle")
+        for wire in group:
+            circuit.join(wire.net, ref, str(wire.pin))
+    # The readers of switches: the boards, then the chips, by number.
+    units = sorted({end.unit.ref: end.unit for end in ends}.values(), key=lambda unit: (unit.ref[0], int(unit.ref[1:])))
     multiplexers = [unit for unit in units if unit.board]
     for ref in sorted({unit.board or unit.ref for unit in units if unit.wiring is None}):
         _add_board(
@@ -340,18 +334,8 @@ def glove_circuit(
         _add_signal(circuit, end, switches[end.switch])
     _add_spi(circuit, units, ends)
     _add_multiplexers(circuit, multiplexers, ends)
-    _add_expanders(circuit, [unit for unit in units if isinstance(unit.wiring, ChipWiring)], ends, harness)
+    _add_expanders(circuit, units, ends, harness)
     return circuit
-
-
-def _add_connectors(circuit: Circuit, wires: Sequence[GloveWire]) -> None:
-    bundles: dict[tuple[str, str], list[GloveWire]] = {}
-    for wire in wires:
-        bundles.setdefault((wire.connector, wire.bundle), []).append(wire)
-    for (ref, bundle), group in bundles.items():
-        circuit.put(ref, header(len(group)), name=f"{bundle} bundle")
-        for wire in group:
-            circuit.join(wire.net, ref, str(wire.pin))
 
 
 def _add_board(circuit: Circuit, ref: str, ends: Sequence[WireEnd], multiplexers: Sequence[Unit]) -> None:
@@ -370,33 +354,21 @@ def _add_board(circuit: Circuit, ref: str, ends: Sequence[WireEnd], multiplexers
 
 
 def _add_signal(circuit: Circuit, end: WireEnd, switch: PlacedSensor) -> None:
-    net = net_of(end, switch)
+    """Connect a switch to its reader, with the diode or the resistor that it needs there."""
+    net, wiring = net_of(end, switch), end.unit.wiring
     circuit.join(net, switch.ref, "1")
     circuit.join(end.other, switch.ref, "2")
     if end.unit.diodes and not end.taxel:
         circuit.between("D", _DIODE, net, f"{end.unit.ref}_{end.pin}")
         return
-    if ComponentPin(end.unit.ref, end.pad) not in circuit.nets[net]:
+    if (end.unit.ref, end.pad) not in circuit.nets[net]:
         circuit.join(net, end.unit.ref, end.pad)
-    _add_pull(circuit, end, net)
-
-
-def _add_pull(circuit: Circuit, end: WireEnd, net: str) -> None:
-    wiring = end.unit.wiring
     if end.taxel:
         circuit.between("R", _DIVIDER, net, GROUND)
-        return
-    if not isinstance(wiring, ChipWiring):
-        return
-    if end.other == SUPPLY:
+    elif isinstance(wiring, ChipWiring) and end.other == SUPPLY:
         circuit.between("R", _PULL_DOWN, net, GROUND)
-    elif not wiring.chip.pulls_up:
+    elif isinstance(wiring, ChipWiring) and not wiring.chip.pulls_up:
         circuit.between("R", _PULL_UP, net, SUPPLY)
-
-
-def _units(ends: Sequence[WireEnd]) -> list[Unit]:
-    """Return the readers of switches: the boards, then the expanders, by number."""
-    return sorted({end.unit.ref: end.unit for end in ends}.values(), key=lambda unit: (unit.ref[0], int(unit.ref[1:])))
 
 
 class BillLine(Struct, frozen=True):
@@ -417,12 +389,37 @@ class BillLine(Struct, frozen=True):
     note: str
 
 
-def bill_of(circuit: Circuit, wires: Sequence[GloveWire]) -> tuple[BillLine, ...]:
-    """Return the bill of materials for a glove's circuit and its wires."""
+def bill_of(circuit: Circuit, wires: Sequence[GloveWire]) -> Iterator[BillLine]:
+    """Yield the bill of materials for a glove's circuit and its wires."""
     groups: dict[ComponentKind, list[str]] = {}
     for component in circuit.components:
         groups.setdefault(component.kind, []).append(component.ref)
-    return (*(_pieces(kind, refs) for kind, refs in groups.items()), *_wire_lines(wires))
+    devices = {"R": "resistor ", "C": "ceramic capacitor ", "R_Variable": ""}
+    for kind, refs in groups.items():
+        what = kind.value
+        if kind.library == "Device":
+            what = f"{devices.get(kind.symbol, 'diode ')}{what}"
+        elif kind.library == "Connector_Generic":
+            what = f"header or holes, {what}"
+        yield BillLine(
+            quantity=len(refs),
+            unit="pcs",
+            what=what,
+            part=kind.part,
+            maker=kind.maker,
+            footprint=kind.footprint,
+            designators=tuple(refs),
+            sure=kind.sure,
+            note=kind.note,
+        )
+    colours: dict[str, list[GloveWire]] = {}
+    for wire in wires:
+        colours.setdefault(wire.colour.partition(",")[0], []).append(wire)
+    for colour, group in colours.items():
+        lengths = [wire.length_mm for wire in group if wire.length_mm is not None]
+        connectors = tuple(dict.fromkeys(wire.connector for wire in group))
+        if lengths:
+            yield BillLine(sum(lengths) / 1000, "m", f"{_STRANDED}, {colour}", "", "", "", connectors, True, _ESTIMATE)
 
 
 def bill_of_joints(joints: Sequence[str], cyberglove: bool) -> tuple[BillLine, ...]:
@@ -432,33 +429,3 @@ def bill_of_joints(joints: Sequence[str], cyberglove: bool) -> tuple[BillLine, .
     what, names = ("CyberGlove", ()) if cyberglove else ("your own joint sensor", tuple(joints))
     note = "it measures the kept joints" if cyberglove else "such as a flex sensor along the joint"
     return (BillLine(len(names) or 1, "pcs", what, "", "", "", names, True, note),)
-
-
-def _pieces(kind: ComponentKind, refs: Sequence[str]) -> BillLine:
-    what = {"Device": f"{_named(kind)}{kind.value}", "Connector_Generic": f"header or holes, {kind.value}"}
-    return BillLine(
-        quantity=len(refs),
-        unit="pcs",
-        what=what.get(kind.library, kind.value),
-        part=kind.part,
-        maker=kind.maker,
-        footprint=kind.footprint,
-        designators=tuple(refs),
-        sure=kind.sure,
-        note=kind.note,
-    )
-
-
-def _named(kind: ComponentKind) -> str:
-    return {"R": "resistor ", "C": "ceramic capacitor ", "R_Variable": ""}.get(kind.symbol, "diode ")
-
-
-def _wire_lines(wires: Sequence[GloveWire]) -> Iterator[BillLine]:
-    colours: dict[str, list[GloveWire]] = {}
-    for wire in wires:
-        colours.setdefault(wire.colour.partition(",")[0], []).append(wire)
-    for colour, group in colours.items():
-        lengths = [wire.length_mm for wire in group if wire.length_mm is not None]
-        refs = tuple(dict.fromkeys(wire.connector for wire in group))
-        if lengths:
-            yield BillLine(sum(lengths) / 1000, "m", f"{_STRANDED}, {colour}", "", "", "", refs, True, _ESTIMATE)

@@ -47,7 +47,7 @@ _DXF_COLOURS = {"outline": 7, "strips": 5, "creases": 8, "holes": 1, "names": 8,
 
 def svg_of(pattern: Pattern) -> bytes:
     """Return the SVG: one user unit is one millimetre, and drawing programs show each group as a layer."""
-    page = pattern.page
+    page, shapes = pattern
     root = ET.Element(
         "svg",
         {
@@ -61,7 +61,7 @@ def svg_of(pattern: Pattern) -> bytes:
     )
     for layer in LAYERS:
         group = ET.SubElement(root, "g", _layer(layer))
-        for shape in pattern.shapes:
+        for shape in shapes:
             if shape.layer == layer:
                 _add_to_svg(group, shape, page.height_mm)
     ET.indent(root, " ")
@@ -109,7 +109,7 @@ def dxf_of(pattern: Pattern) -> bytes:
         for layer in LAYERS:
             document.layers.add(layer, color=_DXF_COLOURS[layer])
         space = document.modelspace()
-        for shape in pattern.shapes:
+        for shape in pattern[1]:
             _add_to_dxf(space, shape)
         document.write(text)
     return text.getvalue().encode(document.output_encoding, "dxfreplace")
@@ -219,10 +219,10 @@ def _nets(circuit: Circuit) -> Iterator[str]:
     pins = {c.ref: {number: (name, kind) for number, name, kind in c.kind.pins} for c in circuit.components}
     for code, (net, nodes) in enumerate(circuit.nets.items(), start=1):
         yield f'    (net (code "{code}") (name {_quoted(net)})'
-        for node in nodes:
-            name, electrical = pins[node.ref][node.pin]
+        for ref, pin in nodes:
+            name, electrical = pins[ref][pin]
             yield (
-                f"      (node (ref {_quoted(node.ref)}) (pin {_quoted(node.pin)}) "
+                f"      (node (ref {_quoted(ref)}) (pin {_quoted(pin)}) "
                 f"(pinfunction {_quoted(name)}) (pintype {_quoted(electrical)}))"
             )
         yield "    )"

@@ -252,7 +252,8 @@ def wires_of(
         wires = [*_signals(bundle, bundles[bundle], switches, home), *_returns(bundle, bundles[bundle], switches, home)]
         for start in range(0, len(wires), _LONGEST_HEADER):
             connectors += 1
-            made += _connected(wires[start : start + _LONGEST_HEADER], f"J{connectors}")
+            group = wires[start : start + _LONGEST_HEADER]
+            made += [replace(wire, connector=f"J{connectors}", pin=pin) for pin, wire in enumerate(group, start=1)]
     return tuple(made)
 
 
@@ -268,10 +269,6 @@ def net_of(end: WireEnd, switch: PlacedSensor) -> str:
     """
     shared = end.unit.wiring is None and end.other != GROUND and not end.unit.diodes and not end.taxel
     return f"{end.unit.ref}_{end.pin}" if shared else f"/{switch.name}"
-
-
-def _connected(wires: Sequence[GloveWire], connector: str) -> Iterator[GloveWire]:
-    return (replace(wire, connector=connector, pin=pin) for pin, wire in enumerate(wires, start=1))
 
 
 def _signals(

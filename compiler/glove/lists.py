@@ -78,7 +78,8 @@ def readme_of(spec: GloveSpec) -> str:
     doubts = [f"{m.part or m.what}: {m.note}" for m in summary.materials if not m.sure]
     parts += ["Please note", *_advice(summary), *summary.remarks, *doubts]
     headings = {parts[0], "To cut and sew", "To wire", "To solder", "To run", "What to expect", "Please note"}
-    return "\n".join(_laid_out(part, part in headings) for part in parts)
+    laid_out = (f"{part}\n{'-' * len(part)}\n" if part in headings else fill(part, _WIDTH) + "\n" for part in parts)
+    return "\n".join(laid_out)
 
 
 def expectations(spec: GloveSpec) -> Iterator[str]:
@@ -139,9 +140,3 @@ def _advice(summary: SpecSummary) -> Iterator[str]:
     yield "Supply all chips and pull-ups with the voltage of the host's bus: 3.3 V on a Raspberry Pi."
     if any(sensor.kind == "switch" for sensor in summary.sensors):
         yield "A contact bounces for up to 3 ms when it closes and 8 ms when it opens: thenar debounces."
-
-
-def _laid_out(part: str, heading: bool) -> str:
-    if heading:
-        return f"{part}\n{'-' * len(part)}\n"
-    return fill(part, _WIDTH) + "\n"

@@ -89,14 +89,7 @@ class Text:
 
 
 Shape = PatternLine | Circle | Text
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pattern:
-    """Shapes on a page."""
-
-    page: Page
-    shapes: tuple[Shape, ...]
+Pattern = tuple[Page, tuple[Shape, ...]]
 
 
 def pattern_of(switches: Sequence[PlacedSensor], hand: HandShape, title: str) -> Pattern:
@@ -118,7 +111,7 @@ def pattern_of(switches: Sequence[PlacedSensor], hand: HandShape, title: str) ->
         *_bar(left, MARGIN_MM + rows * _ROW_MM + _GAP_MM),
         *_legend(switches, rows, left),
     )
-    return Pattern(page, shapes)
+    return page, shapes
 
 
 def _hand(hand: HandShape, move: Floats) -> Iterator[Shape]:

@@ -151,14 +151,15 @@ def glove_spec(
     wires = wires_of(switches, ends, known)
     circuit = glove_circuit(switches, ends, wires, soldered, "" if known is None else known.part_number)
     kept = str(SensorCount.of_build(manifest))
-    title = f"{wired.name}: {counted_sensors(switches)}{_size(known)}"
+    size = "" if known is None or known.length_mm is None else f", right hand of {known.length_mm:g} mm"
+    title = f"{wired.name}: {counted_sensors(switches)}{size}"
     pattern = None if known is None else pattern_of(switches, known, title)
     summary = SpecSummary(
         glove=wired.name,
         kept=kept,
         proposed=harness is None,
         hand_length_mm=None if known is None else known.length_mm,
-        print_on="" if pattern is None else pattern.page.hint,
+        print_on="" if pattern is None else pattern[0].hint,
         sensors=switches,
         readers=_readers(ends),
         wires=wires,
@@ -178,7 +179,6 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) 
         if scan is not None:
             raise SpecError("the build was compiled for a specific wiring: name its glove.toml with ``glove``")
         return propose_harness(names, cyberglove=propose_cyberglove([joint.name for joint in manifest.joints]))
-    names = [switch.name for switch in manifest.switches]
     if scan is not None:
         check_harness(scan, harness, names)
     if lacking := unwired(harness, names):
@@ -186,21 +186,17 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) 
             f"harness {harness.name!r} has no pin or column for {list_names(lacking)}, which the build keeps: "
             "add what is missing to its file"
         )
-    return _portable(harness)
-
-
-def _portable(harness: Harness) -> Harness:
-    """Return the harness with its calibration as a bare file name: the file belongs next to the spec's glove.toml."""
-
-    def named(path: str | None) -> str | None:
-        return (path or "").replace("\\", "/").rsplit("/", 1)[-1] or None
-
+    # Calibrations become bare file names: the files belong next to the spec's glove.toml.
     glove = harness.cyberglove
     return replace(
         harness,
-        cyberglove=None if glove is None else replace(glove, calibration=named(glove.calibration)),
-        streams=tuple(replace(stream, calibration=named(stream.calibration)) for stream in harness.streams),
+        cyberglove=None if glove is None else replace(glove, calibration=_bare(glove.calibration)),
+        streams=tuple(replace(stream, calibration=_bare(stream.calibration)) for stream in harness.streams),
     )
+
+
+def _bare(path: str | None) -> str | None:
+    return (path or "").replace("\\", "/").rsplit("/", 1)[-1] or None
 
 
 def _of_boards(harness: Harness) -> Iterator[str]:
@@ -222,10 +218,6 @@ def _readers(ends: Sequence[WireEnd]) -> tuple[SwitchReader, ...]:
         SwitchReader(ref, group[0].unit.place, tuple(end.pin for end in group), tuple(end.switch + 1 for end in group))
         for ref, group in sorted(groups.items(), key=lambda item: (item[0][0], int(item[0][1:])))
     )
-
-
-def _size(hand: HandShape | None) -> str:
-    return f", right hand of {hand.length_mm:g} mm" if hand is not None and hand.length_mm is not None else ""
 
 
 def _remarks(

@@ -55,15 +55,6 @@ _COLOURS = {colour: f"var(--{name})" for name, (colour, _) in reversed(list(PALE
 _TARGET = "9"  # radius of the clickable area, in units of the charts
 
 
-@dataclass(frozen=True, slots=True)
-class Chart:
-    """A chart as a part of the page: the id of its element, its caption, and its SVG."""
-
-    ident: str
-    caption: str
-    drawing: Markup
-
-
 class PointDetail(Struct, frozen=True):
     """The details of a picked point: a sentence, names and values, its switches, their numbers on the drawn hand, and
     the command that builds it.
@@ -79,9 +70,12 @@ class PointDetail(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class FrontierView:
-    """The content of the section; hand is None where the switches' positions are unknown."""
+    """The content of the section; hand is None where the switches' positions are unknown.
 
-    charts: tuple[Chart, ...]
+    charts  the id, the caption and the SVG of each
+    """
+
+    charts: tuple[tuple[str, str, Markup], ...]
     points: PlainTable
     details: tuple[PointDetail, ...]
     picked: PointDetail | None
@@ -120,11 +114,13 @@ def frontier_view(
     )
 
 
-def _charts(frontier: Frontier, details: Mapping[int, PointDetail], picked: PointDetail) -> Iterator[Chart]:
+def _charts(
+    frontier: Frontier, details: Mapping[int, PointDetail], picked: PointDetail
+) -> Iterator[tuple[str, str, Markup]]:
     drawn = pictures(msgspec.structs.replace(frontier, picked=picked.number), "svg", letters=True)
     for name, svg in drawn.items():
         ident = f"by-{name}"
-        yield Chart(ident, _CAPTIONS[name], _embedded(svg, ident, details, picked.number))
+        yield ident, _CAPTIONS[name], _embedded(svg, ident, details, picked.number)
 
 
 def _embedded(svg: bytes, ident: str, details: Mapping[int, PointDetail], picked: int) -> Markup:
@@ -208,7 +204,6 @@ def _facts(point: FrontierPoint, frontier: Frontier) -> Iterable[tuple[str, str]
     yield of_time(frontier, "Latency"), DASH if mean == DASH else f"{mean} µs, 99th percentile {late} µs"
     yield "Grasps missed", f"{100 * point.latency.missed:.1f} %"
     yield "Flash and RAM", f"{point.flash:,} and {point.ram:,} bytes"
-    yield "To compile", f"{point.compile_s:.1f} s"
 
 
 def _placement(point: FrontierPoint) -> str:
@@ -259,7 +254,7 @@ def _points(frontier: Frontier) -> PlainTable:
 
 
 def _tables(frontier: Frontier) -> Iterator[PlainTable]:
-    """Yield tables of reference points, baselines, screened placements and model errors, where there are any."""
+    """Yield tables of reference points and of baselines, where there are any."""
     kept, trainer = elements_of(frontier).capitalize(), "".join(frontier.trainers[:1]) or "none"
     if frontier.marks:
         marks = tuple(
@@ -278,29 +273,6 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
         columns = ("Method", "Description", *(f"{size:g}" for size in sizes))
         what = f"Accuracy in % ({frontier.by}, trials), {elements_of(frontier)} only, against their number"
         yield PlainTable(f"{what}; trainer: {trainer}", columns, tuple(rows), words=(0, 1))
-    if frontier.tried:
-        tried = tuple(
-            (
-                f"{each.placement.method} {each.placement.parameter:g}",
-                each.inputs,
-                each.trainer,
-                str(each.n_switches),
-                DASH if each.rounds is None else str(each.rounds),
-                interval(each.rate),
-                microseconds(each.frame_us),
-            )
-            for each in frontier.tried
-        )
-        columns = (
-            "Placement",
-            "Inputs",
-            "Trainer",
-            kept,
-            "Rounds",
-            f"{frontier.by}, %",
-            of_time(frontier, "Frame, µs"),
-        )
-        yield PlainTable("Screened placements; settings chosen from the training rows", columns, tried, words=(0, 1, 2))
 
 
 def _taxels(frontier: Frontier) -> str:

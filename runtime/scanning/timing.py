@@ -179,17 +179,15 @@ def selections(ports: Iterable[Port], harness: Harness) -> tuple[tuple[int, ...]
     return tuple(room for room in rooms if alike[room[0], len(room)] > 1)
 
 
-def glove_us(glove: GloveWiring, sensors: int, *, wire_only: bool = False) -> float:
+def glove_us(glove: GloveWiring, sensors: int) -> float:
     """Return the shortest period of a CyberGlove's records of `sensors` sensors, in microseconds.
 
     It is the vendor's formula (`shortest_us`), scaled by the ratio of the measured `record_us` for all sensors to it;
-    and no less than the period of requests. `wire_only` leaves out the time that the box takes to digitise. An unknown
-    rate counts as 115200 baud. A requested record also includes the byte of the request.
+    and no less than the period of requests. An unknown rate counts as 115200 baud. A requested record also includes the
+    byte of the request.
     """
     baud = _BAUD if glove.baud == "auto" else glove.baud
     asking_us = 0.0 if glove.mode == "stream" else sending_us(len(glove_protocol.POLL), baud)
-    if wire_only:
-        return asking_us + sending_us(sensors + glove_protocol.OVERHEAD + 1, baud)
     filtered = bool(glove.filter)
     us = shortest_us(sensors, baud, status=True, filtered=filtered)
     if glove.record_us is not None:

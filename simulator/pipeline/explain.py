@@ -1,8 +1,5 @@
 """The steps and the estimated cost of a simulation, from the time of each step on a few grasps."""
 
-from collections.abc import Sequence
-from time import process_time
-
 import msgspec
 import numpy as np
 
@@ -13,9 +10,7 @@ from ..scenes.scene import Scene
 from .batch import Batch
 from .effect import at_a_time
 from .simulation import SubjectSession, conditions_of, session_of
-from .steps import Ledger, Pipeline, PipelineStep, StepCost, compile_pipeline
-
-_ROUNDS = 3
+from .steps import Ledger, PipelineStep, StepCost, compile_pipeline
 
 
 def middle_session(scene: Scene) -> SubjectSession:
@@ -32,27 +27,6 @@ def sample(session: SubjectSession, most: int) -> list[Batch]:
     """Return batches of all conditions of a session, at most about `most` repetitions in all."""
     share = max(most // len(session.trials), 1)
     return [session.batch(place, np.arange(min(share, len(trials)))) for place, trials in enumerate(session.trials)]
-
-
-def best_us(scene: Scene, variants: Sequence[str | None], most: int = 128) -> list[float]:
-    """Return the microseconds of processor time a grasp of the scene without each of `variants` (None: all of it).
-
-    The same few grasps for each, in turn, repeated several times; the shortest time counts, since other load on the
-    machine only adds to it.
-    """
-    session = middle_session(scene)
-    pipelines = [compile_pipeline(scene, without) for without in variants]
-    most = min(at_a_time(pipeline.setting, most) for pipeline in pipelines)
-    times = [[_seconds(pipeline, session, most) for pipeline in pipelines] for _ in range(_ROUNDS)]
-    grasps = sum(map(len, sample(session, most)))
-    return [min(rounds) * 1e6 / grasps for rounds in zip(*times, strict=True)]
-
-
-def _seconds(pipeline: Pipeline, session: SubjectSession, most: int) -> float:
-    batches = sample(session, most)
-    start = process_time()
-    pipeline.run(batches, Ledger())
-    return process_time() - start
 
 
 # Number of measured grasps, fewer if each has many frames.

@@ -129,7 +129,6 @@ def simulate(
     block: int = 512,
     *,
     keep_unsettled: bool = False,
-    without: str | None = None,
 ) -> Simulation:
     """Return the set of grasps of `scene`, and the report. The set is the same for any `jobs` and `block`.
 
@@ -137,23 +136,22 @@ def simulate(
     progress  called with repetitions (done, all); before, with the objects whose postures are planned
     block     approximate number of repetitions simulated at a time, fewer if each has many frames
     keep_unsettled  keep repetitions that did not settle; the report names them in any case
-    without   a listed effect to omit
 
     Raises SceneError if the scene cannot be simulated, or if none of it settles; PlanError if a hand cannot hold an
     object.
     """
     start = perf_counter()
     # Errors of the scene are raised here and not in a worker.
-    setting = compile_pipeline(scene, without).setting
+    setting = compile_pipeline(scene).setting
     plan = sessions(scene, postures_of(scene, jobs, progress))
-    run = partial(_run, scene, without, keep_unsettled)
+    run = partial(_run, scene, keep_unsettled)
     total = sum(len(session.before) for session in plan)
     made = _gathered(in_workers(run, _groups(plan, at_a_time(setting, block)), jobs), total, progress)
     rows = joined(made.rows, np.repeat(np.arange(len(plan)), [len(session.conditions) for session in plan]))
     if not len(rows):
         why = _unsettled(scene, made)[0].why
         raise SceneError(f"scene {scene.name}: none of its {total} repetitions can be trusted; of the first, {why}")
-    found = _set_of(scene, plan, rows, _taxels(scene, without))
+    found = _set_of(scene, plan, rows, _taxels(scene))
     return Simulation(found, _report(scene, rows, found, made, perf_counter() - start, keep_unsettled=keep_unsettled))
 
 
@@ -176,8 +174,8 @@ def _groups(plan: Sequence[SubjectSession], block: int) -> Iterator[_Batches]:
 _pipeline = lru_cache(maxsize=1)(compile_pipeline)
 
 
-def _run(scene: Scene, without: str | None, keep_unsettled: bool, batches: _Batches) -> _Done:
-    pipeline, done = _pipeline(scene, without), _Done()
+def _run(scene: Scene, keep_unsettled: bool, batches: _Batches) -> _Done:
+    pipeline, done = _pipeline(scene), _Done()
     pipeline.run([batch for _, batch in batches], done.ledger)
     for number, batch in batches:
         kept = np.flatnonzero(batch.settled | keep_unsettled)
@@ -204,11 +202,10 @@ def _gathered(results: Iterator[_Done], total: int, progress: Progress | None) -
     return everything
 
 
-def _taxels(scene: Scene, without: str | None) -> tuple[Joint, ...]:
+def _taxels(scene: Scene) -> tuple[Joint, ...]:
     """Return the joints of the scene's taxels: the meaning of counts by the effect that converts them."""
     listed = dict(scene.effects)
-    converts = TAXEL_ADC in listed and without != TAXEL_ADC
-    converter = TaxelConverter(**dict(listed[TAXEL_ADC])) if converts else TaxelConverter()
+    converter = TaxelConverter(**dict(listed.get(TAXEL_ADC, ())))
     return tuple(converter.column(murakami160()[place].name) for place in taxel_places(scene.glove.taxels))
 
 

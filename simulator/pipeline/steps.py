@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from time import perf_counter_ns
 from typing import Any, Self
 
-from thenar.runtime.names import nearest
-
 from ..contact.model import ContactModel
 from ..errors import SceneError
 from ..scenes.scene import Scene
@@ -121,13 +119,13 @@ def _closing(model: ContactModel) -> Together:
     return act
 
 
-def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
-    """Return the steps of `scene`, except for the listed effect `without`.
+def compile_pipeline(scene: Scene) -> Pipeline:
+    """Return the steps of `scene`.
 
     Raises SceneError if effects have impossible parameters; MissingPackageError if one needs a package that is not
     installed.
     """
-    listed = _listed(scene, without)
+    listed: dict[str, Mapping[str, Any]] = {name: dict(parameters) for name, parameters in scene.effects}
     effects = {name: EFFECTS[name] for name in listed}
     models = [effect for effect in effects.values() if effect.model is not None]
     if default := not models:
@@ -149,17 +147,6 @@ def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
         else:
             steps.append(PipelineStep(effect, _prepared(effect, listed[name], setting), own=False))
     return Pipeline(setting, tuple(sorted(steps, key=lambda step: (step.effect.order, step.effect.name))))
-
-
-def _listed(scene: Scene, without: str | None) -> dict[str, Mapping[str, Any]]:
-    """Return the parameters of the effects that the scene lists, by name, except for `without`."""
-    listed = {name: dict(parameters) for name, parameters in scene.effects}
-    if without is not None and without not in listed:
-        near = nearest(without, list(listed))
-        raise SceneError(f"effect {without!r} cannot be left out: the scene does not list it{near}")
-    if without == DEFAULT_CONTACT:
-        raise SceneError(f"effect {without!r} cannot be left out: without it nothing closes the hand on its object")
-    return {name: parameters for name, parameters in listed.items() if name != without}
 
 
 def _own_steps(listed: Mapping[str, Mapping[str, Any]], setting: SceneSetting) -> Iterator[Effect]:

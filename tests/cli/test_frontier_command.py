@@ -12,7 +12,7 @@ import pytest
 
 from thenar.compiler import GraspSet
 from thenar.compiler.frontier.points import Frontier, frontier_from_bytes
-from thenar.compiler.frontier.timing.machine import machine_name
+from thenar.compiler.frontier.timing.classify_times import machine_name
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime import Build
 
@@ -56,19 +56,15 @@ def test_points_are_numbered_from_the_fastest_on(found: Frontier) -> None:
     assert times == sorted(times)
 
 
-def test_record_time_is_the_vendors_formula_unless_wire_only(
-    thenar: Thenar, small_set: GraspSet, tmp_path: Path
-) -> None:
+def test_record_time_is_the_vendors_formula(thenar: Thenar, small_set: GraspSet, tmp_path: Path) -> None:
     joints = tuple(replace(joint, name=name) for joint, name in zip(small_set.joints, SENSORS_18, strict=False))
     replace(small_set, joints=joints).save(tmp_path / "set.grasps")
     few = ("--methods", "id3", "--baselines", "none", "--rounds", 2, "--finalists", 1, "--repeats", 1, "--jobs", 1)
-    wire_us = round(5 * 10e6 / 115_200)
-    for options, how, us in (((), "formula", 500 + wire_us), (("--record-time", "wire"), "wire", wire_us)):
-        done = thenar("frontier", tmp_path / "set.grasps", "-o", tmp_path / "frontier", *few, *SETTLED, *options)
-        assert done.returncode == 0, done.stderr
-        points = frontier_from_bytes((tmp_path / "frontier" / "frontier.json").read_bytes()).points
-        transfers = [point.transfer for point in points if point.setting.inputs != "switches"]
-        assert {(transfer.how, round(transfer.us)) for transfer in transfers} == {(how, us)}
+    done = thenar("frontier", tmp_path / "set.grasps", "-o", tmp_path / "frontier", *few, *SETTLED)
+    assert done.returncode == 0, done.stderr
+    points = frontier_from_bytes((tmp_path / "frontier" / "frontier.json").read_bytes()).points
+    transfers = [point.transfer for point in points if point.setting.inputs != "switches"]
+    assert {(each.how, round(each.us)) for each in transfers} == {("formula", 500 + round(5 * 10e6 / 115_200))}
 
 
 def test_no_point_of_the_frame_front_is_beaten_by_another(found: Frontier) -> None:

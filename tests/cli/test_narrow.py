@@ -41,7 +41,6 @@ def place(small_set: GraspSet, build_folder: Path, tmp_path: Path, monkeypatch: 
             marks=pytest.mark.slow,
         ),
         pytest.param("simulate quick -o new.grasps --repetitions 1 --jobs 1", marks=pytest.mark.slow),
-        pytest.param("simulate quick --ablate --repetitions 1 --jobs 1", marks=pytest.mark.slow),
     ],
 )
 def test_nothing_is_cut_at_80_columns(line: str, place: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -146,29 +146,6 @@ def test_explaining_names_every_step_and_what_it_costs_and_writes_nothing(tmp_pa
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
-def test_ablation_shows_rates_changes_and_times(tmp_path: Path, capsys: Captured) -> None:
-    scene = tmp_path / "one.toml"
-    text = shipped()["quick"].read_text()
-    scene.write_text(text[: text.index("[effects")].replace('name = "A"', 'name = "Z"') + "[effects.joint.noise]\n")
-    asked = ["simulate", str(scene), "--jobs", "1", "--repetitions", "2", "--subject", "Z", "--ablate"]
-    assert run([*asked, "--json"]) == 0
-    whole, without = json.loads(capsys.readouterr().out)["variants"]
-    assert (whole["without"], without["without"]) == (None, "joint.noise")
-    assert run(asked) == 0
-    printed = capsys.readouterr().out
-    assert "Scene one without each of its effects, simulated" in printed
-    for variant in (whole, without):
-        for one in variant["rates"]:
-            assert (
-                "{:.1f} [{:.1f}, {:.1f}]".format(*(100 * one["rate"][key] for key in ("mean", "low", "high")))
-                in printed
-            )
-    for one in without["rates"]:
-        change = one["change"]
-        assert "{:+.1f} [{:+.1f}, {:+.1f}]".format(*(100 * change[key] for key in ("mean", "low", "high"))) in printed
-
-
 def test_shipped_scenes_are_listed_with_what_they_are(capsys: Captured) -> None:
     assert run(["simulate", "--list"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -181,8 +158,8 @@ def test_shipped_scenes_are_listed_with_what_they_are(capsys: Captured) -> None:
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["quick"], "choose one mode: --output, --explain, --ablate, --list"),
-        (["quick", "--explain", "--ablate"], "choose one mode:"),
+        (["quick"], "choose one mode: --output, --explain, --list"),
+        (["quick", "--explain", "--list"], "choose one mode:"),
         (["--explain"], "name a scene"),
         (["quick", "--list"], "leave out quick"),
         (["quick", "--explain", "--keep-unsettled"], "--keep-unsettled changes the set"),
@@ -213,7 +190,6 @@ def test_a_bad_scene_is_one_sentence_with_file_and_line(tmp_path: Path, capsys: 
     assert not (tmp_path / "set.grasps").exists()
 
 
-@pytest.mark.parametrize("mode", ["--explain", "--ablate"])
 @pytest.mark.parametrize(
     ("added", "sentence"),
     [
@@ -222,12 +198,12 @@ def test_a_bad_scene_is_one_sentence_with_file_and_line(tmp_path: Path, capsys: 
     ],
 )
 def test_faults_of_combined_effects_name_file_and_line(
-    added: str, sentence: str, mode: str, tmp_path: Path, capsys: Captured
+    added: str, sentence: str, tmp_path: Path, capsys: Captured
 ) -> None:
     scene = tmp_path / "bad.toml"
     text = shipped()["quick"].read_text()
     scene.write_text(text + "\n" * (44 - text.count("\n")) + added)
-    assert run(["simulate", str(scene), mode]) == 2
+    assert run(["simulate", str(scene), "--explain"]) == 2
     assert complaint(capsys).startswith(f"thenar: bad.toml, {sentence}")
 
 

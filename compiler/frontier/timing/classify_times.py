@@ -1,18 +1,41 @@
-"""Predict the time of classifying a frame on a target, without compiling."""
+"""Predict the time of classifying a frame on a target, without compiling; measure it in Python on this machine.
 
+Nothing that is deployed depends on the machine's name.
+"""
+
+import platform
+import re
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
+from thenar.runtime.scores import Scorer
 
 from ...firmware import FirmwareError
 from ...firmware.choose import Fit, fit_for
+from ...firmware.probes import random_frames
 from ...firmware.targets import TARGETS, Target, timed
 from ..points import FrontierError, How
-from .machine import machine_name, on_a_pi
-from .python_times import PythonCost, fit_here
 
 # Python's time on a Raspberry Pi 4 relative to here: a guess, and "here" is any machine.
 PI_FACTOR = 4.0
+MODEL_FILE, PROCESSOR_FILE = Path("/proc/device-tree/model"), Path("/proc/cpuinfo")
+
+# Shapes that are timed: switches, joints, grasp types.
+_SWITCHES, _JOINTS, _CLASSES = (0, 1, 4, 8, 16, 33, 66, 160), (0, 16, 22), (4, 14, 33)
+YARDSTICK = (33, 16, 14)
+_BINS, _REACH, _HIGHEST = 8, 60, 254
+_FRAMES, _PASSES = 20, 20
+
+# Microseconds a frame: a constant, and per switch, joint, class, (switch, class) and (joint, class); then the time of
+# tables of the shape YARDSTICK during the fit, which is the machine's speed.
+PythonCost = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,27 +51,24 @@ class Classified:
 class ClassifyModel:
     """Predicts the time of classifying on `target`, one of `timed()`.
 
-    AVR       cycles of classify() for the slowest frame, by the target's formula, at `clock_hz`
-    Cortex-M  instructions of classify(), likewise, at `clock_hz` and one cycle each: hardly any such core is faster,
+    AVR       cycles of classify() for the slowest frame, by the target's formula, at its clock
+    Cortex-M  instructions of classify(), likewise, at its clock and one cycle each: hardly any such core is faster,
               and loads, taken branches and slow flash take more cycles, so times are lower bounds
     host      wall time of the runtime's Scorer here, by a linear fit to tables that are timed on construction
-    pi        that times `factor`; the same time if this machine is a Raspberry Pi
+    pi        that times PI_FACTOR; the same time if this machine is a Raspberry Pi
 
-    python is the result of `fit_here`, for reuse; clock_hz replaces the part's default clock; factor is ignored except
-    on pi. Raises FrontierError for another target.
+    python is the result of `fit_here`, for reuse. Raises FrontierError for another target.
     """
 
-    def __init__(
-        self, target: str, *, clock_hz: int | None = None, python: PythonCost | None = None, factor: float = PI_FACTOR
-    ) -> None:
+    def __init__(self, target: str, *, python: PythonCost | None = None) -> None:
         if target not in timed():
             raise FrontierError(f"there is no target {target!r}: choose one of {', '.join(timed())}")
         part = TARGETS.get(target)
         self.target = target
-        self.part: Target | None = None if part is None or part.clock_hz is None else part
-        self.clock_hz = None if self.part is None else clock_hz or self.part.clock_hz
+        self.clock_hz = None if part is None else part.clock_hz
+        self.part: Target | None = None if self.clock_hz is None else part
         self.python = (python or fit_here()) if self.part is None else None
-        self.factor = factor if target == "pi" and not on_a_pi() else 1.0
+        self.factor = PI_FACTOR if target == "pi" and not on_a_pi() else 1.0
 
     @property
     def identity(self) -> tuple[object, ...]:
@@ -57,11 +77,13 @@ class ClassifyModel:
 
     def cost(self, tables: IntegerTables) -> Classified | None:
         """Return the cost of tables; None where they do not fit."""
-        if self.part is None:
-            assert self.python is not None
+        if self.python is not None:
+            *weights, _ = self.python
+            us = float(_features(tables.n_switches, tables.n_joints, tables.n_classes) @ np.array(weights))
             size = len(tables_to_bytes(tables))
             how: How = "guess" if self.guessed else "model"
-            return Classified(self.python.us(tables) * self.factor, how, size, size)
+            return Classified(us * self.factor, how, size, size)
+        assert self.part is not None
         fit = fitting(tables, self.part)
         if fit is None or fit.cost is None:
             return None
@@ -102,6 +124,14 @@ class ClassifyModel:
             )
         return ""
 
+    @property
+    def unmeasured(self) -> str:
+        """Why its times cannot be measured here, in a sentence; "" if they can."""
+        if self.guessed:
+            return "classify times on pi were not measured: this machine is no Raspberry Pi"
+        lack = self.part.missing() if self.part is not None else None
+        return f"classify times on {self.target} were not counted in a simulator: {lack}" if lack else ""
+
 
 def fitting(tables: IntegerTables, part: Target) -> Fit | None:
     """Return the fit of `tables` on a part, with its cost; None where they do not fit."""
@@ -109,3 +139,88 @@ def fitting(tables: IntegerTables, part: Target) -> Fit | None:
         return fit_for(part, tables)
     except FirmwareError:
         return None
+
+
+def fit_here() -> PythonCost:
+    """Time tables of many shapes on this machine and fit them by least relative squares, no weight below 0.
+
+    Takes about a second, and differs from one run to the next with the machine's speed.
+    """
+    from scipy.optimize import nnls
+
+    shapes = [shape for shape in product(_SWITCHES, _JOINTS, _CLASSES) if shape[0] + shape[1]]
+    taken = np.array(classify_us([random_tables(*shape) for shape in shapes]))
+    rows = np.array([_features(*shape) for shape in shapes])
+    weights, _ = nnls(rows / taken[:, np.newaxis], np.ones(len(taken)))
+    return (*weights.tolist(), float(taken[shapes.index(YARDSTICK)]))
+
+
+def classify_us(several: Sequence[IntegerTables], yardstick: float | None = None) -> list[float]:
+    """Return the time of classifying a frame here with each of the tables, as `Build.classify` does it, but without the
+    check for unusual frames: the mean over random frames.
+
+    yardstick  microseconds of tables of the shape YARDSTICK at the reference speed; None: at the current speed
+
+    For every frame the least of several passes over all tables counts: other work on the machine only adds time, and a
+    busy moment affects all of them. But clocks, and neighbours of a virtual machine, change its speed for minutes, by
+    half and more: so the yardstick is timed in the same passes.
+    """
+    probed = []
+    for tables in (*several, random_tables(*YARDSTICK)):
+        probes = random_frames(tables, _FRAMES, seed=1)
+        probed.append((Scorer(tables), list(zip(probes.bits, probes.codes, strict=True))))
+    least_s = np.full((len(probed), _FRAMES), np.inf)
+    for _ in range(_PASSES):
+        for (scorer, frames), least in zip(probed, least_s, strict=True):
+            for number, (bits, codes) in enumerate(frames):
+                start = time.perf_counter()
+                lanes = scorer.lanes(bits, codes)
+                lanes.index(max(lanes))
+                least[number] = min(least[number], time.perf_counter() - start)
+    *found, now = (1e6 * least_s.sum(axis=1) / _FRAMES).tolist()
+    return [us if yardstick is None else us * yardstick / now for us in found]
+
+
+def _features(switches: int, joints: int, classes: int) -> NDArray[np.float64]:
+    return np.array([1, switches, joints, classes, switches * classes, joints * classes], float)
+
+
+def random_tables(switches: int, joints: int, classes: int) -> IntegerTables:
+    """Return tables of that shape, always the same, with 8 rows a joint: their values do not affect the time."""
+    random = np.random.default_rng(switches + 1000 * joints)
+
+    def rows(*shape: int) -> NDArray[np.int16]:
+        return random.integers(-_REACH, _REACH, (*shape, classes), np.int16, endpoint=True)
+
+    return IntegerTables.of(
+        bias=rows(),
+        switch_rows=rows(switches),
+        thresholds=tuple(
+            np.sort(random.choice(_HIGHEST, _BINS - 1, replace=False)).astype(np.uint16) for _ in range(joints)
+        ),
+        joint_rows=tuple(rows(_BINS) for _ in range(joints)),
+        switch_means=rows(switches),
+        joint_means=rows(joints),
+        scale=100.0,
+    )
+
+
+def on_a_pi() -> bool:
+    """Return whether this machine is a Raspberry Pi."""
+    return "Raspberry Pi" in _text(MODEL_FILE)
+
+
+def machine_name() -> str:
+    """Return this machine's board or processor, and its Python: "AMD EPYC, Python 3.11"."""
+    listed = re.search(r"^model name\s*:\s*(.+)$", _text(PROCESSOR_FILE), re.MULTILINE)
+    board = _text(MODEL_FILE).replace("\0", "")
+    name = board or (listed[1] if listed else "") or platform.processor() or platform.machine()
+    plain = " ".join(re.sub(r"\((?:R|TM)\)|\bCPU\b|@.*", " ", name).split())
+    return f"{plain}, Python {'.'.join(platform.python_version_tuple()[:2])}"
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text(errors="replace")
+    except OSError:
+        return ""

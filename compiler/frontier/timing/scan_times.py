@@ -19,7 +19,7 @@ from thenar.runtime.scanning.timing import glove_us
 
 from ...firmware.targets import TARGETS
 from ..points import How, PointTime
-from .machine import on_a_pi
+from .classify_times import on_a_pi
 from .wirings import WiringOption
 
 NO_TIME = PointTime(0.0, "wire")
@@ -30,35 +30,45 @@ _CALLS, _BATCHES = 200, 9
 
 
 @dataclass(frozen=True, slots=True)
-class Overhead:
-    """Microseconds of each transaction in addition to the wire.
+class ReadingCost:
+    """Microseconds of reading so many things: a constant, and for each of them; no less than least_us.
 
-    what  a sentence on them and their source; how: the source of a scan's time with them
+    Of joints, it is the time of a record; of transactions, the overhead of each in addition to the wire.
+
+    how   the source of these times: "formula" is the vendor's for a CyberGlove
+    what  a sentence on them
     """
 
-    what: str
-    call_us: float = 0.0
+    fixed_us: float = 0.0
+    each_us: float = 0.0
+    least_us: float = 0.0
     how: How = "wire"
+    what: str = ""
+
+    def of(self, count: int) -> PointTime:
+        """Return the time of reading this number of them."""
+        return PointTime(max(self.fixed_us + count * self.each_us, self.least_us), self.how) if count else NO_TIME
 
 
-WIRE_ONLY = Overhead("scans are those of the wire alone")
+NO_RECORDS = ReadingCost()
+WIRE_ONLY = ReadingCost(what="scans are those of the wire alone")
 
 
-def overhead_of(target: str) -> Overhead:
+def overhead_of(target: str) -> ReadingCost:
     """Return the reading overhead on `target` (a name of `frontier --target`)."""
     if target in TARGETS and TARGETS[target].clock_hz is not None:
-        return Overhead(f"scans on {target} are those of the wire alone, without the time of its program")
+        return ReadingCost(what=f"scans on {target} are those of the wire alone, without the time of its program")
     if target == "pi" and not on_a_pi():
-        return Overhead(
-            f"a transfer on a Raspberry Pi is taken to have {PI_CALL_US:g} us of overhead, which is a guess from a "
-            "kernel trace of a Pi 3: run thenar frontier on the Pi itself",
-            call_us=PI_CALL_US,
+        return ReadingCost(
+            each_us=PI_CALL_US,
             how="guess",
+            what=f"a transfer on a Raspberry Pi is taken to have {PI_CALL_US:g} us of overhead, which is a guess from "
+            "a kernel trace of a Pi 3: run thenar frontier on the Pi itself",
         )
-    measured = measured_call_us()
-    return Overhead(
-        f"a transfer has {measured:.1f} us of overhead, measured here: the system call, without the adapter's driver",
-        call_us=measured,
+    us = measured_call_us()
+    return ReadingCost(
+        each_us=us,
+        what=f"a transfer has {us:.1f} us of overhead, measured here: the system call, without the adapter's driver",
     )
 
 
@@ -93,27 +103,27 @@ def _mean_us(call: Callable[[], object], converted: Callable[[], object]) -> flo
 
 @dataclass(frozen=True, slots=True)
 class ScanTimes:
-    """Time of reading the kept switches.
+    """Time of reading the kept switches in one wiring, at this clock.
 
     us     microseconds of a scan; buses are read one after another, as `scan_us` of the runtime adds them up
     ports  transactions, where a stream's row is one; chips: those that are read
     how    "wire", or "guess" if a guess is included
     """
 
+    wiring: str
+    clock_hz: int
     us: float
     ports: int
     chips: int
     how: How
 
 
-def scan_times(names: Sequence[str], wiring: WiringOption, overhead: Overhead = WIRE_ONLY) -> ScanTimes:
+def scan_times(names: Sequence[str], wiring: WiringOption, overhead: ReadingCost = WIRE_ONLY) -> ScanTimes:
     """Return the scan times of a build's switches `names`, in its order.
 
     overhead is added to every transaction. Streams and buses work in parallel, so the slowest counts. Raises
     HarnessError if a switch has no place.
     """
-    if not len(names):
-        return ScanTimes(0.0, 0, 0, "wire")
     harness = wiring.harness_of(names)
     scan = plan_scan(names, harness)
     rows_us = [
@@ -122,14 +132,16 @@ def scan_times(names: Sequence[str], wiring: WiringOption, overhead: Overhead = 
         if read.switches + read.levels
     ]
     return ScanTimes(
-        us=max(_bus_us(scan, harness, overhead), *rows_us, 0.0),
+        wiring=wiring.name,
+        clock_hz=wiring.clock_hz,
+        us=max(_bus_us(scan, harness, overhead.each_us), *rows_us, 0.0),
         ports=len(scan.ports) + len(rows_us),
         chips=len({(port.bus, port.chip) for port in scan.ports}),
         how=overhead.how,
     )
 
 
-def _bus_us(scan: ScanMap, harness: Harness, overhead: Overhead) -> float:
+def _bus_us(scan: ScanMap, harness: Harness, call_us: float) -> float:
     """Return the time of a scan of the chips, if there are any."""
     if not scan.ports:
         return 0.0
@@ -138,31 +150,9 @@ def _bus_us(scan: ScanMap, harness: Harness, overhead: Overhead) -> float:
         # Selecting a channel is a transaction as well.
         wire_ns = costs.after(read, number)
         selected = wire_ns > costs.after(read | 1 << number, number)
-        us.append(wire_ns / 1000 + overhead.call_us * (1 + selected))
+        us.append(wire_ns / 1000 + call_us * (1 + selected))
         read |= 1 << number
     return fsum(us)
-
-
-@dataclass(frozen=True, slots=True)
-class Records:
-    """Time of reading joints: per joint, and a constant; no less than least_us.
-
-    how   the source: "formula" is the vendor's for a CyberGlove
-    what  a sentence on it
-    """
-
-    fixed_us: float = 0.0
-    each_us: float = 0.0
-    least_us: float = 0.0
-    how: How = "wire"
-    what: str = ""
-
-    def of(self, joints: int) -> PointTime:
-        """Return the time of reading this number of joints."""
-        return PointTime(max(self.fixed_us + joints * self.each_us, self.least_us), self.how) if joints else NO_TIME
-
-
-NO_RECORDS = Records()
 
 
 def records_of(
@@ -170,34 +160,30 @@ def records_of(
     given_us: float | None = None,
     glove: GloveWiring | None = None,
     *,
-    wire_only: bool = False,
-    filtered: bool = False,
     masked: bool = True,
-) -> Records:
+) -> ReadingCost:
     """Return the time of reading some of the joints with these names.
 
     A CyberGlove, whose sensors may have other names if it is wired as `glove`, sends only the requested ones if its
     mask is set (`masked`), else all of its 18 or 22. Its time is `glove_us`: as measured if glove.toml has it, else by
-    the vendor's formula, or `wire_only`. `given_us` for all joints overrides that. The time of other joints is unknown.
+    the vendor's formula. `given_us` for all joints overrides that. The time of other joints is unknown.
     """
     if given_us is not None and joints:
-        return Records(each_us=given_us / len(joints), how="given")
+        return ReadingCost(each_us=given_us / len(joints), how="given")
     named = () if glove is None else glove.joints
     sensors = len(named) if joints and set(joints) <= set(named) else sensors_with(joints)
     if sensors is None:
-        return Records(how="unknown" if joints else "wire")
+        return ReadingCost(how="unknown" if joints else "wire")
     wired = glove or GloveWiring(port="-", sensors=22 if sensors > SENSORS else None)
-    wired = replace(wired, filter=True) if filtered else wired
-    fixed, more = (glove_us(replace(wired, rate_hz=None), count, wire_only=wire_only) for count in (0, 1))
+    fixed, more = (glove_us(replace(wired, rate_hz=None), count) for count in (0, 1))
     least = 0.0 if masked else fixed + sensors * (more - fixed)
-    if wired.rate_hz and not wire_only:
+    if wired.rate_hz:
         least = max(least, 1e6 / wired.rate_hz)
-    how: How = "wire" if wire_only else "formula" if wired.record_us is None else "measured"
-    return Records(fixed, more - fixed, least, how, _RECORDS[how])
+    how: How = "formula" if wired.record_us is None else "measured"
+    return ReadingCost(fixed, more - fixed, least, how, _RECORDS[how])
 
 
 _RECORDS: Mapping[How, str] = {
-    "wire": "a CyberGlove's record is its bytes on the line: the box's time to digitise its sensors is left out",
     "formula": "a CyberGlove's record is the vendor's formula, of a single source: each sensor is digitised in 250 us "
     "(376 us through the filter) before the record is sent; thenar doctor measures a connected glove",
     "measured": "a CyberGlove's record is record_us of glove.toml, as measured, and for fewer sensors "

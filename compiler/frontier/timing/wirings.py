@@ -115,11 +115,6 @@ def is_avr(target: str) -> bool:
     return target in TARGETS and TARGETS[target].avr
 
 
-def names_of(count: int) -> list[str]:
-    """Return names for the switches of a hypothetical glove: s0, s1, ..."""
-    return [f"s{number}" for number in range(count)]
-
-
 def _as_wired(given: Harness) -> WiringOption:
     clocks = [bus.clock_hz for bus in given.buses if bus.chips]
     lines = [chip.clock_hz for chip in given.spi] or [stream.baud for stream in given.streams]

@@ -1,6 +1,7 @@
 """Designs of a finalist, made up by hand: what they take, and what becomes of them as points."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,10 +10,10 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.designs import Design, best_designs, designs, lucks, points_of
 from thenar.compiler.frontier.finalists import EvaluatedFinalist
 from thenar.compiler.frontier.latency import POLICIES
-from thenar.compiler.frontier.points import Latency, PlacementChoice, PointTime
-from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
+from thenar.compiler.frontier.points import Latency, PointTime
+from thenar.compiler.frontier.price import PricedTables
 from thenar.compiler.frontier.screen import Screened
-from thenar.compiler.frontier.search import Candidate, Search, Shape
+from thenar.compiler.frontier.search import Search, placed, tabled
 from thenar.compiler.frontier.survey import Cuts, TrialAccuracy
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes, records_of
@@ -20,17 +21,28 @@ from thenar.compiler.placement.elements import Element
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS, Training
 from thenar.drivers.cyberglove_protocol import SENSORS_18
+from thenar.runtime.recipe import PAPERS_TRAINER, Recipe
 
-TABLED = Tabled(10, Shape(16))
 WAIT = Latency(1000.0, 2000.0, 0.0)
 
 
-def names(choice: Candidate) -> list[str]:
-    return [f"s{number}" for number in range(int(choice.placement.parameter))]
+@dataclass
+class Surveyed:
+    """What points ask a survey for."""
+
+    chosen: Training | None = None
+
+    def names(self, choice: Recipe) -> tuple[str, ...]:
+        return tuple(f"s{number}" for number in range(choice.prune))
+
+    def some_joints(self, choice: Recipe) -> tuple[str, ...]:
+        return ()
+
+    def training(self, choice: Recipe) -> Training:
+        return self.chosen or Search().alone(choice.trainer).training
 
 
-def trained(choice: Candidate) -> Training:
-    return Search().alone(choice.trainer).training
+SURVEY: Any = Surveyed()
 
 
 def judged(rate: float) -> TrialAccuracy:
@@ -42,17 +54,11 @@ def judged(rate: float) -> TrialAccuracy:
 def close_of(
     switches: int = 20, rate: float = 0.9, scan_us: float = 500.0, classify_us: float = 50.0
 ) -> EvaluatedFinalist:
-    scan = ScanTimes(scan_us, 4, 2, "wire")
-    wired = (Wired("mcp23017", 400_000, scan),) if switches else ()
-    tables = PricedTables(TABLED, b"", Classified(classify_us, "model", 900, 30), wired, 1.25)
-    choice = PlacementChoice("id3", float(switches))
-    screened = Screened(
-        Candidate(choice, "switches" if switches else "joints"),
-        tuple(map(Element, range(switches))),
-        judged(rate),
-        classify_us,
-    )
-    return EvaluatedFinalist(screened, {}, {TABLED: judged(rate)}, {}, {}, (tables,), 2.0)
+    choice = placed("id3", switches, PAPERS_TRAINER, "switches" if switches else "joints")
+    scans = (ScanTimes("mcp23017", 400_000, scan_us, 4, 2, "wire"),) if switches else ()
+    tables = PricedTables(tabled(choice, 10), b"", Classified(classify_us, "model", 900, 30), scans)
+    screened = Screened(choice, tuple(map(Element, range(switches))), judged(rate), classify_us)
+    return EvaluatedFinalist(screened, {}, {tables.recipe: judged(rate)}, {}, {}, (tables,))
 
 
 def simulated(design: Design, us: float) -> Design:
@@ -76,7 +82,9 @@ def test_luck_is_the_same_however_often_the_same_folds_are_repeated() -> None:
             close = close_of(switches, 0.9, classify_us=50.0 + switches)
             hits = (random.random(200) < 0.8).astype(np.intp)
             judged_so = TrialAccuracy(Rate.counted((int(hits.sum()),), 200, of="pooled"), repeats * hits, repeats)
-            close = replace(close, tables={TABLED: judged_so}, screened=replace(close.screened, judged=judged_so))
+            close = replace(
+                close, tables=dict.fromkeys(close.tables, judged_so), screened=replace(close.screened, judged=judged_so)
+            )
             several.append(next(designs(close)))
         fronts = best_designs(several)
         found.append(sorted(lucks(fronts, several, [], cuts, 1).values()))
@@ -101,7 +109,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     assert other.frame.us < one.frame.us
     several = [simulated(one, 20.0), simulated(other, 60.0)]
     waits = {(design, kind): WAIT for design in several for kind in POLICIES}
-    points = points_of(several, waits, {each.judged: 0.01 for each in several}, names, trained)
+    points = points_of(several, waits, {each.judged: 0.01 for each in several}, SURVEY)
     assert [point.frame.us for point in points] == sorted(point.frame.us for point in points)
     fronts = {(len(point.switches), point.setting.decision): point.fronts for point in points}
     assert fronts[20, "single"] == ("frame", "switches", "latency")
@@ -114,7 +122,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
 def test_luck_lowers_a_points_rate_and_its_intervals_lower_end() -> None:
     design = next(designs(close_of(20, 0.9)))
     waits = dict.fromkeys(((design, kind) for kind in POLICIES), WAIT)
-    (point, *_) = points_of([design], waits, {design.judged: 0.25}, names, trained)
+    (point, *_) = points_of([design], waits, {design.judged: 0.25}, SURVEY)
     found = design.judged.rate
     assert (point.rate.mean, point.rate.low, point.rate.high) == pytest.approx(
         (found.mean - 0.25, found.low - 0.25, found.high)
@@ -124,12 +132,11 @@ def test_luck_lowers_a_points_rate_and_its_intervals_lower_end() -> None:
 
 def test_a_point_says_its_trainer_and_every_setting_that_is_no_default() -> None:
     (design,) = designs(close_of())
-    choice = replace(design.close.screened.choice, trainer="logit")
-    other = replace(design, close=replace(design.close, screened=replace(design.close.screened, choice=choice)))
-    waits = dict.fromkeys(((other, kind) for kind in POLICIES), WAIT)
+    waits = dict.fromkeys(((design, kind) for kind in POLICIES), WAIT)
     usual = {own.name: own.default for own in TRAINERS["logit"].settings}
     chosen = Training("logit", {**usual, "penalty": 17.0, "max_bins": 8})
-    (point, *_) = points_of([other], waits, {other.judged: 0.0}, names, lambda _: chosen)
+    surveyed: Any = Surveyed(chosen)
+    (point, *_) = points_of([design], waits, {design.judged: 0.0}, surveyed)
     setting = point.setting
     assert (setting.trainer, setting.settings, setting.max_bins, setting.rounds) == (
         "logit",

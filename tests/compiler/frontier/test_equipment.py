@@ -2,11 +2,10 @@ import numpy as np
 from msgspec.structs import replace
 
 from thenar.compiler.frontier.cache import question
-from thenar.compiler.frontier.equipment import Equipment
-from thenar.compiler.frontier.price import price
+from thenar.compiler.frontier.price import Equipment, price
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
-from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, Overhead
+from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, ReadingCost
 from thenar.compiler.frontier.timing.wirings import wirings
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.placement import InputSelection
@@ -26,7 +25,7 @@ def test_whatever_times_depend_on_is_part_of_the_question(grasp_set: GraspSet) -
     equipments = [
         Equipment(MODEL, wirings(None), WIRE_ONLY),
         Equipment(ClassifyModel("avr328p"), wirings(None), WIRE_ONLY),
-        Equipment(MODEL, wirings(None), Overhead("", call_us=1.0)),
+        Equipment(MODEL, wirings(None), ReadingCost(each_us=1.0)),
         *(Equipment(MODEL, wirings(given), WIRE_ONLY) for given in (glove, slower, other, faster)),
     ]
     names, samples = tuple(NAMES), Samples.of(grasp_set)
@@ -40,6 +39,6 @@ def test_whatever_times_depend_on_is_part_of_the_question(grasp_set: GraspSet) -
 
 def test_switches_need_a_wiring_with_a_place_for_each() -> None:
     equipment = Equipment(MODEL, wirings(propose_harness(NAMES[:2])), WIRE_ONLY)
-    assert equipment.fitting(()) == ()
-    assert "as wired" in [wiring.name for wiring in equipment.fitting(NAMES[:2])]
-    assert "as wired" not in [wiring.name for wiring in equipment.fitting(NAMES)]
+    assert equipment.scans(()) == ()
+    assert "as wired" in [scan.wiring for scan in equipment.scans(NAMES[:2])]
+    assert "as wired" not in [scan.wiring for scan in equipment.scans(NAMES)]

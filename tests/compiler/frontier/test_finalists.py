@@ -3,13 +3,11 @@ import pytest
 
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.finalists import depth_of, finalists, papers_tables, worthwhile
-from thenar.compiler.frontier.points import PlacementChoice
-from thenar.compiler.frontier.price import Tabled
 from thenar.compiler.frontier.screen import Screened
-from thenar.compiler.frontier.search import Candidate, Search, Shape
+from thenar.compiler.frontier.search import SHAPES, Search, placed, tabled
 from thenar.compiler.frontier.survey import FoldHits, TrialAccuracy
 from thenar.compiler.placement.elements import Element
-from thenar.runtime.recipe import Inputs
+from thenar.runtime.recipe import PAPERS_TRAINER, Inputs, Recipe
 
 
 def judged(rate: float) -> TrialAccuracy:
@@ -17,7 +15,7 @@ def judged(rate: float) -> TrialAccuracy:
 
 
 def _screened(size: int, rate: float, frame_us: float, inputs: Inputs = "switches", method: str = "id3") -> Screened:
-    choice = Candidate(PlacementChoice(method, float(size)), inputs)
+    choice = placed(method, size, PAPERS_TRAINER, inputs)
     return Screened(choice, tuple(map(Element, range(size))), judged(rate), frame_us)
 
 
@@ -48,22 +46,23 @@ def test_equal_placements_count_once() -> None:
     assert finalists([one, same], [], 2) == (one,)
 
 
-def rates_of(shape: Shape, *rates: tuple[int, float]) -> dict[Tabled, TrialAccuracy]:
-    return {Tabled(rounds, shape): judged(rate) for rounds, rate in rates}
+CHOICE = placed("id3", 62, PAPERS_TRAINER, "both")
+
+
+def rates_of(shape: Recipe, *rates: tuple[int, float]) -> dict[Recipe, TrialAccuracy]:
+    return {tabled(CHOICE, rounds, shape): judged(rate) for rounds, rate in rates}
 
 
 def test_every_shape_is_priced_at_its_fewest_equivalent_rounds() -> None:
-    wide, narrow = Shape(16), Shape(4)
+    wide, narrow = SHAPES[0], SHAPES[5]
     rates = rates_of(wide, (10, 0.8), (30, 0.9), (100, 0.9002)) | rates_of(narrow, (10, 0.7), (30, 0.6))
-    assert worthwhile(rates) == (Tabled(30, wide), Tabled(10, narrow))
+    assert worthwhile(rates) == (tabled(CHOICE, 30, wide), tabled(CHOICE, 10, narrow))
 
 
 def test_the_papers_tables_have_at_most_a_hundred_rounds() -> None:
-    rounds = [papers_tables(Search(methods=("id3",), baselines=(), rounds=most)).rounds for most in (300, 100, 50)]
-    assert rounds == [100, 100, 50]
-    for most in (300, 100, 50, 1):
-        search = Search(methods=("id3",), baselines=(), rounds=most)
-        assert papers_tables(search).rounds in search.tabled
+    searches = [Search(methods=("id3",), baselines=(), rounds=most) for most in (300, 100, 50, 1)]
+    assert [papers_tables(CHOICE, search).rounds for search in searches] == [100, 100, 50, 1]
+    assert all(papers_tables(CHOICE, search).rounds in search.tabled for search in searches)
 
 
 def right(count: int) -> bytes:

@@ -139,16 +139,22 @@ def test_what_is_decided_is_what_the_live_recogniser_publishes(
     tables, replay = make_tables(seed, joints), make_random_replay(seed, grasps=2)
     policy = policy_of(kind, dwell_us, 0.05, spacing_us, 70_000)
     live = played_live(tables, replay, step_us, policy)
-    found = decided_on(tables, KEPT, replay, step_us, policy)
-    names = [UNKNOWN if number < 0 else f"grasp {number}" for number in found.at(np.arange(len(live))).tolist()]
+    found = decided_at(decided_on(tables, KEPT, replay, step_us, policy), len(live))
+    names = [UNKNOWN if number < 0 else f"grasp {number}" for number in found]
     assert names == live
+
+
+def decided_at(decided: tuple[np.ndarray, np.ndarray], count: int) -> list[int]:
+    """Return what is decided on at each of `count` frames."""
+    frames, types = decided
+    return [int(types[place]) for place in np.searchsorted(frames, np.arange(count), side="right") - 1]
 
 
 def by_definition(tables: IntegerTables, replay: Replay, step_us: int, policy: Policy | None) -> list[float]:
     """mean, p99, missed and wrong, from every frame's answer and when it is there."""
     decided = decided_on(tables, KEPT, replay, step_us, policy)
     count = -(-(replay.stream.end_us - replay.stream.start_us) // step_us)
-    answers = decided.at(np.arange(count)).tolist()
+    answers = decided_at(decided, count)
     answered_us = [replay.stream.start_us + (frame + 1) * step_us for frame in range(count)]
 
     def answer(time_us: int) -> int:

@@ -9,12 +9,12 @@ import pytest
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.frontier.cache import Cache, Store
-from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.find import FRONTIER_NAME, find_frontier
 from thenar.compiler.frontier.picked import picked
-from thenar.compiler.frontier.points import Frontier, FrontierPoint, PlacementChoice
+from thenar.compiler.frontier.points import Frontier, FrontierPoint
+from thenar.compiler.frontier.price import Equipment
 from thenar.compiler.frontier.replay import replay_of
-from thenar.compiler.frontier.search import TAXEL_LEVELS, Candidate, Search
+from thenar.compiler.frontier.search import TAXEL_LEVELS, Search, placed
 from thenar.compiler.frontier.survey import Cuts, Survey
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY
@@ -106,7 +106,7 @@ def test_levels_of_a_fold_come_from_its_training_rows_alone(pressed: GraspSet, t
         equipment = Equipment(ClassifyModel("avr328p"), (), WIRE_ONLY)
         cache = Cache(store, lambda _done, _all: None, jobs=1)
         survey = Survey(pressed, "set", samples, ports, SEARCH, cuts, equipment, cache)
-        choice, fold = Candidate(PlacementChoice("elimination-cost", 5.0), "switches", levels=3), cuts.screening[0]
+        choice, fold = placed("elimination-cost", 5, "logitboost", "switches", 3), cuts.screening[0]
         survey.choose([choice], [fold])
         alone = samples.rows(fold.train).with_joints(())
         elements = elements_of(alone, 3)

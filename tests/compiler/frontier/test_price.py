@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from thenar.compiler.frontier.equipment import Equipment
-from thenar.compiler.frontier.price import Tabled, price
-from thenar.compiler.frontier.search import Shape
+from thenar.compiler.frontier.price import Equipment, price
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY
 from thenar.compiler.frontier.timing.wirings import wirings
@@ -22,7 +20,7 @@ def test_a_finalist_is_priced_with_what_its_build_holds_for_lost_inputs(grasp_se
     assert made.training is not None
     names, rows = names_of(grasp_set, made.elements), np.arange(len(samples.labels))
     equipment = Equipment(ClassifyModel("avr328p"), wirings(None), WIRE_ONLY)
-    asked = samples, names, rows, made.selection, (Tabled(20, Shape(options.width, options.table_bits)),), made.training
+    asked = samples, names, rows, made.selection, (options,), made.training
     (close,) = price(*asked, equipment, True)
     (quick,) = price(*asked, equipment, False)
     assert close.content == tables_to_bytes(made.tables) != quick.content == tables_to_bytes(made.integers)

@@ -112,7 +112,7 @@ def test_a_set_of_single_trials_is_composed_of_the_rows_given() -> None:
     part = grasp_set.rows(rows)
     replay = replay_of(grasp_set, grasp_set.labels, rows, seed=1, grasps=50)
     check(flat(replay))
-    assert same(flat(replay), flat(composed(part.switches, part.codes, part.labels, seed=1, grasps=50)))
+    assert same(flat(replay), flat(composed(part, part.labels, seed=1, grasps=50)))
     assert "composed of 50 single trials" in replay.what
 
 
@@ -128,12 +128,12 @@ def test_incomplete_movements_are_left_out_of_the_replay() -> None:
 
 def test_rows_are_a_period_apart_and_movements_out_of_step_with_it() -> None:
     grasp_set = whole_movements([0, 1] * 20)
-    stream = flat(recorded(grasp_set, grasp_set.labels, period_us=8_000))
+    stream = flat(recorded(grasp_set, grasp_set.labels))
     steps = np.diff(stream.at_us).reshape(-1, FRAMES)
-    assert (steps[:, :-1] == 8_000).all()
-    assert ((steps[:-1, -1] > 8_000) & (steps[:-1, -1] < 16_000)).all()
-    phases = np.sort(stream.at_us[:-1:FRAMES] % 8_000)
-    assert np.diff(phases).max() < 800
+    assert (steps[:, :-1] == 10_000).all()
+    assert ((steps[:-1, -1] > 10_000) & (steps[:-1, -1] < 20_000)).all()
+    phases = np.sort(stream.at_us[:-1:FRAMES] % 10_000)
+    assert np.diff(phases).max() < 1000
 
 
 def test_timed_rows_keep_their_times_without_gaps_between_movements() -> None:
@@ -142,14 +142,14 @@ def test_timed_rows_keep_their_times_without_gaps_between_movements() -> None:
     times_us = 6_000 * rows + random.integers(0, 900, len(rows)) + 10_000_000 * (rows // FRAMES)
     none = (rows % FRAMES < 9) | (rows % FRAMES >= 32)
     timed = replace(grasp_set, times_us=times_us, grasps=np.where(none, "none", grasp_set.grasps))
-    replay = recorded(timed, np.where(none, -1, grasp_set.labels), period_us=8_000)
+    replay = recorded(timed, np.where(none, -1, grasp_set.labels))
     stream = flat(replay)
     check(stream)
     steps = np.diff(stream.at_us[:-1]).tolist()
     for movement in range(3):
         own = slice(FRAMES * movement, FRAMES * (movement + 1))
         assert steps[own][: FRAMES - 1] == np.diff(times_us[own]).tolist()
-    assert set(steps[FRAMES - 1 :: FRAMES]) == {8_000 + round(0.618034 * 8_000)}
+    assert set(steps[FRAMES - 1 :: FRAMES]) == {10_000 + round(0.618034 * 10_000)}
     # The labels say while when a grasp is complete, whatever the switches do.
     assert (stream.arrivals % FRAMES).tolist() == [9] * 3
     assert (stream.ends % FRAMES).tolist() == [32] * 3
@@ -169,7 +169,7 @@ def test_of_many_movements_some_are_taken_from_all_over_the_set() -> None:
 @given(st.integers(0, 10_000), st.integers(0, 3), st.integers(2, 4), st.integers(1, 70))
 def test_a_composed_stream_holds_trials_and_moves_between_them(seed: int, joints: int, types: int, grasps: int) -> None:
     trials = single_trials(seed, rows=24, joints=joints, types=types)
-    stream = flat(composed(trials.switches, trials.codes, trials.labels, seed=seed, grasps=grasps))
+    stream = flat(composed(trials, trials.labels, seed=seed, grasps=grasps))
     check(stream)
     assert len(stream.arrivals) == grasps
     rows = {(row.tobytes(), codes.tobytes()) for row, codes in zip(trials.switches, trials.codes, strict=True)}
@@ -185,7 +185,7 @@ def test_a_composed_stream_holds_trials_and_moves_between_them(seed: int, joints
 @given(st.integers(0, 10_000))
 def test_switches_open_before_the_hand_travels_and_close_after_it_has(seed: int) -> None:
     trials = single_trials(seed)
-    stream = flat(composed(trials.switches, trials.codes, trials.labels, seed=seed, grasps=9))
+    stream = flat(composed(trials, trials.labels, seed=seed, grasps=9))
     for end, arrival in zip(stream.ends[:-1].tolist(), stream.arrivals[1:].tolist(), strict=True):
         way = np.arange(end, arrival + 1)
         since_us = stream.at_us[way] - stream.at_us[end]
@@ -204,7 +204,9 @@ def test_joints_pass_through_a_more_open_hand(opens_up: bool) -> None:
     trials = single_trials(5, joints=1)
     codes = np.where(trials.labels[:, np.newaxis] == 0, 500 if opens_up else 100, 300).astype(np.uint16)
     labels = np.where(trials.labels == 1, 1, 2)
-    stream = flat(composed(trials.switches, codes, labels, seed=2, grasps=9, opens_up=np.array([opens_up])))
+    ends = (0, 250.0, 1000, -250.0) if opens_up else (0, -250.0, 1000, 250.0)
+    trials = replace(trials, codes=codes, joints=(Joint("j0", "deg", *ends),))
+    stream = flat(composed(trials, labels, seed=2, grasps=9))
     spans = zip(stream.ends[:-1].tolist(), stream.arrivals[1:].tolist(), strict=True)
     ways = [stream.codes[end : arrival + 1, 0].astype(int) for end, arrival in spans]
     there_and_back = [way for way in ways if way[0] == way[-1] == 300]
@@ -218,7 +220,7 @@ def test_joints_pass_through_a_more_open_hand(opens_up: bool) -> None:
 def test_every_trial_is_held_before_any_is_held_again(seed: int) -> None:
     trials = single_trials(seed, rows=20, joints=0)
     unlike = (np.arange(20)[:, np.newaxis] >> np.arange(6) & 1).astype(bool)
-    stream = flat(composed(unlike, trials.codes, trials.labels, seed=seed, grasps=20))
+    stream = flat(composed(replace(trials, switches=unlike), trials.labels, seed=seed, grasps=20))
     held = {row.tobytes() for row in stream.bits[stream.arrivals]}
     # Where the rest of a round is all of one type, the next round begins before it.
     assert len(held) >= 17

@@ -3,27 +3,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from thenar.compiler.frontier.finalists import choices_to_mark
 from thenar.compiler.frontier.find import find_frontier
-from thenar.compiler.frontier.marks import choices_to_mark
-from thenar.compiler.frontier.points import FrontierError, PlacementChoice
-from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
-from thenar.compiler.frontier.search import (
-    Candidate,
-    Search,
-    Shape,
-    curve_placements,
-    tried_placements,
-)
+from thenar.compiler.frontier.points import FrontierError
+from thenar.compiler.frontier.price import PricedTables
+from thenar.compiler.frontier.search import Search, candidates, placed
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.runtime.recipe import PAPERS_TRAINER, Recipe
 
 QUICK = Classified(40.0, "model", 900, 30)
 
 
 def priced(*scans_us: float, classified: Classified | None = QUICK) -> PricedTables:
-    wired = tuple(Wired("mcp23017", 400_000, ScanTimes(us, 1, 1, "wire")) for us in scans_us)
-    return PricedTables(Tabled(12, Shape(16)), b"", classified, wired, 0.1)
+    scans = tuple(ScanTimes("mcp23017", 400_000, us, 1, 1, "wire") for us in scans_us)
+    return PricedTables(Recipe(rounds=12), b"", classified, scans)
 
 
 def test_a_choice_is_as_fast_as_its_fastest_wiring() -> None:
@@ -36,19 +31,22 @@ def test_what_fits_no_flash_has_no_time() -> None:
     assert priced(900.0, classified=None).fastest_us(0) is None
 
 
-def test_elimination_is_tried_at_every_size_up_to_all_switches() -> None:
-    assert [choice.parameter for choice in tried_placements("elimination", 9)] == [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 9.0]
-    assert [choice.parameter for choice in tried_placements("elimination", 8)] == [1.0, 2.0, 3.0, 4.0, 6.0, 8.0]
-    assert [choice.parameter for choice in tried_placements("elimination", 1)] == [1.0]
-    assert max(choice.parameter for choice in curve_placements("rfe", 20)) == 16.0
+@pytest.mark.parametrize(("elements", "sizes"), [(9, [1, 2, 3, 4, 6, 8, 9]), (8, [1, 2, 3, 4, 6, 8]), (1, [1])])
+def test_elimination_is_tried_at_every_size_up_to_all_switches(elements: int, sizes: list[int]) -> None:
+    tried = candidates("elimination", elements, PAPERS_TRAINER, "switches", None)
+    assert [choice.keep for choice in tried] == sizes
 
 
 def test_the_papers_placements_are_marked_with_all_inputs_that_there_are() -> None:
-    assert Candidate(PlacementChoice("id3", 62.0), "both") in choices_to_mark(14, 3)
-    assert Candidate(PlacementChoice("id3", 62.0), "switches") in choices_to_mark(14, 0)
-    assert choices_to_mark(14, 0)[Candidate(PlacementChoice("elimination", 14.0), "switches")] == "all of 14"
-    assert choices_to_mark(14, 3)[Candidate(PlacementChoice("elimination", 14.0), "both")] == "all of 14, joints"
-    assert choices_to_mark(0, 3) == {}
+    papers, every = ("id3", 62, PAPERS_TRAINER), ("elimination", 14, PAPERS_TRAINER)
+    assert choices_to_mark(14, 3, PAPERS_TRAINER) == {
+        placed(*papers, "switches"): "paper, S = 62",
+        placed(*every, "switches"): "all of 14",
+        placed(*papers, "both"): "paper, S = 62, joints",
+        placed(*every, "both"): "all of 14, joints",
+    }
+    assert list(choices_to_mark(14, 0, PAPERS_TRAINER)) == [placed(*papers, "switches"), placed(*every, "switches")]
+    assert choices_to_mark(0, 3, PAPERS_TRAINER) == {}
 
 
 def test_one_type_leaves_nothing_to_tell_apart(grasp_set: GraspSet) -> None:

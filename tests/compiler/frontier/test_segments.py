@@ -7,11 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler.frontier.latency import Pace, latencies, latency
-from thenar.compiler.frontier.price import Tabled
+from thenar.compiler.frontier.latency import latencies, latency, movements_of, segment_tables
 from thenar.compiler.frontier.replay import replay_of
-from thenar.compiler.frontier.search import Shape
-from thenar.compiler.frontier.segments import MovementSamples
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.recordings.graspset import GraspSet
@@ -23,7 +20,7 @@ from thenar.runtime.segmenting.model import SegmentModel
 
 Make = Callable[..., GraspSet]
 BEFORE, HELD, AFTER = 20, 30, 10
-TABLED = Tabled(5, Shape(16))
+RECIPE = Recipe(rounds=5)
 KEPT = InputSelection.of(tuple(map(Element, range(14))), (0, 1, 2))
 
 
@@ -57,14 +54,14 @@ def test_a_left_out_subject_takes_no_part_in_learning(make_set: Make) -> None:
         switches=np.where(new[:, None], random.random(grasp_set.switches.shape) < 0.5, grasp_set.switches),
         codes=np.where(new[:, None], 7, grasp_set.codes).astype(np.uint16),
     )
-    training = Training.of(Recipe(rounds=5))
+    training = Training.of(RECIPE)
     found = []
     for one in (grasp_set, changed):
-        moving = MovementSamples.of(one, held_by(one, "S0"), seed=1)
+        moving = movements_of(one, held_by(one, "S0"))
         assert moving is not None
-        assert sum(len(stream.rows) for stream in moving.streams) >= np.count_nonzero(~new)
-        assert {stream.subject for stream in moving.streams} == {"S0"}
-        made, model = moving.segment_tables(KEPT, [TABLED], training)[TABLED]
+        assert sum(len(stream.rows) for stream in moving[1]) >= np.count_nonzero(~new)
+        assert {stream.subject for stream in moving[1]} == {"S0"}
+        made, model = segment_tables(moving, 1, KEPT, [RECIPE], training)[RECIPE]
         found.append((made.switch_rows.tobytes(), made.scale, model))
     assert found[0] == found[1]
     model = found[0][2]
@@ -76,32 +73,32 @@ def test_a_left_out_subject_takes_no_part_in_learning(make_set: Make) -> None:
 def test_no_stream_goes_over_a_movement_that_is_left_out(make_set: Make) -> None:
     grasp_set = movements(make_set, subjects=1)
     trials = grasp_set.without_none().trials
-    moving = MovementSamples.of(grasp_set, np.flatnonzero((trials != 3) & (trials != 4)), seed=1)
+    moving = movements_of(grasp_set, np.flatnonzero((trials != 3) & (trials != 4)))
     assert moving is not None
-    assert [len(stream.rows) // 60 for stream in moving.streams] == [3, 7]
-    assert [stream.start_us for stream in moving.streams] == [0, 5 * 600_000]
-    assert np.concatenate([stream.rows for stream in moving.streams]).tolist() == list(range(600))
+    assert [len(stream.rows) // 60 for stream in moving[1]] == [3, 7]
+    assert [stream.start_us for stream in moving[1]] == [0, 5 * 600_000]
+    assert np.concatenate([stream.rows for stream in moving[1]]).tolist() == list(range(600))
 
 
 @pytest.mark.parametrize("change", [{"independent": True}, {"none": False}])
 def test_sets_without_streams_or_none_teach_no_segments(make_set: Make, change: dict[str, Any]) -> None:
     grasp_set = make_set(rows=12) if "none" in change else replace(movements(make_set), **change)
-    assert MovementSamples.of(grasp_set, np.arange(6), seed=1) is None
+    assert movements_of(grasp_set, np.arange(6)) is None
 
 
 def test_only_segments_use_learnt_costs_and_the_class_none(make_set: Make) -> None:
     grasp_set = movements(make_set)
-    held, training = Samples.of(grasp_set.without_none()), Training.of(Recipe(rounds=5))
+    held, training = Samples.of(grasp_set.without_none()), Training.of(RECIPE)
     train, new = held_by(grasp_set, "S0"), np.flatnonzero(grasp_set.subjects == "S1")
     labels = np.where(grasp_set.is_none, -1, np.searchsorted(np.unique(grasp_set.labels), grasp_set.labels))
     replay = replay_of(grasp_set, labels, new, seed=1)
-    paces = (Pace(TABLED, 3000.0),)
-    moving = MovementSamples.of(grasp_set, train, seed=1)
+    frames = ((RECIPE, 3000.0),)
+    moving = movements_of(grasp_set, train)
     assert moving is not None
-    ((*others, segments),) = latencies(held, train, KEPT, replay, paces, training, moving)
-    ((*before, usual),) = latencies(held, train, KEPT, replay, paces, training)
+    ((*others, segments),) = latencies(held, train, KEPT, replay, frames, training, moving)
+    ((*before, usual),) = latencies(held, train, KEPT, replay, frames, training)
     assert others == before
-    made, model = moving.segment_tables(KEPT, [TABLED], training)[TABLED]
+    made, model = segment_tables(moving, 1, KEPT, [RECIPE], training)[RECIPE]
     assert made.n_classes == held.n_classes + 1
     assert segments == latency(made, range(14), replay, 3000.0, model)
     assert segments != usual

@@ -95,10 +95,10 @@ def test_without_an_input_that_varies_the_most_frequent_type_is_answered(grasp_s
 
 def test_a_path_holds_the_placement_of_every_parameter(samples: Samples, cuts: Cuts) -> None:
     rows, prunes = cuts.screening[0].train, (0.0, 10.0, 40.0)
-    path = choose_path(samples, rows, "id3", prunes, True, None, None)
+    path = choose_path(samples, rows, "id3", True, None, prunes, None)
     X, y = samples.switches[rows], samples.labels[rows]
     trees = [grow_id3(X, y, min_samples=int(prune)) for prune in prunes]
-    assert path.elements == tuple(tuple(map(Element, tree.inputs)) for tree in trees)
+    assert path == tuple(tuple(map(Element, tree.inputs)) for tree in trees)
 
 
 def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -> None:
@@ -106,7 +106,7 @@ def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -
     several = (((0,) * 14, (1.0,)), ((0,) * 14, (2.0,)), (one, (1.0, 1.0)), (two, (1.0, 1.0)))
     costs = [None, *(PortCosts(*each) for each in several)]
     folds = [*cuts.screening, *cuts.others, cuts.everything]
-    asked = {question(choose_path, (samples, folds[0].train, "id3", (0.0,), True, None, ports), {}) for ports in costs}
+    asked = {question(choose_path, (samples, folds[0].train, "id3", True, None, (0.0,), ports), {}) for ports in costs}
     asked |= {question(fit_stages, (samples, fold, kept((0,)), (1,), (), (), SEARCH.training), {}) for fold in folds}
     assert len(asked) == len(costs) + len(folds)
 

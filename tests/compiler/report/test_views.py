@@ -113,9 +113,9 @@ def test_a_point_that_misses_every_grasp_has_no_latency_to_show(frontier: Fronti
     assert view.points.rows[0][view.points.columns.index("Trainer")].startswith(f"{first.setting.trainer}, ")
     assert DASH not in view.points.rows[1][at : at + 3]
     assert "No tools were there." in view.notes
-    by_frame, _, by_latency = view.charts
-    assert 'data-point="1"' in by_frame.drawing
-    assert 'data-point="1"' not in by_latency.drawing
+    by_frame, _, by_latency = (drawing for _, _, drawing in view.charts)
+    assert 'data-point="1"' in by_frame
+    assert 'data-point="1"' not in by_latency
 
 
 def test_the_section_names_its_machine_and_labels_guesses(frontier: Frontier) -> None:
@@ -127,18 +127,17 @@ def test_the_section_names_its_machine_and_labels_guesses(frontier: Frontier) ->
     view = frontier_view(replaced(frontier, points=tuple(points)), frontier.fingerprint, None)
     assert {"Frame, µs (guess)", "Latency, µs (guess)", "99th pct., µs (guess)"} <= {*view.points.columns}
     timed = [column for each in view.tables for column in each.columns if column.startswith("Frame")]
-    assert len(timed) == 2
-    assert {*timed} == {"Frame, µs (guess)"}
+    assert timed == ["Frame, µs (guess)"]
     assert all("µs (guess)" in detail.said for detail in view.details)
-    assert ["(guess)</text>" in chart.drawing for chart in view.charts] == [True, False, True]
+    assert ["(guess)</text>" in drawing for _, _, drawing in view.charts] == [True, False, True]
 
 
 def test_the_point_that_the_build_is_comes_first(frontier: Frontier, hand: HandShape) -> None:
     for built in (frontier.points[0].number, frontier.points[-1].number):
         view = frontier_view(frontier, frontier.fingerprint, hand, built)
-        assert all(chart.drawing.count('class="point picked"') <= 1 for chart in view.charts)
+        assert all(drawing.count('class="point picked"') <= 1 for _, _, drawing in view.charts)
         marker = f'<g data-point="{built}" class="point picked">'
-        assert any(marker in chart.drawing for chart in view.charts)
+        assert any(marker in drawing for _, _, drawing in view.charts)
         assert view.picked is not None
         assert view.picked.number == built
         assert f"This build is point {built}." in view.notes

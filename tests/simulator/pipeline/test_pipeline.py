@@ -4,12 +4,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.simulator.body.condition import Condition
-from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS, hold_frame
 from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
@@ -46,8 +44,8 @@ def light() -> list[tuple]:
     return [listed_with(name, **special.get(name, {})) for name in OTHERS]
 
 
-def order(scene: Scene, without: str | None = None) -> list[str]:
-    return [stop.effect.name for stop in compile_pipeline(scene, without).steps]
+def order(scene: Scene) -> list[str]:
+    return [stop.effect.name for stop in compile_pipeline(scene).steps]
 
 
 @given(names=SUBSETS)
@@ -143,30 +141,6 @@ def test_a_scene_without_contact_model_gets_the_gloves_default(make_scene: Scene
         ("hand.grip", False),
         ("contact.quasistatic", True),
     ]
-
-
-@pytest.mark.parametrize("name", OTHERS)
-def test_leaving_an_effect_out_is_the_scene_without_it(make_scene: SceneMaker, name: str) -> None:
-    rest = [other for other in EVERYTHING if other != name]
-    left, never = compile_pipeline(make_scene(EVERYTHING), without=name), compile_pipeline(make_scene(rest))
-    assert [(stop.effect, stop.own) for stop in left.steps] == [(stop.effect, stop.own) for stop in never.steps]
-    assert left.setting == never.setting
-
-
-@pytest.mark.parametrize(
-    ("without", "words"),
-    [
-        ("joint.noise", ["'joint.noise'", "does not list it", "joint.drift"]),
-        ("contact.quasistatic", ["'contact.quasistatic'", "nothing closes the hand"]),
-        ("no.such", ["'no.such'", "does not list it"]),
-    ],
-)
-def test_what_cannot_be_left_out_is_refused_with_the_reason(
-    make_scene: SceneMaker, without: str, words: list[str]
-) -> None:
-    with pytest.raises(SceneError) as caught:
-        compile_pipeline(make_scene(["contact.quasistatic", "joint.drift"]), without)
-    assert all(word in str(caught.value) for word in words)
 
 
 def outcome(batch: Batch, row: int) -> dict[str, bytes]:

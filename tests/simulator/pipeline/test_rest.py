@@ -16,7 +16,6 @@ from thenar.runtime.published import NONE
 from thenar.simulator.body.cyberglove import USED, sensors_deg
 from thenar.simulator.body.hand import LIMITS_DEG, RESTS_DEG
 from thenar.simulator.errors import SceneError
-from thenar.simulator.pipeline.ablation import ablate
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import simulate
@@ -161,12 +160,3 @@ def test_a_rest_that_nothing_would_show_is_refused(
 ) -> None:
     with pytest.raises(SceneError, match=rf"^recording\.rest: .* the scene needs {re.escape(lacks)}$"):
         compile_pipeline(make_scene([effect], recording=recording))
-
-
-@pytest.mark.slow
-def test_a_scene_with_rests_can_be_ablated() -> None:
-    scene = load_scene("continuous-rest")
-    objects = tuple(item for item in scene.objects if item.grasp in ("PoS", "Tip"))
-    effects = tuple(each for each in scene.effects if each.name in ("hand.posture", "hand.transition"))
-    found = ablate(replace(scene, objects=objects, effects=effects, subjects=scene.subjects[:1]), jobs=1)
-    assert [each.without for each in found.variants] == [None, "hand.posture", "hand.transition"]

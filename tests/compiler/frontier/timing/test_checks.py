@@ -6,11 +6,10 @@ import pytest
 
 from thenar.compiler.firmware.simavr import missing
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.frontier.measure import steps_of, unmeasured
-from thenar.compiler.frontier.timing.classify_times import ClassifyModel, fitting
-from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
+from thenar.compiler.frontier.price import steps_of
+from thenar.compiler.frontier.timing.classify_times import ClassifyModel, fitting, random_tables
 
-PYTHON = PythonCost(2.0, 0.03, 0.15, 0.03, 0.0002, 0.0009, 10.0)
+PYTHON = (2.0, 0.03, 0.15, 0.03, 0.0002, 0.0009, 10.0)
 TABLES = [random_tables(33, 16, 14), random_tables(20, 0, 14), random_tables(8, 0, 5)]
 
 
@@ -36,12 +35,11 @@ def test_a_target_without_tools_names_what_is_missing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
-    reason = unmeasured(ClassifyModel("avr328p"))
-    assert reason is not None
+    reason = ClassifyModel("avr328p").unmeasured
     assert "avr-gcc" in reason
     assert "apt-get install" in reason
 
 
 def test_a_raspberry_pi_is_not_timed_elsewhere() -> None:
-    assert "no Raspberry Pi" in str(unmeasured(ClassifyModel("pi", python=PYTHON, factor=4.0)))
-    assert unmeasured(ClassifyModel("host", python=PYTHON)) is None
+    assert "no Raspberry Pi" in ClassifyModel("pi", python=PYTHON).unmeasured
+    assert not ClassifyModel("host", python=PYTHON).unmeasured

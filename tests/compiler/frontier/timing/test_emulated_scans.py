@@ -15,7 +15,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.frontier.timing.wirings import BOARD, names_of, wirings
+from thenar.compiler.frontier.timing.wirings import BOARD, wirings
 from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c, WireCounters
 from thenar.drivers.errors import DeviceError
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead, Scan
@@ -44,7 +44,7 @@ def scan_errors(given: Harness) -> list[float]:
 def _new_buses() -> Iterator[BusWiring]:
     for wiring in wirings(None):
         for size in _SIZES:
-            names = names_of(size)
+            names = [f"s{number}" for number in range(size)]
             if wiring.name != BOARD and wiring.fits(names):
                 yield from wiring.harness_of(names).buses
 

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from thenar.compiler.frontier.points import PointTime
 from thenar.compiler.frontier.timing.scan_times import (
-    Overhead,
+    ReadingCost,
     ScanTimes,
     records_of,
     scan_times,
@@ -17,7 +17,7 @@ from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import row_us, scan_us
 
-CALL = Overhead("a call", call_us=7.0)
+CALL = ReadingCost(each_us=7.0)
 wired = st.builds(
     WiringOption, st.sampled_from(["mcp23017", "pca9555", "tca6424a", "pcf8575"]), st.sampled_from([100_000, 400_000])
 )
@@ -33,20 +33,15 @@ def test_scan_time_is_the_runtimes_prediction_with_a_call_per_transaction(switch
     times = scan_times(names, wiring, CALL)
     harness = wiring.harness_of(names)
     scan = plan_scan(names, harness)
-    assert times.us == pytest.approx(scan_us(scan, harness, CALL.call_us).us)
+    assert times.us == pytest.approx(scan_us(scan, harness, CALL.each_us).us)
     assert (times.ports, times.chips, times.how) == (len(scan.ports), len(harness.buses[0].chips), "wire")
 
 
 @pytest.mark.parametrize(("switches", "baud", "hz"), [(33, 115_200, 200), (33, 1_000_000, 200), (200, 115_200, 149)])
 def test_a_board_sends_200_rows_a_second_if_its_line_allows(switches: int, baud: int, hz: int) -> None:
     times = scan_times(names_of(switches), WiringOption(BOARD, baud))
-    assert times == ScanTimes(float(round(1e6 / hz)), 1, 0, "wire")
+    assert times == ScanTimes(BOARD, baud, float(round(1e6 / hz)), 1, 0, "wire")
     assert times.us >= row_us(switches, 0, baud)
-
-
-def test_without_switches_there_is_nothing_to_read() -> None:
-    none = scan_times((), WiringOption("mcp23017", 400_000))
-    assert none == ScanTimes(0.0, 0, 0, "wire")
 
 
 def test_a_switch_without_a_place_is_an_error() -> None:
@@ -56,10 +51,13 @@ def test_a_switch_without_a_place_is_an_error() -> None:
 
 
 @pytest.mark.parametrize("joints", [SENSORS_18[:1], SENSORS_18, SENSORS_22[::-1], ("index_dij",)])
-@pytest.mark.parametrize("filtered", [False, True])
-def test_a_record_is_the_vendors_formula_of_the_sensors_that_are_read(joints: tuple[str, ...], filtered: bool) -> None:
+@pytest.mark.parametrize("filtered", [None, True])
+def test_a_record_is_the_vendors_formula_of_the_sensors_that_are_read(
+    joints: tuple[str, ...], filtered: bool | None
+) -> None:
     """Written out here: 0.25 ms a sensor, 0.1256 more with the filter; ten bits a byte; letter, status and end."""
-    found = records_of(joints, filtered=filtered).of(n := len(joints))
+    glove = GloveWiring(port="/dev/x", sensors=22 if "index_dij" in joints else None, filter=filtered)
+    found = records_of(joints, None, glove).of(n := len(joints))
     assert found.us == pytest.approx(n * (375.6 if filtered else 250.0) + (n + 3) * 10e6 / 115_200)
     assert found.how == "formula"
 
