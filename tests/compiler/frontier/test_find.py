@@ -25,7 +25,7 @@ from thenar.compiler.frontier.replay import replay_of
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
 from thenar.compiler.frontier.timing import classify_times
-from thenar.compiler.frontier.timing.python_times import fit_here
+from thenar.compiler.frontier.timing.classify_times import fit_here
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.methods.base import METHODS
