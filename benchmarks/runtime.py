@@ -94,7 +94,7 @@ def main() -> None:
     ours = call_seconds(lambda: build.classify(bits, codes), 20_000)
     whole = call_seconds(lambda: build.recognise(bits, codes), 10_000)
     print(f"\none frame, {len(kept)} switches + {len(codes)} joints, {len(build.grasps)} grasp types, 100 rounds")
-    scored = call_seconds(lambda: build.scorer.lanes(bits, codes), 20_000)
+    scored = call_seconds(lambda: build.scorer.biased_scores(bits, codes), 20_000)
     print(f"Build.classify          {ours * MICRO:8.2f} us   of which scores {scored * MICRO:.2f}, the rest rejection")
     print(f"Build.recognise         {whole * MICRO:8.2f} us   with probability and margin")
 

@@ -151,7 +151,7 @@ def _bindings(node: ast.AST) -> Iterator[tuple[ast.expr, list[ast.expr]]]:
         yield node.value, node.targets
     elif isinstance(node, ast.For | ast.comprehension):
         yield node.iter, [node.target]
-    elif isinstance(node, ast.NamedExpr) or (isinstance(node, ast.AnnAssign) and node.value is not None):
+    elif isinstance(node, ast.NamedExpr | ast.AnnAssign) and node.value is not None:
         yield node.value, [node.target]
 
 

@@ -97,7 +97,7 @@ def _listen(port: str, baud: int, seconds: float, columns: "Sequence[str]", prop
     from thenar.runtime.harness.checks import faults
     from thenar.runtime.harness.wiring import Harness
     from thenar.runtime.harness.writing import harness_to_toml
-    from thenar.runtime.live.listening import propose_stream
+    from thenar.runtime.live.stream_probe import propose_stream
 
     echo(f"listening to {port} for {seconds:g} s: press every switch and pad, bend every finger", err=True)
     found = propose_stream(port, baud, seconds, columns)

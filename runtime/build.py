@@ -100,16 +100,16 @@ class Build:
 
     def scores(self, bits: ArrayLike, codes: ArrayLike) -> NDArray[np.int64]:
         """Return the scores of one frame, (K,) in steps of 1 / `tables.scale`. Raises FrameError."""
-        return np.array(self.scorer.lanes(bits, codes)) - LANE_OFFSET
+        return np.array(self.scorer.biased_scores(bits, codes)) - LANE_OFFSET
 
     def classify(self, bits: ArrayLike, codes: ArrayLike) -> str:
         """Return the grasp type of one frame, "none" if nothing is held. Raises FrameError."""
-        lanes = self._all_scores(self.scorer.lanes(bits, codes), bits, codes)
-        return self.manifest.classes[lanes.index(max(lanes))]
+        biased_scores = self._all_scores(self.scorer.biased_scores(bits, codes), bits, codes)
+        return self.manifest.classes[biased_scores.index(max(biased_scores))]
 
     def _all_scores(
         self,
-        lanes: tuple[int, ...],
+        biased_scores: tuple[int, ...],
         bits: ArrayLike,
         codes: ArrayLike,
         lost_switches: ArrayLike = False,
@@ -117,12 +117,12 @@ class Build:
     ) -> tuple[int, ...]:
         """Return the scores of all classes, with one for none if the build may refuse the frame."""
         if self.rejector is None:
-            return lanes
+            return biased_scores
         n_switches, n_joints = self.tables.n_switches, self.tables.n_joints
         closed, lost = (_mask(np.broadcast_to(flags, n_switches)) for flags in (bits, lost_switches))
         joints = _mask(np.broadcast_to(lost_joints, n_joints))
-        refused = self.rejector.refuses(lanes, closed, lost, np.asarray(codes).tolist(), lost_joints=joints)
-        return (*lanes, max(lanes) + self.none_leads[refused])
+        refused = self.rejector.refuses(biased_scores, closed, lost, np.asarray(codes).tolist(), lost_joints=joints)
+        return (*biased_scores, max(biased_scores) + self.none_leads[refused])
 
     def recognise(
         self,
@@ -150,16 +150,16 @@ class Build:
             If the frame does not fit the build.
         """
         if lost_switches is None and lost_joints is None:
-            lanes, degraded = self._all_scores(self.scorer.lanes(bits, codes), bits, codes), False
+            biased_scores, degraded = self._all_scores(self.scorer.biased_scores(bits, codes), bits, codes), False
         else:
             switches = np.zeros(self.tables.n_switches, bool) if lost_switches is None else lost_switches
             joints = np.zeros(self.tables.n_joints, bool) if lost_joints is None else lost_joints
-            lanes = self.scorer.lanes_without(bits, codes, switches, joints)
+            biased_scores = self.scorer.biased_scores_without(bits, codes, switches, joints)
             degraded = bool(np.any(switches) or np.any(joints))
-            lanes = self._all_scores(lanes, bits, codes, switches, joints)
-        second, best = sorted(lanes)[-2:]
-        winner = lanes.index(best)
-        probability = softmax(lanes, winner, self.tables.scale)
+            biased_scores = self._all_scores(biased_scores, bits, codes, switches, joints)
+        second, best = sorted(biased_scores)[-2:]
+        winner = biased_scores.index(best)
+        probability = softmax(biased_scores, winner, self.tables.scale)
         return Recognition(self.manifest.classes[winner], probability, best - second, degraded)
 
 

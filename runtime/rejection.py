@@ -40,7 +40,7 @@ class Rejector:
 
     def refuses(
         self,
-        lanes: Sequence[int],
+        biased_scores: Sequence[int],
         closed: Mask,
         lost: Mask,
         codes: Sequence[int] | None,
@@ -51,8 +51,8 @@ class Rejector:
 
         Parameters
         ----------
-        lanes : sequence of int
-            The K scores, each 2^15 too high, as in `Scorer.lanes`.
+        biased_scores : sequence of int
+            The K scores, each 2^15 too high, as in `Scorer.biased_scores`.
         closed, lost : int
             Masks of the kept switches that are closed and lost.
         codes : sequence of int or None
@@ -60,8 +60,8 @@ class Rejector:
         lost_joints : int
             A mask of the joints that are lost.
         """
-        best = max(lanes)
-        candidate = lanes.index(best)
+        best = max(biased_scores)
+        candidate = biased_scores.index(best)
         whole = not (lost or lost_joints or codes is None)
         if best < self._least[candidate] and whole:
             return True

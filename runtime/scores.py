@@ -74,7 +74,7 @@ class Scorer:
         """The same for the mean rows."""
         return _sums(self.switch_means)
 
-    def lanes(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
+    def biased_scores(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
         """Return the scores of one frame, each 2^15 too high: K integers. Raises FrameError."""
         switches = _flags(bits, len(self.switch_rows), "switches")
         total = sum(compress(self.switch_rows, switches), self.start) + self.joint_sum(self._codes(codes))
@@ -96,10 +96,10 @@ class Scorer:
             total += rows[bisect_left(steps, codes[one])][bisect_left(more, codes[other])]
         return total
 
-    def lanes_without(
+    def biased_scores_without(
         self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
     ) -> tuple[int, ...]:
-        """Return `lanes`, with the mean row for every switch and joint that the masks mark as lost."""
+        """Return `biased_scores`, with the mean row for every switch and joint that the masks mark as lost."""
         switches, joints = _flags(bits, len(self.switch_rows), "switches"), self._codes(codes)
         lost_bits = _flags(lost_switches, len(self.switch_rows), "lost switches")
         lost_codes = _flags(lost_joints, len(self.thresholds), "lost joints")
@@ -139,10 +139,10 @@ class LiveScores:
 
     Three sums of packed rows, each recalculated when its inputs change; at first every switch is open and every joint
     lost. A switch adds its row while it is closed, its mean row while it is lost; a joint adds the row of its code's
-    bin, its mean row while it is lost. So `lanes` are exactly `Scorer.lanes_without` of the same state.
+    bin, its mean row while it is lost. So `biased_scores` are exactly `Scorer.biased_scores_without` of the same state.
     """
 
-    __slots__ = ("_closed", "_codes", "_dull", "_joints", "_lost", "_scorer", "_silent", "_there")
+    __slots__ = ("_closed", "_codes", "_joints", "_lost", "_lost_joints", "_scorer", "_silent", "_there")
 
     def __init__(self, scorer: Scorer) -> None:
         self._scorer = scorer
@@ -150,13 +150,13 @@ class LiveScores:
         self._lost: Mask = 0
         self._closed, self._silent = scorer.start, 0
         self._codes: tuple[int, ...] | None = None
-        self._dull: Mask = 0
+        self._lost_joints: Mask = 0
         self._joints = scorer.joints_lost
 
     def joints(self, codes: Sequence[int] | None, lost: Mask = 0) -> None:
         """Take the codes of all joints, and which are lost; None: all are. Raises FrameError."""
         taken = None if codes is None else tuple(codes)
-        if taken == self._codes and lost == self._dull:
+        if taken == self._codes and lost == self._lost_joints:
             return
         scorer = self._scorer
         if taken is None:
@@ -165,9 +165,9 @@ class LiveScores:
             raise FrameError(f"a frame has {len(taken)} codes, but the build has {len(scorer.thresholds)} joints")
         else:
             self._joints = scorer.joint_sum(taken, lost)
-        self._codes, self._dull = taken, lost
+        self._codes, self._lost_joints = taken, lost
 
-    def lanes(self, closed: Mask, lost: Mask = 0) -> tuple[int, ...]:
+    def biased_scores(self, closed: Mask, lost: Mask = 0) -> tuple[int, ...]:
         """Return the K scores, each 2^15 too high, for a state of all switches; bits of `closed` that are lost are
         ignored. Raises FrameError.
         """

@@ -15,7 +15,7 @@ from time import monotonic
 import pytest
 
 from thenar.drivers.lines import LineParser, Row
-from thenar.runtime.live.listening import propose_stream
+from thenar.runtime.live.stream_probe import propose_stream
 
 SENDERS = Path(__file__).resolve().parents[1] / "examples" / "senders"
 COLUMNS = ("ms", "thumb", "index", "flex_index", "pad_palm")

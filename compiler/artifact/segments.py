@@ -133,9 +133,9 @@ def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], 
             read.append((moment.grasp.unix_us, moment.scores, moment.refused))
     if not read:
         raise MovementError(f"{path.name} holds no moment with enough readings for the build")
-    times_us, lanes, no = (np.array(each) for each in zip(*read, strict=True))
+    times_us, biased_scores, no = (np.array(each) for each in zip(*read, strict=True))
     found = []
     for number, (start_us, rows) in enumerate(newest(times_us, tick_us), 1):
-        states, likely = _decoded(build, lanes[rows], no[rows], lag_us)
+        states, likely = _decoded(build, biased_scores[rows], no[rows], lag_us)
         found.append(Timeline(path.stem, str(number), start_us, tick_us, types, states, likely, zero_us=zero_us or 0))
     return tuple(found)

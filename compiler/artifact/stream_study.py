@@ -202,8 +202,8 @@ def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Recipe]) -> tuple[
     for stream in streams_of(grasp_set):
         if stream.subject == subject:
             part = read.rows(stream.rows)
-            lanes = tables.scores(part.switches, part.codes)
-            decoders = _StreamScores(lanes, model, counts, tables.scale)
+            biased_scores = tables.scores(part.switches, part.codes)
+            decoders = _StreamScores(biased_scores, model, counts, tables.scale)
             for name, (states, announced) in decoders.every().items():
                 parts[name].append((stream.continued, part.labels, states, announced))
     return kind, subject, {name: score_streams(every, model.n_types) for name, every in parts.items()}
@@ -227,14 +227,14 @@ def _inner_folds(learning: Samples, others: GraspSet, options: Recipe) -> list[F
 class _StreamScores:
     """Scores (T, K + 1) of a stream, and each method's result: states, and announcements in time."""
 
-    lanes: NDArray[np.int32]
+    biased_scores: NDArray[np.int32]
     model: SegmentModel
     counts: Counts
     scale: float
 
     def every(self) -> Mapping[str, tuple[Labels, Labels | None]]:
         none, policy = self.model.n_types, Policy()
-        live = live_states(self.model, self.lanes, LAG_TICKS)
+        live = live_states(self.model, self.biased_scores, LAG_TICKS)
         announced = announced_live(live, none, LAG_TICKS)
         lead = policy.lead_steps(self.scale)
         rules: dict[str, Decision | SequentialTest] = {
@@ -243,7 +243,7 @@ class _StreamScores:
         rules["sequential test"] = SequentialTest(none + 1, self.scale, _ERROR_RATE, policy.hold_us)
         return {
             "decoder, live": (live, announced),
-            "decoder, afterwards": (decode(self.model, emissions(self.lanes, self.model)), None),
+            "decoder, afterwards": (decode(self.model, emissions(self.biased_scores, self.model)), None),
             **{name: (states, states) for name, states in zip(rules, self._ruled([*rules.values()]), strict=True)},
             "plain HMM": (self._hidden_markov(), None),
         }
@@ -251,7 +251,7 @@ class _StreamScores:
     def _ruled(self, rules: list[Decision | SequentialTest]) -> NDArray[np.intp]:
         """Return the states (rules, T) that the rules announce."""
         none, states = self.model.n_types, []
-        for tick, row in enumerate((self.lanes + LANE_OFFSET).tolist()):
+        for tick, row in enumerate((self.biased_scores + LANE_OFFSET).tolist()):
             standing = Ranking(tuple(row))
             decided = [rule.update(tick * TICK_US, standing) for rule in rules]
             states.append([none if state is None else state for state in decided])
@@ -264,7 +264,7 @@ class _StreamScores:
         changes = changes * (1 - np.eye(len(ticks)))
         chain = changes / (ticks + changes.sum(axis=1))[:, np.newaxis]
         logs = np.log(chain + np.diag(1 - chain.sum(axis=1)))
-        scores = self.lanes / self.scale
+        scores = self.biased_scores / self.scale
         best, back = scores[0], np.zeros((len(scores), len(ticks)), np.intp)
         for tick in range(1, len(scores)):
             ways = best[:, np.newaxis] + logs

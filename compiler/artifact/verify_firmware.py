@@ -177,7 +177,7 @@ class FirmwareTrial:
         self._build, self._lots = build, (("row", rows), ("extreme frame", extreme), ("random frame", random))
         self._frames = joined(rows, extreme, random)
         pairs = zip(self._frames.bits, self._frames.codes, strict=True)
-        self._scores = np.array([build.scorer.lanes(bits, codes) for bits, codes in pairs]) - LANE_OFFSET
+        self._scores = np.array([build.scorer.biased_scores(bits, codes) for bits, codes in pairs]) - LANE_OFFSET
         self._lost = lost_inputs(build.tables, len(self._frames), _SEED)
 
     @cached_property
@@ -185,9 +185,9 @@ class FirmwareTrial:
         """Return the scores with the `_lost` inputs missing."""
         frames = zip(self._frames.bits, self._frames.codes, self._lost, strict=True)
         switches = self._build.tables.n_switches
-        without = self._build.scorer.lanes_without
-        lanes = [without(bits, codes, lost[:switches], lost[switches:]) for bits, codes, lost in frames]
-        return np.array(lanes) - LANE_OFFSET
+        without = self._build.scorer.biased_scores_without
+        biased_scores = [without(bits, codes, lost[:switches], lost[switches:]) for bits, codes, lost in frames]
+        return np.array(biased_scores) - LANE_OFFSET
 
     def check(self, fit: Fit, *, missing: bool = False) -> TargetCheck:
         """Compile the classifier with layout `fit` and compare its results with Python's. Raises FirmwareError."""

@@ -216,8 +216,8 @@ def decisions(scores: NDArray[np.int32], at_us: Times, step_us: int, decide: Dec
     """
     due = -((at_us[0] - at_us) // step_us)
     changes, types = list[int](), list[int]()
-    for lanes, (first, beyond) in zip((scores + LANE_OFFSET).tolist(), pairwise(due.tolist()), strict=True):
-        standing = Ranking(tuple(lanes))
+    for biased_scores, (first, beyond) in zip((scores + LANE_OFFSET).tolist(), pairwise(due.tolist()), strict=True):
+        standing = Ranking(tuple(biased_scores))
         for frame in range(first, beyond):
             decided = decide(frame * step_us, standing)
             decided = NOTHING if decided is None else decided
@@ -243,7 +243,7 @@ def _by_segments(tables: IntegerTables, model: SegmentModel | None) -> Decide:
     live = LiveSegments(model, [str(number) for number in range(tables.n_classes)], Policy().lag_us or 0)
 
     def decide(time_us: int, standing: Ranking) -> int | None:
-        segment = live.update(time_us, standing.lanes)
+        segment = live.update(time_us, standing.biased_scores)
         return None if segment.state == "forming" else segment.label
 
     return decide

@@ -161,7 +161,7 @@ def _deployed_scores(
     scorer = Scorer(integers)
     scores = np.empty((len(bits), integers.n_classes), np.int64)
     for row, (switches, joints) in enumerate(zip(bits, codes, strict=True)):
-        scores[row] = scorer.lanes(switches, joints)
+        scores[row] = scorer.biased_scores(switches, joints)
         if report is not None and row % 1000 == 999:
             report(row + 1, len(bits))
     return scores - LANE_OFFSET

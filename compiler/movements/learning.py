@@ -95,8 +95,8 @@ def learnt(
     chosen = TEMPERATURES[0], LEADS[0], CHANGES[0]
     if scores is not None:
         share = max(1, _TRIED_TICKS // len(streams))
-        lanes = np.rint(scores * _SCALE).astype(np.int64)
-        tests = [(lanes[rows], labels[rows]) for rows in (stream.rows[:share] for stream in streams)]
+        biased_scores = np.rint(scores * _SCALE).astype(np.int64)
+        tests = [(biased_scores[rows], labels[rows]) for rows in (stream.rows[:share] for stream in streams)]
         chosen = _best(counts, tests, tick_us)
     return model_of(counts, *chosen, scale, tick_us)
 
@@ -109,7 +109,7 @@ def _best(
 
     def score_of(costs: tuple[float, float, float]) -> SegmentScore:
         model = model_of(counts, *costs, _SCALE, tick_us)
-        decoded = ((truth, live_states(model, lanes, LAG_TICKS)) for lanes, truth in tests)
+        decoded = ((truth, live_states(model, biased_scores, LAG_TICKS)) for biased_scores, truth in tests)
         return SegmentScore.total(
             score(truth, live, none, announced_live(live, none, LAG_TICKS)) for truth, live in decoded
         )
@@ -162,11 +162,11 @@ def model_of(
 
 
 def live_states(
-    model: SegmentModel, lanes: NDArray[np.integer], lag_ticks: int, refused: NDArray[np.bool_] | None = None
+    model: SegmentModel, biased_scores: NDArray[np.integer], lag_ticks: int, refused: NDArray[np.bool_] | None = None
 ) -> Labels:
     """Return the states (T,) that a live decoder reports for scores (T, n_lanes), `lag_ticks` after each tick."""
     decoder = Decoder(model, lag_ticks)
-    states = [decoder.take(costs).state for costs in emissions(lanes, model, refused).tolist()][lag_ticks:]
+    states = [decoder.take(costs).state for costs in emissions(biased_scores, model, refused).tolist()][lag_ticks:]
     return np.array(states + decoder.finish(), np.intp)
 
 

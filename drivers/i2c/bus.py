@@ -322,9 +322,9 @@ class I2cBus(Closing):
         return self._node.way.value
 
     @property
-    def trouble(self) -> str:
+    def fault_message(self) -> str:
         """A fault of the whole bus and its remedy; "" if there is none."""
-        return self._keeper.trouble
+        return self._keeper.fault_message
 
     @property
     def transfers(self) -> int:

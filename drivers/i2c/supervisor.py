@@ -168,7 +168,7 @@ class PlacedChip:
 class ChipSupervisor:
     """The chips of one bus.
 
-    `revision` changes whenever a chip comes or goes; `due` is the time of the next call of `attend`; `trouble`
+    `revision` changes whenever a chip comes or goes; `due` is the time of the next call of `attend`; `fault_message`
     describes a fault of the whole bus, or is "". Every method that uses the wire raises DeviceError if the device node
     is gone, and no other error.
     """
@@ -180,18 +180,18 @@ class ChipSupervisor:
         self.routes = self._unknown_routes()
         self.revision = 0
         self.due = 0.0
-        self.trouble = ""
+        self.fault_message = ""
 
     def begin(self) -> None:
         """Open the node and set up every chip."""
         self._renew()
         self.routes = self._unknown_routes()
         self._node.find_way()
-        self.trouble = ""
+        self.fault_message = ""
         for member in self._members:
             member.present = False
         for number, member in enumerate(self._members):
-            if not self.trouble:
+            if not self.fault_message:
                 self._bring_up(member, TRIES)
             if member.present:  # spread checks, so that no scan waits for more than one
                 member.due = monotonic() + self._check_every_s * (number + 1) / len(self._members)
@@ -199,7 +199,7 @@ class ChipSupervisor:
 
     def attend(self) -> None:
         """Check the chip that has waited longest, or test whether it is back. A stuck bus comes first."""
-        if self.trouble:
+        if self.fault_message:
             self._unstick()
         elif self._members:
             member = min(self._members, key=lambda member: member.due)
@@ -223,7 +223,7 @@ class ChipSupervisor:
                 self.routes.forget()
                 if error.errno in (errno.ETIMEDOUT, errno.EBUSY):  # each may last a second: retry no more
                     self.check_bus_stuck()
-                if self.trouble or not left:
+                if self.fault_message or not left:
                     self._lose(member, error)
                     break
         return None
@@ -243,16 +243,16 @@ class ChipSupervisor:
         except OSError as error:
             code = error.errno
             if code not in STUCK:  # no acknowledge, whichever errno this adapter uses for it
-                if self.trouble:
+                if self.fault_message:
                     _LOG.warning("%s: the bus is free again", self._node.device)
-                self.trouble = ""
+                self.fault_message = ""
                 return
-        if not self.trouble:
+        if not self.fault_message:
             _LOG.warning("%s", stuck(self._node.device, code))
-        self.trouble = stuck(self._node.device, code)
+        self.fault_message = stuck(self._node.device, code)
         for member in self._members:
             member.present = False
-            member.last_error = self.trouble
+            member.last_error = self.fault_message
             member.due = monotonic()
         self._changed()
 
@@ -274,7 +274,7 @@ class ChipSupervisor:
         was = member.present
         member.present = False
         for left in reversed(range(tries)):
-            if self.trouble:
+            if self.fault_message:
                 break
             expected = self.attempt(member, lambda: self._set_up(member), 1)
             member.present = expected is True
@@ -293,7 +293,7 @@ class ChipSupervisor:
 
     def _refuse(self, member: PlacedChip) -> None:
         self.check_bus_stuck()  # a line held low looks like a reply of every chip
-        if self.trouble:
+        if self.fault_message:
             return
         there = identify_chip(self._node, member.address)
         found = f"{member.named} is not there, but {there}: check the harness and the chip's address pins"
@@ -314,7 +314,7 @@ class ChipSupervisor:
         member.present = False
         member.due = monotonic() + RETRY_S
         self._changed()
-        if self.trouble:
+        if self.fault_message:
             return
         if error.errno == errno.ENODEV:  # no device there, on some adapters; on most, the adapter itself is gone
             self._renew()
@@ -326,7 +326,7 @@ class ChipSupervisor:
         self._renew()
         self.check_bus_stuck()
         for member in self._members:
-            member.due = monotonic() + (RETRY_S if self.trouble else 0.0)
+            member.due = monotonic() + (RETRY_S if self.fault_message else 0.0)
 
     def _unknown_routes(self) -> Routes:
         return Routes(self._node, {member.route.mux for member in self._members if member.route})

@@ -97,7 +97,7 @@ def _record(wiring: GloveWiring, read: Sequence[str]) -> CheckResult:
     part = RECORD if len(read) == device.sensors else f"{RECORD} of {len(read)} sensors"
     try:
         device.open()
-        measured, unmasked = _gap(lambda: device.read(_LISTEN_S), fmean), device.trouble()
+        measured, unmasked = _gap(lambda: device.read(_LISTEN_S), fmean), device.fault_message()
     except ThenarError as wrong:
         return CheckResult(device.name, part, True, predicted, None, (str(wrong),))
     finally:
@@ -126,7 +126,7 @@ def _stream(
                 end = end if rows else now + max(_ROWS_S, 5 * predicted / 1e6)
                 rows += 1
         measured = None if device.watch.hz is None else 1e6 / device.watch.hz
-        wrong = (device.trouble(), f"counted: {faults}" if (faults := device.faults()) else "")
+        wrong = (device.fault_message(), f"counted: {faults}" if (faults := device.faults()) else "")
         remarks = (*filter(None, wrong), *_wrong(names, frames))
     except ThenarError as error:
         return (CheckResult(device.name, "", False, predicted, None, (str(error),)),)
@@ -189,7 +189,7 @@ def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[CheckResult, ...
         found = [_chip(device, place, time) for place, time in enumerate(times.chips)]
         whole = _duration(device.scan(None).read)
         frames = [device.read(_LISTEN_S) for _ in range(_SCANS)] if device.taxels else []
-        way = (device.bus.trouble,) if device.bus.trouble else (f"reads {device.bus.way}",)
+        way = (device.bus.fault_message,) if device.bus.fault_message else (f"reads {device.bus.way}",)
     except ThenarError as wrong:
         return (CheckResult(device.name, "", False, times.us, None, (str(wrong),)),)
     finally:
@@ -207,7 +207,7 @@ def _spi(harness: Harness, bus: int, scan: ScanMap) -> tuple[CheckResult, ...]:
         device.open()
         measured = _duration(device.run)
         frames = [device.read(_LISTEN_S) for _ in range(_SCANS)]
-        wrong = device.trouble()
+        wrong = device.fault_message()
     except ThenarError as error:
         return (CheckResult(device.name, "", False, predicted.us, None, (str(error),)),)
     finally:

@@ -34,22 +34,22 @@ class Ranking:
     the last class.
     """
 
-    __slots__ = ("_odds", "candidate", "lanes")
+    __slots__ = ("_odds", "biased_scores", "candidate")
 
-    def __init__(self, lanes: tuple[int, ...]) -> None:
-        self.lanes = lanes
-        self.candidate = lanes.index(max(lanes))
+    def __init__(self, biased_scores: tuple[int, ...]) -> None:
+        self.biased_scores = biased_scores
+        self.candidate = biased_scores.index(max(biased_scores))
         self._odds = 0.0, 0.0
 
     @property
     def margin(self) -> int:
         """The candidate's lead over the second best, in steps."""
-        second, best = sorted(self.lanes)[-2:]
+        second, best = sorted(self.biased_scores)[-2:]
         return best - second
 
     def lead(self, held: int) -> int:
         """Return the candidate's lead over class `held`, in steps."""
-        return self.lanes[self.candidate] - self.lanes[held]
+        return self.biased_scores[self.candidate] - self.biased_scores[held]
 
     def contradicts(self, held: int, lead: int) -> bool:
         """Return whether the candidate is not `held` and leads it by `lead` steps."""
@@ -59,12 +59,12 @@ class Ranking:
         """Return the softmax of class `number`, at `scale` steps per unit."""
         of, total = self._odds
         if of != scale:
-            self._odds = scale, (total := odds(self.lanes, scale))
-        return softmax(self.lanes, number, scale, total)
+            self._odds = scale, (total := odds(self.biased_scores, scale))
+        return softmax(self.biased_scores, number, scale, total)
 
     def with_none_class(self, lead: int) -> "Ranking":
         """Return the same with none, the last class, `lead` steps above the best, or below it if that is negative."""
-        return Ranking((*self.lanes, max(self.lanes) + lead))
+        return Ranking((*self.biased_scores, max(self.biased_scores) + lead))
 
 
 @dataclass(slots=True)
@@ -163,17 +163,17 @@ class SequentialTest:
         last_us = self._counted_us
         if whole == self._whole and (last_us is None or time_us - last_us >= max(self.spacing_us, 1)):
             self._counted_us = time_us
-            self._add(time_us, standing.lanes)
+            self._add(time_us, standing.biased_scores)
         return self.held
 
     def forget(self) -> None:
         """Drop evidence and result: too little can be read."""
         self.held, self._sums, self._counted_us = None, (), None
 
-    def _add(self, time_us: int, lanes: tuple[int, ...]) -> None:
+    def _add(self, time_us: int, biased_scores: tuple[int, ...]) -> None:
         if not self._sums or time_us - self._began_us > self.longest_us:
             self._sums, self._began_us = (0,) * self.classes, time_us
-        self._sums = tuple(map(int.__add__, self._sums, lanes))
+        self._sums = tuple(map(int.__add__, self._sums, biased_scores))
         second, best = sorted(self._sums)[-2:]
         if best - second >= self.threshold:
             self.held, self._decided_us = self._sums.index(best), time_us

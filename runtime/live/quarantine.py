@@ -110,10 +110,10 @@ class StuckTest:
         self._due, self._seen = np.zeros(len(switches), np.int64), np.zeros(len(switches), np.int64)
         self._last: deque[_Grasp] = deque(maxlen=_KEPT)
 
-    def weigh(self, lanes: Sequence[int], closed: Mask, read: Mask, lost: Mask) -> None:
+    def weigh(self, biased_scores: Sequence[int], closed: Mask, read: Mask, lost: Mask) -> None:
         """Take a grasp: the scores of a frame, the switches closed and read, and those scored as lost."""
         flags = (_flags(mask, len(self._rows)) for mask in (closed, read, lost))
-        grasp = _Grasp(np.array(lanes, np.int64), *flags)
+        grasp = _Grasp(np.array(biased_scores, np.int64), *flags)
         shares, held = self._shares_of(grasp), self._held(grasp)
         self.sums = np.maximum(self.sums + self._evidence(grasp, shares, held), 0)
         due = np.where(grasp.read & held, 255 - shares[1], 0)
@@ -151,7 +151,7 @@ class StuckTest:
         type as far as all other inputs determine it.
         """
         own = np.where(grasp.lost[:, np.newaxis], 0, self._means - self._rows * grasp.closed[:, np.newaxis])
-        scores = grasp.lanes + own
+        scores = grasp.biased_scores + own
         behind = (scores.max(axis=1, keepdims=True) - scores) * self._gain >> 16
         weights = _WEIGHTS[np.minimum(behind, len(_WEIGHTS) - 1)]
         found: Ints = (self._shares * weights).sum(axis=2) // weights.sum(axis=1)
@@ -161,7 +161,7 @@ class StuckTest:
         """Return whether at least half of the likeliest type's contacts are there: with fewer, an open switch means
         nothing.
         """
-        contacts = int(self._contacts[int(grasp.lanes.argmax())])
+        contacts = int(self._contacts[int(grasp.biased_scores.argmax())])
         return 4 * 255 * int(np.count_nonzero(grasp.closed & ~grasp.lost)) >= contacts
 
     def _evidence(self, grasp: "_Grasp", shares: Ints, held: bool) -> Ints:
@@ -180,7 +180,7 @@ class StuckTest:
 class _Grasp:
     """An observed grasp: scores (K,), and which switches were closed, read, and scored as lost (s,)."""
 
-    lanes: Ints
+    biased_scores: Ints
     closed: Flags
     read: Flags
     lost: Flags
@@ -191,7 +191,9 @@ class _Grasp:
             return self
         lost = self.lost.copy()
         lost[switch] = True
-        return replace(self, lanes=self.lanes + means[switch] - rows[switch] * self.closed[switch], lost=lost)
+        return replace(
+            self, biased_scores=self.biased_scores + means[switch] - rows[switch] * self.closed[switch], lost=lost
+        )
 
 
 class Chattering:
@@ -323,7 +325,7 @@ class Quarantine:
             found.append(Quarantined(self._names[is_joint][number], reason, not fits))
         return (out[0], out[1]), tuple(found)
 
-    def look(self, frame: SwitchFrame, lanes: Sequence[int], lost: Mask) -> None:
+    def look(self, frame: SwitchFrame, biased_scores: Sequence[int], lost: Mask) -> None:
         """Take a frame, its scores, and the switches that are scored as lost."""
         time_us = frame.time_us
         if time_us <= self._seen_us:
@@ -343,7 +345,7 @@ class Quarantine:
         self._state, contacts = state, self._shown & ~(lost & read)
         self._stayed &= closed | ~read
         if self._fewest is None or contacts.bit_count() < self._fewest[0].bit_count():
-            self._fewest = contacts, closed, read, lanes, lost
+            self._fewest = contacts, closed, read, biased_scores, lost
         if _differ(contacts, self._contacts):
             self._contacts, self._since_us, self._read, self._weighed = contacts, time_us, read, False
         elif not self._weighed and time_us - self._since_us >= SETTLED_US and not self._read & ~read:
@@ -352,7 +354,7 @@ class Quarantine:
             least, kept, seen, scores, without = self._fewest
             if _differ(least, contacts) and _differ(least, self._before):
                 stuck.weigh(scores, kept, seen & quiet & ~(kept & ~self._stayed), without)
-            stuck.weigh(lanes, closed, read & quiet, lost)
+            stuck.weigh(biased_scores, closed, read & quiet, lost)
             self._before, self._stayed, self._fewest = contacts, self._all, None
             self._sort()
 

@@ -112,13 +112,13 @@ class LiveRecognizer:
             self._scores.joints(codes, lost_joints)
             self._scored = codes, lost_joints
         closed, lost = (0, self._all_switches) if frame is None else (frame.closed & ~frame.lost, frame.lost)
-        standing = Ranking(lanes := self._scores.lanes(closed, lost))
+        standing = Ranking(biased_scores := self._scores.biased_scores(closed, lost))
         missing, too_much = self._missing.of(lost, lost_joints | joints_lost)
         if read is not None:
-            self.quarantine.look(read, lanes, lost)
+            self.quarantine.look(read, biased_scores, lost)
         refused = False
         if self._rejector is not None:
-            refused = self._rejector.refuses(lanes, closed, lost, codes, lost_joints=lost_joints)
+            refused = self._rejector.refuses(biased_scores, closed, lost, codes, lost_joints=lost_joints)
             standing = standing.with_none_class(self._none_leads[refused])
         seen_us = max(newest.time_us, self._joints.newest.time_us)
         if too_much:
@@ -126,7 +126,7 @@ class LiveRecognizer:
             decided = None
         else:
             decided = self._decider.update(max(seen_us, 0), standing, whole=not (missing or late))
-        scores, refused = (None, False) if too_much else (lanes, refused)
+        scores, refused = (None, False) if too_much else (biased_scores, refused)
         segment = Segment() if self._segments is None else self._segments.update(now_us, scores, refused)
         grasp = self._published(now_us, unix_us, standing, missing, too_much, decided, seen_us, segment, late)
         self._number += 1

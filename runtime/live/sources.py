@@ -334,7 +334,7 @@ class Sources:
             DeviceHealth(
                 state.name,
                 state.connected,
-                state.error or device.trouble(),
+                state.error or device.fault_message(),
                 (*device.counts(), Count("program faults", state.faults)),
             )
             for state, device in zip(self.devices(), self._devices, strict=True)

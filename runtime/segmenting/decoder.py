@@ -182,9 +182,9 @@ class Decoder:
         self._model, self._lag, self._paths = model, lag_ticks, _Paths(model, lag_ticks)
         self._state, self._segment = model.n_types, 0
 
-    def push(self, lanes: Sequence[int], refused: bool = False) -> Decoded:
+    def push(self, biased_scores: Sequence[int], refused: bool = False) -> Decoded:
         """Take the scores of the next tick, and whether its frame is refused (for models with a refusal)."""
-        return self.take(self._model.costs(lanes, refused))
+        return self.take(self._model.costs(biased_scores, refused))
 
     def take(self, costs: Sequence[int]) -> Decoded:
         """Take the costs of the next tick, one for each state, as `emissions` returns them."""
@@ -222,14 +222,16 @@ def emissions(scores: ArrayLike, model: SegmentModel, refused: ArrayLike | None 
     BuildError
         If the scores have another number of classes.
     """
-    lanes = np.asarray(scores, np.int64)
-    if lanes.ndim != 2 or lanes.shape[1] != model.n_lanes:
-        raise BuildError(f"scores have shape {lanes.shape}, but the segment model takes {model.n_lanes} a frame")
-    behind = lanes.max(axis=1, initial=np.iinfo(np.int64).min, keepdims=True) - lanes
+    biased_scores = np.asarray(scores, np.int64)
+    if biased_scores.ndim != 2 or biased_scores.shape[1] != model.n_lanes:
+        raise BuildError(
+            f"scores have shape {biased_scores.shape}, but the segment model takes {model.n_lanes} a frame"
+        )
+    behind = biased_scores.max(axis=1, initial=np.iinfo(np.int64).min, keepdims=True) - biased_scores
     found: NDArray[np.int64] = np.minimum((behind >> model.shift) * model.gain >> 8, model.most)
     if model.refusal is None:
         return found
-    no = np.zeros(len(lanes), bool) if refused is None else np.asarray(refused, bool)
+    no = np.zeros(len(biased_scores), bool) if refused is None else np.asarray(refused, bool)
     more = np.where(no, model.refusal, 0)[:, np.newaxis]
     return np.hstack([found + more, model.refusal - more])
 

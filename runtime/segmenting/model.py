@@ -129,11 +129,11 @@ class SegmentModel(Struct, frozen=True, forbid_unknown_fields=True, omit_default
         change = max(*self.enter, *self.leave, *self.direct)
         return 2 * change + (2 * max(self.least) - 1) * tick
 
-    def costs(self, lanes: Sequence[int], refused: bool = False) -> list[int]:
-        """Return the costs of a frame for each of the K + 1 states; `lanes` are its `n_lanes` scores, from any zero."""
-        best, shift, extra = max(lanes), self.shift, self.refusal
+    def costs(self, biased_scores: Sequence[int], refused: bool = False) -> list[int]:
+        """Return the costs of a frame for each of the K + 1 states, from its `n_lanes` scores, of any zero."""
+        best, shift, extra = max(biased_scores), self.shift, self.refusal
         table = _costs(shift, self.gain, self.most)
-        found = [table[best - lane >> shift] for lane in lanes]
+        found = [table[best - lane >> shift] for lane in biased_scores]
         if extra is None:
             return found
         return [*(cost + extra for cost in found), 0] if refused else [*found, extra]

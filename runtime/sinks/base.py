@@ -211,7 +211,7 @@ class _Receiver:
         self._said = self._nothing = SinkReport(name, None, 0, 0)
 
     @property
-    def trouble(self) -> str:
+    def fault_message(self) -> str:
         """Why it takes nothing now; "" if it does."""
         hangs = self._thread is not None and self._thread.hangs
         return self._fault or ("does not respond: what comes meanwhile is lost" if hangs else "")
@@ -221,7 +221,7 @@ class _Receiver:
         """The last report that the sink has made."""
         said = self._nothing if self._fault else self._said
         lost = said.lost + self._lost + (0 if self._thread is None else self._thread.dropped)
-        return replace(said, lost=lost, error=self.trouble or said.error)
+        return replace(said, lost=lost, error=self.fault_message or said.error)
 
     def send(self, send: Callable[[Sink], None], longest_us: int | None) -> None:
         if self._thread is None:
@@ -315,7 +315,9 @@ class Fanout:
 
     def troubles(self) -> tuple[OutputTrouble, ...]:
         """Return the sinks that take nothing now, and why."""
-        return tuple(OutputTrouble(each.report.where, each.trouble) for each in self._receivers if each.trouble)
+        return tuple(
+            OutputTrouble(each.report.where, each.fault_message) for each in self._receivers if each.fault_message
+        )
 
     def reports(self) -> tuple[SinkReport, ...]:
         """Return the states of all sinks, in order; if live, those after the call before this one."""

@@ -57,7 +57,7 @@ class Source(ABC):
         """Return the counts of frames and faults, for health reports."""
         return ()
 
-    def trouble(self) -> str:
+    def fault_message(self) -> str:
         """Return the fault of an open device; "" if there is none."""
         return ""
 

@@ -73,7 +73,7 @@ class GloveDevice(Source):
         """Return the driver's counters."""
         return counted(self.driver.counts)
 
-    def trouble(self) -> str:
+    def fault_message(self) -> str:
         """Return the fault of an open line; "" if there is none."""
         if self._unplugged or self.info is None:
             return "the glove is not plugged into its box" if self._unplugged else ""

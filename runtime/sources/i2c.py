@@ -154,10 +154,10 @@ class I2cDevice(Source):
         )
         return (Count("transfers", self.bus.transfers), Count("held up", self._held_up), *failures)
 
-    def trouble(self) -> str:
+    def fault_message(self) -> str:
         """Return the fault of the bus, or the absent chips; "" if there is none."""
         absent = (chip.last_error for chip in self.bus.chips if not chip.present)
-        return self.bus.trouble or "; ".join((*absent, *taxel_faults(self.taxels)))
+        return self.bus.fault_message or "; ".join((*absent, *taxel_faults(self.taxels)))
 
     def close(self) -> None:
         """Close the bus."""

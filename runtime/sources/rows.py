@@ -386,7 +386,7 @@ class RowSource(Source):
         """Return the counts of rows and lines that did not count, or lacked something: "late 3, gaps 1"."""
         return ", ".join(f"{count.name} {count.value}" for count in self.counts()[2:] if count.value)
 
-    def trouble(self) -> str:
+    def fault_message(self) -> str:
         """Return the fault of arriving rows or lines; "" if there is none."""
         # Compared with the counts at the last row: what came since.
         wrong, misfits, received = map(int.__sub__, self._uncounted(), self._before)

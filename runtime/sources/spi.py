@@ -60,7 +60,7 @@ class SpiConverter(Source):
         """Return the numbers of transfers, and of replies that were not a converter's."""
         return (Count("transfers", self.device.calls), Count("silent", self.device.silent))
 
-    def trouble(self) -> str:
+    def fault_message(self) -> str:
         """Return the fault of the converter or its taxels; "" if there is none."""
         silent = [f"{self.device.chip.name} does not reply: check its supply, its wires and its chip select"]
         return "; ".join(silent if self.silent else taxel_faults(self.taxels))

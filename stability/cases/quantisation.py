@@ -32,7 +32,7 @@ def both_scores(case: Quantised, bits: Sequence[bool], codes: Sequence[int]) -> 
     tables = case.tables
     thresholds, joints = ([part.tolist() for part in parts] for parts in (tables.thresholds, tables.joint_rows))
     scores = table_scores(tables.bias.tolist(), tables.switch_rows.tolist(), thresholds, joints, bits, codes)
-    deployed = [lane - LANE_OFFSET for lane in Scorer(case.integers).lanes(bits, codes)]
+    deployed = [lane - LANE_OFFSET for lane in Scorer(case.integers).biased_scores(bits, codes)]
     return [score * case.integers.scale for score in scores], deployed
 
 

@@ -38,7 +38,7 @@ def test_probabilities_are_those_of_the_build_and_joints_are_in_their_unit(
     for build in (made, Build(replace(made.manifest, joints=degrees, rejection=rejection), made.tables)):
         bits, codes = random.random(6) < 0.5, random.integers(1, 256, 3)
         frame = SwitchFrame(0, mask(bits))
-        scores = build.scorer.lanes(bits, codes)
+        scores = build.scorer.biased_scores(bits, codes)
         moment = Moment(make_grasp(7), frame, None, codes.tolist(), scores=scores)
         detail = Details(build)(moment)
         assert [letter == "1" for letter in detail.closed] == bits.tolist()
@@ -58,7 +58,7 @@ def test_a_refused_frame_shows_that_nothing_is_held(make_build: MakeBuild, make_
     made = make_build(1)
     rejection = Rejection(0.01, (0,) * 4, ((0, 6),) * 4, (((0, 255),) * 3,) * 4, 3)
     build = Build(replace(made.manifest, rejection=rejection), made.tables)
-    scores = build.scorer.lanes([True] * 6, [9, 9, 9])
+    scores = build.scorer.biased_scores([True] * 6, [9, 9, 9])
     details = Details(build)
     shares = [
         details(Moment(make_grasp(), None, None, None, scores=scores, refused=refused)).probabilities

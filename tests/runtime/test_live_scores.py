@@ -32,7 +32,7 @@ class Changes(RuleBasedStateMachine):
     def switches_change(self, data: st.DataObject) -> None:
         masks = st.integers(0, (1 << self.tables.n_switches) - 1)
         self.closed, self.lost = data.draw(masks), data.draw(st.just(0) | masks)
-        self.live.lanes(self.closed, self.lost)
+        self.live.biased_scores(self.closed, self.lost)
 
     @rule(data=st.data())
     def joints_change(self, data: st.DataObject) -> None:
@@ -44,13 +44,13 @@ class Changes(RuleBasedStateMachine):
     @invariant()
     def lanes_are_those_of_the_whole_frame(self) -> None:
         switches, joints = self.tables.n_switches, self.tables.n_joints
-        expected = self.whole.lanes_without(
+        expected = self.whole.biased_scores_without(
             flags(self.closed, switches),
             [0] * joints if self.codes is None else self.codes,
             flags(self.lost, switches),
             np.full(joints, self.codes is None),
         )
-        assert self.live.lanes(self.closed, self.lost) == expected
+        assert self.live.biased_scores(self.closed, self.lost) == expected
 
 
 @pytest.mark.parametrize(("classes", "switches", "joints"), [(5, 9, 3), (2, 0, 2), (14, 40, 16), (3, 4, 0), (4, 5, 1)])
@@ -69,13 +69,13 @@ def test_changes_at_the_edge_of_int16_do_not_spill(sign: int) -> None:
     tables = IntegerTables.of(rows(0, 7)[0], rows(32767, -32760), (), (), rows(-1, 1), rows(), 1.0)
     live, whole = LiveScores(Scorer(tables)), Scorer(tables)
     for closed, lost in [(1, 0), (0, 1), (1, 1), (0, 0), (1, 0)]:
-        assert live.lanes(closed, lost) == whole.lanes_without([closed], [], [lost], [])
+        assert live.biased_scores(closed, lost) == whole.biased_scores_without([closed], [], [lost], [])
 
 
 @pytest.mark.parametrize(("closed", "lost"), [(1 << 9, 0), (0, 1 << 9), (-1, 0), (0, -1)])
 def test_a_switch_that_the_build_does_not_have_is_refused(make_tables: MakeTables, closed: int, lost: int) -> None:
     with pytest.raises(FrameError, match="beyond the 9 of the build"):
-        LiveScores(Scorer(make_tables())).lanes(closed, lost)
+        LiveScores(Scorer(make_tables())).biased_scores(closed, lost)
 
 
 @pytest.mark.parametrize("codes", [[], [1, 2], [1, 2, 3, 4]])

@@ -47,9 +47,9 @@ def test_scores_are_the_sum_of_the_rows(
     tables = make_tables(seed, switches=switches, joints=joints)
     bits, codes, lost_bits, lost_codes = data.draw(frames(switches, joints))
     scorer, none = Scorer(tables), [False] * (switches + joints)
-    whole = np.array(scorer.lanes(bits, codes)) - LANE_OFFSET
+    whole = np.array(scorer.biased_scores(bits, codes)) - LANE_OFFSET
     assert np.array_equal(whole, _sum(tables, bits, codes, none[:switches], none[:joints]))
-    degraded = np.array(scorer.lanes_without(bits, codes, lost_bits, lost_codes)) - LANE_OFFSET
+    degraded = np.array(scorer.biased_scores_without(bits, codes, lost_bits, lost_codes)) - LANE_OFFSET
     assert np.array_equal(degraded, _sum(tables, bits, codes, lost_bits, lost_codes))
 
 
@@ -59,15 +59,15 @@ def test_a_code_equal_to_a_threshold_goes_left_of_it(make_tables: MakeTables) ->
     scorer = Scorer(tables)
     for code, bin_ in ((threshold, 2), (threshold + 1, 3)):
         expected = tables.bias.astype(int) + tables.joint_rows[0][bin_] + LANE_OFFSET
-        assert scorer.lanes([], [code]) == tuple(expected)
-        assert scorer.lanes_without([], [code], [], [False]) == tuple(expected)
+        assert scorer.biased_scores([], [code]) == tuple(expected)
+        assert scorer.biased_scores_without([], [code], [], [False]) == tuple(expected)
 
 
 @pytest.mark.parametrize("sign", [+1, -1])
 def test_lanes_at_the_edge_of_int16_do_not_spill(sign: int) -> None:
     bias = np.array([32767 * sign, -32767 * sign, 0], np.int16)
     none = np.zeros((0, 3), np.int16)
-    assert Scorer(IntegerTables.of(bias, none, (), (), none, none, 1.0)).lanes([], []) == tuple(
+    assert Scorer(IntegerTables.of(bias, none, (), (), none, none, 1.0)).biased_scores([], []) == tuple(
         bias.astype(int) + LANE_OFFSET
     )
 
@@ -76,7 +76,7 @@ def test_lanes_at_the_edge_of_int16_do_not_spill(sign: int) -> None:
 def test_codes_may_come_in_any_integers(make_tables: MakeTables, kind: type) -> None:
     scorer, codes = Scorer(make_tables()), [3, 200, 77]
     given_codes: ArrayLike = codes if kind is list else np.array(codes, kind)
-    assert scorer.lanes([0, 1] * 4 + [1], given_codes) == scorer.lanes(
+    assert scorer.biased_scores([0, 1] * 4 + [1], given_codes) == scorer.biased_scores(
         np.array([0, 1] * 4 + [1], bool), np.array(codes, np.uint16)
     )
 
@@ -99,7 +99,7 @@ def test_a_frame_that_does_not_fit_is_refused(
     make_tables: MakeTables, bits: ArrayLike, codes: ArrayLike, reason: str
 ) -> None:
     with pytest.raises(FrameError, match=reason):
-        Scorer(make_tables()).lanes(bits, codes)
+        Scorer(make_tables()).biased_scores(bits, codes)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_a_mask_that_does_not_fit_is_named(
     make_tables: MakeTables, lost_bits: ArrayLike, lost_codes: ArrayLike, reason: str
 ) -> None:
     with pytest.raises(FrameError, match=reason):
-        Scorer(make_tables()).lanes_without(np.zeros(9, bool), [0, 0, 0], lost_bits, lost_codes)
+        Scorer(make_tables()).biased_scores_without(np.zeros(9, bool), [0, 0, 0], lost_bits, lost_codes)
 
 
 def test_every_code_has_its_bins_row_also_when_cached(make_tables: MakeTables) -> None:
@@ -123,5 +123,5 @@ def test_every_code_has_its_bins_row_also_when_cached(make_tables: MakeTables) -
     bins = np.searchsorted(tables.thresholds[0], codes)
     expected = tables.bias.astype(np.int64) + tables.joint_rows[0][bins] + tables.joint_rows[1][0]
     for _ in range(2):
-        found = [scorer.lanes([], np.array([code, 0], np.uint16)) for code in codes]
+        found = [scorer.biased_scores([], np.array([code, 0], np.uint16)) for code in codes]
         assert np.array_equal(np.array(found) - LANE_OFFSET, expected)

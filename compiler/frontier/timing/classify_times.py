@@ -174,8 +174,8 @@ def classify_us(several: Sequence[IntegerTables], yardstick: float | None = None
         for (scorer, frames), least in zip(probed, least_s, strict=True):
             for number, (bits, codes) in enumerate(frames):
                 start = time.perf_counter()
-                lanes = scorer.lanes(bits, codes)
-                lanes.index(max(lanes))
+                biased_scores = scorer.biased_scores(bits, codes)
+                biased_scores.index(max(biased_scores))
                 least[number] = min(least[number], time.perf_counter() - start)
     *found, now = (1e6 * least_s.sum(axis=1) / _FRAMES).tolist()
     return [us if yardstick is None else us * yardstick / now for us in found]

@@ -129,7 +129,7 @@ def test_without_rows_of_none_the_requested_share_is_refused(moved: GraspSet, tm
     gone = refused(made.manifest.rejection, scores, bits, codes)
     assert gone[~moved.is_none].mean() <= 0.02
     assert gone[moved.is_none].mean() >= 0.5
-    lost = build.scorer.lanes(bits[0], codes[0])
+    lost = build.scorer.biased_scores(bits[0], codes[0])
     mask = sum(1 << int(number) for number in np.flatnonzero(bits[0]))
     assert build.rejector.refuses(lost, mask, 0, codes[0].tolist()) == gone[0]
 

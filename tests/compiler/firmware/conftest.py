@@ -99,7 +99,7 @@ def same_as_python() -> Callable[..., None]:
     """Return what compares every score and class with those of a Build, which inputs are `lost` to."""
 
     def compare(answers: Predictions, tables: IntegerTables, frames: Probes, lost: Lost | None = None) -> None:
-        without = Build(_describe(tables), tables).scorer.lanes_without
+        without = Build(_describe(tables), tables).scorer.biased_scores_without
         s = tables.n_switches
         gone = np.zeros((len(frames), s + tables.n_joints), bool) if lost is None else lost
         held = zip(frames.bits, frames.codes, gone, strict=True)

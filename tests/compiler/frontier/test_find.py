@@ -140,7 +140,7 @@ def rows_recognised(grasp_set: GraspSet, point: FrontierPoint, train: Rows, test
     stumps, _ = boost(X[train], labels[train], 4, rounds=setting.rounds)
     tables = collapse(stumps, len(columns))
     scorer = Scorer(quantise(tables, bits[train], codes[train], setting.width, setting.table_bits))
-    answers = [scorer.lanes(bits[row], codes[row]) for row in test]
+    answers = [scorer.biased_scores(bits[row], codes[row]) for row in test]
     return sum(lanes.index(max(lanes)) == labels[row] for lanes, row in zip(answers, test, strict=True))
 
 

@@ -88,7 +88,7 @@ def test_every_frame_sees_the_state_that_began_last(
 
     def decide(time_us: int, standing: Ranking) -> int:
         shown.append(time_us)
-        return standing.lanes[0] - LANE_OFFSET
+        return standing.biased_scores[0] - LANE_OFFSET
 
     found = decisions(scores, at_us, step_us, decide)
     assert shown == (due - begins_us).tolist()

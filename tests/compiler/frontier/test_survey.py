@@ -78,7 +78,7 @@ def test_tables_answer_as_they_will_when_deployed(samples: Samples, cuts: Cuts) 
         for shape, correct in zip(SHAPES, row, strict=True):
             scores = collapse(stumps, switches)
             scorer = Scorer(quantise(scores, bits[fold.train], codes[fold.train], shape.width, shape.table_bits))
-            lanes = [scorer.lanes(bits[test], codes[test]) for test in fold.test]
+            lanes = [scorer.biased_scores(bits[test], codes[test]) for test in fold.test]
             answers = [lane.index(max(lane)) for lane in lanes]
             assert counted(correct) == np.count_nonzero(answers == samples.labels[fold.test])
 

@@ -81,7 +81,7 @@ def test_every_fault_is_counted_as_the_runtime_scores_it(
     def without(*lost: int) -> int:
         mask = np.isin(np.arange(inputs), lost)
         masks = mask[:switches], mask[switches:]
-        lanes = [scorer.lanes_without(own, joint, *masks) for own, joint in zip(bits, codes, strict=True)]
+        lanes = [scorer.biased_scores_without(own, joint, *masks) for own, joint in zip(bits, codes, strict=True)]
         return recognised(lanes, labels, trials)
 
     assert found.total == len(set(trials.tolist()))
@@ -98,7 +98,9 @@ def test_every_fault_is_counted_as_the_runtime_scores_it(
             else:
                 low = value.removeprefix("codes ").removeprefix("above ").split(" ")[0]
                 asked[:, element - switches] = 0 if value == "any code" else int(low) + value.startswith("codes above")
-            assert count == recognised([scorer.lanes(*each) for each in zip(stuck, asked, strict=True)], labels, trials)
+            assert count == recognised(
+                [scorer.biased_scores(*each) for each in zip(stuck, asked, strict=True)], labels, trials
+            )
 
 
 def test_the_worst_fault_of_each_kind_names_its_inputs() -> None:

@@ -29,7 +29,7 @@ def test_the_first_terms_reach_the_bound_and_no_running_sum_leaves_it(tables: In
 @given(tables)
 def test_its_frame_scores_as_its_terms_add_up(tables: IntegerTables) -> None:
     found = furthest(tables)
-    lanes = Scorer(tables).lanes_without(found.bits, found.codes, found.lost_switches, found.lost_joints)
+    lanes = Scorer(tables).biased_scores_without(found.bits, found.codes, found.lost_switches, found.lost_joints)
     assert (np.array(lanes) - LANE_OFFSET).tolist() == found.terms.sum(axis=0, dtype=int).tolist()
     assert sorted(found.order) == list(range(len(found.terms)))
 

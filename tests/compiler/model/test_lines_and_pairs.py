@@ -148,8 +148,8 @@ def test_the_runtime_sums_as_arrays_do_without_lost_inputs(seed: int) -> None:
     scorer, scores = Scorer(integers), integers.scores(bits, codes)
     lost = np.arange(integers.n_joints) % 2 == seed % 2
     for row in range(len(bits)):
-        assert (np.array(scorer.lanes(bits[row], codes[row])) - LANE_OFFSET == scores[row]).all()
-        left = np.array(scorer.lanes_without(bits[row], codes[row], np.zeros(4, bool), lost)) - LANE_OFFSET
+        assert (np.array(scorer.biased_scores(bits[row], codes[row])) - LANE_OFFSET == scores[row]).all()
+        left = np.array(scorer.biased_scores_without(bits[row], codes[row], np.zeros(4, bool), lost)) - LANE_OFFSET
         for joint in np.flatnonzero(lost).tolist():
             mine = integers.joint_rows[joint][np.searchsorted(integers.thresholds[joint], codes[row, joint])].astype(
                 int
@@ -229,19 +229,19 @@ def test_a_missing_joint_adds_its_mean_and_gives_pairs_code_0(seed: int) -> None
     scorer, scores = Scorer(integers), integers.scores(bits, codes)
     lost = np.random.default_rng(seed).random(JOINTS) < 0.5
     for row in range(len(bits)):
-        assert (np.array(scorer.lanes(bits[row], codes[row])) - LANE_OFFSET == scores[row]).all()
+        assert (np.array(scorer.biased_scores(bits[row], codes[row])) - LANE_OFFSET == scores[row]).all()
         asked = np.where(lost, 0, codes[row]).astype(np.uint16)[np.newaxis]
         meant = integers.scores(bits[row : row + 1], asked)[0]
         for joint in np.flatnonzero(lost).tolist():
             meant = meant + integers.joint_means[joint] - integers.joint_rows[joint][0]
-        left = np.array(scorer.lanes_without(bits[row], codes[row], np.zeros(3, bool), lost)) - LANE_OFFSET
+        left = np.array(scorer.biased_scores_without(bits[row], codes[row], np.zeros(3, bool), lost)) - LANE_OFFSET
         assert (left == meant).all()
         assert np.abs(left).max() <= integers.bound
     live, every = LiveScores(scorer), np.ones(JOINTS, bool)
     for held in (None, tuple(codes[0].tolist()), None):
         live.joints(held)
-        none = scorer.lanes_without([False] * 3, codes[0], [False] * 3, every if held is None else ~every)
-        assert live.lanes(0) == none
+        none = scorer.biased_scores_without([False] * 3, codes[0], [False] * 3, every if held is None else ~every)
+        assert live.biased_scores(0) == none
 
 
 @settings(deadline=None, max_examples=25)

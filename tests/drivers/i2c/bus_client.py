@@ -54,7 +54,7 @@ class Client:
                 {name: getattr(chip, name) for name in ("present", "errors", "last_error")} for chip in self._bus.chips
             ],
             "way": self._bus.way,
-            "trouble": self._bus.trouble,
+            "fault_message": self._bus.fault_message,
             "transfers": self._bus.transfers,
         }
 

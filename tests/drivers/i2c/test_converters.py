@@ -207,4 +207,4 @@ def test_channels_at_rest_are_looked_into_once_a_check(monkeypatch: pytest.Monke
     wire.sda_low = True
     bus.chips[0].checked += 1
     assert reads.read() == [None] * 4
-    assert "stuck" in bus.trouble
+    assert "stuck" in bus.fault_message

@@ -111,14 +111,14 @@ def test_a_line_held_low_gives_no_answers_advice_and_recovers(rig: MakeRig, adap
     glove = running(rig, adapter=adapter)
     glove.emulated.hold_sda(0)
     assert glove.client.ask("read") == [None, None]
-    assert "/dev/i2c-7 is stuck" in glove.client.state().trouble
-    assert "clock SCL nine times" in glove.client.state().trouble
+    assert "/dev/i2c-7 is stuck" in glove.client.state().fault_message
+    assert "clock SCL nine times" in glove.client.state().fault_message
     before = glove.client.state().transfers
     assert glove.client.ask("read_until", [], 2.5) == [[None, None]]
     assert glove.client.state().transfers - before <= 4  # tried once a second, not in every scan
     glove.emulated.heal(0)
     recovers(glove, LEVELS, by_way_of=[[None, None], [LEVELS[0], None], [None, LEVELS[1]]])
-    assert glove.client.state().trouble == ""
+    assert glove.client.state().fault_message == ""
 
 
 def test_zeros_from_a_line_held_low_are_no_closed_switches(rig: MakeRig) -> None:
@@ -146,7 +146,7 @@ def test_a_line_held_low_at_open_is_reported_without_error(rig: MakeRig, adapter
     glove.client.ask("open")
     glove.client.ask("prepare", BOTH)
     assert glove.client.ask("read") == [None, None]
-    assert "is stuck" in glove.client.state().trouble
+    assert "is stuck" in glove.client.state().fault_message
     glove.emulated.heal(0)
     recovers(glove, LEVELS, by_way_of=[[None, None], [LEVELS[0], None], [None, LEVELS[1]]])
 
@@ -278,11 +278,11 @@ def test_an_unusual_errno_for_a_nak_is_no_stuck_bus(rig: MakeRig) -> None:
     glove.emulated.set_all([LEVELS])
     glove.emulated.fail(0, errno.EIO, address=0x7F)
     glove.client.ask("open")
-    assert glove.client.state().trouble == ""
+    assert glove.client.state().fault_message == ""
     glove.client.ask("prepare", BOTH)
     glove.emulated.fail(0, errno.EIO, address=0x20)
     assert glove.client.ask("read") == [None, LEVELS[1]]
-    assert glove.client.state().trouble == ""
+    assert glove.client.state().fault_message == ""
 
 
 @pytest.mark.parametrize("leftover", [0x80, 0xA0, 0x20])

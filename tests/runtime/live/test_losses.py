@@ -30,7 +30,7 @@ class Row:
 
     closed: int
     sensors: bytes
-    lanes: tuple[int, ...]
+    biased_scores: tuple[int, ...]
 
 
 def recording(build: Build, seed: int) -> list[Row]:
@@ -44,7 +44,7 @@ def recording(build: Build, seed: int) -> list[Row]:
         elif random.random() < 0.3:
             closed ^= 1 << random.randrange(SWITCHES)
         bits = np.array([closed >> switch & 1 for switch in range(SWITCHES)], bool)
-        whole = scorer.lanes_without(bits, list(sensors), np.zeros(SWITCHES, bool), np.zeros(JOINTS, bool))
+        whole = scorer.biased_scores_without(bits, list(sensors), np.zeros(SWITCHES, bool), np.zeros(JOINTS, bool))
         rows.append(Row(closed, sensors, tuple(whole)))
     return rows
 
@@ -86,10 +86,10 @@ class Player:
     def _check(self, row: Row, found: LiveGrasp, *, whole: bool) -> None:
         if found.grasp != self._last:
             self._last, self._confirmed = found.grasp, whole
-        self._confirmed |= whole and row.lanes.index(max(row.lanes)) == self._index(found.grasp)
+        self._confirmed |= whole and row.biased_scores.index(max(row.biased_scores)) == self._index(found.grasp)
         self.changing += found.health == "changing"
         if found.health == "ok":
-            behind = max(row.lanes) - row.lanes[self._grasps.index(found.grasp)]
+            behind = max(row.biased_scores) - row.biased_scores[self._grasps.index(found.grasp)]
             self.ok += 1
             self.wrong += behind > self._lead or not self._confirmed
 

@@ -90,7 +90,7 @@ def test_evidence_is_the_ratio_of_the_probabilities_of_what_is_shown(make_build:
     for closed in drawn(shares, 40, 1):
         test = StuckTest(build)
         bits = np.array([closed >> switch & 1 for switch in range(SWITCHES)], bool)
-        test.weigh(scorer.lanes(bits, []), closed, (1 << SWITCHES) - 1, 0)
+        test.weigh(scorer.biased_scores(bits, []), closed, (1 << SWITCHES) - 1, 0)
         for switch in np.flatnonzero(bits):
             others = np.arange(SWITCHES) != switch
             likely = np.where(bits[:, np.newaxis], shares, 1 - shares)[others].prod(axis=0)
@@ -297,7 +297,7 @@ def test_a_drifting_joint_alone_is_lost_until_it_returns(make_build: MakeBuild) 
         if not said or said[-1] != named:
             said.append(named)
         if named:
-            found = build.scorer.lanes_without(
+            found = build.scorer.biased_scores_without(
                 np.zeros(6, bool), list(codes), np.ones(6, bool), np.array([True, False, False])
             )
             assert build.grasps[found.index(max(found))] == moment.grasp.candidate

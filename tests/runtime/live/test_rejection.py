@@ -124,11 +124,11 @@ def test_lost_switches_refuse_nothing_by_being_lost(build: Build) -> None:
 def test_with_none_a_standing_is_that_of_one_more_class(make_build: MakeBuild, data: st.DataObject) -> None:
     build = make_build(data.draw(st.integers(0, 9)), joints=0)
     lead = data.draw(st.integers(-40, 40))
-    lanes = build.scorer.lanes(np.array([data.draw(st.booleans()) for _ in range(6)]), [])
+    lanes = build.scorer.biased_scores(np.array([data.draw(st.booleans()) for _ in range(6)]), [])
     plain = Ranking(lanes)
     both, none = plain.with_none_class(lead), len(lanes)
     assert both.candidate == (none if lead > 0 else plain.candidate)
-    assert both.lanes[none] - max(lanes) == lead
+    assert both.biased_scores[none] - max(lanes) == lead
     for held in range(none):
         if lead <= 0:
             assert both.lead(held) == plain.lead(held)

@@ -7,15 +7,15 @@ from hypothesis import strategies as st
 from thenar.runtime.live.decision import Ranking
 
 
-@given(lanes=st.lists(st.integers(0, 65535), min_size=2, max_size=6).map(tuple))
-def test_it_says_what_the_scores_say(lanes: tuple[int, ...]) -> None:
-    standing = Ranking(lanes)
-    assert standing.candidate == int(np.argmax(lanes))
-    assert standing.margin == np.diff(np.sort(lanes)[-2:])[0]
-    assert [standing.lead(number) for number in range(len(lanes))] == [max(lanes) - lane for lane in lanes]
-    for number in range(len(lanes)):
-        assert standing.contradicts(number, 5) == (lanes[number] + 5 <= max(lanes) and number != standing.candidate)
-    total = math.fsum(standing.probability(number, 3.0) for number in range(len(lanes)))
+@given(scores=st.lists(st.integers(0, 65535), min_size=2, max_size=6).map(tuple))
+def test_it_says_what_the_scores_say(scores: tuple[int, ...]) -> None:
+    standing = Ranking(scores)
+    assert standing.candidate == int(np.argmax(scores))
+    assert standing.margin == np.diff(np.sort(scores)[-2:])[0]
+    assert [standing.lead(number) for number in range(len(scores))] == [max(scores) - lane for lane in scores]
+    for number in range(len(scores)):
+        assert standing.contradicts(number, 5) == (scores[number] + 5 <= max(scores) and number != standing.candidate)
+    total = math.fsum(standing.probability(number, 3.0) for number in range(len(scores)))
     assert math.isclose(total, 1.0)
 
 

@@ -17,7 +17,7 @@ import pytest
 from thenar.drivers.errors import SettingError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.live.listening import propose_stream
+from thenar.runtime.live.stream_probe import propose_stream
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.ros import RosReader
@@ -106,7 +106,9 @@ def test_messages_of_a_second_publisher_are_left_out_and_said(talk: Talk) -> Non
             frame = new or frame
             if source.reader.counts().foreign:
                 break
-        assert source.trouble().startswith("another publisher sends on this topic, too, and its messages are left out")
+        assert source.fault_message().startswith(
+            "another publisher sends on this topic, too, and its messages are left out"
+        )
     finally:
         source.close()
 
@@ -116,7 +118,7 @@ def test_a_joint_that_is_renamed_is_lost_and_said(hear: Hear) -> None:
     source, frames = hear("JointState", "", {"stamp": [0, 0], "name": ["idx", "ring"], "position": [1.0, 1.0]}, text)
     assert isinstance(frames[0], GloveFrame)
     assert frames[0].sensors == bytes((128, 0))
-    assert source.trouble() == "its rows lack index: name columns in glove.toml as it does"
+    assert source.fault_message() == "its rows lack index: name columns in glove.toml as it does"
 
 
 def test_positions_of_a_joint_state_are_joints_by_their_names(hear: Hear) -> None:
@@ -171,7 +173,7 @@ def test_a_joint_state_of_names_without_positions_is_counted(hear: Hear) -> None
     text = '[[stream]]\nport = "{port}"\njoints = {{ a = [0, 1] }}\n'
     source, frames = hear("JointState", "", {"stamp": [0, 0], "name": ["a", "b"], "position": [1.0]}, text)
     assert not frames
-    assert source.trouble() == "the data holds no rows: a JointState of 2 names and 1 positions"
+    assert source.fault_message() == "the data holds no rows: a JointState of 2 names and 1 positions"
 
 
 @pytest.mark.parametrize("port", ["ros:", "ros:topic", "ros:/t?type=String", "ros:/a b", "ros:/t?x"])

@@ -39,7 +39,7 @@ def test_a_frame_has_every_sensor_unrequested_ones_zero(line: PtyLine) -> None:
         device = opened(line)
         wanted = [value if name in SOME else 0 for name, value in zip(SENSORS_18, VALUES, strict=True)]
         assert list(first(device).sensors) == wanted
-        assert device.trouble() == ""
+        assert device.fault_message() == ""
         device.close()
 
 
@@ -48,7 +48,7 @@ def test_a_box_without_a_mask_delivers_all_and_is_in_trouble(line: PtyLine) -> N
         emulated.set(VALUES)
         device = opened(line)
         assert first(device).sensors == VALUES
-        assert "it accepts no sensor mask" in device.trouble()
+        assert "it accepts no sensor mask" in device.fault_message()
         device.close()
 
 

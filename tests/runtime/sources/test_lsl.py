@@ -87,11 +87,11 @@ def test_channels_with_other_labels_are_not_taken_by_their_order(outlet: Outlet,
     (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
     source.open()
     end = time.monotonic() + LONG_S
-    while not source.trouble():
+    while not source.fault_message():
         assert time.monotonic() < end
         sender.push_sample([1.0, 0.5])
         assert source.read(0.05) is None
-    assert source.trouble() == "its rows have other columns than glove.toml: finger, palm, not thumb, pad"
+    assert source.fault_message() == "its rows have other columns than glove.toml: finger, palm, not thumb, pad"
     source.close()
 
 

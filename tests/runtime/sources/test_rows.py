@@ -136,10 +136,12 @@ def test_columns_by_name_in_any_order_and_by_a_header(play: Play) -> None:
 def test_named_columns_are_read_by_name_or_not_at_all(play: Play) -> None:
     source, frames = play([(0, b"ms,thumb,spare,idx,pad,flex,bend\n1,1,7,1023,0,0,0\n")])
     assert frames[0] == SwitchFrame(0, 0b0100, 0b0001, GloveFrame(0, b"\x01\x80"), (0,))
-    assert source.trouble() == "its rows lack index: name columns in glove.toml as it does"
+    assert source.fault_message() == "its rows lack index: name columns in glove.toml as it does"
     source, frames = play([(0, b"a,b,c,d,e,f,g\n1,1,7,1023,0,0,0\n")])
     assert frames == []
-    assert source.trouble().startswith("its rows have other columns than glove.toml: a, b, c, d, e and 2 more, not ms,")
+    assert source.fault_message().startswith(
+        "its rows have other columns than glove.toml: a, b, c, d, e and 2 more, not ms,"
+    )
 
 
 def test_the_senders_clock_times_rows_by_the_quickest_of_them(play: Play) -> None:
@@ -186,7 +188,7 @@ def test_what_comes_twice_late_or_not_at_all_is_counted(play: Play) -> None:
     sent = [0, 10, 20, 20, 40, 30, 50, 100, 110, 5, 15]
     source, _ = play([(10_000 * n, row(ms)) for n, ms in enumerate(sent)])
     assert counted(source) == {"rows": 7, "repeated": 1, "late": 3, "gaps": 2, "lost": 5}
-    assert source.trouble() == "rows come after later ones and are left out: do two programs send?"
+    assert source.fault_message() == "rows come after later ones and are left out: do two programs send?"
 
 
 @pytest.mark.parametrize("began_ms", [3_600_000, 100])
@@ -201,9 +203,9 @@ def test_rows_of_another_clock_count_once_the_first_one_is_silent(play: Play, be
     assert (found["rows"], found["jumped"], found["restarts"]) == (len(switches), 300 - len(switches), 1)
     assert switches[100].time_us == 10_000 * 99 + 1_005_000
     source, _ = play(sorted(first + other[:50]))
-    assert source.trouble() == "rows of another clock come and are left out: do two programs send?"
+    assert source.fault_message() == "rows of another clock come and are left out: do two programs send?"
     source, _ = play([*first[:1], *other])
-    assert source.trouble() == "its clock has restarted: was the board reset, or does another program send?"
+    assert source.fault_message() == "its clock has restarted: was the board reset, or does another program send?"
 
 
 @pytest.mark.parametrize(("unit", "ticks"), [("ms", 1), ("us", 1000)])
@@ -222,16 +224,16 @@ def test_a_row_whose_clock_is_no_time_is_left_out_and_said(play: Play, clock: by
     source, frames = play(sorted(good + odd), GLOVE.replace('time = "ms"', 'time = "ms"\ntime_unit = "s"'))
     assert [frame.closed for frame in frames if isinstance(frame, SwitchFrame)] == [0b0100] * 4
     assert counted(source)["untimed"] == 4
-    assert source.trouble() == "rows come whose clock is missing, or no time, and are left out"
+    assert source.fault_message() == "rows come whose clock is missing, or no time, and are left out"
 
 
 def test_more_rows_than_stated_are_said_unless_they_had_been_waiting(play: Play) -> None:
     waiting = [(2_000_000, b"".join(b"%d,0,0,0,0,0,0\n" % (10 * n) for n in range(100)))]
     paced = [(2_000_000 + 10_000 * n, b"%d,0,0,0,0,0,0\n" % (1000 + 10 * n)) for n in range(150)]
     source, _ = play(waiting + paced)
-    assert source.trouble() == ""
+    assert source.fault_message() == ""
     source, _ = play([(5_000 * n, b"%d,0,0,0,0,0,0\n" % (5 * n)) for n in range(500)])
-    assert source.trouble() == (
+    assert source.fault_message() == (
         "200 rows a second arrive, but glove.toml says 100: set rate_hz = 200, unless two programs send"
     )
 
@@ -295,7 +297,7 @@ def test_a_board_may_print_the_kept_elements_only(play: Play, names: tuple[str, 
     assert frames == [SwitchFrame(1_000_000, (1 << len(names)) - 1, 0, (*glove, None)[0], codes), *glove]
     clipped = {"out of range": 1} if only else {}
     assert counted(source) == {"rows": 1} | clipped
-    assert source.trouble() == ""
+    assert source.fault_message() == ""
 
 
 def test_a_board_that_lacks_needed_elements_is_told(play: Play) -> None:
@@ -303,7 +305,7 @@ def test_a_board_that_lacks_needed_elements_is_told(play: Play) -> None:
     names = ("a", "b", "t>700")
     source, frames = play([(1_000_000, lines)], BOARD, names, ())
     assert frames == [SwitchFrame(1_000_000, 0b101, 0b010, None, (800, None))]
-    assert source.trouble() == "its rows lack b: upload this build's sketch"
+    assert source.fault_message() == "its rows lack b: upload this build's sketch"
     assert counted(source) == {"rows": 1, "missing": 1}
     source, frames = play([(1_000_000, lines)], BOARD, ("a", "b", "c", "d"), ())
     assert frames == []
@@ -332,37 +334,39 @@ def test_garbage_loses_nothing_but_itself(play: Play) -> None:
 
 def test_what_is_wrong_with_all_rows_is_said(play: Play) -> None:
     source, _ = play([(0, b"1,2,3\n")])
-    assert source.trouble() == "its rows have other columns than glove.toml: column 1, column 2, column 3, not " + (
-        "ms, thumb, index, pad, flex and 1 more"
+    assert (
+        source.fault_message()
+        == "its rows have other columns than glove.toml: column 1, column 2, column 3, not "
+        + ("ms, thumb, index, pad, flex and 1 more")
     )
     source, _ = play([(0, b"rst:0x10\n")])
-    assert source.trouble() == "the data holds no rows: 'rst:0x10'"
+    assert source.fault_message() == "the data holds no rows: 'rst:0x10'"
     source, _ = play([(100_000 * n, b"%d,0,0,0,0,0,0\n" % (100 * n)) for n in range(12)])
-    assert source.trouble() == "10 rows a second arrive, but glove.toml says 100: set rate_hz = 10"
+    assert source.fault_message() == "10 rows a second arrive, but glove.toml says 100: set rate_hz = 10"
 
 
 def test_a_sender_that_falls_silent_or_sends_something_else_is_said(play: Play) -> None:
     row, silent = b"5,0,0,0,0,0,0\n", "connected, but no row has come for 2 s or longer: is its program running?"
     source, _ = play([(1_000_000, b"boot\n" + row), (2_900_000, b"")])
-    assert source.trouble() == ""
+    assert source.fault_message() == ""
     source, _ = play([(1_000_000, b"boot\n1,2\n" + row), (3_100_000, b"")])
-    assert source.trouble() == silent
+    assert source.fault_message() == silent
     assert source.counts()[0].value == 0
     source, _ = play([(1_000_000, row), (3_100_000, b"1,2\n")])
-    assert source.trouble().startswith("its rows have other columns than glove.toml: column 1, column 2, not ms")
+    assert source.fault_message().startswith("its rows have other columns than glove.toml: column 1, column 2, not ms")
     source, _ = play([(1_000_000, row), (3_100_000, b"rst:0x10\n")])
-    assert source.trouble() == "the data holds no rows: 'rst:0x10'"
+    assert source.fault_message() == "the data holds no rows: 'rst:0x10'"
     source, _ = play([(1_000_000, row), (3_100_000, b"\x80\x00\x80")])
-    assert source.trouble() == "bytes come, but no row: check the line ends and, of a serial port, the baud rate"
+    assert source.fault_message() == "bytes come, but no row: check the line ends and, of a serial port, the baud rate"
 
 
 @pytest.mark.parametrize("moving", [0, 1])
 def test_a_clock_that_stands_still_is_said(play: Play, moving: int) -> None:
     still = [(1_000_000 + 10_000 * n, b"7,%d,0,0,0,0,0\n" % (n % 2 * moving)) for n in range(8)]
     source, _ = play(still[:4])
-    assert source.trouble() == ""
+    assert source.fault_message() == ""
     source, _ = play(still)
-    assert source.trouble().startswith("its clock does not change from row to row")
+    assert source.fault_message().startswith("its clock does not change from row to row")
 
 
 @pytest.mark.parametrize(

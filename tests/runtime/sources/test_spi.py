@@ -52,14 +52,14 @@ def test_levels_are_closed_above_their_codes_and_the_codes_go_along(answers: lis
         SwitchFrame(5, 0b00001, taxels=(None, 40, 101)),
         SwitchFrame(5, 0b10100, taxels=(None, 501, 0)),
     ]
-    assert device.trouble() == ""
+    assert device.fault_message() == ""
 
 
 def test_where_no_converter_answers_levels_are_lost_and_it_says_so(answers: list[list[int | None]]) -> None:
     device = SpiConverter(HARNESS, 1, whole_scan(HARNESS, NAMES))
     answers.append([None, None])
     assert device.read(0.1) == SwitchFrame(5, 0, lost=0b10101, taxels=(None, None, None))
-    assert "mcp3008 does not reply" in device.trouble()
+    assert "mcp3008 does not reply" in device.fault_message()
 
 
 def test_a_saturated_taxel_is_lost_and_named(answers: list[list[int | None]], tmp_path: Path) -> None:
@@ -71,7 +71,7 @@ def test_a_saturated_taxel_is_lost_and_named(answers: list[list[int | None]], tm
     found = device.read(0.1)
     assert found is not None
     assert (found.closed, found.lost) == (0b00001, 0b10100)
-    assert device.trouble() == "taxels with faults: t1: saturated"
+    assert device.fault_message() == "taxels with faults: t1: saturated"
 
 
 def test_only_devices_with_levels_are_sources_of_a_build() -> None:
