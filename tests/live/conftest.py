@@ -1,7 +1,7 @@
 """A small scene as a subject plays it, builds of it, harnesses for them, and what must be true of what is published.
 
-The oracle is offline: `Scorer.biased_scores_without` on the bits that were shown and the codes that the subject's calibration
-gives to the bytes that were shown.
+The oracle is offline: `Scorer.biased_scores_without` on the bits that were shown and the codes that the subject's
+calibration gives to the bytes that were shown.
 """
 
 from bisect import bisect_right
