@@ -13,7 +13,7 @@ from .options import (
     CHOOSING,
     LIMITS,
     LazyOption,
-    Training,
+    TrainingCommand,
     asked_settings,
     fitted_hand,
     layout_option,
@@ -89,7 +89,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     context.default_map = {names[option]: value for option, value in given}
 
 
-@click.command("compile", cls=Training, groups=_GROUPS)
+@click.command("compile", cls=TrainingCommand, groups=_GROUPS)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option(
     "-o", "--output", type=OutputFolder(), required=True, help="Build folder to write; an existing build is replaced."

@@ -11,7 +11,7 @@ from thenar.compiler.text import DASH, counted, interval
 from .options import (
     CHOOSING,
     LIMITS,
-    Training,
+    TrainingCommand,
     asked_settings,
     glove_option,
     layout_option,
@@ -57,7 +57,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     return ("paper", "nested") if value == "both" else (value,)
 
 
-@click.command(cls=Training)
+@click.command(cls=TrainingCommand)
 @click.argument("grasps", type=existing_file)
 @click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Use only this subject; repeatable.")
 @recipe_options("folds", least=2)

@@ -10,7 +10,7 @@ from thenar.compiler.text import duration, interval
 from thenar.drivers.names import printable
 from thenar.runtime.recipe import AUTO
 
-from .options import Training, asked_settings, method_list, trainer_option
+from .options import TrainingCommand, asked_settings, method_list, trainer_option
 from .parameters import (
     Number,
     OneOf,
@@ -38,7 +38,7 @@ def _timed() -> tuple[str, ...]:
     return timed()
 
 
-@click.command("frontier", cls=Training)
+@click.command("frontier", cls=TrainingCommand)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=OutputFolder(), required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring too, and choose by its ports.")

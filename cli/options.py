@@ -214,7 +214,7 @@ def _methods_by_number() -> "Sections":
     return sections
 
 
-class Training(Described):
+class TrainingCommand(Described):
     """A command with `trainer_option`, followed by an option for each setting of a trainer that the command does not
     define itself. The trainers are imported when the options are needed, not when the command is defined.
 

@@ -10,7 +10,7 @@ from thenar.runtime.recipe import AUTO
 
 from .options import (
     CHOOSING,
-    Training,
+    TrainingCommand,
     asked_settings,
     glove_option,
     layout_option,
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from thenar.runtime.recipe import Recipe
 
 
-@click.command("place", cls=Training)
+@click.command("place", cls=TrainingCommand)
 @click.argument("grasps", type=existing_file)
 @recipe_options(*CHOOSING)
 @recipe_options("inputs")

@@ -10,6 +10,7 @@ from thenar.drivers.extras import optional
 
 if TYPE_CHECKING:
     from thenar.drivers.errors import ThenarError
+    from thenar.runtime.build import Build
     from thenar.runtime.model.tables import ScoreTables
     from thenar.runtime.model.terms.base import Term
     from thenar.runtime.model.terms.bins import Bins
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from .artifact import CompileError
     from .artifact.compile import compile_build
     from .artifact.documents import BuildReport, Documents
-    from .artifact.estimator import Build, compile  # noqa: A004
+    from .artifact.estimator import compile, export_c  # noqa: A004
     from .artifact.verify import FaultCheck, Verification, verify, verify_faults
     from .boosting.boost import BoostingError
     from .boosting.classifier import LogitBoostClassifier
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "thenar.drivers.errors": ("ThenarError",),
+    "thenar.runtime.build": ("Build",),
     "thenar.runtime.model.tables": ("ScoreTables",),
     "thenar.runtime.model.terms.base": ("Term",),
     "thenar.runtime.model.terms.bins": ("Bins",),
@@ -58,7 +60,7 @@ _HOMES = {
     ".artifact.compile": ("compile_build",),
     ".artifact.documents": ("BuildReport", "Documents"),
     ".artifact": ("CompileError",),
-    ".artifact.estimator": ("Build", "compile"),
+    ".artifact.estimator": ("compile", "export_c"),
     ".artifact.verify": ("FaultCheck", "Verification", "verify", "verify_faults"),
     ".boosting.boost": ("BoostingError",),
     ".boosting.classifier": ("LogitBoostClassifier",),
@@ -122,6 +124,7 @@ __all__ = [
     "compile_build",
     "dask_cluster",
     "evaluate",
+    "export_c",
     "find_frontier",
     "from_dataframe",
     "grow_id3",

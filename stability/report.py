@@ -15,7 +15,7 @@ import msgspec
 from thenar.compiler.workers import in_workers
 
 from .finding import Case, Finding
-from .weka import Comparison, Differences, NotRun
+from .weka import Differences, NotRun, WekaComparison
 
 NAMES = (
     "elementary",
@@ -84,7 +84,7 @@ class Report(msgspec.Struct, frozen=True):
 
     full: bool
     cases: tuple[CaseReport, ...]
-    weka: Comparison | NotRun | None
+    weka: WekaComparison | NotRun | None
     holds: bool
 
 
@@ -204,7 +204,7 @@ def legend(report: Report) -> tuple[tuple[str, str], ...]:
     )
 
 
-def weka_lines(weka: Comparison | NotRun) -> tuple[str, ...]:
+def weka_lines(weka: WekaComparison | NotRun) -> tuple[str, ...]:
     """Return the results of the comparison with Weka, one sentence per line."""
     if isinstance(weka, NotRun):
         return (f"not run: {weka.why}",)

@@ -101,7 +101,7 @@ class Differences(msgspec.Struct, frozen=True):
     parts: int | None
 
 
-class Comparison(msgspec.Struct, frozen=True, tag="run"):
+class WekaComparison(msgspec.Struct, frozen=True, tag="run"):
     """The comparison of Weka and thenar."""
 
     weka: str  # its version
@@ -121,7 +121,7 @@ class NotRun(msgspec.Struct, frozen=True, tag="not run"):
     why: str
 
 
-def compare_with_weka() -> Comparison | NotRun:
+def compare_with_weka() -> WekaComparison | NotRun:
     """Run the comparison, or return the reason why it cannot run."""
     try:
         return _compare()
@@ -145,7 +145,7 @@ def separable_set() -> tuple[NDArray[np.int64], NDArray[np.intp]]:
     return np.hstack([switches, joints]), labels
 
 
-def _compare() -> Comparison:
+def _compare() -> WekaComparison:
     X, labels = separable_set()
     half = len(labels) // 2
     training, held_out = (X[:half], labels[:half]), X[half:]
@@ -154,7 +154,7 @@ def _compare() -> Comparison:
     )
     ours, _ = boost(*training, CLASSES, rounds=ROUNDS)
     outputs = {name: _staged(stumps, held_out) for name, stumps in (("p", processor), ("j", java), ("o", ours))}
-    return Comparison(
+    return WekaComparison(
         weka=run_weka("weka.core.Version").partition("\n")[0].strip(),
         rounds=ROUNDS,
         classes=CLASSES,

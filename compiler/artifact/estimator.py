@@ -10,7 +10,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from thenar.drivers.extras import optional
-from thenar.runtime.build import Build as LoadedBuild
+from thenar.runtime.build import Build
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.published import NONE
@@ -45,53 +45,49 @@ with optional():
 _UNSEEN = -1e6
 
 
-class Build(LoadedBuild):
-    """A build, loaded as by `thenar.runtime.Build`, that can also be exported as C.
+def export_c(
+    build: Build,
+    folder: str | Path,
+    target: str = "avr328p",
+    *,
+    name: str = LIBRARY_NAME,
+    flash: int | None = None,
+    overwrite: bool = False,
+) -> tuple[Path, ...]:
+    """Write C99 that predicts exactly as a build does into `folder`, and return the files.
+
+    Parameters
+    ----------
+    build : Build
+        The build, loaded.
+    folder : path
+        The folder to write.
+    target : str
+        The name of `thenar firmware --target`: one of `TARGETS`.
+    name : str
+        The prefix of every C name.
+    flash : int, optional
+        Bytes of flash that the classifier may use; None: half of the part's flash.
+    overwrite : bool
+        Whether existing files may be replaced.
+
+    Raises
+    ------
+    MemberError
+        If there is no such target.
+    FirmwareError
+        If the build does not fit the target.
 
     Examples
     --------
-    >>> from thenar.compiler import Build, GraspSet, compile_build
+    >>> from thenar.compiler import Build, GraspSet, compile_build, export_c
     >>> report = compile_build(GraspSet.load("set.grasps"), "build", rounds=3, folds=0)
-    >>> sorted(path.name for path in Build.load("build").export_c("firmware", "host"))[:2]
+    >>> sorted(path.name for path in export_c(Build.load("build"), "firmware", "host"))[:2]
     ['Makefile', 'check.c']
     """
-
-    __slots__ = ()
-
-    def export_c(
-        self,
-        folder: str | Path,
-        target: str = "avr328p",
-        *,
-        name: str = LIBRARY_NAME,
-        flash: int | None = None,
-        overwrite: bool = False,
-    ) -> tuple[Path, ...]:
-        """Write C99 that predicts exactly as this build does into `folder`, and return the files.
-
-        Parameters
-        ----------
-        folder : path
-            The folder to write.
-        target : str
-            The name of `thenar firmware --target`: one of `TARGETS`.
-        name : str
-            The prefix of every C name.
-        flash : int, optional
-            Bytes of flash that the classifier may use; None: half of the part's flash.
-        overwrite : bool
-            Whether existing files may be replaced.
-
-        Raises
-        ------
-        MemberError
-            If there is no such target.
-        FirmwareError
-            If the build does not fit the target.
-        """
-        files = Firmware(self.tables, self.manifest, target, name, flash).files()
-        write_folder(files, Path(folder), overwrite=overwrite)
-        return tuple(Path(folder) / path for path in files)
+    files = Firmware(build.tables, build.manifest, target, name, flash).files()
+    write_folder(files, Path(folder), overwrite=overwrite)
+    return tuple(Path(folder) / path for path in files)
 
 
 def compile(  # noqa: A001

@@ -20,7 +20,7 @@ from thenar.runtime.names import list_names, nearest
 from thenar.runtime.scores import LANE_OFFSET
 
 from ..firmware import FirmwareError
-from ..firmware.choose import Fit, features, fit_for, smallest_fit
+from ..firmware.choose import PartFit, features, fit_for, smallest_fit
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library
 from ..firmware.generate import LARGEST
 from ..firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames, states_of
@@ -189,7 +189,7 @@ class FirmwareTrial:
         biased_scores = [without(bits, codes, lost[:switches], lost[switches:]) for bits, codes, lost in frames]
         return np.array(biased_scores) - LANE_OFFSET
 
-    def check(self, fit: Fit, *, missing: bool = False) -> TargetCheck:
+    def check(self, fit: PartFit, *, missing: bool = False) -> TargetCheck:
         """Compile the classifier with layout `fit` and compare its results with Python's. Raises FirmwareError."""
         found = self._run(fit, lost=self._lost if missing else None)
         scores = self._scores_without if missing else self._scores
@@ -251,7 +251,7 @@ class FirmwareTrial:
             return None
         return sum(name != grasp for name, grasp in zip(found.names, self._build.grasps, strict=True))
 
-    def _run(self, fit: Fit, *, lost: Lost | None) -> Predictions:
+    def _run(self, fit: PartFit, *, lost: Lost | None) -> Predictions:
         layout, target = fit.layout, fit.target
         files = target.sources(Library(LIBRARY_NAME, self._build.manifest, layout))
         frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
@@ -360,7 +360,7 @@ def verify_firmware(
     )
 
 
-def _fit(build: Build, kind: str) -> Fit:
+def _fit(build: Build, kind: str) -> PartFit:
     """Return the smallest part of a kind that fits, with its layout."""
     first, *more = (target for target in TARGETS.values() if target.kind == kind)
     return smallest_fit(build.tables, kind=kind) if more else fit_for(first, build.tables)

@@ -19,7 +19,7 @@ _FAST_SHARE = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fit:
+class PartFit:
     """A part, the layout of a build on it, and its estimated cost; None where the part has no formula."""
 
     target: Target
@@ -54,7 +54,7 @@ def largest_classifier(target: Target) -> int:
     return min(target.flash * 3 // 4, target.most_flash)
 
 
-def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> Fit:
+def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> PartFit:
     """Return the fit of `tables` on a target, whose flash the classifier may fill up to `flash` bytes, by default
     `largest_classifier`.
 
@@ -78,11 +78,11 @@ def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> 
     return _fit(target, tables, smallest, allowed)
 
 
-def _fit(target: Target, tables: IntegerTables, group: int, allowed: int) -> Fit:
+def _fit(target: Target, tables: IntegerTables, group: int, allowed: int) -> PartFit:
     """Return the fit with a layout, in `allowed` bytes of flash. Raises FirmwareError if it does not fit."""
     layout = Layout(tables, group)
     if target.formula is None:
-        return Fit(target, layout, None)
+        return PartFit(target, layout, None)
     rows = 4 * layout.row_pairs * layout.n_rows
     if target.avr and rows > _LARGEST_ARRAY:
         raise FirmwareError(
@@ -96,10 +96,10 @@ def _fit(target: Target, tables: IntegerTables, group: int, allowed: int) -> Fit
             f"{allowed} and {target.ram} are allowed: compile with a higher ``prune``, fewer ``rounds`` or a smaller "
             "``max_bins``, or use a larger part"
         )
-    return Fit(target, layout, cost)
+    return PartFit(target, layout, cost)
 
 
-def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = None) -> Fit:
+def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = None) -> PartFit:
     """Return the smallest part that holds the tables, of those that builds carry firmware for, or those of `kind`;
     in `flash` bytes where given, or in all of the part's flash if that is less: then of parts whose flash is estimated.
 

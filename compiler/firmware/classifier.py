@@ -11,7 +11,7 @@ from thenar.runtime.manifest import Rejection
 from thenar.runtime.model.terms.line import Slope
 from thenar.runtime.softmax import Softmax
 
-from .layout import Bins, Layout, Rows
+from .layout import Layout, Rows, StoredBins
 from .segments import SEGMENT_FILES, segment_files
 from .sensors import Sensors, codes_files, sensors_of
 from .words import Names, answers_of, comment, identifiers, inputs_in_words, joint_in_words, none_of, string
@@ -140,11 +140,11 @@ def _values(name: str, names: Names, layout: Layout, notes: Sequence[str]) -> di
     }
 
 
-def _bins(bins: Bins) -> str:
+def _bins(bins: StoredBins) -> str:
     return f"{{{bins.joint}u, {bins.first_threshold}u, {bins.half}u, {bins.first_row}u}}"
 
 
-def _grid(down: Bins, across: Bins) -> str:
+def _grid(down: StoredBins, across: StoredBins) -> str:
     return f"{{{len(across.thresholds) + 1}u, {_bins(down)}, {_bins(across)}}}"
 
 

@@ -15,7 +15,7 @@ from thenar.runtime.model.integers import IntegerTables
 
 from ..publication import check_folder, entries, publish_folder
 from . import FirmwareError
-from .choose import Fit, fit_for
+from .choose import PartFit, fit_for
 from .classifier import LIBRARY_NAME, Library
 from .sensors import Sensors
 from .targets import TARGETS, Target
@@ -50,7 +50,7 @@ class Firmware:
         return TARGETS.named(self.target)
 
     @cached_property
-    def fit(self) -> Fit:
+    def fit(self) -> PartFit:
         """The part of the target, and the layout of the build. Raises FirmwareError if it does not fit."""
         return fit_for(self._target, self.tables, self.flash)
 

@@ -29,7 +29,7 @@ Rows = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class Bins:
+class StoredBins:
     """The thresholds of a joint, and the places of the first of them and of the row of code 0, the latter in pairs.
 
     The core halves them: they are filled up to one less than a power of two, by thresholds that no code exceeds.
@@ -117,17 +117,17 @@ class Layout:
         return (*switches, *bins, *grids)
 
     @cached_property
-    def bins(self) -> tuple[Bins, ...]:
+    def bins(self) -> tuple[StoredBins, ...]:
         """The joints that have thresholds, then both joints of each pair."""
         tables = self.tables
         row = 1 + sum((1 << len(group)) - 1 for group in self.groups)
         found, at = [], 0
         for joint in self.binned:
-            found.append(Bins(joint, at, tuple(tables.thresholds[joint].tolist()), row * self.row_pairs))
+            found.append(StoredBins(joint, at, tuple(tables.thresholds[joint].tolist()), row * self.row_pairs))
             row, at = row + len(tables.thresholds[joint]) + 1, at + len(found[-1].filled)
         for grid in tables.grids:
             for joint, steps in zip(grid.joints, grid.thresholds, strict=True):
-                found.append(Bins(joint, at, tuple(steps.tolist()), row * self.row_pairs))
+                found.append(StoredBins(joint, at, tuple(steps.tolist()), row * self.row_pairs))
                 at += len(found[-1].filled)
             row += grid.n_rows
         return tuple(found)

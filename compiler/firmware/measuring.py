@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from . import FirmwareError
-from .choose import Fit
+from .choose import PartFit
 from .classifier import Library
 from .costs import Unit
 from .probes import Predictions, Probes, extreme_frames, joined, random_frames
@@ -40,7 +40,7 @@ class Measured:
         )
 
 
-def measure(library: Library, fit: Fit) -> Measured:
+def measure(library: Library, fit: PartFit) -> Measured:
     """Compile a classifier, run extreme and random frames, and return the measured maxima.
 
     Raises FirmwareError where a tool is missing, or for a part whose simulator does not count.

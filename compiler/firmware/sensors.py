@@ -25,7 +25,7 @@ _RAW = "raw"
 
 
 @dataclass(frozen=True, slots=True)
-class Grid:
+class CodeGrid:
     """The even grid on which the numbers of a stream are coded first: `low` as `first`, `high` as `last`."""
 
     low: int
@@ -58,7 +58,7 @@ class Sensor:
     codes: tuple[int, int]
     says: tuple[str, str]
     readings: tuple[int, int] | None = None
-    grid: Grid | None = None
+    grid: CodeGrid | None = None
 
     def code(self, reading: int) -> int:
         """Return the code of a known sensor's reading: the same as in C."""
@@ -152,7 +152,10 @@ def _points(coded: Calibration) -> tuple[float, float]:
 
 
 def _sensor(
-    coded: Calibration, values: tuple[float, float], readings: tuple[int, int] | None = None, grid: Grid | None = None
+    coded: Calibration,
+    values: tuple[float, float],
+    readings: tuple[int, int] | None = None,
+    grid: CodeGrid | None = None,
 ) -> Sensor:
     first, second = (code_point(coded, value) for value in values)
     if first == second:
@@ -183,7 +186,7 @@ def _taxel(threshold: Threshold, lines: TaxelCalibration | None, limits: Range |
     return _sensor(coded, (0.0, own.value), (own.rest, own.press), grid)
 
 
-def _grid(name: str, limits: Range, first: int, last: int) -> Grid:
+def _grid(name: str, limits: Range, first: int, last: int) -> CodeGrid:
     low, high = limits
     whole = float(low).is_integer() and float(high).is_integer()
     if not whole or max(abs(low), abs(high), abs(high - low)) > FARTHEST:
@@ -191,7 +194,7 @@ def _grid(name: str, limits: Range, first: int, last: int) -> Grid:
             f"the range of {name!r} in glove.toml, {low:g} to {high:g}, must be whole numbers within {FARTHEST}: "
             "a board converts its converter's counts; give their range"
         )
-    return Grid(int(low), int(high), first, last)
+    return CodeGrid(int(low), int(high), first, last)
 
 
 def codes_files(name: str, sensors: Sensors) -> dict[str, str]:

@@ -9,7 +9,7 @@ from thenar.runtime.model.integers import IntegerTables, tables_from_bytes, tabl
 from thenar.runtime.recipe import Recipe
 
 from ..evaluation.folds import Rows
-from ..firmware.choose import Fit
+from ..firmware.choose import PartFit
 from ..firmware.classifier import LIBRARY_NAME, Library
 from ..firmware.measuring import run_counted, slow_frames
 from ..firmware.words import numbered
@@ -126,7 +126,7 @@ def count_steps(content: bytes, model: ClassifyModel) -> float:
     return steps_of(fit)
 
 
-def steps_of(fit: Fit) -> float:
+def steps_of(fit: PartFit) -> float:
     """Compile a classifier for its part and run it; return the cycles of the slowest of the frames that should take
     longest and of extreme ones. Raises FirmwareError.
     """

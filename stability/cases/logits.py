@@ -18,7 +18,7 @@ from ..checks.roundings import ROUNDING
 from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import HardSet, contradictory, intervals, noisy, separable, words
 from ..inputs.hard_tables import largest_sum, rows_of
-from ..reference.logit import Column, largest_derivative
+from ..reference.logit import ReferenceColumn, largest_derivative
 from ..reference.numbers import precisely
 
 CASE = Case(
@@ -92,14 +92,14 @@ def _unrest(hard: HardSet, tables: ColumnTables, pulls: tuple[float, float]) -> 
     row, which is at most the total weight, add a few more roundings.
     """
     weights, (penalty, smoothness) = _weights(hard), pulls
-    columns = [Column([0] * len(hard.X), [tables.bias.tolist()], [BIAS_SHARE * penalty], [])]
+    columns = [ReferenceColumn([0] * len(hard.X), [tables.bias.tolist()], [BIAS_SHARE * penalty], [])]
     for x, edges, rows in zip(hard.X.T, tables.edges, tables.rows, strict=True):
         bins = np.searchsorted(edges, x)
         two = len(edges) < 2
         pulled = [penalty] if two else [BIN_SHARE * penalty] * (len(edges) + 1)
         own = rows[1:2] if two else rows[:-1]
         steps = [(number, number + 1, smoothness) for number in range(len(pulled) - 1)]
-        columns.append(Column((bins - two).tolist(), own.tolist(), pulled, steps))
+        columns.append(ReferenceColumn((bins - two).tolist(), own.tolist(), pulled, steps))
     largest = largest_derivative(columns, hard.labels.tolist(), weights.tolist())
     allowed = TOLERANCE + (hard.n_classes + 20) * 2 * ROUNDING
     return float(largest / (allowed * float(weights.sum())))
@@ -153,10 +153,13 @@ def _numbers(tables: ScoreTables) -> list[np.ndarray]:
 def _pairs_unrest(
     tables: ScoreTables, codes: np.ndarray, labels: np.ndarray, penalty: float, smoothness: float
 ) -> float:
-    columns, pull = [Column([0] * len(codes), [tables.bias.tolist()], [BIAS_SHARE * penalty], [])], BIN_SHARE * penalty
+    columns, pull = (
+        [ReferenceColumn([0] * len(codes), [tables.bias.tolist()], [BIAS_SHARE * penalty], [])],
+        BIN_SHARE * penalty,
+    )
     for steps, rows, x in zip(tables.thresholds, tables.joint_rows, codes.T, strict=True):
         between = [(bin_, bin_ + 1, smoothness) for bin_ in range(len(steps))]
-        columns.append(Column(np.searchsorted(steps, x).tolist(), rows.tolist(), [pull] * len(rows), between))
+        columns.append(ReferenceColumn(np.searchsorted(steps, x).tolist(), rows.tolist(), [pull] * len(rows), between))
     for pair in tables.grids:
         down, across = pair.rows.shape[:2]
         one, other = (np.searchsorted(t, codes[:, a]) for a, t in zip(pair.joints, pair.thresholds, strict=True))
@@ -164,6 +167,6 @@ def _pairs_unrest(
         both = zip([*cells[1:].flat, *cells[:, 1:].flat], [*cells[:-1].flat, *cells[:, :-1].flat], strict=True)
         between = [(int(b), int(a), smoothness) for a, b in both]
         flat = pair.rows.reshape(down * across, -1).tolist()
-        columns.append(Column((one * across + other).tolist(), flat, [pull] * len(flat), between))
+        columns.append(ReferenceColumn((one * across + other).tolist(), flat, [pull] * len(flat), between))
     largest = largest_derivative(columns, labels.tolist(), [1.0] * len(codes))
     return float(largest / ((TOLERANCE + 22 * 2 * ROUNDING) * len(codes)))

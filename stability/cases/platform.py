@@ -113,7 +113,7 @@ def _digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-class Setting(NamedTuple):
+class PlatformSetting(NamedTuple):
     """A process to run: its environment and its Python."""
 
     name: str
@@ -121,7 +121,7 @@ class Setting(NamedTuple):
     python: Path = Path(sys.executable)
 
 
-AS_IT_IS = Setting("as it is")
+AS_IT_IS = PlatformSetting("as it is")
 
 
 def findings(full: bool) -> Iterator[Finding]:
@@ -140,7 +140,7 @@ def findings(full: bool) -> Iterator[Finding]:
             yield _compared(check, here, [AS_IT_IS._replace(python=python), plainest(there)._replace(python=python)])
 
 
-def _settings(here: Built, full: bool) -> list[Setting]:
+def _settings(here: Built, full: bool) -> list[PlatformSetting]:
     settings = [plainest(here), _set("OPENBLAS_NUM_THREADS", "2")]
     if full:
         settings += [_set("OPENBLAS_CORETYPE", kernel) for kernel in _kernels(here)]
@@ -155,7 +155,7 @@ def _failed(ending: str) -> Finding:
     return Finding("a build as it is", "a process that succeeds", 1, 0, "processes", 1, ending)
 
 
-def _compared(check: str, here: Built, settings: list[Setting]) -> Finding:
+def _compared(check: str, here: Built, settings: list[PlatformSetting]) -> Finding:
     """Count the files that differ from this process's. The bound is 0: bytes of files are not rounded."""
     worst = Worst(check, "bytes of a plain run", 0, "files")
     moved = 0
@@ -171,8 +171,8 @@ def _compared(check: str, here: Built, settings: list[Setting]) -> Finding:
     return msgspec.structs.replace(found, reference=note)
 
 
-def _set(name: str, value: str) -> Setting:
-    return Setting(f"{name}={value}", ((name, value),))
+def _set(name: str, value: str) -> PlatformSetting:
+    return PlatformSetting(f"{name}={value}", ((name, value),))
 
 
 def _kernels(built: Built) -> tuple[str, ...]:
@@ -184,7 +184,7 @@ def _kernels(built: Built) -> tuple[str, ...]:
     return _X86_KERNELS[: newest + 1]
 
 
-def plainest(built: Built) -> Setting:
+def plainest(built: Built) -> PlatformSetting:
     """Return the setting of the oldest kernels and the fewest instructions, one thread, another order of hashes."""
     environment = {
         "OPENBLAS_NUM_THREADS": "1",
@@ -193,10 +193,10 @@ def plainest(built: Built) -> Setting:
         "GLIBC_TUNABLES": _PLAIN_LIBM,
         "PYTHONHASHSEED": "1",
     }
-    return Setting("plainest", tuple(environment.items()))
+    return PlatformSetting("plainest", tuple(environment.items()))
 
 
-def run(setting: Setting) -> Built | str:
+def run(setting: PlatformSetting) -> Built | str:
     """Build in a process of this setting; return the digests, or how the process failed."""
     environment = {name: value for name, value in os.environ.items() if name not in _OURS} | dict(setting.environment)
     command = [str(setting.python), "-P", "-m", __name__]

@@ -15,7 +15,7 @@ from .numbers import precisely
 Rows = Sequence[Sequence[float]]
 
 
-class Column(NamedTuple):
+class ReferenceColumn(NamedTuple):
     """The row of each frame (n,), -1: none; rows (r, K), the penalty of each (r,), and their smoothness."""
 
     added: Sequence[int]
@@ -25,7 +25,7 @@ class Column(NamedTuple):
 
 
 @precisely()
-def largest_derivative(columns: Sequence[Column], labels: Sequence[int], weights: Sequence[float]) -> mpf:
+def largest_derivative(columns: Sequence[ReferenceColumn], labels: Sequence[int], weights: Sequence[float]) -> mpf:
     """Return the largest derivative with respect to any entry of any column's rows; one column may be the bias."""
     n_classes = len(columns[0].rows[0])
     residuals: list[list[mpf]] = []
@@ -46,7 +46,7 @@ def largest_derivative(columns: Sequence[Column], labels: Sequence[int], weights
     return largest
 
 
-def _held(column: Column, sums: list[list[mpf]]) -> list[list[mpf]]:
+def _held(column: ReferenceColumn, sums: list[list[mpf]]) -> list[list[mpf]]:
     """Return the sums plus the derivatives of the penalties."""
     rows = [[mpf(entry) for entry in row] for row in column.rows]
     for row, pull, own in zip(rows, column.pulls, sums, strict=True):

@@ -25,6 +25,7 @@ from thenar.compiler import (
     Samples,
     compile,  # noqa: A004
     compile_build,
+    export_c,
     verify,
 )
 from thenar.runtime.errors import ThenarError
@@ -144,8 +145,8 @@ def test_what_is_no_sum_over_these_columns_is_refused(grasp_set: GraspSet, X: np
 def test_a_build_is_written_as_c(grasp_set: GraspSet, tmp_path: Path) -> None:
     compile_build(grasp_set, tmp_path / "build", rounds=3, folds=0)
     build = Build.load(tmp_path / "build")
-    written = build.export_c(tmp_path / "c", "avr328p")
+    written = export_c(build, tmp_path / "c", "avr328p")
     assert set(written) == {*(tmp_path / "c").iterdir()} - {tmp_path / "c" / "SHA256SUMS"}
     with pytest.raises(ThenarError):
-        build.export_c(tmp_path / "c", "avr328p")
-    assert build.export_c(tmp_path / "c", "avr328p", overwrite=True) == written
+        export_c(build, tmp_path / "c", "avr328p")
+    assert export_c(build, tmp_path / "c", "avr328p", overwrite=True) == written

@@ -29,7 +29,7 @@ from thenar.stability.reference.information import (
     sign_of_log_sum,
 )
 from thenar.stability.reference.intervals import normal_quantile, student, student_quantile, wilson
-from thenar.stability.reference.logit import Column, largest_derivative
+from thenar.stability.reference.logit import ReferenceColumn, largest_derivative
 from thenar.stability.reference.numbers import DIGITS, cos, precisely, sin, turn
 from thenar.stability.reference.standing_in import Kind, stand_ins
 
@@ -252,5 +252,5 @@ def test_the_derivative_is_that_of_the_loss() -> None:
         return (moved(step) - moved(-step)) / (2 * step)
 
     true = max(abs(slope(row, k)) for row in range(4) for k in range(3))
-    found = largest_derivative([Column(added, rows.tolist(), pulls, smoothness)], labels, weights)
+    found = largest_derivative([ReferenceColumn(added, rows.tolist(), pulls, smoothness)], labels, weights)
     assert abs(found - true) < mpf(10) ** -30

@@ -235,7 +235,7 @@ def spoil_statistics(patch: Patch) -> None:
 def spoil_platform(patch: Patch) -> None:
     right = platform.run
 
-    def differing(setting: platform.Setting) -> platform.Built | str:
+    def differing(setting: platform.PlatformSetting) -> platform.Built | str:
         built = right(platform.AS_IT_IS)
         if setting is platform.AS_IT_IS or isinstance(built, str):
             return built

@@ -15,8 +15,8 @@ from thenar.stability.weka import (
     DIVERGED,
     EXP_IN_JAVA,
     EXP_OF_THE_PROCESSOR,
-    Comparison,
     NotRun,
+    WekaComparison,
     WekaError,
     compare_with_weka,
     read_stumps,
@@ -41,10 +41,10 @@ x0 is missing : 0.0
 
 
 @pytest.fixture(scope="module")
-def compared(weka: Callable[..., str]) -> Comparison:
+def compared(weka: Callable[..., str]) -> WekaComparison:
     """What came of it where Weka is installed."""
     found = compare_with_weka()
-    assert isinstance(found, Comparison), found
+    assert isinstance(found, WekaComparison), found
     return found
 
 
@@ -89,7 +89,7 @@ def test_the_stumps_read_give_wekas_own_probabilities(weka: Callable[..., str], 
     assert (ours.argmax(axis=1) == theirs.argmax(axis=1)).all()
 
 
-def test_weka_parts_from_itself_and_thenar_from_weka_not_before(compared: Comparison) -> None:
+def test_weka_parts_from_itself_and_thenar_from_weka_not_before(compared: WekaComparison) -> None:
     parts = compared.weka_itself.parts
     assert parts is not None
     assert max(compared.weka_itself.largest[: parts - 1]) < DIVERGED < compared.weka_itself.largest[parts - 1]

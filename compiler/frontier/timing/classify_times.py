@@ -18,7 +18,7 @@ from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.scores import Scorer
 
 from ...firmware import FirmwareError
-from ...firmware.choose import Fit, fit_for
+from ...firmware.choose import PartFit, fit_for
 from ...firmware.probes import random_frames
 from ...firmware.targets import TARGETS, Target, timed
 from ..points import FrontierError, How
@@ -133,7 +133,7 @@ class ClassifyModel:
         return f"classify times on {self.target} were not counted in a simulator: {lack}" if lack else ""
 
 
-def fitting(tables: IntegerTables, part: Target) -> Fit | None:
+def fitting(tables: IntegerTables, part: Target) -> PartFit | None:
     """Return the fit of `tables` on a part, with its cost; None where they do not fit."""
     try:
         return fit_for(part, tables)
