@@ -31,9 +31,8 @@ from thenar.compiler.frontier.timing.wirings import wirings
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.merging import merge
 from thenar.compiler.samples import Samples
-from thenar.compiler.tables.quantise import integer_scores
 from thenar.compiler.workers import in_workers
-from thenar.runtime.tables import tables_from_bytes
+from thenar.runtime.model.integers import tables_from_bytes
 from thenar.simulator import load_scene, simulate
 
 SCENE, TARGET = "kamakura", "avr2560"
@@ -98,7 +97,7 @@ def played(asked: tuple[int, GraspSet | None, Equipment]) -> Case:
     best = [design for design in fronts[0] if design.frame.us <= BUDGET_US or design is fronts[0][0]][-1]
     tables = tables_from_bytes(best.tables.content)
     columns = [element.column for element in best.close.screened.elements]
-    predicted = integer_scores(tables, fresh.switches[:, columns], fresh.codes[:, : tables.n_joints]).argmax(axis=1)
+    predicted = tables.scores(fresh.switches[:, columns], fresh.codes[:, : tables.n_joints]).argmax(axis=1)
     truth = np.array([samples.grasps.index(grasp) for grasp in fresh.grasps.tolist()])
     lucky = luck[best.judged]
     return Case(corrected(best.judged.rate, lucky), lucky, float((predicted == truth).mean()))

@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Compared, Fitting, Of
+from thenar.runtime.model.tables import ScoreTables
 
 from ..elementary import softmax_and_loss
+from ..model.collapse import Model, collapse
 from ..samples import Samples, decided
-from ..tables.collapse import Model, ScoreTables, collapse, model_scores
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
 from .folds import Fold, leave_groups_out, trial_folds
@@ -160,7 +161,7 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
     weights, held = 1.0 / np.bincount(trial)[trial], ~test.is_none[first]
     found = []
     for model in _models(trainings, learning):
-        scores = model_scores(model, test.switches, test.codes)
+        scores = model.scores(test.switches, test.codes)
         predicted = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
         loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
         found.append(

@@ -8,9 +8,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import AUTO, Recipe, changed
 
-from ..boosting.stumps import winners
 from ..placement.elements import Elements, bits_of, elements_of
 from ..placement.joints import joint_order
 from ..placement.methods.base import METHODS, PAPERS
@@ -18,7 +18,6 @@ from ..placement.methods.filters import random_placement
 from ..placement.placement import Placer
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
-from ..tables.collapse import model_scores
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
 from .choosing import choose_training
@@ -93,7 +92,7 @@ def predictions(data: Data, fit: FoldFit, training: Training, ways: Ways | None 
         groups = None if data.groups is None else data.groups[rows]
         fitting = choose_training(learning, (ways or {})[fit.learner], groups=groups)
         training = Training.chosen(fitting, masked=training.masked)
-    return grasps[winners(model_scores(training.train(learning), test.switches, test.codes))]
+    return grasps[winners(training.train(learning).scores(test.switches, test.codes))]
 
 
 def _classified(name: str, learning: Samples, X: NDArray[np.generic]) -> Labels:

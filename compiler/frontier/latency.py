@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.live.decision import Decision, Ranking, SequentialTest
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.policy import Policy
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.segmenting.live import LiveSegments
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.folds import Rows, leave_groups_out, trial_folds
 from ..movements.learning import learnt
@@ -27,7 +27,6 @@ from ..movements.streams import TICK_US, MovementError, Stream, Times, streams_o
 from ..placement.placement import InputSelection
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
-from ..tables.quantise import integer_scores
 from ..trainers.base import Training
 from .cache import stored
 from .points import DecisionKind, FrontierError, Latency
@@ -126,7 +125,7 @@ def segment_tables(
     for fold in folds:
         test = selection.read(samples.rows(fold.test))
         for recipe, made in tables_of(samples, fold.train, selection, recipes, training):
-            scores[recipe][fold.test] = integer_scores(made, test.switches, test.codes) / made.scale
+            scores[recipe][fold.test] = made.scores(test.switches, test.codes) / made.scale
     return {
         recipe: (made, learnt(streams, samples.labels, scores[recipe], samples.n_types, made.scale, TICK_US))
         for recipe, made in tables_of(samples, np.arange(len(samples.labels)), selection, recipes, training)
@@ -206,7 +205,7 @@ def decided_on(
     the held types. Both devices show each frame whole, at the same time.
     """
     rows, codes = replay.stream.rows, replay.codes[:, : None if tables.n_joints else 0]
-    scores = integer_scores(tables, replay.bits[rows][:, list(columns)], codes[rows])
+    scores = tables.scores(replay.bits[rows][:, list(columns)], codes[rows])
     return decisions(scores, _bounds_us(replay), step_us, decider_of(tables, policy))
 
 

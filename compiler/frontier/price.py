@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 from msgspec import Struct
 
+from thenar.runtime.model.integers import IntegerTables, tables_from_bytes, tables_to_bytes
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.tables import IntegerTables, tables_from_bytes, tables_to_bytes
 
 from ..evaluation.folds import Rows
 from ..firmware.choose import Fit

@@ -9,9 +9,9 @@ from msgspec.structs import replace as changed_to
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Fitting
+from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Inputs, Recipe
 
-from ..boosting.stumps import winners
 from ..evaluation.choosing import choose_training
 from ..evaluation.folds import EvaluationError, Fold, Rows, leave_groups_out, trial_folds
 from ..evaluation.rates import Rate
@@ -23,7 +23,6 @@ from ..placement.ports import PortCosts
 from ..recogniser import Recogniser, predicted_classes
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples, decided
-from ..tables.collapse import model_scores
 from ..trainers.base import Training
 from .cache import Cache, stored
 from .points import By, PointTime
@@ -364,7 +363,7 @@ def fit_stages(
         return FoldHits((trials,) * len(stages), *(((each,) * len(shapes),) * len(tabled) for each in (trials, frames)))
     rounds = (*stages, *tabled)
     made = dict(zip(rounds, Recogniser.stages(samples, Recipe(), fold.train, selection, training, rounds), strict=True))
-    predictions = (winners(model_scores(made[stage].model, test.switches, test.codes)) for stage in stages)
+    predictions = (winners(made[stage].model.scores(test.switches, test.codes)) for stage in stages)
     by_stage = tuple(_packed(predicted, test)[0] for predicted in predictions)
     found = [
         [

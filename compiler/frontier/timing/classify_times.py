@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.scores import Scorer
-from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ...firmware import FirmwareError
 from ...firmware.choose import Fit, fit_for
@@ -192,7 +192,7 @@ def random_tables(switches: int, joints: int, classes: int) -> IntegerTables:
     def rows(*shape: int) -> NDArray[np.int16]:
         return random.integers(-_REACH, _REACH, (*shape, classes), np.int16, endpoint=True)
 
-    return IntegerTables(
+    return IntegerTables.of(
         bias=rows(),
         switch_rows=rows(switches),
         thresholds=tuple(

@@ -21,10 +21,10 @@ from thenar.runtime.build import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
+from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import UNKNOWN
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 CLASSES, SWITCHES, JOINTS = 4, 7, 3
 KEPT = (5, 0, 3, 2)
@@ -37,7 +37,7 @@ def make_tables(seed: int, joints: int = JOINTS) -> IntegerTables:
     def rows(*shape: int) -> np.ndarray:
         return random.integers(-60, 61, shape).astype(np.int16)
 
-    return IntegerTables(
+    return IntegerTables.of(
         bias=rows(CLASSES),
         switch_rows=rows(len(KEPT), CLASSES),
         thresholds=tuple(np.sort(random.choice(256, 4, replace=False)).astype(np.uint16) for _ in range(joints)),
@@ -194,7 +194,7 @@ def two_grasps(flicker: bool = False) -> tuple[IntegerTables, Replay]:
     """Class 0 for a second, its switch open; class 1 for a second, its switch closed from the arrival on."""
     rows = np.array([[-400, 400]], np.int16)
     none = np.zeros((0, 2), np.int16)
-    tables = IntegerTables(np.array([200, -200], np.int16), rows, (), (), rows // 2, none, 100.0)
+    tables = IntegerTables.of(np.array([200, -200], np.int16), rows, (), (), rows // 2, none, 100.0)
     closed = [False, True, not flicker, True]
     at_us = np.array([0, 1_000_300, 1_500_300, 1_600_300])
     codes = np.zeros((4, 0), np.uint16)

@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 
 from thenar.compiler.frontier.latency import NOTHING, decider_of, decisions
 from thenar.runtime.live.decision import Decision, Ranking, SequentialTest
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.policy import Policy
 from thenar.runtime.scores import LANE_OFFSET
-from thenar.runtime.tables import IntegerTables
 
 CLASSES, SCALE = 3, 4.0
 Runs = tuple[np.ndarray, np.ndarray, int]
@@ -16,7 +16,7 @@ Runs = tuple[np.ndarray, np.ndarray, int]
 
 def bare_tables(classes: int = CLASSES) -> IntegerTables:
     nothing = np.zeros((0, classes), np.int16)
-    return IntegerTables(np.zeros(classes, np.int16), nothing, (), (), nothing, nothing, SCALE)
+    return IntegerTables.of(np.zeros(classes, np.int16), nothing, (), (), nothing, nothing, SCALE)
 
 
 def at_each(decided: tuple[np.ndarray, np.ndarray], count: int) -> list[int]:

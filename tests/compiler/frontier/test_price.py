@@ -10,8 +10,8 @@ from thenar.compiler.placement.elements import names_of
 from thenar.compiler.recogniser import Recogniser
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
+from thenar.runtime.model.integers import tables_to_bytes
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.tables import tables_to_bytes
 
 
 def test_a_finalist_is_priced_with_what_its_build_holds_for_lost_inputs(grasp_set: GraspSet) -> None:

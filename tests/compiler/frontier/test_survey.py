@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.frontier.cache import question
 from thenar.compiler.frontier.search import SHAPES, Search
 from thenar.compiler.frontier.survey import Cuts, FoldHits, choose_path, fit_stages
+from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
-from thenar.compiler.tables.collapse import collapse
-from thenar.compiler.tables.quantise import quantise
+from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.tables import winners
 from thenar.runtime.scores import Scorer
 
 COLUMNS = (3, 0, 7, 9)

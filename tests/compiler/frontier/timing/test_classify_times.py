@@ -5,7 +5,7 @@ from thenar.compiler.firmware.targets import TARGETS, timed
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel, classify_us, fit_here, random_tables
 from thenar.compiler.workers import in_workers
-from thenar.runtime.tables import tables_to_bytes
+from thenar.runtime.model.integers import tables_to_bytes
 
 PYTHON = (1.0, 0.1, 0.2, 0.3, 0.01, 0.02, 10.0)
 TABLES = random_tables(33, 16, 14)
