@@ -16,8 +16,8 @@ from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.package import Package
 from thenar.compiler.firmware.tools import call, workshop
 from thenar.runtime.manifest import Manifest
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.tables import IntegerTables
 
 BENCHMARKS = Path(__file__).resolve().parents[3] / "benchmarks"
 LAG = 15

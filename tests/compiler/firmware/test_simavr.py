@@ -8,7 +8,7 @@ from thenar.compiler.firmware import FirmwareError, simavr
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.firmware_templates.rendering import file_text
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.model.integers import IntegerTables
 
 SMALL, LARGE = TARGETS["avr328p"], TARGETS["avr2560"]
 TABLES = """
@@ -51,7 +51,7 @@ def installed(tool: Callable[[str], str]) -> None:
 
 def one_switch() -> IntegerTables:
     one = np.ones((1, 2), np.int16)
-    return IntegerTables(
+    return IntegerTables.of(
         bias=0 * one[0],
         switch_rows=one,
         thresholds=(),

@@ -26,16 +26,16 @@ from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
 from thenar.compiler.frontier.timing import classify_times
 from thenar.compiler.frontier.timing.python_times import fit_here
+from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
-from thenar.compiler.tables.collapse import collapse
-from thenar.compiler.tables.quantise import quantise
 from thenar.compiler.trainers.base import TRAINERS
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.members import MemberError
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scores import Scorer
 
