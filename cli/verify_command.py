@@ -13,7 +13,7 @@ from .printing import echo, json_flag, out, progress, show, table
 if TYPE_CHECKING:
     from thenar.compiler.artifact.verify import FaultCheck, Verification
     from thenar.compiler.artifact.verify_firmware import Difference, FirmwareVerification, TargetCheck
-    from thenar.compiler.tables.compare import WorstCase
+    from thenar.compiler.model.compare import WorstCase
 
 _SHOWN = 20
 
