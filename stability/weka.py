@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import Stumps, winners
+from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import Floats, softmax
 from thenar.drivers.errors import ThenarError
+from thenar.runtime.model.tables import winners
 
 JAR = Path("/usr/share/java/weka.jar")  # where Debian's package puts it
 

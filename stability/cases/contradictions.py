@@ -14,7 +14,7 @@ import numpy as np
 from mpmath import mpf
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import winners
+from thenar.runtime.model.tables import winners
 
 from ..checks.roundings import ROUNDING, share_error
 from ..checks.rounds import Moment, counted, loss_rounding, moments, rise_rounding

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import Stumps, winners
+from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import softmax
 from thenar.runtime.build import Build
+from thenar.runtime.model.tables import winners
 
 from ..finding import Case, Finding, Worst
 from ..inputs.small_sets import make_set, one_hot

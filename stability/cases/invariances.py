@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.model.collapse import collapse
+from thenar.compiler.model.substitutes import fit_lost
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
-from thenar.compiler.tables.collapse import collapse
-from thenar.compiler.tables.quantise import quantise
-from thenar.compiler.tables.standing_in import fit_lost
-from thenar.runtime.tables import HIGHEST_CODE
+from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.terms.base import HIGHEST_CODE
 
 from ..checks.class_rounds import see_round
 from ..checks.rounds import counted, moments

@@ -10,9 +10,9 @@ import numpy as np
 
 from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, BINS, TOLERANCE, ColumnTables, fit_logit
 from thenar.compiler.additive.pairs import fit_pairs
-from thenar.compiler.tables.collapse import ScoreTables
-from thenar.compiler.tables.quantise import integer_scores, quantise
-from thenar.runtime.tables import LIMIT
+from thenar.runtime.model.integers import LIMIT
+from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.tables import ScoreTables
 
 from ..checks.roundings import ROUNDING
 from ..finding import REFERENCE, Case, Finding, Worst
@@ -47,7 +47,7 @@ def findings(full: bool) -> Iterator[Finding]:
         integers = quantise(scores, hard.bits, hard.codes)
         overflow.see(largest_sum(rows_of(integers)), at)
         if is_separable:
-            named = tables.scores(hard.X).argmax(axis=1), integer_scores(integers, hard.bits, hard.codes).argmax(axis=1)
+            named = tables.scores(hard.X).argmax(axis=1), integers.scores(hard.bits, hard.codes).argmax(axis=1)
             wrong.see(float(sum(np.count_nonzero(each != hard.labels) for each in named)), at, len(hard.X))
         order = np.random.default_rng(1).permutation(len(hard.X))
         turned = replace(hard, X=np.column_stack([hard.X, np.full(len(hard.X), 7)])[order], labels=hard.labels[order])
@@ -138,7 +138,7 @@ def _pairs(full: bool) -> Iterator[Finding]:
             integers = quantise(tables, none, codes)
             overflow.see(float(integers.bound), at)
             if is_separable:
-                named = integer_scores(integers, none, codes).argmax(axis=1)
+                named = integers.scores(none, codes).argmax(axis=1)
                 wrong.see(float(np.count_nonzero(named != targets)), at, len(codes))
             same = zip(_numbers(tables), _numbers(again), strict=True)
             changed.see(float(not all(np.array_equal(one, other) for one, other in same)), at)

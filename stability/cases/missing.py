@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.tables.furthest import furthest
 from thenar.runtime.build import Build
+from thenar.runtime.model.proof import furthest
+from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.scores import LANE_OFFSET
-from thenar.runtime.tables import HIGHEST_CODE
 
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_tables import Bits, Codes, first_best

@@ -5,10 +5,10 @@ from itertools import permutations
 
 from mpmath import mpf
 
-from thenar.compiler.tables.compare import float_slack
-from thenar.compiler.tables.worstcase import Rounding
+from thenar.compiler.model.compare import float_slack
+from thenar.runtime.model.integers import MAX_SWITCHES
+from thenar.runtime.model.proof import Rounding
 from thenar.runtime.scores import LANE_OFFSET, Scorer
-from thenar.runtime.tables import MAX_SWITCHES
 
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_tables import (

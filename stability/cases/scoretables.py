@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import Floats
-from thenar.compiler.tables.collapse import collapse
-from thenar.compiler.tables.quantise import balance, quantise
+from thenar.compiler.model.collapse import collapse
+from thenar.runtime.model.quantise import balance, quantise
 
 from ..checks.roundings import ROUNDING, SMALLEST, part_of
 from ..finding import REFERENCE, Case, Finding, Worst

@@ -15,10 +15,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import Stumps, winners
-from thenar.compiler.tables.collapse import collapse
-from thenar.compiler.tables.quantise import quantise
-from thenar.runtime.tables import LIMIT, IntegerTables
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.model.collapse import collapse
+from thenar.runtime.model.integers import LIMIT, IntegerTables
+from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.tables import winners
 
 from ..checks.roundings import ROUNDING, loss_error, part_of
 from ..checks.rounds import Moment, loss_rounding, moments, rise_rounding

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
 from thenar.compiler.placement.gain import NodeCounts
-from thenar.runtime.tables import HIGHEST_CODE
+from thenar.runtime.model.terms.base import HIGHEST_CODE
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.tables.collapse import Floats, ScoreTables
-from thenar.compiler.tables.quantise import quantise
-from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
+from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.base import HIGHEST_CODE, Floats
 
 Bits = NDArray[np.bool_]
 Codes = NDArray[np.uint16]
@@ -40,7 +41,7 @@ def drawn(seed: int, classes: int, switches: int, bins: tuple[int, ...], decades
         return drawn
 
     thresholds = [np.sort(random.choice(255, n - 1, replace=False)).astype(np.uint16) for n in bins]
-    return ScoreTables(rows(1)[0], rows(switches), tuple(thresholds), tuple(rows(n) for n in bins))
+    return ScoreTables.of(rows(1)[0], rows(switches), tuple(thresholds), tuple(rows(n) for n in bins))
 
 
 def dominated(seed: int, classes: int, switches: int, bins: tuple[int, ...], factor: float) -> ScoreTables:
@@ -53,7 +54,7 @@ def dominated(seed: int, classes: int, switches: int, bins: tuple[int, ...], fac
 def sized(tables: ScoreTables, sizes: float | Floats) -> ScoreTables:
     """Return tables with every row multiplied by `sizes`, a number or one per class (K,)."""
     rows = tuple(rows * sizes for rows in tables.joint_rows)
-    return ScoreTables(tables.bias * sizes, tables.switch_rows * sizes, tables.thresholds, rows)
+    return ScoreTables.of(tables.bias * sizes, tables.switch_rows * sizes, tables.thresholds, rows)
 
 
 def half_a_step_off(switches: int, limit: int) -> ScoreTables:
@@ -67,7 +68,7 @@ def half_a_step_off(switches: int, limit: int) -> ScoreTables:
     first = np.full(switches, float(even))
     first[0] += limit - limit % 2 - even * switches
     rows = np.stack([first + 0.5, np.full(switches, 1.5)], axis=1)
-    return ScoreTables(np.array([0.5, 1.5]), rows, (), ())
+    return ScoreTables.of(np.array([0.5, 1.5]), rows, (), ())
 
 
 def whole_numbers(seed: int, classes: int, switches: int, bins: tuple[int, ...], most: int) -> IntegerTables:
@@ -80,7 +81,7 @@ def whole_numbers(seed: int, classes: int, switches: int, bins: tuple[int, ...],
     thresholds = [np.sort(random.choice(HIGHEST_CODE, n - 1, replace=False)).astype(np.uint16) for n in bins]
     joints = tuple(rows(n, classes) for n in bins)
     means = rows(switches, classes), rows(len(bins), classes)
-    return IntegerTables(rows(classes), rows(switches, classes), tuple(thresholds), joints, *means, 1.0)
+    return IntegerTables.of(rows(classes), rows(switches, classes), tuple(thresholds), joints, *means, 1.0)
 
 
 def quantised(name: str, tables: ScoreTables, width: int = 16, seed: int = 0) -> Quantised:

@@ -25,8 +25,8 @@ from thenar.compiler.placement.cooccurrence import Cooccurrence
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.tables import collapse, quantise
 from thenar.runtime.build import Build, Recognition
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.scores import Scorer
-from thenar.runtime.tables import IntegerTables
 from thenar.simulator.contact.settle import Rest, close
 from thenar.stability.cases import (
     codes,
