@@ -58,7 +58,7 @@ uint8_t copy(void);
 __attribute__((noinline, noclone)) uint8_t copy(void)
 {{
     for (uint8_t lane = 0u; lane < {lanes}u; lane++)
-        scores[lane] = record.biased_scores[lane];
+        scores[lane] = record.lanes[lane];
     return record.best;
 }}
 __attribute__((noinline, noclone)) uint8_t decide(void)
