@@ -218,10 +218,10 @@ class _Receiver:
 
     @property
     def report(self) -> SinkReport:
-        """The last report that the sink has made."""
+        """The last report that the sink has made, with what it never took: one that hangs loses, which is no error."""
         said = self._nothing if self._fault else self._said
         lost = said.lost + self._lost + (0 if self._thread is None else self._thread.dropped)
-        return replace(said, lost=lost, error=self.fault_message or said.error)
+        return replace(said, lost=lost, error=self._fault or said.error)
 
     def send(self, send: Callable[[Sink], None], longest_us: int | None) -> None:
         if self._thread is None:
