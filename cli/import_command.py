@@ -18,20 +18,14 @@ if TYPE_CHECKING:
     from thenar.compiler.recordings.propose import ColumnProposal
 
 
-_PATH = click.Path(path_type=Path)
-
-
-def _existing(context: click.Context, argument: click.Parameter, paths: tuple[Path, ...]) -> tuple[Path, ...]:
+def _existing(context: click.Context, argument: click.Parameter, given: tuple[str, ...]) -> tuple[Path, ...]:
     """Return the paths, each of which is there, or is a pattern of files: a path with fields in braces."""
     is_there = click.Path(exists=True)
-    for path in paths:
-        if "{" not in str(path):
-            is_there.convert(path, argument, context)
-    return paths
+    return tuple(Path(each if "{" in each else is_there.convert(each, argument, context)) for each in given)
 
 
 @click.command("import")
-@click.argument("tables", metavar="TABLE", type=_PATH, callback=_existing, nargs=-1, required=True)
+@click.argument("tables", metavar="TABLE", type=click.Path(), callback=_existing, nargs=-1, required=True)
 @click.option("-o", "--output", type=OutputFile(".grasps"), required=True, help="The .grasps file to write.")
 @overwrite_flag
 @click.option("--columns", type=existing_file, help="columns.toml: the meaning of each column of the table.")
