@@ -84,7 +84,7 @@ class Walker:
                     self._methods.setdefault(method, []).append((name, node))
 
     def walk(self, module: str, function: str, parameter: str) -> Walk:
-        """Return what is met from a parameter of a function."""
+        """Return the stops and names of a walk from a parameter of a function."""
         walk, waiting = Walk(), [(module, self.modules[module].functions[function], parameter)]
         while waiting:
             home, node, name = waiting.pop()

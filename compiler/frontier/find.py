@@ -347,7 +347,7 @@ def _picked(points: Sequence[FrontierPoint], budget_us: float | None, rate: floa
 
 
 def _in_words(budget_us: float | None, rate: float | None) -> str:
-    """Return what a point is to be picked for, "" for nothing."""
+    """Return the goal for which a point is to be picked, "" for none."""
     if budget_us is not None:
         return f"the best within {budget_us:g} us a frame"
     return "" if rate is None else f"the fastest that recognises {100 * rate:g} %"

@@ -35,7 +35,7 @@ Choosing = tuple[str, bool, int | None]
 
 
 def placed(method: str, parameter: int, trainer: str, inputs: Inputs, levels: int | None = None) -> Recipe:
-    """Return the candidate whose elements a method chooses, given its number, of so many levels of a taxel."""
+    """Return the candidate whose elements a method chooses, given its number, and the levels of a taxel."""
     named = {"keep" if METHODS[method].by_number else "prune": parameter}
     return changed(Recipe(placement=method, trainer=trainer, inputs=inputs, levels=levels), named)
 
@@ -49,13 +49,13 @@ def placement_of(recipe: Recipe) -> PlacementChoice:
 
 
 def chosen_by(recipe: Recipe) -> Choosing:
-    """Return what the choice of a candidate's elements depends on, but for its number."""
+    """Return all on which the choice of a candidate's elements depends, but for its number."""
     joints = recipe.inputs == "both" and METHODS[recipe.placement].uses_joints
     return placement_of(recipe).method, joints, recipe.levels
 
 
 def tabled(recipe: Recipe, rounds: int, shape: Recipe = SHAPES[0]) -> Recipe:
-    """Return a candidate of so many rounds, and tables of this shape."""
+    """Return a candidate of this number of rounds, and tables of this shape."""
     return changed_to(recipe, rounds=rounds, width=shape.width, table_bits=shape.table_bits)
 
 

@@ -194,7 +194,7 @@ class IntegerTables(Additive):
         return states, np.stack(contributions).astype(np.int64)
 
     def binned(self, joint: int) -> Bins:
-        """Return what a joint alone adds, as if each distance of its slope were a bin."""
+        """Return the contribution of a joint alone, as if each distance of its slope were a bin."""
         bins, *slopes = self.of_joint(joint)
         thresholds = np.unique(np.concatenate([term.steps[0].astype(np.int64) for term in (bins, *slopes)]))
         codes = np.append(0, thresholds + 1)

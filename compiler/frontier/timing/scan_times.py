@@ -31,7 +31,7 @@ _CALLS, _BATCHES = 200, 9
 
 @dataclass(frozen=True, slots=True)
 class ReadingCost:
-    """Microseconds of reading so many things: a constant, and for each of them; no less than least_us.
+    """Microseconds of reading a number of things: a constant, and for each of them; no less than least_us.
 
     Of joints, it is the time of a record; of transactions, the overhead of each in addition to the wire.
 
