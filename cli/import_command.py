@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 def _existing(context: click.Context, argument: click.Parameter, given: tuple[str, ...]) -> tuple[Path, ...]:
     """Return the paths, each of which is there, or is a pattern of files: a path with fields in braces."""
     is_there = click.Path(exists=True)
-    return tuple(Path(each if "{" in each else is_there.convert(each, argument, context)) for each in given)
+    return tuple(
+        Path(each if "{" in each else os.fsdecode(is_there.convert(each, argument, context))) for each in given
+    )
 
 
 @click.command("import")
