@@ -33,8 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...samples import Columns, Samples
-from ..counts import Counter, Digits
-from ..gain import NodeCounts, best_per_cost
+from ..gain import CellCounter, NodeCounts, best_per_cost
 from ..id3 import grow_id3
 from ..ports import PortCosts
 from ..tree import Tree
@@ -217,7 +216,7 @@ def cost_aware_order(samples: Samples, ports: PortCosts | None = None) -> Column
     """Return the switches of cost-aware ID3, in the order found; without `ports` all cost the same."""
     ports = ports or PortCosts((0,) * samples.n_switches, (0.0,))
     bits, labels, n_classes = samples.switches, samples.labels, samples.n_classes
-    counter = Counter(Digits.from_matrix(bits), labels, n_classes)
+    counter = CellCounter(bits, labels, n_classes)
     waiting: list[tuple[int, int, NDArray[np.intp]]] = [(-len(bits), 0, np.arange(len(bits)))]
     found: dict[int, None] = {}
     costs = ports.marginal_costs(found)

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from sklearn.tree import DecisionTreeClassifier
 
 from thenar.compiler import grow_id3
-from thenar.compiler.placement.counts import Digits
 from thenar.compiler.placement.tree import Tree
 
 Rows = list[tuple[tuple[int, ...], int]]
@@ -72,11 +71,9 @@ def test_the_tree_is_the_papers_steps_written_out(drawn: Data, min_samples: int)
 
 
 @given(data(most_values=2))
-def test_bits_are_the_same_as_bool_as_numbers_and_as_packed_bytes(drawn: Data) -> None:
+def test_bits_are_the_same_as_bool_and_as_numbers(drawn: Data) -> None:
     X, y = drawn
-    packed = np.packbits(X.astype(bool), axis=1, bitorder="little")
     assert grow_id3(X.astype(bool), y) == grow_id3(X, y)
-    assert grow_id3(Digits.from_packed_bits(packed, X.shape[1]), y) == grow_id3(X, y)
 
 
 def grasps(n: int, seed: int) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.intp]]:
