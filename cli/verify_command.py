@@ -170,10 +170,10 @@ def print_firmware(found: "FirmwareVerification") -> None:
             console.print(f"    {check.misnamed} of the grasp types have ANOTHER NAME")
         if check.first is not None:
             _print_difference(check.first)
-    if not found.carried.present:
+    if found.outdated is None:
         console.print("  the build carries no firmware")
-    elif found.carried.outdated:
-        outdated = ", ".join(found.carried.outdated)
+    elif found.outdated:
+        outdated = ", ".join(found.outdated)
         console.print(f"  {outdated}: not what thenar makes of the build now; compile it again")
     else:
         console.print("  the build carries the firmware that thenar makes of it now")
