@@ -13,7 +13,18 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
-from thenar.runtime.hand import HAND_NAME, HandDrawing, hand_from_bytes, hand_to_bytes
+from thenar.runtime.hand import (
+    HAND_NAME,
+    HandDrawing,
+    Line,
+    Spot,
+    drawn_joints,
+    drawn_switches,
+    drawn_taxels,
+    grid_hand,
+    hand_from_bytes,
+    hand_to_bytes,
+)
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.system import unread_joints
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch, Threshold
@@ -25,7 +36,7 @@ from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
-from ..hand import HandShape
+from ..hand import Floats, HandShape
 from ..model.compare import Comparison, compare
 from ..model.faults import count_faults, groups_of, worst_faults
 from ..placement.constraints import Limits
@@ -40,7 +51,6 @@ from ..samples import Samples
 from ..trainers.base import SHARED, TRAINERS, Training
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, TRY_NAME, BuildReport, Documents, Progress
-from .drawn_hand import drawn_hand
 from .ensemble import ensemble_to_bytes
 from .replay import stored_digests
 from .training import (
@@ -103,6 +113,7 @@ def _foreign(folder: Path, members: frozenset[str]) -> list[Path]:
 
 
 _MOST_REFUSED = 0.5
+_NEAREST_MM = 0.5  # points of a drawing closer than this to the last one drawn are omitted
 
 # A wiring, or a function that returns one for the names of the kept switches.
 Wired = Harness | Callable[[Sequence[str]], Harness]
@@ -305,10 +316,32 @@ class BuildAssembly:
         return report
 
     def _drawn(self, manifest: Manifest) -> HandDrawing:
-        taxels = len(self.grasp_set.switch_names)
-        names = self.grasp_set.element_names
+        """Return the drawing on the hand, with all recorded switches and taxels and the kept ones marked; without a
+        hand that has positions for the switches, the kept ones in a grid.
+        """
+        hand, names, taxels = self.hand, self.grasp_set.element_names, len(self.grasp_set.switch_names)
         codes = self.recogniser.read(self.recogniser.samples).codes
-        return drawn_hand(manifest, self.hand, names[:taxels], names[taxels:], codes)
+        ranges = list(zip(codes.min(axis=0).tolist(), codes.max(axis=0).tolist(), strict=True)) if len(codes) else None
+        if not manifest.switches or hand is None or not hand.knows(names):
+            return grid_hand(manifest, ranges)
+
+        def places(names: Sequence[str]) -> dict[str, tuple[float, float]]:
+            return dict(zip(names, _rounded(hand.places[hand.numbers_of(names)]), strict=True))
+
+        return HandDrawing(
+            view=hand.view,
+            placed=True,
+            radius_mm=round(hand.radius_mm, 2),
+            outline=_thinned(hand.outline),
+            strips=tuple(map(_thinned, hand.strips)),
+            creases=tuple(map(_thinned, hand.creases)),
+            labels=tuple(
+                Spot(name, x, y) for name, (x, y) in zip(hand.part_names, _rounded(hand.labels), strict=False)
+            ),
+            switches=drawn_switches(manifest, places(names[:taxels])),
+            taxels=drawn_taxels(manifest, places(names[taxels:])),
+            joints=drawn_joints(manifest.joints, ranges),
+        )
 
     def _page(self, manifest: Manifest, tables: bytes, hand: bytes) -> bytes | None:
         from ..tryout.writing import try_html
@@ -380,6 +413,21 @@ class BuildAssembly:
             return Switch(column, name, gain)
         joint = self.grasp_set.taxel_columns[taxel]
         return Switch(column, name, gain, Threshold(code, float(joint.value(code + 0.5)), _calibration(taxel, joint)))
+
+
+def _thinned(points: Floats) -> Line:
+    if not len(points):
+        return ()
+    drawn = [points[0]]
+    for point in points[1:-1]:
+        if np.hypot(*(point - drawn[-1])) >= _NEAREST_MM:
+            drawn.append(point)
+    return tuple(_rounded(np.array([*drawn, points[-1]])))
+
+
+def _rounded(points: Floats) -> list[tuple[float, float]]:
+    # Adding 0 turns a rounded -0 into 0.
+    return [(x, y) for x, y in (np.round(points, 1) + 0.0).tolist()]
 
 
 def _sha256(data: bytes) -> str:
