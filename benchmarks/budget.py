@@ -99,7 +99,7 @@ def our_columns(name: str, learning: Samples, ports: PortCosts, bounds: Sequence
     if METHODS[name].nested:
         order = METHODS[name].chooser(learning, ports)(learning.n_switches)
         return [bound.obeyed(order, learning.n_switches) for bound in bounds]
-    return [choose(learning, name, learning.n_switches, ports, bound).columns for bound in bounds]
+    return [choose(learning, name, learning.n_switches, ports, bound)[0] for bound in bounds]
 
 
 def main() -> None:

@@ -46,12 +46,12 @@ def blocks(n: int) -> Any:
         yield start, prototypes[labels] ^ (rng.random((len(labels), N_BITS), dtype=np.float32) < FLIP), labels
 
 
-def filled(n: int, dtype: str, width: int, convert: Any) -> tuple[Any, Any]:
+def filled(n: int, dtype: str) -> tuple[Any, Any]:
     import numpy as np
 
-    X, y = np.empty((n, width), dtype=dtype), np.empty(n, dtype=np.int64)
+    X, y = np.empty((n, N_BITS), dtype=dtype), np.empty(n, dtype=np.int64)
     for start, bits, labels in blocks(n):
-        X[start : start + len(bits)] = convert(bits)
+        X[start : start + len(bits)] = bits
         y[start : start + len(bits)] = labels
     return X, y
 
@@ -60,19 +60,13 @@ def peak_mib() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def measure_thenar(n: int, packed: bool) -> Measured:
-    import numpy as np
-
-    from thenar.compiler.placement.counts import Digits
+def measure_thenar(n: int) -> Measured:
     from thenar.compiler.placement.id3 import grow_id3
 
     before = peak_mib()
-    if packed:
-        X, y = filled(n, "uint8", N_BITS // 8, lambda bits: np.packbits(bits, axis=1, bitorder="little"))
-    else:
-        X, y = filled(n, "bool", N_BITS, lambda bits: bits)
+    X, y = filled(n, "bool")
     start = time.perf_counter()
-    tree = grow_id3(Digits.from_packed_bits(X, N_BITS) if packed else X, y, min_samples=MIN_SAMPLES)
+    tree = grow_id3(X, y, min_samples=MIN_SAMPLES)
     seconds, mib = time.perf_counter() - start, peak_mib() - before
     right = sum(int((tree.predict(bits) == labels).sum()) for _, bits, labels in blocks(n))
     return Measured(seconds, mib, tree.depth, tree.n_leaves, right / n)
@@ -82,7 +76,7 @@ def measure_sklearn(n: int, depth: int) -> Measured:
     from sklearn.tree import DecisionTreeClassifier
 
     before = peak_mib()
-    X, y = filled(n, "float32", N_BITS, lambda bits: bits)
+    X, y = filled(n, "float32")
     tree = DecisionTreeClassifier(criterion="entropy", max_depth=depth, min_samples_split=MIN_SAMPLES, random_state=0)
     start = time.perf_counter()
     tree.fit(X, y)
@@ -105,7 +99,7 @@ def one(arguments: list[str]) -> Measured:
     what, n, *depth = arguments
     if what == "sklearn":
         return measure_sklearn(int(n), int(depth[0]))
-    return measure_thenar(int(n), packed=what == "packed")
+    return measure_thenar(int(n))
 
 
 def line(n: int, name: str, found: Measured, times: str) -> str:
@@ -117,14 +111,14 @@ def line(n: int, name: str, found: Measured, times: str) -> str:
 
 def compare(rows: tuple[int, ...]) -> dict[str, list[Measured]]:
     """Measure and print line by line."""
-    curves: dict[str, list[Measured]] = {"thenar": [], "thenar, packed": [], "scikit-learn": []}
+    curves: dict[str, list[Measured]] = {"thenar": [], "scikit-learn": []}
     print(f"{platform.machine()}, one thread; {N_BITS} bits, {N_CLASSES} classes, S = {MIN_SAMPLES}, noise {FLIP}")
     print("     rows  what                  time       peak  depth  leaves    rate")
     for n in rows:
-        ours, packed = in_own_process("thenar", str(n)), in_own_process("packed", str(n))
+        ours = in_own_process("thenar", str(n))
         theirs = in_own_process("sklearn", str(n), str(ours.depth))
         allowed = 2 * n * N_BITS / 8 / MIB + 256
-        for (name, curve), found in zip(curves.items(), (ours, packed, theirs), strict=True):
+        for (name, curve), found in zip(curves.items(), (ours, theirs), strict=True):
             curve.append(found)
             times = f"{theirs.seconds / found.seconds:.0f} times as fast; {allowed:.0f} MiB are allowed"
             print(line(n, name, found, times if found is not theirs else ""), flush=True)

@@ -95,7 +95,7 @@ def _placed(of: Of, samples: Samples, fold: Fold) -> Cut:
 
 
 def _with_switches(of: Of, name: str, train: Samples, test: Samples, groups: Rows) -> Cut:
-    columns = choose(train).columns[:SWITCHES] if train.n_switches else ()
+    columns = choose(train)[0][:SWITCHES] if train.n_switches else ()
     return Cut(of, name, train.keeping(columns), test.keeping(columns), groups)
 
 

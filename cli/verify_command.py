@@ -148,10 +148,10 @@ def print_firmware(found: "FirmwareVerification") -> None:
             echo(f"    {check.misnamed} of the grasp types have ANOTHER NAME")
         if check.first is not None:
             _print_difference(check.first)
-    if not found.carried.present:
+    if found.outdated is None:
         echo("  the build carries no firmware")
-    elif found.carried.outdated:
-        outdated = ", ".join(found.carried.outdated)
+    elif found.outdated:
+        outdated = ", ".join(found.outdated)
         echo(f"  {outdated}: not what thenar makes of the build now; compile it again")
     else:
         echo("  the build carries the firmware that thenar makes of it now")

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from .placement.id3 import grow_id3
     from .placement.methods.base import METHODS
     from .placement.placement import Placement, place
-    from .placement.selectors import ID3Selector, SwitchSelector
+    from .placement.selectors import SwitchSelector
     from .recordings.columns import ColumnRoles
     from .recordings.dataframes import from_dataframe
     from .recordings.export import to_dataframe
@@ -74,7 +74,7 @@ _HOMES = {
     ".placement.id3": ("grow_id3",),
     ".placement.methods.base": ("METHODS",),
     ".placement.placement": ("Placement", "place"),
-    ".placement.selectors": ("ID3Selector", "SwitchSelector"),
+    ".placement.selectors": ("SwitchSelector",),
     ".recordings.columns": ("ColumnRoles",),
     ".recordings.dataframes": ("from_dataframe",),
     ".recordings.export": ("to_dataframe",),
@@ -103,7 +103,6 @@ __all__ = [
     "Frontier",
     "GraspSet",
     "Grid",
-    "ID3Selector",
     "Joint",
     "Line",
     "LogitBoostClassifier",

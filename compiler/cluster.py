@@ -1,4 +1,7 @@
-"""Independent tasks on the workers of a Dask cluster: same results as locally, each as soon as it is available."""
+"""Independent tasks on the workers of a Dask cluster: same results as locally, each as soon as it is available.
+
+joblib's backend for Dask does not do: where a task kills workers, it waits forever.
+"""
 
 import asyncio
 import pickle
@@ -10,7 +13,6 @@ from contextvars import ContextVar
 from functools import lru_cache
 from importlib.metadata import version
 from itertools import islice
-from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from thenar.drivers.errors import ThenarError
@@ -18,36 +20,6 @@ from thenar.drivers.extras import optional
 
 if TYPE_CHECKING:
     from distributed import Client, Future, Security
-
-
-class UnreadableError(ThenarError):
-    """A worker cannot unpickle its task."""
-
-
-def _run(pickled: bytes) -> Any:
-    """Run a task in a worker."""
-    try:
-        work, task = pickle.loads(pickled)  # noqa: S301 - of the program that this cluster works for
-    except Exception as reason:
-        raise UnreadableError(
-            f"a worker with thenar {installed()} and Python {sys.version.split()[0]} cannot read its task ({reason})"
-        ) from reason
-    _take_one_thread(len(sys.modules))
-    return work(task)
-
-
-@lru_cache(maxsize=1)
-def _take_one_thread(_modules: int) -> None:
-    """Limit BLAS and OpenMP to one thread; again after modules, and with them libraries, have been loaded."""
-    from threadpoolctl import threadpool_limits
-
-    threadpool_limits(limits=1)
-
-
-def installed() -> str:
-    """Return the version of thenar in this process."""
-    return version("thenar")
-
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -110,19 +82,24 @@ def on_cluster(work: Callable[[Task], Result], tasks: Iterable[Task], address: s
     or if they cannot read it; and any exception of `work`.
     """
     with _connected(address) as client:
-        _check_workers(client, address)
+        ours = installed()
+        for worker, theirs in client.run(installed, on_error="return").items():
+            if theirs != ours:
+                raise ClusterError(
+                    f"worker {worker} lacks thenar {ours} ({theirs}): install it on all workers and on the scheduler"
+                )
         yield from _results(client, address, work, tasks)
 
 
 @contextmanager
 def _connected(address: str) -> "Iterator[Client]":
+    """Connect to a scheduler that has workers."""
     with optional(ClusterError, "work on a cluster"):
         from distributed import Client
     try:
-        security = _security(address)
         # A separate event loop: the caller's thread may run one.
         with ThreadPoolExecutor(1) as thread:
-            thread.submit(asyncio.run, _greet(address, security)).result()
+            security = thread.submit(asyncio.run, _greet(address)).result()
         client = Client(address, timeout=CONNECT_S, set_as_default=False, security=security)
     except (OSError, ValueError, TypeError, RuntimeError) as reason:
         raise ClusterError(
@@ -130,42 +107,28 @@ def _connected(address: str) -> "Iterator[Client]":
             "which is like tcp://10.0.0.5:8786"
         ) from reason
     try:
+        _wait_for_workers(client, address)
         yield client
     finally:
         client.close(timeout=CONNECT_S)
 
 
-def _security(address: str) -> "Security":
-    """Return the TLS settings of the user's Dask configuration."""
-    import dask
-    from distributed import Security
-    from distributed.utils import import_term
-
-    loader = dask.config.get("distributed.client.security-loader")
-    return import_term(loader)({"address": address}) if loader else Security()
-
-
-async def _greet(address: str, security: "Security") -> None:
-    """Connect to the scheduler and disconnect.
+async def _greet(address: str) -> "Security":
+    """Connect to the scheduler and disconnect; return the TLS settings of the user's Dask configuration.
 
     A Client that cannot connect stays half initialised. When it is collected it can take the lock under which the next
     one starts, so none is made until a scheduler replies. (Without an address Dask would start a local cluster.)
     """
+    import dask
+    from distributed import Security
     from distributed.comm.core import connect
+    from distributed.utils import import_term
 
+    loader = dask.config.get("distributed.client.security-loader")
+    security: Security = import_term(loader)({"address": address}) if loader else Security()
     greeting = await connect(address, timeout=CONNECT_S, **security.get_connection_args("client"))
     await greeting.close()
-
-
-def _check_workers(client: "Client", address: str) -> None:
-    """Raise ClusterError unless there are workers, each with this version of thenar."""
-    _wait_for_workers(client, address)
-    ours = installed()
-    for worker, theirs in client.run(installed, on_error="return").items():
-        if theirs != ours:
-            raise ClusterError(
-                f"worker {worker} lacks thenar {ours} ({theirs}): install it on all workers and on the scheduler"
-            )
+    return security
 
 
 def _wait_for_workers(client: "Client", address: str) -> None:
@@ -177,67 +140,59 @@ def _wait_for_workers(client: "Client", address: str) -> None:
 
 def _results(client: "Client", address: str, work: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[Result]:
     import dask
+    from distributed import CancelledError, KilledWorker, wait
 
-    finished: SimpleQueue[Future[Any]] = SimpleQueue()
-    begun: set[Future[Any]] = set()
     waiting = iter(tasks)
 
-    def begin(number: int) -> None:
-        for task in islice(waiting, number):
-            with dask.config.set(_LARGE_TASKS):
-                future = client.submit(_run, pickle.dumps((work, task), pickle.HIGHEST_PROTOCOL), pure=False)
-            begun.add(future)
-            future.add_done_callback(finished.put)
+    def begun(number: int) -> "set[Future[Any]]":
+        with dask.config.set(_LARGE_TASKS):
+            pickled = (pickle.dumps((work, task), pickle.HIGHEST_PROTOCOL) for task in islice(waiting, number))
+            return {client.submit(_run, task, pure=False) for task in pickled}
 
-    begin(AHEAD * max(sum(client.ncores().values()), 1))
-    while begun:
-        future = _next(finished, client, address)
-        result = _result(future, client, address)
-        begun.discard(future)
-        begin(1)
-        yield result
-
-
-def _next(finished: "SimpleQueue[Future[Any]]", client: "Client", address: str) -> "Future[Any]":
-    while True:
-        try:
-            return finished.get(timeout=PATIENCE_S)
-        except Empty:
-            _check_alive(client, address)
-
-
-def _check_alive(client: "Client", address: str) -> None:
-    if client.status != "running":
-        raise _lost(address)
-    _wait_for_workers(client, address)
+    running = begun(AHEAD * max(sum(client.ncores().values()), 1))
+    try:
+        while running:
+            try:
+                with client.as_current():
+                    done, running = wait(running, timeout=PATIENCE_S, return_when="FIRST_COMPLETED")
+            except TimeoutError:
+                _wait_for_workers(client, address)
+                continue
+            for future in done:
+                running |= begun(1)
+                yield future.result()
+    except KilledWorker as reason:
+        raise ClusterError(
+            f"one task ended {reason.allowed_failures + 1} workers of the cluster at {address}, perhaps for lack of "
+            "memory: give each worker more"
+        ) from reason
+    except CancelledError as reason:
+        raise ClusterError(
+            f"the scheduler at {address}, or its tasks, are lost: check how it or its workers ended, and run this again"
+        ) from reason
 
 
-def _lost(address: str) -> ClusterError:
-    return ClusterError(
-        f"the scheduler at {address}, or its tasks, are lost: check how it or its workers ended, and run this again"
-    )
+def _run(pickled: bytes) -> Any:
+    """Run a task in a worker."""
+    try:
+        work, task = pickle.loads(pickled)  # noqa: S301 - of the program that this cluster works for
+    except Exception as reason:
+        raise ClusterError(
+            f"a worker with thenar {installed()} and Python {sys.version.split()[0]} cannot read its task ({reason}): "
+            "the cluster needs the packages installed here"
+        ) from reason
+    _take_one_thread(len(sys.modules))
+    return work(task)
 
 
-def _result(future: "Future[Any]", client: "Client", address: str) -> Any:
-    """Return the result of a finished `future`, or raise the exception of its work."""
-    from distributed import CancelledError, KilledWorker
+@lru_cache(maxsize=1)
+def _take_one_thread(_modules: int) -> None:
+    """Limit BLAS and OpenMP to one thread; again after modules, and with them libraries, have been loaded."""
+    from threadpoolctl import threadpool_limits
 
-    patience = PATIENCE_S
-    while True:
-        try:
-            return future.result(timeout=patience)
-        except KilledWorker as reason:
-            raise ClusterError(
-                f"one task ended {reason.allowed_failures + 1} workers of the cluster at {address}, perhaps for lack "
-                "of memory: give each worker more"
-            ) from reason
-        except UnreadableError as reason:
-            raise ClusterError(f"{reason}: the cluster at {address} needs the packages installed here") from reason
-        except CancelledError as reason:
-            raise _lost(address) from reason
-        except TimeoutError:
-            if future.status == "error":
-                raise  # from the work itself
-        # The worker with the result may be gone: another repeats the task.
-        _check_alive(client, address)
-        patience *= 2
+    threadpool_limits(limits=1)
+
+
+def installed() -> str:
+    """Return the version of thenar in this process."""
+    return version("thenar")

@@ -110,13 +110,13 @@ class Recogniser:
         if rows is not None:
             samples, groups = samples.rows(rows), None if groups is None else groups[rows]
         selection = select(samples.without_none(), recipe, ports, limits)
-        if not selection.chosen.columns and not samples.codes.shape[1]:
+        if not selection.columns and not samples.codes.shape[1]:
             raise CompileError(
                 "no switch is worth keeping: lower ``prune``, or record switches that differ between grasps"
             )
         balanced = samples.balanced()
         kept = selection.read(samples.rows(balanced))
-        check_inputs(len(samples.grasps), len(selection.chosen.columns), len(selection.joints), CompileError)
+        check_inputs(len(samples.grasps), len(selection.columns), len(selection.joints), CompileError)
         if not (kept.inputs != kept.inputs[0]).any():
             raise CompileError("no input differs between rows: nothing distinguishes the grasp types")
         candidates, of = Training.candidates(recipe), OF[recipe.by or "subject"]
@@ -205,7 +205,7 @@ class Recogniser:
     @property
     def zero_gain_nodes(self) -> int:
         """The number of tree nodes at which no single switch gained anything."""
-        tree = self.selection.chosen.tree
+        tree = self.selection.tree
         return 0 if tree is None else tree.n_zero_gain
 
 

@@ -331,7 +331,7 @@ class BuildAssembly:
         rates = rates_of("training", samples, deployed, options.seed)
         detection = detection_of("training", samples, deployed, options.seed)
         elements = recogniser.elements
-        switches = zip(elements, names_of(grasp_set, elements), recogniser.selection.chosen.gains, strict=True)
+        switches = zip(elements, names_of(grasp_set, elements), recogniser.selection.gains, strict=True)
         shares = kept.switches.mean(axis=0).tolist()
         return Manifest(
             schema=SCHEMA,

@@ -146,7 +146,7 @@ class Documents:
                 tables=made.tables,
                 facts=made.facts,
                 warnings=made.warnings,
-                tree=made.recogniser.selection.chosen.tree,
+                tree=made.recogniser.selection.tree,
                 confusion=made.confusion,
                 study=study,
                 no_study=no_study,

@@ -56,15 +56,8 @@ class _StumpsHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     shrinkage: Annotated[float, Meta(gt=0.0, le=1.0)]
 
 
-class _NoHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    pass
-
-
-class _OthersHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    kinds: tuple[str, ...]
-
-
-_HEADERS = {STUMPS: _StumpsHeader, OTHERS: _OthersHeader}
+class _TermsHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    kinds: tuple[str, ...] = ()
 
 
 def ensemble_to_bytes(model: Model) -> bytes:
@@ -74,7 +67,7 @@ def ensemble_to_bytes(model: Model) -> bytes:
         version, header = STUMPS, msgspec.json.encode(_StumpsHeader(model.n_inputs, model.shrinkage))
         arrays = {"columns": model.columns, "thresholds": model.thresholds, "values": model.values}
     else:
-        version, header = TABLES, msgspec.json.encode(_NoHeader())
+        version, header = TABLES, msgspec.json.encode(_TermsHeader())
         arrays = {
             "bias": model.bias,
             "switch_rows": model.switch_rows,
@@ -83,7 +76,7 @@ def ensemble_to_bytes(model: Model) -> bytes:
             "joint_rows": np.concatenate([np.zeros((0, model.n_classes)), *model.joint_rows]),
         }
         if any(not isinstance(term, CoreTerm) for term in model.terms):
-            version, header = OTHERS, msgspec.json.encode(_OthersHeader(tuple(term.name for term in model.further)))
+            version, header = OTHERS, msgspec.json.encode(_TermsHeader(tuple(term.name for term in model.further)))
             for number, term in enumerate(model.further):
                 arrays |= {f"term_{number}_{name}": array for name, array in term.arrays().items()}
         elif model.lines:
@@ -112,12 +105,12 @@ def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
     if found != {name: np.dtype(dtype) for name, dtype in dtypes.items()}:
         raise BuildError(f"{what} is damaged: its arrays are not {', '.join(dtypes)}")
     try:
-        header = msgspec.json.decode(header_bytes, type=_HEADERS.get(version, _NoHeader))
-    except (ValueError, RecursionError) as wrong:
+        if version == STUMPS:
+            return _stumps(msgspec.json.decode(header_bytes, type=_StumpsHeader), arrays, what)
+        kinds = msgspec.json.decode(header_bytes, type=_TermsHeader).kinds
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
         raise BuildError(f"{what} is damaged: {wrong}") from None
-    if isinstance(header, _StumpsHeader):
-        return _stumps(header, arrays, what)
-    return _tables(arrays, header.kinds if isinstance(header, _OthersHeader) else (), what)
+    return _tables(arrays, kinds, what)
 
 
 def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) -> str:

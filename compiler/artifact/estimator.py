@@ -26,7 +26,7 @@ from ..firmware.generate import Firmware, write_folder
 from ..model.collapse import Model
 from ..placement.elements import elements_of
 from ..placement.methods.base import METHODS, PAPERS
-from ..placement.placement import Chosen, InputSelection, information_alone
+from ..placement.placement import InputSelection, information_alone
 from ..placement.selectors import SwitchSelector
 from ..recogniser import Recogniser, Scores
 from ..recordings.frames import check_trials
@@ -157,7 +157,7 @@ def compile(  # noqa: A001
     _columns(estimator, samples.inputs)
     samples = _labelled(samples, grasp_set, classifier.classes_)
     selection, model = _learnt(estimator, samples)
-    columns = selection.chosen.columns
+    columns = selection.columns
     inputs: Inputs = "both" if columns and selection.joints else "switches" if columns else "joints"
     options = Recipe(
         inputs=inputs, folds=folds, seed=seed, table_bits=table_bits, width=width, placement="estimator", by=by
@@ -167,7 +167,7 @@ def compile(  # noqa: A001
     cuts = cuts_of(grasp_set, options)
     options, gains = _placed_by(estimator, _trained_by(classifier, options))
     gains = gains or information_alone(samples.without_none(), columns)
-    selection = replace(selection, chosen=Chosen(columns, gains, None))
+    selection = replace(selection, gains=gains)
     made = BuildAssembly(grasp_set, Recogniser(options, samples, selection, model), harness)
     test = partial(_scores_of, estimator, samples, options)
     tested = cross_validated(samples, cuts, options, test, jobs, progress or _silent)
@@ -191,7 +191,7 @@ def _learnt(estimator: Any, samples: Samples) -> tuple[InputSelection, Model]:
     model = _model(classifier, columns, samples.n_switches)
     if fault := model_fault(model, len(switches), len(joints), len(classifier.classes_)):
         raise CompileError(f"the estimator has a model that {fault}: fit it on these recordings")
-    return InputSelection(elements_of(samples), Chosen(switches, (), None), joints), model
+    return InputSelection(elements_of(samples), switches, joints), model
 
 
 def _columns(estimator: Any, X: NDArray[np.uint16]) -> Columns:

@@ -7,7 +7,6 @@ tables.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from statistics import fmean
 from typing import Any
@@ -202,9 +201,8 @@ def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Recipe]) -> tuple[
     for stream in streams_of(grasp_set):
         if stream.subject == subject:
             part = read.rows(stream.rows)
-            biased_scores = tables.scores(part.switches, part.codes)
-            decoders = _StreamScores(biased_scores, model, counts, tables.scale)
-            for name, (states, announced) in decoders.every().items():
+            scores = tables.scores(part.switches, part.codes)
+            for name, (states, announced) in _decoded(scores, model, counts, tables.scale).items():
                 parts[name].append((stream.continued, part.labels, states, announced))
     return kind, subject, {name: score_streams(every, model.n_types) for name, every in parts.items()}
 
@@ -223,57 +221,47 @@ def _inner_folds(learning: Samples, others: GraspSet, options: Recipe) -> list[F
     return [Fold(np.setdiff1d(every, rows[fold.test]), rows[fold.test], fold.name) for fold in folds]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _StreamScores:
-    """Scores (T, K + 1) of a stream, and each method's result: states, and announcements in time."""
+def _decoded(
+    scores: NDArray[np.int32], model: SegmentModel, counts: Counts, scale: float
+) -> Mapping[str, tuple[Labels, Labels | None]]:
+    """Return each method's result for scores (T, K + 1) of a stream: states, and announcements in time."""
+    none, policy = model.n_types, Policy()
+    live = live_states(model, scores, LAG_TICKS)
+    lead = policy.lead_steps(scale)
+    rules: dict[str, Decision | SequentialTest] = {
+        f"dwell {ms} ms": Decision(lead, 1000 * ms, policy.hold_us) for ms in (50, 200)
+    }
+    rules["sequential test"] = SequentialTest(none + 1, scale, _ERROR_RATE, policy.hold_us)
+    ruled: dict[str, list[int]] = {name: [] for name in rules}
+    for tick, row in enumerate((scores + LANE_OFFSET).tolist()):
+        standing = Ranking(tuple(row))
+        for name, rule in rules.items():
+            state = rule.update(tick * TICK_US, standing)
+            ruled[name].append(none if state is None else state)
+    return {
+        "decoder, live": (live, announced_live(live, none, LAG_TICKS)),
+        "decoder, afterwards": (decode(model, emissions(scores, model)), None),
+        **{name: (states := np.array(found, np.intp), states) for name, found in ruled.items()},
+        "plain HMM": (_hidden_markov(scores / scale, counts), None),
+    }
 
-    biased_scores: NDArray[np.int32]
-    model: SegmentModel
-    counts: Counts
-    scale: float
 
-    def every(self) -> Mapping[str, tuple[Labels, Labels | None]]:
-        none, policy = self.model.n_types, Policy()
-        live = live_states(self.model, self.biased_scores, LAG_TICKS)
-        announced = announced_live(live, none, LAG_TICKS)
-        lead = policy.lead_steps(self.scale)
-        rules: dict[str, Decision | SequentialTest] = {
-            f"dwell {ms} ms": Decision(lead, 1000 * ms, policy.hold_us) for ms in (50, 200)
-        }
-        rules["sequential test"] = SequentialTest(none + 1, self.scale, _ERROR_RATE, policy.hold_us)
-        return {
-            "decoder, live": (live, announced),
-            "decoder, afterwards": (decode(self.model, emissions(self.biased_scores, self.model)), None),
-            **{name: (states, states) for name, states in zip(rules, self._ruled([*rules.values()]), strict=True)},
-            "plain HMM": (self._hidden_markov(), None),
-        }
-
-    def _ruled(self, rules: list[Decision | SequentialTest]) -> NDArray[np.intp]:
-        """Return the states (rules, T) that the rules announce."""
-        none, states = self.model.n_types, []
-        for tick, row in enumerate((self.biased_scores + LANE_OFFSET).tolist()):
-            standing = Ranking(tuple(row))
-            decided = [rule.update(tick * TICK_US, standing) for rule in rules]
-            states.append([none if state is None else state for state in decided])
-        return np.array(states, np.intp).T
-
-    def _hidden_markov(self) -> Labels:
-        """Return the most probable states of a chain with the counted changes per tick and softmax scores."""
-        ticks = np.array([sum(durations) for durations in self.counts.durations]) + 1.0
-        changes = self.counts.changes + 0.5 * (1 - np.eye(len(ticks)))
-        changes = changes * (1 - np.eye(len(ticks)))
-        chain = changes / (ticks + changes.sum(axis=1))[:, np.newaxis]
-        logs = np.log(chain + np.diag(1 - chain.sum(axis=1)))
-        scores = self.biased_scores / self.scale
-        best, back = scores[0], np.zeros((len(scores), len(ticks)), np.intp)
-        for tick in range(1, len(scores)):
-            ways = best[:, np.newaxis] + logs
-            back[tick] = ways.argmax(axis=0)
-            best = ways.max(axis=0) + scores[tick]
-        states = [int(best.argmax())]
-        for tick in range(len(scores) - 1, 0, -1):
-            states.append(int(back[tick, states[-1]]))
-        return np.array(states[::-1], np.intp)
+def _hidden_markov(scores: NDArray[np.float64], counts: Counts) -> Labels:
+    """Return the most probable states of a chain with the counted changes per tick and softmax scores (T, K + 1)."""
+    ticks = np.array([sum(durations) for durations in counts.durations]) + 1.0
+    changes = counts.changes + 0.5 * (1 - np.eye(len(ticks)))
+    changes = changes * (1 - np.eye(len(ticks)))
+    chain = changes / (ticks + changes.sum(axis=1))[:, np.newaxis]
+    logs = np.log(chain + np.diag(1 - chain.sum(axis=1)))
+    best, back = scores[0], np.zeros((len(scores), len(ticks)), np.intp)
+    for tick in range(1, len(scores)):
+        ways = best[:, np.newaxis] + logs
+        back[tick] = ways.argmax(axis=0)
+        best = ways.max(axis=0) + scores[tick]
+    states = [int(best.argmax())]
+    for tick in range(len(scores) - 1, 0, -1):
+        states.append(int(back[tick, states[-1]]))
+    return np.array(states[::-1], np.intp)
 
 
 def _row(scores: list[SegmentScore]) -> dict[str, SubjectMean]:

@@ -89,13 +89,6 @@ RANDOM_FRAMES = 10_000
 _SEED = 1
 
 
-class BundledFirmware(Struct, frozen=True):
-    """Whether a build has the folder `firmware/`, and which of its files differ from those generated for it now."""
-
-    present: bool
-    outdated: tuple[str, ...]
-
-
 def made_firmware(manifest: Manifest, tables: IntegerTables) -> tuple[dict[str, str], str]:
     """Return path in the build -> text of its firmware, and its target or why there is none, in words."""
     try:
@@ -106,14 +99,14 @@ def made_firmware(manifest: Manifest, tables: IntegerTables) -> tuple[dict[str, 
     return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, fit.words
 
 
-def bundled_firmware(folder: Path, build: Build) -> BundledFirmware:
-    """Compare the firmware in the build `folder` with the firmware generated now."""
+def outdated_firmware(folder: Path, build: Build) -> tuple[str, ...] | None:
+    """Return which files of the build's folder `firmware/` differ from those generated now; None without it."""
     if not (folder / FIRMWARE_NAME).is_dir():
-        return BundledFirmware(False, ())
+        return None
     made, _ = made_firmware(build.manifest, build.tables)
     now = {name: text.encode() for name, text in made.items()}
     names = [f"{FIRMWARE_NAME}/{name}" for name in LIBRARY_FILES]
-    return BundledFirmware(True, tuple(name for name in names if now.get(name) != _content(folder / name)))
+    return tuple(name for name in names if now.get(name) != _content(folder / name))
 
 
 def _content(path: Path) -> bytes | None:
@@ -303,22 +296,22 @@ def _masks(flags: NDArray[np.bool_]) -> list[int]:
 
 
 class FirmwareVerification(Struct, frozen=True, kw_only=True):
-    """The result of firmware verification: each check on the same rows, extreme and random frames, and the state of the
-    build's own `firmware/`.
+    """The result of firmware verification: each check on the same rows, extreme and random frames, and the outdated
+    files of the build's own `firmware/`; None if it has none.
     """
 
     rows: int
     extreme: int
     random: int
     checks: tuple[TargetCheck, ...]
-    carried: BundledFirmware
+    outdated: tuple[str, ...] | None
 
     @property
     def holds(self) -> bool:
         """Whether every score, grasp type, margin, probability and name agrees, and the build's own firmware, if any,
         is up to date.
         """
-        return not self.carried.outdated and not any(check.differing or check.misnamed for check in self.checks)
+        return not self.outdated and not any(check.differing or check.misnamed for check in self.checks)
 
 
 def verify_firmware(
@@ -356,7 +349,7 @@ def verify_firmware(
         extreme=len(extreme),
         random=len(random),
         checks=tuple(checks),
-        carried=bundled_firmware(Path(folder), build),
+        outdated=outdated_firmware(Path(folder), build),
     )
 
 

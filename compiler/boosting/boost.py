@@ -75,7 +75,8 @@ def boost(
     fitted: list[tuple[NDArray[np.int32], Floats, Floats]] = []
     stopped = False
     while len(fitted) < rounds and binned.groups and not stopped:
-        stumps = fit_stumps(binned, working_targets(probability, member, z_max, weights), z_max, used)
+        targets = Targets(*weights_and_responses(probability, member, z_max, weights))
+        stumps = fit_stumps(binned, targets, z_max, used)
         # Drop the outputs: with a million rows they would take a hundred megabytes a round.
         fitted.append((stumps.columns, stumps.thresholds, stumps.values))
         scores, carry = add_exactly(scores, carry, centred(stumps.outputs, shrinkage))
@@ -85,13 +86,6 @@ def boost(
         if on_round is not None:
             on_round(len(fitted), rounds)
     return _stack(fitted, X.shape[1], n_classes, shrinkage, stopped), tuple(losses)
-
-
-def working_targets(
-    probability: Floats, member: NDArray[np.bool_], z_max: float, row_weights: Floats | None
-) -> Targets:
-    """Return the weights and working responses for P (K, n), put on grids."""
-    return Targets(*weights_and_responses(probability, member, z_max, row_weights))
 
 
 def weights_and_responses(

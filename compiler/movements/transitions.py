@@ -99,37 +99,19 @@ class Transitions:
 
 # The picture's side, the radius of the circle of types, and the radius of a type, reduced if there are many.
 SIZE, _CIRCLE, _LARGEST_DOT = 720, 262.0, 21.0
-
-
-@dataclass(frozen=True, slots=True)
-class GraphNode:
-    """A type: its position, and the position of its name outside, aligned by `anchor`."""
-
-    name: str
-    x: float
-    y: float
-    label: tuple[float, float]
-    anchor: str
-    words: str
-
-
-@dataclass(frozen=True, slots=True)
-class GraphEdge:
-    """A change: `path` is a value of `d`, `tip` of the arrow's `points`; its width, opacity and text."""
-
-    path: str
-    tip: str
-    width: float
-    opacity: float
-    words: str
+Place = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """Types on a circle, and changes as arrows between them, the rarest first so that frequent ones are on top."""
+    """Types on a circle, and changes as arrows between them, the rarest first so that frequent ones are on top.
 
-    nodes: tuple[GraphNode, ...]
-    edges: tuple[GraphEdge, ...]
+    nodes  name, place, the place of the name outside, its alignment ("start", ...), and words
+    edges  path (a value of `d`), tip (of the arrow's `points`), width, opacity and words
+    """
+
+    nodes: tuple[tuple[str, Place, Place, str, str], ...]
+    edges: tuple[tuple[str, str, float, float, str], ...]
     radius: float
     size: int = SIZE
 
@@ -146,10 +128,9 @@ def graph_of(transitions: Transitions) -> Graph:
         label = SIZE / 2 + reach * cos(angle), SIZE / 2 + reach * sin(angle) + 5
         anchor = "middle" if abs(cos(angle)) < 0.2 else "start" if cos(angle) > 0 else "end"
         nodes.append(
-            GraphNode(
+            (
                 name,
-                round(x, 1),
-                round(y, 1),
+                (round(x, 1), round(y, 1)),
                 (round(label[0], 1), round(label[1], 1)),
                 anchor,
                 f"{name}: followed {int(counts.sum())} times",
@@ -171,8 +152,8 @@ def graph_of(transitions: Transitions) -> Graph:
 
 
 def _edge(
-    start: tuple[float, float], end: tuple[float, float], angle: float, dot: float, share: float, words: str
-) -> GraphEdge:
+    start: Place, end: Place, angle: float, dot: float, share: float, words: str
+) -> tuple[str, str, float, float, str]:
     """Return the arrow from one type to another, or a loop outside the circle.
 
     Arrows bend towards the middle, so that both directions are apart.
@@ -184,7 +165,7 @@ def _edge(
         turned = [(x + 26 * cos(angle + turn), y + 26 * sin(angle + turn)) for turn in (-1.0, 1.0)]
         points = [(x, y), *turned, (x, y)]
         path = "M{} C{} {} {}".format(*map(_point, points))
-        return GraphEdge(path, "", round(width, 2), round(opacity, 2), words)
+        return path, "", round(width, 2), round(opacity, 2), words
     middle = SIZE / 2
     dx, dy = end[0] - start[0], end[1] - start[1]
     # To the right of the straight line, and towards the middle.
@@ -199,13 +180,13 @@ def _edge(
     point = _towards(end, bend, dot)
     tip = [point, (last[0] - uy * half, last[1] + ux * half), (last[0] + uy * half, last[1] - ux * half)]
     path = f"M{_point(first)} Q{_point(bend)} {_point(last)}"
-    return GraphEdge(path, " ".join(map(_point, tip)), round(width, 2), round(opacity, 2), words)
+    return path, " ".join(map(_point, tip)), round(width, 2), round(opacity, 2), words
 
 
-def _towards(place: tuple[float, float], other: tuple[float, float], far: float) -> tuple[float, float]:
+def _towards(place: Place, other: Place, far: float) -> Place:
     length = hypot(other[0] - place[0], other[1] - place[1]) or 1.0
     return (place[0] + far * (other[0] - place[0]) / length, place[1] + far * (other[1] - place[1]) / length)
 
 
-def _point(place: tuple[float, float]) -> str:
+def _point(place: Place) -> str:
     return f"{place[0]:.1f},{place[1]:.1f}"

@@ -1,30 +1,19 @@
 """ID3 by the paper's steps 1 to 6, pruned by S, with ties of gain decided exactly."""
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
 
-from .counts import Counter, Digits
 from .exact import Counts
-from .gain import NodeCounts, best_position, gain_bits
+from .gain import CellCounter, NodeCounts, best_position, gain_bits
 from .inputs import PlacementError, check_labels, check_matrix
 from .tree import Node, Tree
 
 Rows = npt.NDArray[np.intp]
 
 
-@dataclass(frozen=True, slots=True)
-class _Subset:
-    """The subset C of a node to be made: its rows, class totals (K,), and its cells if they are already known."""
-
-    rows: Rows
-    totals: Counts
-    cells: Counts | None = None
-
-
-def grow_id3(X: npt.ArrayLike | Digits, y: npt.ArrayLike, min_samples: int = 0) -> Tree:
+def grow_id3(X: npt.ArrayLike, y: npt.ArrayLike, min_samples: int = 0) -> Tree:
     """Grow the paper's tree.
 
     A node is terminal if its rows have one label, are fewer than `min_samples`, or agree in every input; it then
@@ -35,7 +24,7 @@ def grow_id3(X: npt.ArrayLike | Digits, y: npt.ArrayLike, min_samples: int = 0) 
     Parameters
     ----------
     X : array-like, shape (n, d)
-        Bool or integers >= 0, with any number of values per input; or packed `Digits`.
+        Bool or integers >= 0, with any number of values per input.
     y : array-like, shape (n,)
         Labels that can be sorted.
     min_samples : int
@@ -59,67 +48,42 @@ def grow_id3(X: npt.ArrayLike | Digits, y: npt.ArrayLike, min_samples: int = 0) 
     """
     if min_samples < 0:
         raise PlacementError(f"min_samples is {min_samples}, a number of rows >= 0 is needed")
-    digits = X if isinstance(X, Digits) else Digits.from_matrix(check_matrix(X))
-    classes, labels = check_labels(y, digits.n_rows)
-    nodes = _Growth(digits, labels, len(classes), min_samples).nodes()
-    return Tree(tuple(nodes), tuple(classes.tolist()), digits.n_inputs, min_samples)
+    matrix = check_matrix(X)
+    classes, labels = check_labels(y, len(matrix))
+    nodes = _nodes(CellCounter(matrix, labels, len(classes)), np.bincount(labels), min_samples)
+    return Tree(tuple(nodes), tuple(classes.tolist()), matrix.shape[1], min_samples)
 
 
-class _Growth:
-    def __init__(self, digits: Digits, labels: npt.NDArray[np.intp], n_classes: int, min_samples: int) -> None:
-        self.digits = digits
-        self.counter = Counter(digits, labels, n_classes)
-        self.min_samples = min_samples
-        self.root = _Subset(np.arange(digits.n_rows), np.bincount(labels, minlength=n_classes))
-
-    def nodes(self) -> list[Node]:
-        """Return the nodes in preorder. A stack replaces recursion: trees may be deep."""
-        nodes, waiting = [], [self.root]
-        while waiting:
-            node, children = self._make(waiting.pop())
-            nodes.append(node)
-            waiting += reversed(children)
-        return nodes
-
-    def _make(self, subset: _Subset) -> tuple[Node, list[_Subset]]:
-        counts = tuple(subset.totals.tolist())
-        split = self._split(subset) if self._goes_on(subset.totals) else None
-        if split is None:
-            return Node(counts), []
-        counted, position = split
+def _nodes(counter: CellCounter, totals: Counts, min_samples: int) -> Iterator[Node]:
+    """Yield the nodes in preorder; `totals` (K,) are the rows of each class. A stack replaces recursion: trees may be
+    deep.
+    """
+    # The rows of each node to be made, its class totals, and its cells if they are already known.
+    waiting: list[tuple[Rows, Counts, Counts | None]] = [(np.arange(len(counter.X)), totals, None)]
+    while waiting:
+        rows, totals, cells = waiting.pop()
+        position = None
+        if len(counter.columns) and _goes_on(totals, min_samples):
+            cells = counter.count(rows) if cells is None else cells
+            counted = NodeCounts(totals, cells, counter.starts)
+            position = best_position(counted, counter.columns)
+        if position is None:
+            yield Node(tuple(totals.tolist()))
+            continue
         table = counted.table(position)
         present = np.flatnonzero(table.any(axis=0))
-        values = tuple(self.digits.values[position][present].tolist())
-        node = Node(counts, int(self.digits.columns[position]), gain_bits(table), values)
-        return node, self._children(subset.rows, counted, position, table[:, present], present)
+        column, values = int(counter.columns[position]), counter.values[position][present]
+        yield Node(tuple(totals.tolist()), column, gain_bits(table), tuple(values.tolist()))
+        taken = counter.X[rows, column]
+        parts, tables = [rows[taken == value] for value in values], table[:, present].T
+        known: list[Counts | None] = [None] * len(parts)
+        small, *others = np.argsort([len(part) for part in parts], kind="stable").tolist()
+        if len(others) == 1 and _goes_on(tables[others[0]], min_samples):
+            # Count the smaller of two children only; the larger gets the rest.
+            known[small] = counter.count(parts[small])
+            known[others[0]] = counted.cells - known[small]
+        waiting += reversed(list(zip(parts, tables, known, strict=True)))
 
-    def _goes_on(self, totals: Counts) -> bool:
-        return int(np.count_nonzero(totals)) > 1 and int(totals.sum()) >= self.min_samples
 
-    def _split(self, subset: _Subset) -> tuple[NodeCounts, int] | None:
-        if not len(self.digits.columns):
-            return None
-        cells = self.counter.count(subset.rows) if subset.cells is None else subset.cells
-        counted = NodeCounts(subset.totals, cells, self.counter.starts)
-        position = best_position(counted, self.digits.columns)
-        return None if position is None else (counted, position)
-
-    def _children(
-        self, rows: Rows, counted: NodeCounts, position: int, tables: Counts, present: npt.NDArray[Any]
-    ) -> list[_Subset]:
-        codes = self.digits.codes(position, rows)
-        parts = [rows[codes == code] for code in present]
-        children = [_Subset(part, table) for part, table in zip(parts, tables.T, strict=True)]
-        return self._with_known_cells(counted.cells, children)
-
-    def _with_known_cells(self, cells: Counts, children: list[_Subset]) -> list[_Subset]:
-        """Count the smaller of two children only; the larger gets the remainder of the parent's `cells`."""
-        if len(children) != 2:
-            return children
-        small, large = (0, 1) if len(children[0].rows) <= len(children[1].rows) else (1, 0)
-        if self._goes_on(children[large].totals):
-            counted = self.counter.count(children[small].rows)
-            rest = cells - counted
-            for index, known in ((small, counted), (large, rest)):
-                children[index] = _Subset(children[index].rows, children[index].totals, known)
-        return children
+def _goes_on(totals: Counts, min_samples: int) -> bool:
+    return int(np.count_nonzero(totals)) > 1 and int(totals.sum()) >= min_samples

@@ -38,23 +38,26 @@ class InputSelection:
     """The elements and joints that a recipe keeps.
 
     elements  those that there were to choose from: switches, and levels of taxels
-    chosen    the columns of the kept ones among them, in the method's order
+    columns   the kept ones among them, in the method's order
     joints    the columns of the kept joints
+    gains     of `columns`, and tree: see `choose`
     """
 
     elements: Elements
-    chosen: "Chosen"
+    columns: Columns
     joints: Columns
+    gains: tuple[float, ...] = ()
+    tree: Tree | None = None
 
     @classmethod
     def of(cls, kept: Elements, joints: Columns) -> Self:
         """Return the selection of these elements and joints, of which all are kept."""
-        return cls(kept, Chosen(tuple(range(len(kept))), (), None), joints)
+        return cls(kept, tuple(range(len(kept))), joints)
 
     @property
     def kept(self) -> Elements:
         """The kept elements, in the method's order."""
-        return tuple(self.elements[column] for column in self.chosen.columns)
+        return tuple(self.elements[column] for column in self.columns)
 
     def read(self, samples: Samples) -> Samples:
         """Return these samples as a glove with only the kept elements and joints reads them."""
@@ -91,8 +94,9 @@ def select(
     parameter = float(recipe.keep or 0 if method.by_number else recipe.prune)
     costs = None if ports is None else ports_of(ports, elements)
     bound = None if limits is None else limits.on(elements, costs)
-    chosen = choose(bits, method.name, parameter, costs, bound, robust=recipe.robust)
-    return InputSelection(elements, chosen, kept_joints(bits.keeping(chosen.columns), recipe.keep_joints, limits))
+    columns, gains, tree = choose(bits, method.name, parameter, costs, bound, robust=recipe.robust)
+    joints = kept_joints(bits.keeping(columns), recipe.keep_joints, limits)
+    return InputSelection(elements, columns, joints, gains, tree)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,17 +113,6 @@ class Placer:
         return select(samples, recipe, self.ports, self.limits).kept
 
 
-@dataclass(frozen=True, slots=True)
-class Chosen:
-    """The columns that a method keeps, in its order, and their gains in bits: in the tree of the paper's ID3, or each
-    column's alone for another method, which has no tree.
-    """
-
-    columns: Columns
-    gains: tuple[float, ...]
-    tree: Tree | None
-
-
 def choose(
     samples: Samples,
     method: str = PAPERS,
@@ -128,9 +121,11 @@ def choose(
     limits: Bound | None = None,
     *,
     robust: bool = False,
-) -> Chosen:
+) -> tuple[Columns, tuple[float, ...], Tree | None]:
     """Choose switches of `samples` by a method of `METHODS`, whose parameter is S or a number of switches.
 
+    Return their columns in the method's order, and their gains in bits: in the tree of the paper's ID3, which is
+    returned too, or each column's alone for another method.
     `ports` are the costs for methods that use them, `limits` hold for all methods; `robust` looks for the placement
     that loses least with its worst lost switch. Raises MemberError for an unknown method, PlacementError if it cannot
     choose.
@@ -144,8 +139,8 @@ def choose(
         pick = partial(_picked, method=METHODS.named(method), parameter=parameter, ports=ports, limits=limits)
         columns = most_robust(samples, pick) if robust else pick(samples)
     if tree is not None and tree.inputs == columns:
-        return Chosen(columns, tree.gains, tree)
-    return Chosen(columns, information_alone(samples, columns), None)
+        return columns, tree.gains, tree
+    return columns, information_alone(samples, columns), None
 
 
 def _picked(
@@ -323,12 +318,11 @@ def place(
     fingerprint, grasp_set = grasp_set.fingerprint(), grasp_set.without_none()
     samples = _samples_of(grasp_set, recipe)
     selection = select(samples, recipe, ports, limits)
-    chosen = selection.chosen
     return Placement(
         method=method.name,
         parameter=float(recipe.keep or 0 if method.by_number else recipe.prune),
         joints=method.uses_joints and samples.codes.shape[1] > 0,
-        switches=_with_gains(_kept_of(grasp_set, selection.kept), chosen),
+        switches=_kept_of(grasp_set, selection),
         rows=len(grasp_set),
         fingerprint=fingerprint,
         all_names=names_of(grasp_set, selection.elements),
@@ -336,22 +330,10 @@ def place(
         n_taxels=len(grasp_set.taxel_columns),
         n_joints=len(grasp_set.joints),
         grasps=samples.grasps,
-        tree=chosen.tree,
+        tree=selection.tree,
         kept_joints=()
         if recipe.keep_joints is None
         else tuple(grasp_set.joint_names[joint] for joint in selection.joints),
-    )
-
-
-def _with_gains(kept: tuple[Kept, ...], chosen: Chosen) -> tuple[Kept, ...]:
-    """Return the kept elements with their gains in the tree, if there is one."""
-    if chosen.tree is None:
-        return kept
-    entropy = entropy_bits(list(chosen.tree.nodes[0].counts))
-    together = accumulate(chosen.gains)
-    return tuple(
-        replace(one, gain_bits=gain, cumulative_share=so_far / entropy)
-        for one, gain, so_far in zip(kept, chosen.gains, together, strict=True)
     )
 
 
@@ -384,10 +366,17 @@ def _samples_of(grasp_set: GraspSet, recipe: Recipe) -> Samples:
     return Samples.of(grasp_set, recipe.inputs)
 
 
-def _kept_of(grasp_set: GraspSet, kept: Elements) -> tuple[Kept, ...]:
-    """Return the kept elements with their names."""
-    n_switches = len(grasp_set.switch_names)
-    return tuple(
+def _kept_of(grasp_set: GraspSet, selection: InputSelection) -> tuple[Kept, ...]:
+    """Return the kept elements with their names, and with their gains in the tree, if there is one."""
+    n_switches, kept = len(grasp_set.switch_names), selection.kept
+    found = [
         Kept(one.column, name, above=None if one.column < n_switches else one.code)
         for one, name in zip(kept, names_of(grasp_set, kept), strict=True)
+    ]
+    if selection.tree is None:
+        return tuple(found)
+    entropy, together = entropy_bits(list(selection.tree.nodes[0].counts)), accumulate(selection.gains)
+    return tuple(
+        replace(one, gain_bits=gain, cumulative_share=so_far / entropy)
+        for one, gain, so_far in zip(found, selection.gains, together, strict=True)
     )

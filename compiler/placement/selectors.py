@@ -1,6 +1,6 @@
 """Placement as scikit-learn's feature selection: in a Pipeline, in GridSearchCV, on a data frame."""
 
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,7 @@ from ..samples import Samples
 from .constraints import Limits
 from .elements import elements_of
 from .inputs import check_bits
-from .methods.base import BEST, METHODS, PAPERS, Method
+from .methods.base import BEST, METHODS
 from .placement import choose
 from .ports import PortCosts
 
@@ -52,6 +52,8 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
         The kept columns, in the order in which the method chose them; `get_support` and `transform` keep that of X.
     gains_ : ndarray of float, shape (n_kept,)
         The information about the class of each of `order_`, in bits: its gain in the tree for ID3, otherwise alone.
+    tree_ : Tree or None
+        The tree of the paper's ID3; its classes are numbers of `classes_`, and `tree_.text(names)` prints it.
     parameter_ : int
         The most switches to keep, or the paper's S.
     classes_ : ndarray, shape (n_classes,)
@@ -67,9 +69,10 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
         In `fit`, if X or y cannot be used; a MemberError for an unknown method, a PlacementError if it cannot choose
         here, or if a number is out of its range.
 
-    See Also
-    --------
-    ID3Selector : The paper's method, with its tree.
+    References
+    ----------
+    J. R. Quinlan, "Induction of decision trees", Machine Learning 1 (1986): the method "id3". Of equal gains, exactly
+    compared, the lowest column wins.
 
     Examples
     --------
@@ -79,6 +82,8 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
     >>> X = np.column_stack([y & 1, y >> 1, y == 0, np.ones(40)])
     >>> SwitchSelector(method="cmim", n_switches=2).fit(X, y).get_support()
     array([ True,  True, False, False])
+    >>> SwitchSelector("id3", min_samples=13).fit(X, y).tree_.inputs
+    (0, 1)
     """
 
     def __init__(
@@ -111,11 +116,7 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
         -------
         self
         """
-        self._choose(X, y, METHODS.named(self.method))
-        return self
-
-    def _choose(self, X: ArrayLike, y: ArrayLike, method: Method) -> Any:
-        """Choose, set the attributes, and return the tree, if there is one."""
+        method = METHODS.named(self.method)
         inputs, targets = validate_data(self, X, y)
         check_classification_targets(targets)
         bits = check_bits(inputs) if self.binarize is None else inputs > self.binarize
@@ -128,10 +129,9 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
             if len(self.limits.names) != bits.shape[1]:
                 raise ValueError(f"the limits name {len(self.limits.names)} switches, X has {bits.shape[1]} columns")
             bound = self.limits.on(elements_of(samples), self.ports)
-        chosen = choose(samples, method.name, float(self.parameter_), self.ports, bound)
-        self.order_ = np.array(chosen.columns, dtype=np.intp)
-        self.gains_ = np.array(chosen.gains)
-        return chosen.tree
+        columns, gains, self.tree_ = choose(samples, method.name, float(self.parameter_), self.ports, bound)
+        self.order_, self.gains_ = np.array(columns, dtype=np.intp), np.array(gains)
+        return self
 
     def _most(self, columns: int) -> int:
         if self.n_switches is None:
@@ -158,49 +158,3 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
         tags = super().__sklearn_tags__()
         tags.target_tags.required = True
         return tags
-
-
-class ID3Selector(SwitchSelector):
-    """Keep the switches that decide nodes of the paper's ID3 tree.
-
-    Parameters
-    ----------
-    min_samples : int, default=0
-        The paper's S: a node with fewer rows decides nothing, and fewer switches are kept; 0 does not prune.
-    binarize : float or None, default=None
-        A switch counts as closed if its input exceeds this number; None rejects any input that is not a bit.
-        (`grow_id3` takes inputs of more than two values.)
-
-    Attributes
-    ----------
-    tree_ : Tree
-        The tree. Its classes are `classes_`' numbers; `tree_.text(names)` prints it.
-    order_, gains_, parameter_, classes_, n_features_in_, feature_names_in_
-        As in `SwitchSelector`; the gains are those in the tree, and add up.
-
-    See Also
-    --------
-    SwitchSelector : All methods, by a number of switches.
-
-    References
-    ----------
-    J. R. Quinlan, "Induction of decision trees", Machine Learning 1 (1986). Of equal gains, exactly compared, the
-    lowest column wins.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from thenar.compiler import ID3Selector
-    >>> y = np.arange(40) % 4
-    >>> X = np.column_stack([np.ones(40), y & 1, y >> 1, y == 0])
-    >>> ID3Selector(min_samples=13).fit(X, y).get_support()
-    array([False,  True,  True, False])
-    """
-
-    def __init__(self, min_samples: int = 0, binarize: float | None = None) -> None:
-        super().__init__(PAPERS, min_samples=min_samples, binarize=binarize)
-
-    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Grow the tree of bits X (n_samples, n_features) and labels y (n_samples,), and keep the inputs it tests."""
-        self.tree_ = self._choose(X, y, METHODS[PAPERS])
-        return self

@@ -1,4 +1,4 @@
-"""A grown decision tree: predicts, prints, and converts to JSON and back.
+"""A grown decision tree: predicts and prints.
 
 Nodes are in preorder: a node, then its children's subtrees in the order of their values. That order and each node's
 number of values determine the children.
@@ -6,7 +6,6 @@ number of values determine the children.
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import msgspec
@@ -51,18 +50,12 @@ class Node(msgspec.Struct, frozen=True):
 
 
 class Tree(msgspec.Struct, frozen=True, dict=True):
-    """An ID3 tree over `n_inputs` inputs: `nodes` in preorder, `classes` in ascending order, pruned by `min_samples`.
-
-    Raises PlacementError if nodes, classes and inputs do not make a tree.
-    """
+    """An ID3 tree over `n_inputs` inputs: nodes in preorder, classes in ascending order, pruned by `min_samples`."""
 
     nodes: tuple[Node, ...]
     classes: tuple[Label, ...]
     n_inputs: int
     min_samples: int = 0
-
-    def __post_init__(self) -> None:
-        _check_tree(self)
 
     @cached_property
     def children(self) -> tuple[tuple[int, ...], ...]:
@@ -153,74 +146,31 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
                 continue
             labels[rows] = node.majority
             if node.input is not None:
-                rows_of |= _share_out(rows, matrix[rows, node.input], node.values, self.children[number])
+                column = matrix[rows, node.input]
+                for value, child in zip(node.values, self.children[number], strict=True):
+                    if (below := rows[column == value]).size:
+                        rows_of[child] = below
         return np.array(self.classes)[labels]
 
     def text(self, names: Sequence[str] = (), class_names: Sequence[str] = ()) -> str:
-        """Return the tree as text, one line per node; names default to x0, x1 ... and `classes`."""
-        return _tree_text(self, names, class_names)
+        """Return the tree as text, one line per node; names default to x0, x1 ... and `classes`.
 
-    def to_json(self) -> bytes:
-        """Return the tree as one JSON document."""
-        return msgspec.json.encode(self)
-
-    @classmethod
-    def from_json(cls, document: bytes | str) -> "Tree":
-        """Return the tree of `to_json`; raise PlacementError if the document is not one, or the tree is invalid."""
-        try:
-            return msgspec.json.decode(document, type=cls)
-        except (ValueError, RecursionError) as wrong:
-            raise PlacementError(f"this is no stored tree: {wrong}") from None
-
-
-def _share_out(
-    rows: npt.NDArray[np.intp], column: npt.NDArray[Any], values: tuple[int, ...], children: tuple[int, ...]
-) -> dict[int, npt.NDArray[np.intp]]:
-    parts = {child: rows[column == value] for value, child in zip(values, children, strict=True)}
-    return {child: part for child, part in parts.items() if len(part)}
-
-
-def _check_tree(tree: Tree) -> None:
-    """Raise PlacementError, with the number of the node, if `tree` is invalid."""
-    if not tree.nodes or not tree.classes:
-        raise PlacementError("a tree has at least one node and one class")
-    waiting = 1
-    for number, node in enumerate(tree.nodes):
-        waiting += len(node.values) - 1
-        if waiting < 0 or (waiting == 0) != (number == len(tree.nodes) - 1):
-            raise PlacementError(f"the {len(tree.nodes)} nodes are not one tree in preorder (node {number})")
-        _check_node(tree, number, node)
-    for number, children in enumerate(tree.children):
-        counts = zip(*(tree.nodes[child].counts for child in children), strict=True)
-        if children and tuple(map(sum, counts)) != tree.nodes[number].counts:
-            raise PlacementError(f"the children of node {number} do not hold its rows")
-
-
-def _check_node(tree: Tree, number: int, node: Node) -> None:
-    if len(node.counts) != len(tree.classes) or min(node.counts) < 0 or not node.size:
-        raise PlacementError(f"node {number} needs {len(tree.classes)} class counts >= 0, not all zero")
-    if (node.input is None) != (len(node.values) < 2) or (node.input is None and (node.values or node.gain)):
-        raise PlacementError(f"node {number} is neither a leaf nor a decision between two values or more")
-    if node.input is not None and not 0 <= node.input < tree.n_inputs:
-        raise PlacementError(f"node {number} tests input {node.input}, there are {tree.n_inputs}")
-    if not node.gain >= 0 or any(a >= b for a, b in pairwise((-1, *node.values))):
-        raise PlacementError(f"node {number} has a negative gain, or values that do not ascend from 0")
-
-
-def _tree_text(tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> str:
-    """Return the text of Tree.text; raise PlacementError if there are names, but not one for each."""
-    names, class_names = names_for(tree, names, class_names)
-    lines = []
-    # The node's number, and the prefixes of its line and of its children's lines.
-    waiting = [(0, "", "")]
-    while waiting:
-        number, lead, below = waiting.pop()
-        node, children = tree.nodes[number], tree.children[number]
-        lines.append(lead + node_text(node, names, class_names))
-        for value, child in zip(reversed(node.values), reversed(children), strict=True):
-            last = child == children[-1]
-            waiting.append((child, f"{below}{'└─' if last else '├─'} {value}: ", below + ("   " if last else "│  ")))
-    return "\n".join([*lines, _summary(tree)])
+        Raises PlacementError if there are names, but not one for each.
+        """
+        names, class_names = names_for(self, names, class_names)
+        lines = []
+        # The node's number, and the prefixes of its line and of its children's lines.
+        waiting = [(0, "", "")]
+        while waiting:
+            number, lead, below = waiting.pop()
+            node, children = self.nodes[number], self.children[number]
+            lines.append(lead + node_text(node, names, class_names))
+            for value, child in zip(reversed(node.values), reversed(children), strict=True):
+                last = child == children[-1]
+                waiting.append(
+                    (child, f"{below}{'└─' if last else '├─'} {value}: ", below + ("   " if last else "│  "))
+                )
+        return "\n".join([*lines, _summary(self)])
 
 
 def sizes_of(tree: Tree, deepest: int | None = None) -> list[int]:

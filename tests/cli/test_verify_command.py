@@ -9,7 +9,7 @@ from msgspec import to_builtins
 from msgspec.structs import replace as replace_fields
 
 from thenar.cli.verify_command import print_firmware, verdict
-from thenar.compiler.artifact.verify_firmware import BundledFirmware, Difference, FirmwareVerification, TargetCheck
+from thenar.compiler.artifact.verify_firmware import Difference, FirmwareVerification, TargetCheck
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import tables_from_bytes, tables_to_bytes
 
@@ -121,7 +121,7 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
         unit="instructions",
         stack=None,
     )
-    found = FirmwareVerification(rows=4, extreme=3, random=3, checks=(check,), carried=BundledFirmware(False, ()))
+    found = FirmwareVerification(rows=4, extreme=3, random=3, checks=(check,), outdated=None)
     print_firmware(found)
     assert capsys.readouterr().out.splitlines() == [
         "firmware, on 4 rows, 3 extreme and 3 random frames:",

@@ -20,9 +20,9 @@ from thenar.compiler import (
     Build,
     CompileError,
     GraspSet,
-    ID3Selector,
     LogitBoostClassifier,
     Samples,
+    SwitchSelector,
     compile,  # noqa: A004
     compile_build,
     export_c,
@@ -111,7 +111,7 @@ def test_a_pipeline_and_compile_build_make_the_same_papers_recipe(
     grasp_set = make_set(subjects=subjects, frames=2)
     X = Samples.of(grasp_set).inputs
     switches = slice(0, len(grasp_set.switch_names))
-    chosen = ColumnTransformer([("switches", ID3Selector(min_samples=5), switches)], remainder="passthrough")
+    chosen = ColumnTransformer([("switches", SwitchSelector("id3", min_samples=5), switches)], remainder="passthrough")
     pipeline = make_pipeline(chosen, LogitBoostClassifier(rounds=4)).fit(X, grasp_set.labels)
     made = compile(pipeline, grasp_set, tmp_path / "made", folds=3).manifest
     same = compile_build(grasp_set, tmp_path / "same", prune=5, rounds=4, folds=3).manifest

@@ -49,7 +49,33 @@ def elimination_order(samples: Samples, ports: PortCosts | None = None) -> Colum
 
     Takes the time of some 1500 evaluations of the tables for 160 switches, independent of the data.
     """
-    return _Elimination(sampled(samples), ports).order()
+    rows = sampled(samples)
+    left: list[int] = np.flatnonzero(_varying(rows)).tolist()
+    gone: list[int] = []
+    bits = np.ascontiguousarray(rows.switches.T[left])
+    fit = Logistic(np.concatenate([bits, thermometer(rows.codes)]), rows.labels, rows.n_classes)
+    if len(left) > 1:
+        fit.improve(FIRST_STEPS)
+    while len(left) > 1:
+        costs = np.ones(len(left)) if ports is None else 1.0 + PORT_WEIGHT * ports.shares(left)
+        rises = removal_rises(fit.probability, bits, fit.rows[: len(left)], rows.labels)
+        likeliest = np.argsort(rises / costs, kind="stable").tolist()
+        if len(left) > LAST:
+            worst = likeliest[: max(1, int(SHARE * len(left)))]
+            fit = fit.without(worst)
+            fit.improve(STEPS)
+        else:
+            fits = {position: fit.without([position]) for position in likeliest[:CANDIDATES]}
+            for candidate in fits.values():
+                candidate.improve(TRIAL_STEPS)
+            before = fit.loss
+            worst = [min(fits, key=lambda position: (fits[position].loss - before) / costs[position])]
+            fit = fits[worst[0]]
+            fit.improve(STEPS - TRIAL_STEPS)
+        gone += [left[position] for position in worst]
+        left = [column for position, column in enumerate(left) if position not in set(worst)]
+        bits = np.delete(bits, worst, axis=0)
+    return tuple(left + gone[::-1])
 
 
 def boosted_elimination_order(samples: Samples) -> Columns:
@@ -71,54 +97,6 @@ def _boosted_costs(samples: Samples, left: NDArray[np.intp]) -> Floats:
     rows = collapse(stumps, len(left)).switch_rows
     probability = softmax(np.ascontiguousarray(stumps.scores(X).T))
     return removal_rises(probability, np.ascontiguousarray(samples.switches[:, left].T), rows, samples.labels)
-
-
-class _Elimination:
-    def __init__(self, samples: Samples, ports: PortCosts | None) -> None:
-        self._left: list[int] = np.flatnonzero(_varying(samples)).tolist()
-        self._bits = np.ascontiguousarray(samples.switches.T[self._left])
-        self._labels, self._ports = samples.labels, ports
-        self._gone: list[int] = []
-        columns = np.concatenate([self._bits, thermometer(samples.codes)])
-        self._fit = Logistic(columns, samples.labels, samples.n_classes)
-
-    def order(self) -> Columns:
-        if len(self._left) > 1:
-            self._fit.improve(FIRST_STEPS)
-        while len(self._left) > 1:
-            rises = removal_rises(self._fit.probability, self._bits, self._fit.rows[: len(self._left)], self._labels)
-            likeliest = np.argsort(rises / self._costs(), kind="stable").tolist()
-            if len(self._left) > LAST:
-                worst = likeliest[: max(1, int(SHARE * len(self._left)))]
-                self._fit = self._fit.without(worst)
-                self._fit.improve(STEPS)
-            else:
-                worst = [self._try(likeliest[:CANDIDATES])]
-            self._drop(worst)
-        return tuple(self._left + self._gone[::-1])
-
-    def _try(self, candidates: list[int]) -> int:
-        """Drop the candidate (a position) whose removal, after the others are refitted, costs least."""
-        fits = [self._fit.without([position]) for position in candidates]
-        for fit in fits:
-            fit.improve(TRIAL_STEPS)
-        costs = self._costs()
-        rises = [(fit.loss - self._fit.loss) / costs[p] for fit, p in zip(fits, candidates, strict=True)]
-        best = rises.index(min(rises))
-        self._fit = fits[best]
-        self._fit.improve(STEPS - TRIAL_STEPS)
-        return candidates[best]
-
-    def _drop(self, positions: list[int]) -> None:
-        self._gone += [self._left[position] for position in positions]
-        self._left = [column for position, column in enumerate(self._left) if position not in set(positions)]
-        self._bits = np.delete(self._bits, positions, axis=0)
-
-    def _costs(self) -> Floats:
-        """Return the relative cost of dropping each remaining switch."""
-        if self._ports is None:
-            return np.ones(len(self._left))
-        return 1.0 + PORT_WEIGHT * self._ports.shares(self._left)
 
 
 def _varying(samples: Samples) -> Bits:

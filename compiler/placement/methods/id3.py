@@ -33,8 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...samples import Columns, Samples
-from ..counts import Counter, Digits
-from ..gain import NodeCounts, best_per_cost
+from ..gain import CellCounter, NodeCounts, best_per_cost
 from ..id3 import grow_id3
 from ..ports import PortCosts
 from ..tree import Tree
@@ -73,10 +72,43 @@ class PruningPath:
 
 def weakest_links(tree: Tree, brought: Sequence[int]) -> PruningPath:
     """Return the pruning path of `tree`, given how much the decision at each node lowers the risk (0 for a leaf)."""
-    pruning = _Pruning(tree, brought)
-    steps = list(pruning.steps())
-    n_inputs = (len(set(tree.inputs)), *(left for _, _, left in steps))
-    return PruningPath(tree, tuple(node for node, _, _ in steps), tuple(g for _, g, _ in steps), n_inputs)
+    standing = [node.input is not None for node in tree.nodes]
+    # The reduction by each node and those below it, and their links.
+    total, links = list(brought), [max(len(node.values) - 1, 0) for node in tree.nodes]
+    for number in range(len(tree.nodes) - 1, 0, -1):
+        total[tree.parents[number]] += total[number]
+        links[tree.parents[number]] += links[number]
+    labels = collections.Counter(node.input for node in tree.nodes if node.input is not None)
+
+    def key(number: int) -> tuple[Fraction, int]:
+        return Fraction(total[number], links[number]), -number
+
+    order, strengths, n_inputs = list[int](), list[Fraction](), [len(labels)]
+    waiting = [key(number) for number, remaining in enumerate(standing) if remaining]
+    heapify(waiting)
+    while waiting:
+        strength, number = weakest = heappop(waiting)
+        number = -number
+        if not standing[number] or weakest != key(number):
+            continue  # removed, or pushed again since
+        below = [number]
+        while below:
+            node = below.pop()
+            label = tree.nodes[node].input
+            if label is not None and standing[node]:
+                standing[node] = False
+                labels -= collections.Counter([label])
+                below += tree.children[node]
+        above = tree.parents[number]
+        while above >= 0:
+            total[above] -= total[number]
+            links[above] -= links[number]
+            heappush(waiting, key(above))
+            above = tree.parents[above]
+        order.append(number)
+        strengths.append(strength)
+        n_inputs.append(len(labels))
+    return PruningPath(tree, tuple(order), tuple(strengths), tuple(n_inputs))
 
 
 def entropy_brought(tree: Tree) -> list[int]:
@@ -103,58 +135,6 @@ def error_reduction(tree: Tree, X: NDArray[np.bool_], labels: NDArray[np.intp]) 
         if children:
             spared[number] = errors[number] - sum(errors[child] for child in children)
     return spared
-
-
-class _Pruning:
-    """The remaining decisions of a tree; each node with the total reduction of itself and those below it."""
-
-    def __init__(self, tree: Tree, brought: Sequence[int]) -> None:
-        self.tree = tree
-        self.standing = [node.input is not None for node in tree.nodes]
-        self.brought = list(brought)
-        self.links = [max(len(node.values) - 1, 0) for node in tree.nodes]
-        for number in range(len(tree.nodes) - 1, 0, -1):
-            parent = tree.parents[number]
-            self.brought[parent] += self.brought[number]
-            self.links[parent] += self.links[number]
-        self.labels = collections.Counter(node.input for node in tree.nodes if node.input is not None)
-
-    def steps(self) -> Iterator[tuple[int, Fraction, int]]:
-        """Yield each weakest link as it is removed: node, g, number of distinct inputs left."""
-        waiting = [self._key(number) for number, remaining in enumerate(self.standing) if remaining]
-        heapify(waiting)
-        while waiting:
-            key = heappop(waiting)
-            number = -key[1]
-            if not self.standing[number] or key != self._key(number):
-                continue  # removed, or pushed again since
-            for above in self._take_off(number):
-                heappush(waiting, self._key(above))
-            yield number, key[0], len(self.labels)
-
-    def _key(self, number: int) -> tuple[Fraction, int]:
-        return Fraction(self.brought[number], self.links[number]), -number
-
-    def _take_off(self, number: int) -> Iterator[int]:
-        """Turn a node into a leaf; yield its ancestors, whose links change."""
-        brought, links = self.brought[number], self.links[number]
-        self._clear(number)
-        above = self.tree.parents[number]
-        while above >= 0:
-            self.brought[above] -= brought
-            self.links[above] -= links
-            yield above
-            above = self.tree.parents[above]
-
-    def _clear(self, number: int) -> None:
-        waiting = [number]
-        while waiting:
-            node = waiting.pop()
-            label = self.tree.nodes[node].input
-            if label is not None and self.standing[node]:
-                self.standing[node] = False
-                self.labels -= collections.Counter([label])
-                waiting += self.tree.children[node]
 
 
 def _labels(tree: Tree, leaves: set[int]) -> Iterator[int]:
@@ -217,7 +197,7 @@ def cost_aware_order(samples: Samples, ports: PortCosts | None = None) -> Column
     """Return the switches of cost-aware ID3, in the order found; without `ports` all cost the same."""
     ports = ports or PortCosts((0,) * samples.n_switches, (0.0,))
     bits, labels, n_classes = samples.switches, samples.labels, samples.n_classes
-    counter = Counter(Digits.from_matrix(bits), labels, n_classes)
+    counter = CellCounter(bits, labels, n_classes)
     waiting: list[tuple[int, int, NDArray[np.intp]]] = [(-len(bits), 0, np.arange(len(bits)))]
     found: dict[int, None] = {}
     costs = ports.marginal_costs(found)

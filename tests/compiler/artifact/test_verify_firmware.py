@@ -51,7 +51,7 @@ def test_every_score_and_type_of_every_frame_is_pythons(
         assert (check.worst is None) == (kind == "host" or (kind == "avr" and check.missing))
         assert check.misnamed == (None if kind == "avr" else 0)
         assert check.shares == (kind != "avr" or check.missing)
-    assert (found.carried.present, found.carried.outdated) == (True, ())
+    assert found.outdated == ()
 
 
 @pytest.fixture
@@ -203,7 +203,7 @@ def test_what_does_not_hold_of_firmware_does_not_hold_of_the_build(
     whole = verify(folder, grasp_set, ("host",))
     changed = whole.firmware
     assert changed is not None
-    assert changed.carried.outdated == ("firmware/thenar.h", "firmware/thenar_glove.c")
+    assert changed.outdated == ("firmware/thenar.h", "firmware/thenar_glove.c")
     assert not changed.holds
     assert not whole.holds
 
@@ -216,7 +216,7 @@ def test_a_build_of_before_carries_no_firmware_and_holds(grasp_set: GraspSet, to
         path.unlink()
     (folder / "firmware").rmdir()
     found = verify_firmware(folder, grasp_set, ("host",))
-    assert (found.carried.present, found.holds) == (False, True)
+    assert (found.outdated, found.holds) == (None, True)
 
 
 @pytest.mark.parametrize("kind", ["host", "avr"])

@@ -10,7 +10,7 @@ import pytest
 from sklearn.model_selection import GroupKFold, LeaveOneGroupOut, cross_val_predict
 from sklearn.pipeline import make_pipeline
 
-from thenar.compiler import GraspSet, ID3Selector, LogitBoostClassifier, evaluate
+from thenar.compiler import GraspSet, LogitBoostClassifier, SwitchSelector, evaluate
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.permutation import shuffled_labels
 from thenar.compiler.text import INDEPENDENT
@@ -39,7 +39,7 @@ def majorities(predicted: list[str], grasp_set: GraspSet) -> int:
 def test_leaving_subjects_out_matches_a_scikit_learn_pipeline(make_grasps: Make) -> None:
     grasp_set = framed(make_grasps)
     study = evaluate(grasp_set, scheme="subject", **NESTED)
-    selected = make_pipeline(ID3Selector(), LogitBoostClassifier(rounds=10))
+    selected = make_pipeline(SwitchSelector("id3"), LogitBoostClassifier(rounds=10))
     predicted = cross_val_predict(
         selected, grasp_set.switches, grasp_set.grasps, groups=grasp_set.subjects, cv=LeaveOneGroupOut()
     )

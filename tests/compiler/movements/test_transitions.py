@@ -42,16 +42,16 @@ def test_changes_are_arrows_between_separate_types_within_the_picture(
 ) -> None:
     found = Transitions.of(sequences, types)
     graph = graph_of(found)
-    assert [node.name for node in graph.nodes] == list(types)
+    assert [name for name, *_ in graph.nodes] == list(types)
     assert len(graph.edges) == np.count_nonzero(found.counts)
     for one in graph.nodes:
         for other in graph.nodes:
-            assert one is other or np.hypot(one.x - other.x, one.y - other.y) > 2 * graph.radius
-    for edge in graph.edges:
-        numbers = [float(number) for number in re.findall(r"-?\d+\.\d", f"{edge.path} {edge.tip}")]
+            assert one is other or np.hypot(one[1][0] - other[1][0], one[1][1] - other[1][1]) > 2 * graph.radius
+    for path, tip, _, _, words in graph.edges:
+        numbers = [float(number) for number in re.findall(r"-?\d+\.\d", f"{path} {tip}")]
         assert all(0 <= number <= SIZE for number in numbers)
-        assert re.search(r": \d+ of \d+ \(\d+%\)", edge.words)
-    assert [edge.width for edge in graph.edges] == sorted(edge.width for edge in graph.edges)
+        assert re.search(r": \d+ of \d+ \(\d+%\)", words)
+    assert [edge[2] for edge in graph.edges] == sorted(edge[2] for edge in graph.edges)
 
 
 def test_nothing_held_is_passed_over_and_what_is_written_is_read(

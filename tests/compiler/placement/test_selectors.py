@@ -16,7 +16,7 @@ from thenar.compiler import GraspSet, grow_id3
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.placement import place
 from thenar.compiler.placement.ports import PortCosts
-from thenar.compiler.placement.selectors import ID3Selector, SwitchSelector
+from thenar.compiler.placement.selectors import SwitchSelector
 from thenar.drivers.members import MemberError
 from thenar.runtime.recipe import Recipe
 
@@ -26,7 +26,7 @@ Make = Callable[..., GraspSet]
 # Some checks take positive inputs only: all switches are closed then, and scikit-learn warns that none is kept.
 @pytest.mark.filterwarnings("ignore:No features were selected")
 @parametrize_with_checks(
-    [ID3Selector(binarize=0.0), *(SwitchSelector(name, binarize=0.0) for name in ("cmim", "elimination"))]
+    [SwitchSelector("id3", binarize=0.0), *(SwitchSelector(name, binarize=0.0) for name in ("cmim", "elimination"))]
 )
 def test_scikit_learn_s_checks_pass_without_exception(estimator: BaseEstimator, check: Any) -> None:
     check(estimator)
@@ -64,7 +64,7 @@ def test_rows_in_which_nothing_is_held_place_no_switch(
 
 def test_id3_keeps_its_tree_and_what_each_switch_brought(data: tuple[Any, Any]) -> None:
     X, y = data
-    selector = ID3Selector(min_samples=50).fit(X, y)
+    selector = SwitchSelector("id3", min_samples=50).fit(X, y)
     tree = grow_id3(X, y, min_samples=50)
     assert selector.tree_.nodes == tree.nodes
     assert selector.classes_.tolist() == list(tree.classes)
@@ -83,8 +83,8 @@ def test_a_search_over_a_pipeline_finds_how_many_are_enough(data: tuple[Any, Any
 def test_numbers_become_bits_at_a_threshold_or_are_refused(data: tuple[Any, Any]) -> None:
     X, y = data
     pressure = np.where(X, 0.8, 0.1)
-    assert ID3Selector(binarize=0.5).fit(pressure, y).tree_ == ID3Selector().fit(X, y).tree_
-    for selector in (ID3Selector(), SwitchSelector(n_switches=2)):
+    assert SwitchSelector("id3", binarize=0.5).fit(pressure, y).tree_ == SwitchSelector("id3").fit(X, y).tree_
+    for selector in (SwitchSelector("id3"), SwitchSelector(n_switches=2)):
         with pytest.raises(ValueError, match=r"X holds 0\.[18] in row 0, column 0"):
             selector.fit(pressure, y)
         with pytest.raises(ValueError, match=r"X holds 7 in row \d+, column \d: neither 0 nor 1"):
@@ -100,7 +100,7 @@ def test_what_cannot_be_chosen_is_said(data: tuple[Any, Any]) -> None:
     assert len(SwitchSelector("cmim").fit(*data).order_) == 9
     for number in (-1, 2.5):
         with pytest.raises(ValueError, match=f"min_samples={number}: give a whole number of rows"):
-            ID3Selector(number).fit(*data)  # type: ignore[arg-type]
+            SwitchSelector("id3", min_samples=number).fit(*data)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="2 switches, the set has 9"):
         SwitchSelector("id3-cost", 3, ports=PortCosts((0, 0), (1.0,))).fit(*data)
 

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler.placement.counts import Counter, Digits
-from thenar.compiler.placement.gain import NodeCounts, best_position, compare_scores, gain_bits
+from thenar.compiler.placement.gain import CellCounter, NodeCounts, best_position, compare_scores, gain_bits
 
 LARGEST = "paper14_bits"
 SETS = ("bin14", "bin16", "bin3", "dup", "multi", LARGEST, "rare")
@@ -19,8 +18,7 @@ class Walk:
 
     def __init__(self, X: Any, y: Any) -> None:
         self.X, self.y, self.classes = X, y, int(y.max()) + 1
-        self.digits = Digits.from_matrix(X)
-        self.counter = Counter(self.digits, y, self.classes)
+        self.counter = CellCounter(X, y, self.classes)
         self.decisions = self.unique = 0
 
     def visit(self, weka: dict[str, Any], rows: Any) -> None:
@@ -34,7 +32,7 @@ class Walk:
             self.visit(child, rows[self.X[rows, weka["att"]] == value])
 
     def _decision(self, node: NodeCounts, taken: int) -> None:
-        columns = self.digits.columns
+        columns = self.counter.columns
         position = best_position(node, columns)
         assert position is not None
         best, theirs = node.table(position), node.table(columns.tolist().index(taken))
@@ -52,7 +50,7 @@ class Walk:
             return
         assert weka["leaf"] == int(np.argmax(totals))
         node = NodeCounts(totals, self.counter.count(rows), self.counter.starts)
-        position = best_position(node, self.digits.columns)
+        position = best_position(node, self.counter.columns)
         # Weka stops below 1e-6 bits.
         assert position is None or gain_bits(node.table(position)) < 1e-6
 
