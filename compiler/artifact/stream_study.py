@@ -201,8 +201,8 @@ def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Recipe]) -> tuple[
     for stream in streams_of(grasp_set):
         if stream.subject == subject:
             part = read.rows(stream.rows)
-            scores = tables.scores(part.switches, part.codes)
-            for name, (states, announced) in _decoded(scores, model, counts, tables.scale).items():
+            whole = tables.scores(part.switches, part.codes)
+            for name, (states, announced) in _decoded(whole, model, counts, tables.scale).items():
                 parts[name].append((stream.continued, part.labels, states, announced))
     return kind, subject, {name: score_streams(every, model.n_types) for name, every in parts.items()}
 
