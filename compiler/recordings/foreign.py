@@ -1,4 +1,4 @@
-"""Tables of other programs: spreadsheets, Parquet, HDF5 and MATLAB files, read by their libraries.
+"""Tables of other programs: spreadsheets, Parquet, HDF5, MATLAB and npz files, read by their libraries.
 
 They are read in a process with limits on memory and time, and returned as npz: so a file that claims a terabyte, that
 crashes a library or that never ends, ends in an error message. The process ends with the one that started it, and
@@ -20,13 +20,14 @@ from tempfile import TemporaryFile
 from typing import IO, Any
 
 import numpy as np
+from numpy.dtypes import StringDType
 from numpy.typing import NDArray
 
 from thenar.drivers.extras import missing
 from thenar.runtime.files import open_file
 from thenar.runtime.names import list_names, shortened
 
-from .arrays import AnyArray, arrays_in
+from .arrays import AnyArray
 from .errors import COLUMNS, LARGEST, ROWS, TableError
 from .headers import preface
 
@@ -70,12 +71,14 @@ def read_foreign(paths: Sequence[Path], skip: int | None = 0) -> Iterator[Foreig
             for path in paths:  # to know which
                 yield from read_foreign([path], skip)
             return
-        columns = arrays_in(paths[0].name, made, len(paths) * (COLUMNS + 3)) if os.fstat(made.fileno()).st_size else {}
-    count = len([name for name in columns if name.endswith(".rows")])
-    for number in range(count):
-        names, rows, skipped = (columns.pop(f"{number}.{name}") for name in ("names", "rows", "skip"))
-        found = {str(name): columns.pop(f"{number}.{place}") for place, name in enumerate(names)}
-        yield found, rows.astype(np.int64), int(skipped.astype(np.int64)[0])
+        # Written by the process from plain columns. Each is read as it is asked for.
+        made.seek(0)
+        arrays: Mapping[str, AnyArray] = np.load(made) if os.fstat(made.fileno()).st_size else {}
+        count = len([name for name in arrays if name.endswith(".rows")])
+        for number in range(count):
+            names, rows, skipped = (arrays[f"{number}.{name}"] for name in ("names", "rows", "skip"))
+            columns = {str(name): arrays[f"{number}.{place}"] for place, name in enumerate(names)}
+            yield columns, rows.astype(np.int64), int(skipped.astype(np.int64)[0])
     if refusal:
         raise TableError(f"{paths[count].name}: {refusal}")
 
@@ -207,6 +210,25 @@ def _cell(value: Any) -> object:
     return "" if not array.size else array.ravel()[0].item() if array.size == 1 else str(value)
 
 
+def _npz(path: Path, _skip: int | None) -> tuple[Columns, Sequence[int], int]:
+    found: Columns = {}
+    with path.open("rb") as file, np.lib.npyio.NpzFile(file) as arrays:
+        for name in arrays.files:
+            array = arrays[name]
+            if not isinstance(array, np.ndarray) or array.ndim not in (1, 2) or array.dtype.kind not in "biufSU":
+                shown = f"array {shortened(repr(name))} is not of numbers or text, in one or two dimensions"
+                raise TableError(f"{shown}: leave it out")
+            if array.dtype.kind == "S":
+                array = np.char.decode(array, "utf-8")
+            elif array.dtype.kind == "U":
+                array = array.astype(array.dtype.newbyteorder("="))
+                array.astype(StringDType())  # raises TypeError for characters that do not exist
+            parts = {f"{name}.{place}": part for place, part in enumerate(array.T)} if array.ndim > 1 else {name: array}
+            for column, part in parts.items():
+                _add(found, column, part)
+    return _even(found)
+
+
 def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int], int]:
     """Return the arrays as columns; those with one element are left out if others have more."""
     columns: Columns = {}
@@ -269,6 +291,7 @@ READERS: dict[str, tuple[str, str, Callable[[Path, int | None], tuple[Columns, S
     **dict.fromkeys((".xlsx", ".xls", ".ods"), ("a spreadsheet", "python_calamine", _spreadsheet)),
     ".parquet": ("Parquet", "pyarrow.parquet", _parquet),
     **dict.fromkeys((".h5", ".hdf5"), ("HDF5", "h5py", _hdf5)),
+    ".npz": ("npz", "numpy", _npz),
     ".mat": ("a MATLAB file", "scipy.io", _matlab),
 }
 

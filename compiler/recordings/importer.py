@@ -425,6 +425,7 @@ def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportRe
     table = _renamed(table, columns.rename)
     selection = select(columns, list(table.columns))
     readings, times_us, warnings, notes = read_cells(table, columns, selection)
+    table = replace(table, columns={})  # its cells were read: their memory is needed
     grasps, taxonomy, aliases = _labels(table, columns, readings)
     coded = [
         code_joint(name, entry, readings.joints[:, column], readings.rows)

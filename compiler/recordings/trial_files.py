@@ -18,7 +18,7 @@ from thenar.runtime.names import list_names, shortened
 
 from .columns import TextFormat
 from .errors import LARGEST, ROWS, FileRows, TableError, check_room
-from .table import SUFFIXES, Column, Table, TextColumn, read_tables
+from .table import SUFFIXES, Column, Table, is_numeric, read_tables
 from .trials import natural_key
 
 # The most files of a set.
@@ -173,13 +173,10 @@ def _check_alike(first: str, table: Table, other: str, its: Table) -> None:
 
 def _joined(parts: Sequence[Column]) -> Column:
     """Return the cells of a column in several files: as they are if all are text or all numbers, else as text."""
-    texts = [part for part in parts if isinstance(part, TextColumn)]
-    if len(texts) == len(parts):
-        return TextColumn.joined(texts)
     arrays = [np.asarray(part) for part in parts]
-    if len({array.dtype.kind == "U" for array in arrays}) == 1:
+    if len({*map(is_numeric, arrays)}) == 1:
         return np.concatenate(arrays)
-    return np.concatenate([array if array.dtype.kind == "U" else _written(array) for array in arrays])
+    return np.concatenate([_written(array) if is_numeric(array) else array for array in arrays])
 
 
 def _written(numbers: NDArray[np.generic]) -> NDArray[np.str_]:

@@ -19,7 +19,7 @@ from thenar.compiler.recordings.columns import ColumnRoles, JointColumns
 from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
-from thenar.compiler.recordings.table import read_table
+from thenar.compiler.recordings.table import Table, read_table
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 
 from ..finding import Case, Finding, Worst
@@ -188,17 +188,17 @@ def _complaints(folder: Path) -> Iterator[tuple[str, str, str]]:
             good = dict.fromkeys(heads, "1")
             rows = [list((good | bad).values()) for bad in ({}, {}, {column: cell}, {})]
             path = _csv(folder, rows, heads)
-            yield f"{column} {cell!r} as text", _complaint(path, entry), f"row 4 {column!r} ({cell!r})"
+            yield f"{column} {cell!r} as text", _complaint(read_table(path), entry), f"row 4 {column!r} ({cell!r})"
     for column in heads:
         for number in NO_FLOATS:
             arrays = {head: np.array([1.0, 1.0, number if head == column else 1.0, 1.0]) for head in heads}
-            np.savez(folder / "table.npz", **arrays)  # type: ignore[arg-type]  # typeshed takes arrays for flags
-            yield f"{column} {number}", _complaint(folder / "table.npz", degrees), f"row 3 {column!r} ('{number}')"
+            complaint = _complaint(Table("arrays", arrays, np.arange(1, 5)), degrees)
+            yield f"{column} {number}", complaint, f"row 3 {column!r} ('{number}')"
 
 
-def _complaint(path: Path, entry: JointColumns) -> str:
+def _complaint(table: Table, entry: JointColumns) -> str:
     try:
-        import_table(read_table(path), _columns(entry, trial="trial"))
+        import_table(table, _columns(entry, trial="trial"))
     except TableError as complaint:
         return str(complaint)
     return "no error"
