@@ -75,14 +75,14 @@ def _print(summary: "Summary", path: Path) -> None:
 
 def _print_counts(summary: "Summary") -> None:
     grasps = table(("grasp type", "frames", "share"), ("frames", "share"), "Grasp types")
-    for grasp in summary.grasps:
-        grasps.add_row(grasp.name, str(grasp.frames), f"{grasp.frames / summary.frames:.1%}")
+    for grasp, frames in summary.grasps.items():
+        grasps.add_row(grasp, str(frames), f"{frames / summary.frames:.1%}")
     if summary.none:
         grasps.add_row(NONE, str(summary.none), f"{summary.none / summary.frames:.1%}")
     out().print(grasps)
     echo(f"balance (rarest type over commonest): {summary.balance:.2f}")
     for what, counts in (("subjects", summary.subjects), ("objects", summary.objects)):
-        echo(f"{what}: " + ", ".join(f"{count.name} ({count.frames})" for count in counts))
+        echo(f"{what}: " + ", ".join(f"{name} ({frames})" for name, frames in counts.items()))
 
 
 def _print_ranges(kind: str, ranges: "Sequence[JointRange]") -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
 import msgspec
+import tomli_w
 
 from thenar.runtime.names import LONGEST_NAME, nearest, shortened
 from thenar.runtime.toml_source import read_source
@@ -183,6 +184,10 @@ class ColumnRoles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
         """The columns named by this key."""
         value: str | tuple[str, ...] | None = getattr(self, key)
         return (value,) if isinstance(value, str) else value or ()
+
+    def toml(self) -> str:
+        """Return the text of the columns.toml."""
+        return tomli_w.dumps(msgspec.to_builtins(self))
 
     @property
     def text(self) -> TextFormat:

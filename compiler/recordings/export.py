@@ -4,13 +4,12 @@ import csv
 import glob
 import gzip
 import io
-import json
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +18,13 @@ from thenar.drivers.extras import optional
 from thenar.runtime.files import write_atomically
 
 from ..text import cell, cells
+from .columns import KEYS, CalibrationPoints, ColumnRoles, JointColumns, TaxelColumns
 from .errors import TableError
 from .graspset import GraspSet, Joint
 from .taxonomy import is_published
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-_KEYS = ("label", "subject", "object", "session", "trial", "time")
 
 
 def heads_of(grasp_set: GraspSet) -> dict[str, str]:
@@ -37,7 +34,7 @@ def heads_of(grasp_set: GraspSet) -> dict[str, str]:
     has that name.
     """
     inputs = {*grasp_set.element_names, *grasp_set.joint_names}
-    heads = dict(zip(_KEYS, ("grasp", *_KEYS[1:-1], "time_us"), strict=True))
+    heads = dict(zip(KEYS, ("grasp", *KEYS[1:-1], "time_us"), strict=True))
     for key in heads:
         while heads[key] in inputs:
             heads[key] += "_"
@@ -50,7 +47,7 @@ def meta_of(grasp_set: GraspSet) -> dict[str, NDArray[np.generic]]:
     There is a session only if the set has several, a time only if it is known, and a trial only if rows are not
     independent.
     """
-    found = {key: getattr(grasp_set, f"{key}s" if key != "time" else "times_us") for key in _KEYS[1:]}
+    found = {key: getattr(grasp_set, f"{key}s" if key != "time" else "times_us") for key in KEYS[1:]}
     absent = {"time"} if not grasp_set.times_us.size else set()
     absent |= {"trial"} if grasp_set.independent else set()
     absent |= {"session"} if not (grasp_set.sessions != "1").any() else set()
@@ -65,55 +62,36 @@ def types_of(grasp_set: GraspSet) -> tuple[str, ...]:
 def columns_of(grasp_set: GraspSet, codes: bool = False) -> str:
     """Return the text of the columns.toml that imports the exported table again; `codes` as in `export`."""
     heads, taxonomy = heads_of(grasp_set), grasp_set.taxonomy
-    lines = [f"label = {_text(heads['label'])}"]
-    lines += [f"{key} = {_text(heads[key])}" for key in meta_of(grasp_set)]
-    if grasp_set.times_us.size:
-        lines.append('time_unit = "us"')
-    if grasp_set.independent:
-        lines.append('frames = "independent"')
-    if grasp_set.simulated:
-        lines.append(f"simulated = {_text(grasp_set.simulated)}")
-    types = _text(taxonomy.name) if is_published(taxonomy) else _list(taxonomy.types)
-    named = is_published(taxonomy) or taxonomy.name == "own"
-    lines.append(f"taxonomy = {types if named else f'{{ {_text(taxonomy.name)} = {types} }}'}")
-    if grasp_set.switch_names:
-        lines.append(f"switches = {_globs(grasp_set.switch_names)}")
-    for joints in _alike(grasp_set.joints):
-        lines += ["", "[[joints]]", *_entry(joints, codes)]
-    for taxels in _alike(grasp_set.taxel_columns):
-        lines += ["", "[[taxels]]", *_entry(taxels, codes)]
-    return "\n".join([*lines, ""])
+    types = taxonomy.types if taxonomy.name == "own" else {taxonomy.name: taxonomy.types}
+    roles = ColumnRoles(
+        label=heads["label"],
+        **{key: heads[key] for key in meta_of(grasp_set)},  # type: ignore[arg-type]
+        time_unit="us" if grasp_set.times_us.size else None,
+        frames="independent" if grasp_set.independent else None,
+        simulated=grasp_set.simulated,
+        taxonomy=taxonomy.name if is_published(taxonomy) else types,
+        switches=tuple(map(glob.escape, grasp_set.switch_names)),
+        joints=_entries(JointColumns, grasp_set.joints, codes),
+        taxels=_entries(TaxelColumns, grasp_set.taxel_columns, codes),
+    )
+    return roles.toml()
 
 
-def _entry(joints: list[Joint], codes: bool) -> list[str]:
-    """Return the entry of joints, or of taxels, with the same calibration."""
-    joint = joints[0]
-    points = {key: getattr(joint, key) for key in ("code_a", "value_a", "code_b", "value_b")}
-    calibration = ", ".join(f"{key} = {number!r}" for key, number in points.items())
-    return [
-        f"columns = {_globs(joint.name for joint in joints)}",
-        f"unit = {_text(joint.unit)}",
-        *(["codes = true"] if codes else []),
-        f"calibration = {{ {calibration} }}",
-    ]
+_Entry = TypeVar("_Entry", JointColumns, TaxelColumns)
 
 
-def _alike(joints: Iterable[Joint]) -> Iterable[list[Joint]]:
-    """Group neighbours with the same calibration; only neighbours, since their order is the order of the codes."""
-    return (list(group) for _, group in groupby(joints, key=lambda joint: replace(joint, name="any")))
-
-
-def _text(text: str) -> str:
-    # JSON's escapes are valid in TOML.
-    return json.dumps(text, ensure_ascii=False)
-
-
-def _list(texts: Iterable[str]) -> str:
-    return f"[{', '.join(map(_text, texts))}]"
-
-
-def _globs(names: Iterable[str]) -> str:
-    return _list(map(glob.escape, names))
+def _entries(kind: type[_Entry], joints: Iterable[Joint], codes: bool) -> tuple[_Entry, ...]:
+    """Return an entry for neighbours with the same calibration: their order is the order of the codes."""
+    alike = (list(group) for _, group in groupby(joints, key=lambda joint: replace(joint, name="any")))
+    return tuple(
+        kind(
+            tuple(glob.escape(joint.name) for joint in group),
+            unit=group[0].unit,
+            codes=codes,
+            calibration=CalibrationPoints(group[0].code_a, group[0].value_a, group[0].code_b, group[0].value_b),
+        )
+        for group in alike
+    )
 
 
 # The formats of an export.

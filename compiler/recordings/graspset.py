@@ -13,8 +13,7 @@ times     (n,) int64                microseconds; only where they are known, and
 """
 
 import hashlib
-from dataclasses import dataclass, field
-from html import escape
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self, TypeVar
 
@@ -255,20 +254,6 @@ class GraspSet:
         who = f"{read}, {subjects} subjects, {objects} objects"
         return f"GraspSet: {what}, {who}" + (f"\nsimulated: {shortened(self.simulated)}" if self.simulated else "")
 
-    def _repr_html_(self) -> str:
-        """Return the representation in a notebook: the line, and trials and frames of each grasp type."""
-        first = np.unique(self.trial_ids, return_index=True)[1]
-        counts = (
-            np.bincount(labels, minlength=len(self.taxonomy.names)) for labels in (self.labels[first], self.labels)
-        )
-        body = "".join(
-            f"<tr><td>{escape(name)}</td><td>{trials}</td><td>{rows}</td></tr>"
-            for name, trials, rows in zip(self.taxonomy.names, *counts, strict=True)
-            if rows or name in self.taxonomy.types
-        )
-        head = "<tr><th>grasp type</th><th>trials</th><th>frames</th></tr>"
-        return f"<p>{escape(repr(self)).replace(chr(10), '<br>')}</p><table>{head}{body}</table>"
-
     @property
     def joint_names(self) -> tuple[str, ...]:
         """The joints' names, in the order of `codes`."""
@@ -340,23 +325,9 @@ class GraspSet:
         """Return the set of the rows selected by `index` (numbers or a mask of n), in that order."""
         pick = np.asarray(index)
         pick = pick if pick.size else pick.astype(np.intp)
-        return GraspSet(
-            switches=self.switches[pick],
-            switch_names=self.switch_names,
-            codes=self.codes[pick],
-            joints=self.joints,
-            grasps=self.grasps[pick],
-            taxonomy=self.taxonomy,
-            subjects=self.subjects[pick],
-            objects=self.objects[pick],
-            trials=self.trials[pick],
-            simulated=self.simulated,
-            sessions=self.sessions[pick],
-            independent=self.independent,
-            taxels=self.taxels[pick],
-            taxel_columns=self.taxel_columns,
-            times_us=self.times_us[pick] if self.times_us.size else self.times_us,
-        )
+        rowed = ("switches", "codes", "taxels", "grasps", "subjects", "objects", "sessions", "trials")
+        picked = {name: getattr(self, name)[pick] for name in rowed}
+        return replace(self, **picked, times_us=self.times_us[pick] if self.times_us.size else self.times_us)
 
     def fingerprint(self) -> str:
         """Return the SHA-256 of the content, in hex: equal for equal sets, independent of file and machine."""

@@ -6,7 +6,6 @@ from typing import Literal
 
 import msgspec
 import numpy as np
-import tomli_w
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
@@ -49,9 +48,7 @@ class ColumnProposal(msgspec.Struct, frozen=True):
         """Return the text of the columns.toml, with the reasons."""
         said = [*self.remarks, *(f"{listed(role.columns)}: {role.role}: {role.reason}" for role in self.roles)]
         said += [f"TO DO: {self.lacks}"] if self.lacks else []
-        return (
-            "".join(f"# {printable(line)}\n" for line in said) + "\n" + tomli_w.dumps(msgspec.to_builtins(self.columns))
-        )
+        return "".join(f"# {printable(line)}\n" for line in said) + "\n" + self.columns.toml()
 
 
 def propose_file(path: Path, progress: Report = lambda _done, _total: None) -> tuple[Table, ColumnProposal]:

@@ -3,7 +3,7 @@
 import codecs
 import csv
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -94,27 +94,17 @@ def _dialect(lines: Iterable[str]) -> tuple[str, str]:
 
 def _rows(lines: Sequence[str], delimiter: str, quote: str) -> tuple[list[list[str]], list[int]]:
     """Return the rows in `lines` that are not empty, and how many lines precede each."""
+    reader = csv_rows(lines, delimiter or "\0", quote or '"', strict=False)
     rows: list[list[str]] = []
     starts: list[int] = []
-    cells = 0
-    for start, row in _parsed(lines, delimiter, quote):
-        rows.append(named_by_comment([cell.strip() for cell in row], delimiter))
-        starts.append(start)
-        cells += len(row)
-        if cells > _CELLS:
-            break
-    return rows, starts
-
-
-def _parsed(lines: Sequence[str], delimiter: str, quote: str) -> Iterator[tuple[int, list[str]]]:
-    reader = csv_rows(lines, delimiter or "\0", quote or '"', strict=False)
-    while True:
+    row: list[str] | None = []
+    while row is not None and sum(map(len, rows)) <= _CELLS:
         start = reader.line_num
         try:
             row = next(reader, None)
         except csv.Error:
             continue
-        if row is None:
-            return
         if row:
-            yield start, row
+            rows.append(named_by_comment([cell.strip() for cell in row], delimiter))
+            starts.append(start)
+    return rows, starts

@@ -165,18 +165,18 @@ def read_tables(paths: Sequence[Path], text: TextFormat = PLAIN) -> Iterator[Tab
         foreign = read_foreign(batch, text.skip) if is_foreign else None
         for path in batch:
             try:
-                table = _read_ours(path, text) if foreign is None else _of_foreign(path, *next(foreign))
+                if foreign is None:
+                    table = _read_ours(path, text)
+                else:
+                    read, rows, skip = next(foreign)
+                    check_names("column", read)
+                    table = Table(path.name, read, rows, skip=skip)
                 columns = unlisted(table.what, table.columns, table.rows)
             except RecordingError as reason:
                 raise TableError(f"{path.name}: {reason}") from reason
             if not len(table.rows):
                 raise TableError(f"{path.name} has no rows")
             yield replace(table, columns=columns, size=path.stat().st_size)
-
-
-def _of_foreign(path: Path, columns: dict[str, AnyArray], rows: NDArray[np.int64], skip: int) -> Table:
-    check_names("column", columns)
-    return Table(path.name, columns, rows, skip=skip)
 
 
 def _read_ours(path: Path, text: TextFormat) -> Table:
