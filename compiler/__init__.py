@@ -38,8 +38,7 @@ if TYPE_CHECKING:
     from .placement.placement import Placement, place
     from .placement.selectors import ID3Selector, SwitchSelector
     from .recordings.columns import ColumnRoles
-    from .recordings.dataframes import from_dataframe
-    from .recordings.export import to_dataframe
+    from .recordings.export import from_dataframe, to_dataframe
     from .recordings.graspset import GraspSet, Joint
     from .recordings.merging import merge, split
     from .samples import Samples
@@ -74,8 +73,7 @@ _HOMES = {
     ".placement.placement": ("Placement", "place"),
     ".placement.selectors": ("ID3Selector", "SwitchSelector"),
     ".recordings.columns": ("ColumnRoles",),
-    ".recordings.dataframes": ("from_dataframe",),
-    ".recordings.export": ("to_dataframe",),
+    ".recordings.export": ("from_dataframe", "to_dataframe"),
     ".recordings.graspset": ("GraspSet", "Joint"),
     ".recordings.merging": ("merge", "split"),
     ".samples": ("Samples",),

@@ -23,13 +23,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from thenar.runtime.errors import SealError
 from thenar.runtime.files import read_file, write_atomically
-from thenar.runtime.names import shortened
+from thenar.runtime.names import LONGEST_NAME, fault, shortened
 from thenar.runtime.nesting import check_json
 from thenar.runtime.sealed import seal, unseal
 
 from ..text import counted, trials_of_frames
 from .arrays import AnyArray, pack, unpack
-from .errors import LARGEST, RecordingError, check_names, check_room, check_simulated
+from .errors import LARGEST, RecordingError, check_names, check_room
 from .taxonomy import Taxonomy
 from .trials import groups
 
@@ -214,7 +214,8 @@ class GraspSet:
             object.__setattr__(self, "trials", np.ones(rows, np.int64))
             self.trials.setflags(write=False)
         self._freeze("times_us", np.int64, (rows if self.times_us.size else 0,))
-        check_simulated(self.simulated)
+        if self.simulated and (reason := fault(self.simulated, 2 * LONGEST_NAME)):
+            raise RecordingError(f"simulated {shortened(repr(self.simulated))} {reason}")
         object.__setattr__(self, "labels", self._label())
         self.labels.setflags(write=False)
 
@@ -382,7 +383,8 @@ VERSION = 2
 MOST = 10_000_000
 
 _DTYPES = {"switches": "u1", "codes": "<u2", "taxels": "<u2", "trials": "<i8", "times": "<i8"}
-_DTYPES |= dict.fromkeys(("grasps", "subjects", "objects", "sessions"), "<u4")
+_TEXTS = ("subjects", "objects", "sessions")
+_DTYPES |= dict.fromkeys(("grasps", *_TEXTS), "<u4")
 
 AnyGraspSet = TypeVar("AnyGraspSet", bound=GraspSet)
 
@@ -402,19 +404,17 @@ class _Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
 
 
 def _pack(grasp_set: GraspSet) -> bytes:
-    subjects, subject = np.unique(grasp_set.subjects, return_inverse=True)
-    objects, object_ = np.unique(grasp_set.objects, return_inverse=True)
-    sessions, session = np.unique(grasp_set.sessions, return_inverse=True)
-    several = sessions.tolist() != ["1"]
+    texts = {name: np.unique(getattr(grasp_set, name), return_inverse=True) for name in _TEXTS}
+    subjects, objects, sessions = (tuple(names.tolist()) for names, _ in texts.values())
     header = _Header(
         rows=len(grasp_set),
         switches=grasp_set.switch_names,
         joints=grasp_set.joints,
         taxonomy=grasp_set.taxonomy,
-        subjects=tuple(subjects.tolist()),
-        objects=tuple(objects.tolist()),
+        subjects=subjects,
+        objects=objects,
         simulated=grasp_set.simulated,
-        sessions=tuple(sessions.tolist()) if several else (),
+        sessions=sessions if sessions != ("1",) else (),
         independent=grasp_set.independent,
         taxels=grasp_set.taxel_columns,
         times=grasp_set.times_us.size > 0,
@@ -423,12 +423,12 @@ def _pack(grasp_set: GraspSet) -> bytes:
         "switches": np.packbits(grasp_set.switches, axis=1),
         "codes": grasp_set.codes,
         "grasps": grasp_set.labels,
-        "subjects": subject,
-        "objects": object_,
+        "subjects": texts["subjects"][1],
+        "objects": texts["objects"][1],
         "trials": grasp_set.trials,
     }
     if header.sessions:
-        arrays["sessions"] = session
+        arrays["sessions"] = texts["sessions"][1]
     if header.taxels:
         arrays["taxels"] = grasp_set.taxels
     if header.times:

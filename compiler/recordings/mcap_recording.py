@@ -34,8 +34,7 @@ from .coding import CodingCost, code_joint
 from .columns import CalibrationPoints, JointColumns
 from .errors import ColumnsError, TableError, list_rows
 from .graspset import CODES, GraspSet, Joint
-from .importer import ImportReport, import_file, import_table, report_of
-from .propose import propose_file
+from .importer import ImportReport, import_file, report_of
 from .summary import Oddity, find_oddities
 from .taxonomy import Taxonomy
 from .trial_files import Report
@@ -95,10 +94,8 @@ def import_files(
     """Import one table with the columns.toml in file `columns`, or self-describing recordings.
 
     A path with fields in braces, such as data/{label}_{trial}.csv, is a table in many files; `progress` takes how many
-    of how many were read.
-    Recordings are imported as a `stream` or trial by trial. Without `columns`, the roles of a table's columns are found
-    from their names and values. Raises TableError, ColumnsError, RecordingError or McapError naming file, rows and
-    columns, and OSError.
+    of how many were read. Recordings are imported as a `stream` or trial by trial. Raises TableError, ColumnsError,
+    RecordingError or McapError naming file, rows and columns, and OSError.
     """
     if all(path.suffix.lower() == ".mcap" for path in paths):
         if columns is not None:
@@ -114,10 +111,7 @@ def import_files(
             "name the pattern of their paths, such as 'data/{label}_{trial}.csv'"
         )
     if columns is None:
-        table, proposal = propose_file(paths[0], progress)
-        if proposal.lacks:
-            raise ColumnsError(f"{paths[0].name}: {proposal.lacks}, in a columns.toml")
-        return import_table(table, proposal.columns)
+        raise ColumnsError(f"{paths[0].name}: name the columns.toml that says what its columns are")
     return import_file(paths[0], columns, progress)
 
 

@@ -340,7 +340,6 @@ def _unquote(where: str, value: str) -> str:
 # A list as pandas and numpy write it, with commas or blanks, and a number of numpy in it.
 _LIST = re.compile(r"[\[(](.*)[\])]", re.DOTALL)
 _SCALAR = re.compile(r"np\.\w+\(([^()]*)\)")
-_LISTS = 1 << 14
 
 
 def unlisted(what: str, columns: Mapping[str, Column], rows: NDArray[np.int64]) -> dict[str, Column]:
@@ -370,22 +369,19 @@ def unlisted(what: str, columns: Mapping[str, Column], rows: NDArray[np.int64]) 
 
 def _of_lists(where: str, column: Column, rows: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the numbers (n, k) of lists of k, NaN for missing ones. Raises TableError."""
-    cells = ((row, str(cell)) for row, cell in enumerate(column))
-    first_row, first = next((row, found) for row, cell in cells if (found := _list_of(cell)))
-    parts = [np.full((first_row, len(first)), np.nan), np.array([first])]
-    while piece := list(islice(cells, _LISTS)):
-        lists = []
-        for row, cell in piece:
-            found = _list_of(cell) if cell.strip() else []
-            if found is None:
-                shown = f"but row {rows[row]} has {shortened(repr(cell))}: write each list whole"
-                raise TableError(f"{where} holds lists of numbers, {shown}")
-            if len(found) not in (0, len(first)):
-                shown = f"{len(first)} in row {rows[first_row]} and {len(found)} in row {rows[row]}"
-                raise TableError(f"{where} holds lists of unequal lengths, {shown}: write lists of one length")
-            lists.append(found or [np.nan] * len(first))
-        parts.append(np.array(lists))
-    return np.concatenate(parts)
+    first, width = next((row, len(cells)) for row, cell in enumerate(column) if (cells := _list_of(str(cell))))
+    numbers = np.full((len(column), width), np.nan)
+    for row, cell in enumerate(map(str, column)):
+        cells = _list_of(cell) if cell.strip() else []
+        if cells is None:
+            shown = f"but row {rows[row]} has {shortened(repr(cell))}: write each list whole"
+            raise TableError(f"{where} holds lists of numbers, {shown}")
+        if len(cells) not in (0, width):
+            shown = f"{width} in row {rows[first]} and {len(cells)} in row {rows[row]}"
+            raise TableError(f"{where} holds lists of unequal lengths, {shown}: write lists of one length")
+        if cells:
+            numbers[row] = cells
+    return numbers
 
 
 def _list_of(cell: str) -> list[float] | None:
