@@ -194,7 +194,11 @@ def to_dataframe(grasp_set: GraspSet, codes: bool = False) -> "pd.DataFrame":
 def to_arff(grasp_set: GraspSet, codes: bool = False, meta: bool = False) -> str:
     """Return the set as ARFF: switches nominal {0,1}, joints numeric, the grasp type nominal and last."""
     heads, who = heads_of(grasp_set), meta_of(grasp_set) if meta else {}
-    attributes = [f"{_quote(heads[key])} {_kind(column)}" for key, column in who.items()]
+    kinds = {
+        key: _nominal(np.unique(column).tolist()) if column.dtype.kind == "U" else "numeric"
+        for key, column in who.items()
+    }
+    attributes = [f"{_quote(heads[key])} {kind}" for key, kind in kinds.items()]
     attributes += [f"{_quote(name)} {{0,1}}" for name in grasp_set.switch_names]
     attributes += [f"{_quote(joint.name)} numeric" for joint, _ in _coded(grasp_set)]
     attributes.append(f"{_quote(heads['label'])} {_nominal(types_of(grasp_set))}")
@@ -204,27 +208,19 @@ def to_arff(grasp_set: GraspSet, codes: bool = False, meta: bool = False) -> str
     return "\n".join([*lines, *map(",".join, rows), ""])
 
 
-def _kind(column: NDArray[np.generic]) -> str:
-    return _nominal(np.unique(column).tolist()) if column.dtype.kind == "U" else "numeric"
-
-
 def _inputs(grasp_set: GraspSet, codes: bool) -> Iterable[Sequence[str]]:
     """Yield the cells of each switch, taxel and joint."""
     for switch in grasp_set.switches.T:
         yield ["1" if bit else "0" for bit in switch.tolist()]
     for joint, column in _coded(grasp_set):
-        yield [str(code) for code in column.tolist()] if codes else _values(joint, column.tolist())
+        # Twelve digits distinguish any two codes of a Joint, and hide the last bits of the arithmetic.
+        yield list(map(str, column.tolist())) if codes else [f"{value:.12g}" for value in joint.value(column).tolist()]
 
 
 def _coded(grasp_set: GraspSet) -> Iterable[tuple[Joint, NDArray[np.uint16]]]:
     """Yield the taxels and then the joints, each with its codes (n,)."""
     yield from zip(grasp_set.taxel_columns, grasp_set.taxels.T, strict=True)
     yield from zip(grasp_set.joints, grasp_set.codes.T, strict=True)
-
-
-def _values(joint: Joint, codes: list[int]) -> list[str]:
-    # Twelve digits distinguish any two codes of a Joint, and hide the last bits of the arithmetic.
-    return [f"{value:.12g}" for value in joint.value(codes).tolist()]
 
 
 def _nominal(names: Iterable[str]) -> str:

@@ -10,7 +10,7 @@ was not calibrated, otherwise half degrees on one scale for all subjects. Taxels
 drift of their baselines; if they were calibrated, all counts are converted to the first calibration.
 """
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -153,15 +153,12 @@ def _parts(reader: Reader, stream: bool) -> list[_Part]:
     parts: list[_Part] = []
     for watch in _watched(reader, stream):
         if watch.undone:
-            parts = [_without(part, watch.undone) for part in parts]
+            kept = (tuple(row for row in part.grasps if row.label.trial not in watch.undone) for part in parts)
+            parts = [replace(part, grasps=grasps) for part, grasps in zip(parts, kept, strict=True)]
         collection = watch.session.collection
         if collection is not None and (rows := _streamed(watch, collection) if stream else watch.rows()):
             parts.append(_Part(reader.path.name, watch.session, collection, rows))
     return [part for part in parts if part.grasps]
-
-
-def _without(part: _Part, trials: Set[int]) -> _Part:
-    return replace(part, grasps=tuple(grasp for grasp in part.grasps if grasp.label.trial not in trials))
 
 
 def _watched(reader: Reader, stream: bool) -> Iterator["_Watch"]:
@@ -233,18 +230,15 @@ class _Watch:
             accepted = label.event == "accepted" and label.trial == before.trial
             self.attempts[-1].accepted, self.attempts[-1].judged_us = accepted, label.time_us
         elif label.event == "undone":
-            self._undo(label.trial)
+            same = [each for each in self.attempts if each.accepted and each.captured.label.trial == label.trial]
+            if same:
+                same[-1].accepted = False
+            else:
+                self.undone.add(label.trial)
         if self._stream:
             self._due_us = label.time_us if self._due_us is None else self._due_us
         elif label.event != "begun":
             self._due_us = None
-
-    def _undo(self, trial: int) -> None:
-        here = [attempt for attempt in self.attempts if attempt.accepted and attempt.captured.label.trial == trial]
-        if here:
-            here[-1].accepted = False
-        else:
-            self.undone.add(trial)
 
     def _tick(self, until_us: int) -> None:
         """Add the rows that are due before `until_us`, while devices are read."""

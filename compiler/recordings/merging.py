@@ -68,8 +68,13 @@ def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
         name: np.concatenate([getattr(found, name) for found in own])
         for name in ("grasps", "subjects", "objects", "sessions", "trials")
     }
+    places = [dict(zip(found.switch_names, range(len(found.switch_names)), strict=True)) for found in own]
+    switches = [
+        found.switches[:, [place[name] for name in first.switch_names]]
+        for found, place in zip(own, places, strict=True)
+    ]
     return GraspSet(
-        switches=np.concatenate([found.switches[:, _places(first.switch_names, found.switch_names)] for found in own]),
+        switches=np.concatenate(switches),
         switch_names=first.switch_names,
         codes=codes,
         joints=joints,
@@ -248,11 +253,6 @@ def _moved(name: str, line: Joint, own: Joint, codes: NDArray[np.uint16]) -> NDA
     if moved.max(initial=0) >= CODES:
         raise RecordingError(f"{name}: {shortened(line.name)} gets codes above {CODES - 1}: import with a coarser grid")
     return moved
-
-
-def _places(wanted: tuple[str, ...], names: tuple[str, ...]) -> list[int]:
-    place = {name: number for number, name in enumerate(names)}
-    return [place[name] for name in wanted]
 
 
 def _origin(sets: list[GraspSet]) -> str:

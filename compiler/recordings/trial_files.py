@@ -241,7 +241,7 @@ def propose_pattern(folder: Path) -> tuple[Path, list[str]]:
     inside = read_table(first, sniff(first)[0] if is_text(first) else PLAIN._replace(skip=None)).columns
     names = _named([part for level in levels for part in level if isinstance(part, _Part)], [*inside])
     pattern = "/".join(
-        "".join(f"{{{names[part.texts]}}}" if isinstance(part, _Part) else _plain(part) for part in level)
+        "".join(f"{{{names[part.texts]}}}" if isinstance(part, _Part) else re.sub(r"[{}]", "*", part) for part in level)
         for level in levels
     )
     remarks = [f"{len(paths)} files as {folder / pattern}"]
@@ -338,8 +338,3 @@ def _is_label(part: _Part) -> bool:
     """Return whether the texts of a part are known as names of grasps."""
     texts = {*part.texts}
     return published_for(texts) is not None or any(plain(text) in _LABELS for text in texts)
-
-
-def _plain(text: str) -> str:
-    """Return `text` for a pattern, in which braces are no letters."""
-    return re.sub(r"[{}]", "*", text)
