@@ -74,7 +74,7 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream
 
 def _pattern(folder: Path) -> Path:
     """Return the pattern of the tables in a folder, and say what it is."""
-    from thenar.compiler.recordings.folders import propose_pattern
+    from thenar.compiler.recordings.trial_files import propose_pattern
 
     pattern, remarks = propose_pattern(folder)
     for remark in remarks:

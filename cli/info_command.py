@@ -57,13 +57,13 @@ def _print(summary: "Summary", path: Path) -> None:
         echo(f"simulated: {summary.simulated}")
     if summary.independent:
         echo(INDEPENDENT)
-    counts = [(grasp.name, grasp.frames) for grasp in summary.grasps]
+    counts = [*summary.grasps.items()]
     counts += [(NONE, summary.none)] if summary.none else []
     rows = ((name, str(frames), f"{frames / summary.frames:.1%}") for name, frames in counts)
     out().print(table(("grasp type", "frames", "share"), ("frames", "share"), "Grasp types", rows))
     echo(f"balance (rarest type over commonest): {summary.balance:.2f}")
     for what, people in (("subjects", summary.subjects), ("objects", summary.objects)):
-        echo(f"{what}: " + ", ".join(f"{count.name} ({count.frames})" for count in people))
+        echo(f"{what}: " + ", ".join(f"{name} ({frames})" for name, frames in people.items()))
     for kind, ranges in (("taxel", summary.taxels), ("joint", summary.joints)):
         if ranges:
             numbers = ("least", "largest", "distinct codes")

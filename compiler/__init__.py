@@ -39,8 +39,7 @@ if TYPE_CHECKING:
     from .placement.placement import Placement, place
     from .placement.selectors import SwitchSelector
     from .recordings.columns import ColumnRoles
-    from .recordings.dataframes import from_dataframe
-    from .recordings.export import to_dataframe
+    from .recordings.export import from_dataframe, to_dataframe
     from .recordings.graspset import GraspSet, Joint
     from .recordings.merging import merge, split
     from .samples import Samples
@@ -76,8 +75,7 @@ _HOMES = {
     ".placement.placement": ("Placement", "place"),
     ".placement.selectors": ("SwitchSelector",),
     ".recordings.columns": ("ColumnRoles",),
-    ".recordings.dataframes": ("from_dataframe",),
-    ".recordings.export": ("to_dataframe",),
+    ".recordings.export": ("from_dataframe", "to_dataframe"),
     ".recordings.graspset": ("GraspSet", "Joint"),
     ".recordings.merging": ("merge", "split"),
     ".samples": ("Samples",),

@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import compress
@@ -18,13 +17,12 @@ from .arrays import AnyArray
 from .errors import check_room
 from .graspset import CODES
 from .headers import MISSING_NUMBERS
-from .table import Column, pieces
+from .table import Column, is_numeric, pieces
 
 MISSING_NAMES = frozenset({"", "?"})
 
 _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?")
 _BITS = {"true": 1.0, "false": 0.0}
-_PIECE = 1 << 14
 
 Value = TypeVar("Value", bound=np.generic)
 
@@ -71,7 +69,7 @@ def times(column: Column, decimal: str = ".") -> Parsed[np.float64]:
     microseconds since 1970; missing as in `numbers`, wrong: anything else.
     """
     parsed = numbers(column, decimal)
-    if not parsed.wrong.any() or (isinstance(column, np.ndarray) and column.dtype.kind != "U"):
+    if not parsed.wrong.any() or is_numeric(column):
         return parsed
     texts = [text.strip().removesuffix("Z") for piece in pieces(column) for text in piece]
     if not all(map(_DATE.fullmatch, compress(texts, (~parsed.missing).tolist()))):
@@ -91,33 +89,19 @@ def names(column: Column, cells: bool = False, size: int = 0) -> Parsed[np.str_]
     infinity, which is wrong. Integers are written without decimals: 3, not 3.0. Raises RecordingError if the names are
     too long for the number of rows of a file of `size` bytes.
     """
-    missing, wrong = (np.zeros(len(column), np.bool_) for _ in range(2))
-    found: list[NDArray[np.str_]] = []
-    start = longest = 0
-    for texts, faulty in _names(column, cells):
-        longest = max(longest, *map(len, texts))
-        check_room(len(column), longest, size)
-        found.append(np.array(texts, np.str_))
-        end = start + len(texts)
-        for mask, these in (missing, MISSING_NAMES), (wrong, faulty):
-            if not these.isdisjoint(texts):
-                mask[start:end] = [text in these for text in texts]
-        start = end
-    return Parsed(np.concatenate(found) if found else np.zeros(0, np.str_), missing, wrong)
-
-
-def _names(column: Column, cells: bool) -> Iterator[tuple[list[str], set[str]]]:
-    """Yield the names in a column, piece by piece, with the wrong ones of each piece."""
-    if isinstance(column, np.ndarray) and column.dtype.kind != "U":
+    if is_numeric(column):
         values = _floats(column)
-        for start in range(0, len(values), _PIECE):
-            texts = list(map(_name_of_number, values[start : start + _PIECE].tolist()))
-            yield texts, {text for text in texts if text.endswith("inf")}
-        return
-    for piece in pieces(column):
-        texts = [text_of(cell.strip()) if cells else cell.strip() for cell in piece]
-        # Looked up as str: an array would lose NULs at the ends.
-        yield texts, {text for text in {*texts} - MISSING_NAMES if fault(text)}
+        texts = list(map(_name_of_number, values.tolist()))
+        faulty = {"inf", "-inf"}
+    else:
+        texts = [text_of(cell.strip()) if cells else cell.strip() for piece in pieces(column) for cell in piece]
+        faulty = {text for text in {*texts} - MISSING_NAMES if fault(text)}
+    check_room(len(texts), max(map(len, texts), default=0), size)
+    # Looked up as str: an array would lose NULs at the ends.
+    missing, wrong = (
+        np.fromiter((text in those for text in texts), np.bool_, len(texts)) for those in (MISSING_NAMES, faulty)
+    )
+    return Parsed(np.array(texts, np.str_), missing, wrong)
 
 
 def _name_of_number(number: float) -> str:
@@ -133,7 +117,7 @@ _COMMA = str.maketrans({",": ".", ".": "_"})
 
 def _parsed(column: Column, words: dict[str, float], decimal: str) -> Parsed[np.float64]:
     """Return the cells as floats, NaN if missing or wrong; `words` are read in addition to numbers."""
-    if isinstance(column, np.ndarray) and column.dtype.kind != "U":
+    if is_numeric(column):
         values = _floats(column)
         missing = np.isnan(values)
     else:

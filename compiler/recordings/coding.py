@@ -49,7 +49,9 @@ def code_joint(
         entry = replace(entry, codes=True) if whole else replace(entry, grid=sound_grid(values))
     joint = _joint(name, entry, float(values.min()))
     if isinstance(entry, TaxelColumns) and entry.bits is not None:
-        joint = _over_range(joint, entry.bits)
+        # Calibrated at the ends of the converter's range.
+        least, most = joint.value([0, top := 2**entry.bits - 1]).tolist()
+        joint = Joint(joint.name, joint.unit, 0, least, top, most)
         if (beyond := values > joint.code_b).any():
             raise TableError(f"taxel {name!r}: {list_rows(rows[beyond])} exceed {entry.bits} bits: say how many it has")
     codes = values if entry.is_counts else joint.code(values)
@@ -83,12 +85,6 @@ def _joint(name: str, entry: JointColumns, least: float) -> Joint:
     floor = math.floor(steps) * entry.step if math.isfinite(steps) else least
     origin = floor if entry.origin is None else entry.origin
     return Joint(name, entry.unit, 0, origin, _FAR, origin + _FAR * entry.step)
-
-
-def _over_range(joint: Joint, bits: int) -> Joint:
-    """Return the joint, calibrated at the ends of a converter's range."""
-    least, most = joint.value([0, top := 2**bits - 1]).tolist()
-    return Joint(joint.name, joint.unit, 0, least, top, most)
 
 
 # The most codes for values that share a decimal place; the fewest between the 1st and 99th percentiles of others.

@@ -5,7 +5,7 @@ import glob
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import translate
 from itertools import islice
@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
 import msgspec
+import tomli_w
 
 from thenar.runtime.names import LONGEST_NAME, nearest, shortened
 from thenar.runtime.toml_source import read_source
@@ -184,6 +185,10 @@ class ColumnRoles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
         value: str | tuple[str, ...] | None = getattr(self, key)
         return (value,) if isinstance(value, str) else value or ()
 
+    def toml(self) -> str:
+        """Return the text of the columns.toml."""
+        return tomli_w.dumps(msgspec.to_builtins(self))
+
     @property
     def text(self) -> TextFormat:
         """The format of the table."""
@@ -234,14 +239,20 @@ def select(columns: ColumnRoles, names: Sequence[str]) -> Selection:
         for column in columns.parts(key):
             if column not in there:
                 raise ColumnsError(f"{key}: the table has no column {shortened(repr(column))}{nearest(column, names)}")
-    lists = [
-        columns.switches,
-        *(entry.columns for entry in columns.taxels),
-        *(entry.columns for entry in columns.joints),
+    lists: list[tuple[str, JointColumns | None, tuple[str, ...]]] = [
+        ("switches", None, columns.switches),
+        *(("taxels", entry, entry.columns) for entry in columns.taxels),
+        *(("joints", entry, entry.columns) for entry in columns.joints),
     ]
-    _check_globs([pattern for patterns in lists for pattern in patterns], names)
+    _check_globs([glob for _, _, globs in lists for glob in globs], names)
+    matched = (
+        (name, entry)
+        for what, entry, globs in lists
+        for pattern in globs
+        for name in _matches(what, pattern, names, there)
+    )
     # One match more than there are columns means that some column is matched twice.
-    found = list(islice(_matched(columns, names), len(names) + 1))
+    found = list(islice(matched, len(names) + 1))
     used = Counter([*(name for key in KEYS for name in columns.parts(key)), *(name for name, _ in found)])
     if twice := [name for name, times in used.items() if times > 1]:
         raise ColumnsError(f"column {twice[0]!r} is used {used[twice[0]]} times: name it once, or narrow the globs")
@@ -269,20 +280,7 @@ def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
         )
 
 
-def _matched(columns: ColumnRoles, names: Sequence[str]) -> Iterator[tuple[str, JointColumns | None]]:
-    """Yield each matched column, with its taxel or joint entry, None for a switch."""
-    there = frozenset(names)
-    for pattern in columns.switches:
-        yield from ((name, None) for name in _matches("switches", pattern, names, there))
-    for taxel in columns.taxels:
-        for pattern in taxel.columns:
-            yield from ((name, taxel) for name in _matches("taxels", pattern, names, there))
-    for joint in columns.joints:
-        for pattern in joint.columns:
-            yield from ((name, joint) for name in _matches("joints", pattern, names, there))
-
-
-def _matches(what: str, pattern: str, names: Sequence[str], there: frozenset[str]) -> list[str]:
+def _matches(what: str, pattern: str, names: Sequence[str], there: set[str]) -> list[str]:
     if _is_wild(pattern):
         found = list(filter(re.compile(translate(pattern)).match, names))
     else:

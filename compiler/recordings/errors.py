@@ -6,10 +6,11 @@ Within the limits, reading a file of n bytes takes at most 220 MB + 20 n of memo
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.dtypes import StringDType
 from numpy.typing import NDArray
 
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.names import LONGEST_NAME, SHOWN, fault, list_names, shortened
+from thenar.runtime.names import SHOWN, fault, list_names, shortened
 
 
 class RecordingError(ThenarError, ValueError):
@@ -55,12 +56,6 @@ def check_names(what: str, names: Iterable[str]) -> None:
         seen.add(name)
 
 
-def check_simulated(text: str) -> None:
-    """Raise RecordingError unless `text`, the origin of a simulated set including its name, is valid or empty."""
-    if text and (reason := fault(text, 2 * LONGEST_NAME)):
-        raise RecordingError(f"simulated {shortened(repr(text))} {reason}")
-
-
 def check_room(rows: int, longest: int, size: int) -> None:
     """Raise RecordingError if names of at most `longest` characters, one per row, need too much memory.
 
@@ -77,30 +72,23 @@ class FileRows(np.ndarray[tuple[int], np.dtype[np.int64]]):
     """
 
     column: str
-    _files: tuple[str, ...]
-    _starts: NDArray[np.int64]
-    _numbers: NDArray[np.int64]
+    _places: NDArray[np.generic]
 
     @classmethod
     def of(cls, files: Sequence[tuple[str, NDArray[np.int64]]], column: str) -> "FileRows":
         """Return the rows of `files`, each a name and the numbers of its rows as the user sees them."""
-        counts = [len(rows) for _, rows in files]
-        made = np.arange(1, sum(counts) + 1).view(cls)
-        made.column = column
-        made._files = tuple(name for name, _ in files)
-        made._starts = np.cumsum([0, *counts])
-        made._numbers = np.concatenate([rows for _, rows in files])
+        places = [f"{number} of {shortened(name)}" for name, rows in files for number in rows.tolist()]
+        made = np.arange(1, len(places) + 1).view(cls)
+        made.column, made._places = column, np.array(places, StringDType())
         return made
 
     def __array_finalize__(self, source: object) -> None:
-        for name in ("column", "_files", "_starts", "_numbers"):
-            setattr(self, name, getattr(source, name, None))
+        self.column, self._places = getattr(source, "column", ""), getattr(source, "_places", np.empty(0))
 
     def shown(self) -> list[str]:
         """Return each row as its number in its file, and the file."""
-        file = np.searchsorted(self._starts, self, "left") - 1
-        places = zip(self._numbers[self - 1].tolist(), file.tolist(), strict=True)
-        return [f"{number} of {shortened(self._files[file])}" for number, file in places]
+        places: list[str] = self._places[self - 1].tolist()
+        return places
 
 
 def list_rows(rows: NDArray[np.int64]) -> str:

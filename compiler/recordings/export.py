@@ -1,33 +1,38 @@
-"""Export a `GraspSet` as a table for other programs, with the columns.toml that imports it again."""
+"""Export a `GraspSet` as a table or DataFrame for other programs, with the columns.toml, and import a DataFrame."""
 
 import csv
 import glob
 import gzip
 import io
-import json
 import re
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thenar.drivers.extras import optional
 from thenar.runtime.files import write_atomically
+from thenar.runtime.names import shortened
+from thenar.runtime.toml_source import TomlText
+from thenar.runtime.toml_struct import convert
 
 from ..text import cell, cells
-from .errors import TableError
+from .clocks import POSSIBLE_CLOCKS
+from .columns import KEYS, CalibrationPoints, ColumnRoles, JointColumns, TaxelColumns, read_columns
+from .errors import ColumnsError, TableError, check_names
 from .graspset import GraspSet, Joint
+from .importer import import_table
+from .propose import propose
+from .table import Column, Table, unlisted
 from .taxonomy import is_published
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-_KEYS = ("label", "subject", "object", "session", "trial", "time")
 
 
 def heads_of(grasp_set: GraspSet) -> dict[str, str]:
@@ -37,7 +42,7 @@ def heads_of(grasp_set: GraspSet) -> dict[str, str]:
     has that name.
     """
     inputs = {*grasp_set.element_names, *grasp_set.joint_names}
-    heads = dict(zip(_KEYS, ("grasp", *_KEYS[1:-1], "time_us"), strict=True))
+    heads = dict(zip(KEYS, ("grasp", *KEYS[1:-1], "time_us"), strict=True))
     for key in heads:
         while heads[key] in inputs:
             heads[key] += "_"
@@ -50,7 +55,7 @@ def meta_of(grasp_set: GraspSet) -> dict[str, NDArray[np.generic]]:
     There is a session only if the set has several, a time only if it is known, and a trial only if rows are not
     independent.
     """
-    found = {key: getattr(grasp_set, f"{key}s" if key != "time" else "times_us") for key in _KEYS[1:]}
+    found = {key: getattr(grasp_set, f"{key}s" if key != "time" else "times_us") for key in KEYS[1:]}
     absent = {"time"} if not grasp_set.times_us.size else set()
     absent |= {"trial"} if grasp_set.independent else set()
     absent |= {"session"} if not (grasp_set.sessions != "1").any() else set()
@@ -65,55 +70,36 @@ def types_of(grasp_set: GraspSet) -> tuple[str, ...]:
 def columns_of(grasp_set: GraspSet, codes: bool = False) -> str:
     """Return the text of the columns.toml that imports the exported table again; `codes` as in `export`."""
     heads, taxonomy = heads_of(grasp_set), grasp_set.taxonomy
-    lines = [f"label = {_text(heads['label'])}"]
-    lines += [f"{key} = {_text(heads[key])}" for key in meta_of(grasp_set)]
-    if grasp_set.times_us.size:
-        lines.append('time_unit = "us"')
-    if grasp_set.independent:
-        lines.append('frames = "independent"')
-    if grasp_set.simulated:
-        lines.append(f"simulated = {_text(grasp_set.simulated)}")
-    types = _text(taxonomy.name) if is_published(taxonomy) else _list(taxonomy.types)
-    named = is_published(taxonomy) or taxonomy.name == "own"
-    lines.append(f"taxonomy = {types if named else f'{{ {_text(taxonomy.name)} = {types} }}'}")
-    if grasp_set.switch_names:
-        lines.append(f"switches = {_globs(grasp_set.switch_names)}")
-    for joints in _alike(grasp_set.joints):
-        lines += ["", "[[joints]]", *_entry(joints, codes)]
-    for taxels in _alike(grasp_set.taxel_columns):
-        lines += ["", "[[taxels]]", *_entry(taxels, codes)]
-    return "\n".join([*lines, ""])
+    types = taxonomy.types if taxonomy.name == "own" else {taxonomy.name: taxonomy.types}
+    roles = ColumnRoles(
+        label=heads["label"],
+        **{key: heads[key] for key in meta_of(grasp_set)},  # type: ignore[arg-type]
+        time_unit="us" if grasp_set.times_us.size else None,
+        frames="independent" if grasp_set.independent else None,
+        simulated=grasp_set.simulated,
+        taxonomy=taxonomy.name if is_published(taxonomy) else types,
+        switches=tuple(map(glob.escape, grasp_set.switch_names)),
+        joints=_entries(JointColumns, grasp_set.joints, codes),
+        taxels=_entries(TaxelColumns, grasp_set.taxel_columns, codes),
+    )
+    return roles.toml()
 
 
-def _entry(joints: list[Joint], codes: bool) -> list[str]:
-    """Return the entry of joints, or of taxels, with the same calibration."""
-    joint = joints[0]
-    points = {key: getattr(joint, key) for key in ("code_a", "value_a", "code_b", "value_b")}
-    calibration = ", ".join(f"{key} = {number!r}" for key, number in points.items())
-    return [
-        f"columns = {_globs(joint.name for joint in joints)}",
-        f"unit = {_text(joint.unit)}",
-        *(["codes = true"] if codes else []),
-        f"calibration = {{ {calibration} }}",
-    ]
+_Entry = TypeVar("_Entry", JointColumns, TaxelColumns)
 
 
-def _alike(joints: Iterable[Joint]) -> Iterable[list[Joint]]:
-    """Group neighbours with the same calibration; only neighbours, since their order is the order of the codes."""
-    return (list(group) for _, group in groupby(joints, key=lambda joint: replace(joint, name="any")))
-
-
-def _text(text: str) -> str:
-    # JSON's escapes are valid in TOML.
-    return json.dumps(text, ensure_ascii=False)
-
-
-def _list(texts: Iterable[str]) -> str:
-    return f"[{', '.join(map(_text, texts))}]"
-
-
-def _globs(names: Iterable[str]) -> str:
-    return _list(map(glob.escape, names))
+def _entries(kind: type[_Entry], joints: Iterable[Joint], codes: bool) -> tuple[_Entry, ...]:
+    """Return an entry for neighbours with the same calibration: their order is the order of the codes."""
+    alike = (list(group) for _, group in groupby(joints, key=lambda joint: replace(joint, name="any")))
+    return tuple(
+        kind(
+            tuple(glob.escape(joint.name) for joint in group),
+            unit=group[0].unit,
+            codes=codes,
+            calibration=CalibrationPoints(group[0].code_a, group[0].value_a, group[0].code_b, group[0].value_b),
+        )
+        for group in alike
+    )
 
 
 # The formats of an export.
@@ -208,7 +194,11 @@ def to_dataframe(grasp_set: GraspSet, codes: bool = False) -> "pd.DataFrame":
 def to_arff(grasp_set: GraspSet, codes: bool = False, meta: bool = False) -> str:
     """Return the set as ARFF: switches nominal {0,1}, joints numeric, the grasp type nominal and last."""
     heads, who = heads_of(grasp_set), meta_of(grasp_set) if meta else {}
-    attributes = [f"{_quote(heads[key])} {_kind(column)}" for key, column in who.items()]
+    kinds = {
+        key: _nominal(np.unique(column).tolist()) if column.dtype.kind == "U" else "numeric"
+        for key, column in who.items()
+    }
+    attributes = [f"{_quote(heads[key])} {kind}" for key, kind in kinds.items()]
     attributes += [f"{_quote(name)} {{0,1}}" for name in grasp_set.switch_names]
     attributes += [f"{_quote(joint.name)} numeric" for joint, _ in _coded(grasp_set)]
     attributes.append(f"{_quote(heads['label'])} {_nominal(types_of(grasp_set))}")
@@ -218,27 +208,19 @@ def to_arff(grasp_set: GraspSet, codes: bool = False, meta: bool = False) -> str
     return "\n".join([*lines, *map(",".join, rows), ""])
 
 
-def _kind(column: NDArray[np.generic]) -> str:
-    return _nominal(np.unique(column).tolist()) if column.dtype.kind == "U" else "numeric"
-
-
 def _inputs(grasp_set: GraspSet, codes: bool) -> Iterable[Sequence[str]]:
     """Yield the cells of each switch, taxel and joint."""
     for switch in grasp_set.switches.T:
         yield ["1" if bit else "0" for bit in switch.tolist()]
     for joint, column in _coded(grasp_set):
-        yield [str(code) for code in column.tolist()] if codes else _values(joint, column.tolist())
+        # Twelve digits distinguish any two codes of a Joint, and hide the last bits of the arithmetic.
+        yield list(map(str, column.tolist())) if codes else [f"{value:.12g}" for value in joint.value(column).tolist()]
 
 
 def _coded(grasp_set: GraspSet) -> Iterable[tuple[Joint, NDArray[np.uint16]]]:
     """Yield the taxels and then the joints, each with its codes (n,)."""
     yield from zip(grasp_set.taxel_columns, grasp_set.taxels.T, strict=True)
     yield from zip(grasp_set.joints, grasp_set.codes.T, strict=True)
-
-
-def _values(joint: Joint, codes: list[int]) -> list[str]:
-    # Twelve digits distinguish any two codes of a Joint, and hide the last bits of the arithmetic.
-    return [f"{value:.12g}" for value in joint.value(codes).tolist()]
 
 
 def _nominal(names: Iterable[str]) -> str:
@@ -248,3 +230,83 @@ def _nominal(names: Iterable[str]) -> str:
 def _quote(name: str) -> str:
     """Return `name` as ARFF writes it, quoted like Weka if necessary."""
     return name if _BARE.fullmatch(name) else "'" + re.sub(r"([\\'\"%])", r"\\\1", name) + "'"
+
+
+_WHAT = "the DataFrame"
+
+
+def from_dataframe(frame: "pd.DataFrame", columns: ColumnRoles | str | Path | None = None) -> GraspSet:
+    """Return the set in a DataFrame with one row per frame; its index is ignored.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Any dtypes: switches are bool, or 0 and 1; joints are numbers; names are text, numbers or categories. NaN, None
+        and NA are missing values.
+    columns : ColumnRoles, str or Path, optional
+        The roles of the columns: `thenar.compiler.ColumnRoles`, or the path of a columns.toml. A frame from
+        `to_dataframe` has them in its `attrs`; for any other they are guessed from names and values, as by `thenar
+        import`.
+
+    Raises
+    ------
+    TableError, ColumnsError, RecordingError
+        As for an import of the same table; the message names rows, as counted by `iloc`, and columns.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from thenar.compiler import ColumnRoles, from_dataframe
+    >>> frame = pd.DataFrame({"grasp": ["pinch", "hook"], "thumb": [True, False], "n": [1, 2]})
+    >>> from_dataframe(frame, ColumnRoles(label="grasp", switches=("thumb",), trial="n"))
+    GraspSet: 2 trials of 2 frames, 2 grasp types (own), 1 switches, 0 joints, 1 subjects, 1 objects
+    """
+    table = table_of(frame)
+    roles = columns if isinstance(columns, ColumnRoles) else None
+    if columns is None and (roles := _said(frame)) is None:
+        proposal = propose(table)
+        if proposal.lacks:
+            advice = "say so in `columns`: a ColumnRoles, or the path of a columns.toml"
+            raise ColumnsError(f"{_WHAT}: {proposal.lacks}; {advice}")
+        roles = proposal.columns
+    grasp_set, report = import_table(table, roles or read_columns(Path(columns)))  # type: ignore[arg-type]
+    for finding in report.warnings:
+        if finding.kind == POSSIBLE_CLOCKS:
+            warnings.warn(finding.message, stacklevel=2)
+    return grasp_set
+
+
+def _said(frame: "pd.DataFrame") -> ColumnRoles | None:
+    """Return the columns that a frame describes in its attributes."""
+    text = frame.attrs.get(COLUMNS_TOML)
+    if not isinstance(text, str):
+        return None
+    source = TomlText(f"attrs[{COLUMNS_TOML!r}] of {_WHAT}", text, ColumnsError)
+    return convert(source, (), source.tables(), ColumnRoles)
+
+
+def table_of(frame: "pd.DataFrame") -> Table:
+    """Return the table in a DataFrame, with rows counted from 0, as in `iloc`. The index is ignored.
+
+    Raises TableError if it has no rows, or duplicate column names.
+    """
+    if not len(frame):
+        raise TableError(f"{_WHAT} has no rows")
+    names = [str(name).strip() for name in frame.columns]
+    check_names(f"{_WHAT}: column", names)
+    rows = np.arange(len(frame))
+    columns = {name: _column(frame.iloc[:, number], name) for number, name in enumerate(names)}
+    return Table(_WHAT, unlisted(_WHAT, columns, rows), rows, size=int(frame.memory_usage(deep=True).sum()))
+
+
+def _column(series: "pd.Series", name: str) -> Column:
+    """Return numbers and bits as float64, NaN if missing, and everything else as text, empty if missing."""
+    from pandas.api.types import is_complex_dtype, is_numeric_dtype
+
+    if is_complex_dtype(series):
+        raise TableError(f"{_WHAT}: column {shortened(repr(name))} holds complex numbers: split or drop it")
+    if is_numeric_dtype(series):
+        return series.to_numpy(np.float64, na_value=np.nan)  # type: ignore[no-any-return]
+    # An array's own text is rounded.
+    plain = (value.tolist() if isinstance(value, np.ndarray) else value for value in series)
+    return ["" if gone else str(value) for value, gone in zip(plain, series.isna(), strict=True)]

@@ -1,4 +1,4 @@
-"""Tables of other programs: spreadsheets, Parquet, HDF5 and MATLAB files, read by their libraries.
+"""Tables of other programs: spreadsheets, Parquet, HDF5, MATLAB and npz files, read by their libraries.
 
 They are read in a process with limits on memory and time, and returned as npz: so a file that claims a terabyte, that
 crashes a library or that never ends, ends in an error message. The process ends with the one that started it, and
@@ -13,20 +13,20 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any
 
 import numpy as np
+from numpy.dtypes import StringDType
 from numpy.typing import NDArray
 
 from thenar.drivers.extras import missing
 from thenar.runtime.files import open_file
 from thenar.runtime.names import list_names, shortened
 
-from .arrays import AnyArray, arrays_in
+from .arrays import AnyArray
 from .errors import COLUMNS, LARGEST, ROWS, TableError
 from .headers import preface
 
@@ -70,12 +70,14 @@ def read_foreign(paths: Sequence[Path], skip: int | None = 0) -> Iterator[Foreig
             for path in paths:  # to know which
                 yield from read_foreign([path], skip)
             return
-        columns = arrays_in(paths[0].name, made, len(paths) * (COLUMNS + 3)) if os.fstat(made.fileno()).st_size else {}
-    count = len([name for name in columns if name.endswith(".rows")])
-    for number in range(count):
-        names, rows, skipped = (columns.pop(f"{number}.{name}") for name in ("names", "rows", "skip"))
-        found = {str(name): columns.pop(f"{number}.{place}") for place, name in enumerate(names)}
-        yield found, rows.astype(np.int64), int(skipped.astype(np.int64)[0])
+        # Written by the process from plain columns. Each is read as it is asked for.
+        made.seek(0)
+        arrays: Mapping[str, AnyArray] = np.load(made) if os.fstat(made.fileno()).st_size else {}
+        count = len([name for name in arrays if name.endswith(".rows")])
+        for number in range(count):
+            names, rows, skipped = (arrays[f"{number}.{name}"] for name in ("names", "rows", "skip"))
+            columns = {str(name): arrays[f"{number}.{place}"] for place, name in enumerate(names)}
+            yield columns, rows.astype(np.int64), int(skipped.astype(np.int64)[0])
     if refusal:
         raise TableError(f"{paths[count].name}: {refusal}")
 
@@ -133,7 +135,7 @@ def _spreadsheet(path: Path, skip: int | None) -> tuple[Columns, Sequence[int], 
     return columns, [row + 1 for row in body], skip
 
 
-def _parquet(path: Path, _skip: int | None) -> tuple[Columns, Sequence[int], int]:
+def _parquet(path: Path) -> Columns:
     import pyarrow
     from pyarrow import parquet
 
@@ -149,10 +151,10 @@ def _parquet(path: Path, _skip: int | None) -> tuple[Columns, Sequence[int], int
         else:
             array = _array(column.to_pylist())
         _add(columns, name, array)
-    return columns, range(1, table.num_rows + 1), 0
+    return columns
 
 
-def _hdf5(path: Path, _skip: int | None) -> tuple[Columns, Sequence[int], int]:
+def _hdf5(path: Path) -> Columns:
     import h5py
 
     found: Columns = {}
@@ -172,7 +174,7 @@ def _hdf5(path: Path, _skip: int | None) -> tuple[Columns, Sequence[int], int]:
     return _even(found)
 
 
-def _matlab(path: Path, _skip: int | None) -> tuple[Columns, Sequence[int], int]:
+def _matlab(path: Path) -> Columns:
     from scipy.io import loadmat
 
     try:
@@ -207,7 +209,26 @@ def _cell(value: Any) -> object:
     return "" if not array.size else array.ravel()[0].item() if array.size == 1 else str(value)
 
 
-def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int], int]:
+def _npz(path: Path) -> Columns:
+    found: Columns = {}
+    with path.open("rb") as file, np.lib.npyio.NpzFile(file) as arrays:
+        for name in arrays.files:
+            array = arrays[name]
+            if not isinstance(array, np.ndarray) or array.ndim not in (1, 2) or array.dtype.kind not in "biufSU":
+                shown = f"array {shortened(repr(name))} is not of numbers or text, in one or two dimensions"
+                raise TableError(f"{shown}: leave it out")
+            if array.dtype.kind == "S":
+                array = np.char.decode(array, "utf-8")
+            elif array.dtype.kind == "U":
+                array = array.astype(array.dtype.newbyteorder("="))
+                array.astype(StringDType())  # raises TypeError for characters that do not exist
+            parts = {f"{name}.{place}": part for place, part in enumerate(array.T)} if array.ndim > 1 else {name: array}
+            for column, part in parts.items():
+                _add(found, column, part)
+    return _even(found)
+
+
+def _even(found: Mapping[str, AnyArray]) -> Columns:
     """Return the arrays as columns; those with one element are left out if others have more."""
     columns: Columns = {}
     for name, array in found.items():
@@ -222,7 +243,7 @@ def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int], int]:
     for name, column in columns.items():
         if len(column) == rows:
             _add(made, name, column)
-    return made, range(1, rows + 1), 0
+    return made
 
 
 def _columns(name: str, array: AnyArray) -> Columns:
@@ -238,8 +259,6 @@ def _array(cells: list[Any]) -> AnyArray:
     """Return cells as numbers, with NaN for empty ones, or as text."""
     if all(cell is None or cell == "" or isinstance(cell, (int, float)) for cell in cells):
         return np.array([np.nan if cell is None or cell == "" else cell for cell in cells], np.float64)
-    if all(isinstance(cell, (list, tuple)) for cell in cells) and len({*map(len, cells)}) == 1:
-        return np.array(cells, np.float64)
     return np.array([_text(cell) for cell in cells], np.str_)
 
 
@@ -264,11 +283,12 @@ def _check(rows: int, columns: int) -> None:
         raise TableError(f"it has more than {ROWS} rows or {COLUMNS} columns, the most that are read of a table")
 
 
-# By suffix: the kind of file, its package, and its reader.
-READERS: dict[str, tuple[str, str, Callable[[Path, int | None], tuple[Columns, Sequence[int], int]]]] = {
-    **dict.fromkeys((".xlsx", ".xls", ".ods"), ("a spreadsheet", "python_calamine", _spreadsheet)),
+# By suffix: the kind of file, its package, and its reader, None for spreadsheets, whose table may begin anywhere.
+READERS: dict[str, tuple[str, str, Callable[[Path], Columns] | None]] = {
+    **dict.fromkeys((".xlsx", ".xls", ".ods"), ("a spreadsheet", "python_calamine", None)),
     ".parquet": ("Parquet", "pyarrow.parquet", _parquet),
     **dict.fromkeys((".h5", ".hdf5"), ("HDF5", "h5py", _hdf5)),
+    ".npz": ("npz", "numpy", _npz),
     ".mat": ("a MATLAB file", "scipy.io", _matlab),
 }
 
@@ -320,32 +340,26 @@ def main(skip: str, parent: str, *sources: str) -> int:
     made: dict[str, AnyArray] = {}
     code = 0
     for number, path in enumerate(paths):
-        if reason := _read(made, number, what, partial(read, path, None if skip == "None" else int(skip))):
-            print(reason)
+        try:
+            if read is None:
+                columns, rows, skipped = _spreadsheet(path, None if skip == "None" else int(skip))
+            elif columns := read(path):
+                rows, skipped = range(1, len(next(iter(columns.values()))) + 1), 0
+            else:
+                raise TableError("it holds no columns of numbers or text")
+        except Exception as reason:  # whatever a library raises for bytes that it cannot read
+            said = shortened(" ".join(str(reason).split()) or type(reason).__name__, 300)
+            memory = f"it needs more than {MEMORY} bytes of memory: save it as CSV"
+            cannot = memory if isinstance(reason, MemoryError) else f"cannot be read as {what}: {said}"
+            print(reason if isinstance(reason, TableError) else cannot)
             code = _REFUSED
             break
+        described = {"names": np.array(list(columns)), "rows": np.array(rows, np.int64), "skip": np.array([skipped])}
+        numbered = {str(place): column for place, column in enumerate(columns.values())}
+        made |= {f"{number}.{name}": array for name, array in (described | numbered).items()}
     np.savez(output, **made)  # type: ignore[arg-type]
     output.flush()
     return code
-
-
-def _read(made: Columns, number: int, what: str, read: Callable[[], tuple[Columns, Sequence[int], int]]) -> str:
-    """Add what `read` returns to `made` under a table's number; return why that is impossible, or ""."""
-    try:
-        columns, rows, skipped = read()
-        if not columns:
-            return "it holds no columns of numbers or text"
-    except TableError as reason:
-        return str(reason)
-    except MemoryError:
-        return f"it needs more than {MEMORY} bytes of memory: save it as CSV"
-    except Exception as reason:
-        # Whatever a library raises for bytes that it cannot read.
-        return f"cannot be read as {what}: {shortened(' '.join(str(reason).split()) or type(reason).__name__, 300)}"
-    described = {"names": np.array(list(columns)), "rows": np.array(rows, np.int64), "skip": np.array([skipped])}
-    numbered = {str(place): column for place, column in enumerate(columns.values())}
-    made |= {f"{number}.{name}": array for name, array in (described | numbered).items()}
-    return ""
 
 
 if __name__ == "__main__":

@@ -1,7 +1,5 @@
 """Detect frames that are counted as trials, by the similarity of consecutive rows."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,15 +23,8 @@ _APART = 0.75
 _SEED = 1
 
 
-class _Likeness(NamedTuple):
-    """Why rows of several trials look like frames of fewer, and what to do; `refused` unless the trials are apart."""
-
-    reason: str
-    refused: bool = True
-    remedy: str = (
-        'name the column that numbers the trials (trial = "..." in columns.toml) and import again; or, if each row is '
-        'a separate trial, state that in place of `trial` (frames = "independent")'
-    )
+_NUMBER = 'name the column that numbers {} (trial = "..." in columns.toml) and import again'
+_STATE = '; or, if each row is a separate trial, state that in place of `trial` (frames = "independent")'
 
 
 def check_trials(grasp_set: GraspSet, error: type[ThenarError]) -> list[Oddity]:
@@ -45,10 +36,11 @@ def check_trials(grasp_set: GraspSet, error: type[ThenarError]) -> list[Oddity]:
     found = None if grasp_set.independent else _likeness(grasp_set)
     if found is None:
         return []
-    if found.refused:
-        raise error(f"{found.reason}: their accuracy would be too high, and its interval too narrow; {found.remedy}")
+    reason, remedy = found
+    if remedy:
+        raise error(f"{reason}: their accuracy would be too high, and its interval too narrow; {remedy}")
     message = (
-        f"{found.reason}: if they were recorded in blocks, with the glove worn or the object placed anew for each "
+        f"{reason}: if they were recorded in blocks, with the glove worn or the object placed anew for each "
         "block, name the blocks (`session`), since accuracies on new trials of the same block are too high"
     )
     return [Oddity("alike trials", len(np.unique(grasp_set.trial_ids)), message)]
@@ -56,12 +48,12 @@ def check_trials(grasp_set: GraspSet, error: type[ThenarError]) -> list[Oddity]:
 
 def looks_like_frames(grasp_set: GraspSet) -> str | None:
     """Return why rows that count as several trials look like the frames of fewer, or None if they do not."""
-    found = _likeness(grasp_set)
-    return found.reason if found is not None and found.refused else None
+    reason, remedy = _likeness(grasp_set) or ("", "")
+    return reason if remedy else None
 
 
-def _likeness(grasp_set: GraspSet) -> _Likeness | None:
-    """Return in what way trials resemble their neighbours, None if they do not.
+def _likeness(grasp_set: GraspSet) -> tuple[str, str] | None:
+    """Return in what way trials resemble their neighbours, and what to do, "" if they are apart; None if they do not.
 
     Rows of one subject, grasp type, object and session are compared in order, ignoring their trial numbers; for
     neighbouring rows of one trial only the middle one. Frames of a trial differ far less from the next than from rows a
@@ -79,7 +71,7 @@ def _likeness(grasp_set: GraspSet) -> _Likeness | None:
     size = np.repeat(sizes, sizes)
     # A scene without noise repeats itself, and its repetitions are numbered correctly.
     if not grasp_set.simulated and (reason := _copies(grasp_set, order, place, starts)):
-        return _Likeness(reason)
+        return reason, _NUMBER.format("the trials") + _STATE
     this = np.flatnonzero((place + 1 < size) & (size >= 4))
     if not len(this):
         return None
@@ -96,10 +88,9 @@ def _likeness(grasp_set: GraspSet) -> _Likeness | None:
     )
     single = len(order) == len(grasp_set)
     if _are_apart(grasp_set) or (single and excess < _REFUSED):
-        return _Likeness(f"trials resemble the trial before: {shares}", refused=False)
-    found = _Likeness(f"the rows look like frames of fewer trials: {shares}")
-    remedy = 'name the column that numbers whole trials (trial = "..." in columns.toml) and import again'
-    return found if single else found._replace(remedy=remedy)
+        return f"trials resemble the trial before: {shares}", ""
+    remedy = _NUMBER.format("the trials") + _STATE if single else _NUMBER.format("whole trials")
+    return f"the rows look like frames of fewer trials: {shares}", remedy
 
 
 def _are_apart(grasp_set: GraspSet) -> bool:

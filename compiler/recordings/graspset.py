@@ -13,8 +13,7 @@ times     (n,) int64                microseconds; only where they are known, and
 """
 
 import hashlib
-from dataclasses import dataclass, field
-from html import escape
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self, TypeVar
 
@@ -24,13 +23,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from thenar.runtime.errors import SealError
 from thenar.runtime.files import read_file, write_atomically
-from thenar.runtime.names import shortened
+from thenar.runtime.names import LONGEST_NAME, fault, shortened
 from thenar.runtime.nesting import check_json
 from thenar.runtime.sealed import seal, unseal
 
 from ..text import counted, trials_of_frames
 from .arrays import AnyArray, pack, unpack
-from .errors import LARGEST, RecordingError, check_names, check_room, check_simulated
+from .errors import LARGEST, RecordingError, check_names, check_room
 from .taxonomy import Taxonomy
 from .trials import groups
 
@@ -215,7 +214,8 @@ class GraspSet:
             object.__setattr__(self, "trials", np.ones(rows, np.int64))
             self.trials.setflags(write=False)
         self._freeze("times_us", np.int64, (rows if self.times_us.size else 0,))
-        check_simulated(self.simulated)
+        if self.simulated and (reason := fault(self.simulated, 2 * LONGEST_NAME)):
+            raise RecordingError(f"simulated {shortened(repr(self.simulated))} {reason}")
         object.__setattr__(self, "labels", self._label())
         self.labels.setflags(write=False)
 
@@ -254,20 +254,6 @@ class GraspSet:
         read = f"{len(self.switch_names)} switches, {taxels}{len(self.joints)} joints"
         who = f"{read}, {subjects} subjects, {objects} objects"
         return f"GraspSet: {what}, {who}" + (f"\nsimulated: {shortened(self.simulated)}" if self.simulated else "")
-
-    def _repr_html_(self) -> str:
-        """Return the representation in a notebook: the line, and trials and frames of each grasp type."""
-        first = np.unique(self.trial_ids, return_index=True)[1]
-        counts = (
-            np.bincount(labels, minlength=len(self.taxonomy.names)) for labels in (self.labels[first], self.labels)
-        )
-        body = "".join(
-            f"<tr><td>{escape(name)}</td><td>{trials}</td><td>{rows}</td></tr>"
-            for name, trials, rows in zip(self.taxonomy.names, *counts, strict=True)
-            if rows or name in self.taxonomy.types
-        )
-        head = "<tr><th>grasp type</th><th>trials</th><th>frames</th></tr>"
-        return f"<p>{escape(repr(self)).replace(chr(10), '<br>')}</p><table>{head}{body}</table>"
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -340,23 +326,9 @@ class GraspSet:
         """Return the set of the rows selected by `index` (numbers or a mask of n), in that order."""
         pick = np.asarray(index)
         pick = pick if pick.size else pick.astype(np.intp)
-        return GraspSet(
-            switches=self.switches[pick],
-            switch_names=self.switch_names,
-            codes=self.codes[pick],
-            joints=self.joints,
-            grasps=self.grasps[pick],
-            taxonomy=self.taxonomy,
-            subjects=self.subjects[pick],
-            objects=self.objects[pick],
-            trials=self.trials[pick],
-            simulated=self.simulated,
-            sessions=self.sessions[pick],
-            independent=self.independent,
-            taxels=self.taxels[pick],
-            taxel_columns=self.taxel_columns,
-            times_us=self.times_us[pick] if self.times_us.size else self.times_us,
-        )
+        rowed = ("switches", "codes", "taxels", "grasps", "subjects", "objects", "sessions", "trials")
+        picked = {name: getattr(self, name)[pick] for name in rowed}
+        return replace(self, **picked, times_us=self.times_us[pick] if self.times_us.size else self.times_us)
 
     def fingerprint(self) -> str:
         """Return the SHA-256 of the content, in hex: equal for equal sets, independent of file and machine."""
@@ -411,7 +383,8 @@ VERSION = 2
 MOST = 10_000_000
 
 _DTYPES = {"switches": "u1", "codes": "<u2", "taxels": "<u2", "trials": "<i8", "times": "<i8"}
-_DTYPES |= dict.fromkeys(("grasps", "subjects", "objects", "sessions"), "<u4")
+_TEXTS = ("subjects", "objects", "sessions")
+_DTYPES |= dict.fromkeys(("grasps", *_TEXTS), "<u4")
 
 AnyGraspSet = TypeVar("AnyGraspSet", bound=GraspSet)
 
@@ -431,19 +404,17 @@ class _Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
 
 
 def _pack(grasp_set: GraspSet) -> bytes:
-    subjects, subject = np.unique(grasp_set.subjects, return_inverse=True)
-    objects, object_ = np.unique(grasp_set.objects, return_inverse=True)
-    sessions, session = np.unique(grasp_set.sessions, return_inverse=True)
-    several = sessions.tolist() != ["1"]
+    texts = {name: np.unique(getattr(grasp_set, name), return_inverse=True) for name in _TEXTS}
+    subjects, objects, sessions = (tuple(names.tolist()) for names, _ in texts.values())
     header = _Header(
         rows=len(grasp_set),
         switches=grasp_set.switch_names,
         joints=grasp_set.joints,
         taxonomy=grasp_set.taxonomy,
-        subjects=tuple(subjects.tolist()),
-        objects=tuple(objects.tolist()),
+        subjects=subjects,
+        objects=objects,
         simulated=grasp_set.simulated,
-        sessions=tuple(sessions.tolist()) if several else (),
+        sessions=sessions if sessions != ("1",) else (),
         independent=grasp_set.independent,
         taxels=grasp_set.taxel_columns,
         times=grasp_set.times_us.size > 0,
@@ -452,12 +423,12 @@ def _pack(grasp_set: GraspSet) -> bytes:
         "switches": np.packbits(grasp_set.switches, axis=1),
         "codes": grasp_set.codes,
         "grasps": grasp_set.labels,
-        "subjects": subject,
-        "objects": object_,
+        "subjects": texts["subjects"][1],
+        "objects": texts["objects"][1],
         "trials": grasp_set.trials,
     }
     if header.sessions:
-        arrays["sessions"] = session
+        arrays["sessions"] = texts["sessions"][1]
     if header.taxels:
         arrays["taxels"] = grasp_set.taxels
     if header.times:

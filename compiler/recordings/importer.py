@@ -6,7 +6,6 @@ from functools import partial
 from heapq import nsmallest
 from operator import itemgetter
 from pathlib import Path
-from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -27,7 +26,7 @@ from .summary import Oddity, find_oddities
 from .table import Table, read_table
 from .taxonomy import Taxonomy, own, plain, published
 from .trial_files import Report, find_files, is_pattern, read_files
-from .trials import Frames, fill, groups, in_runs, in_time, numbered, otsu, restarts, unit_of_time
+from .trials import fill, frame_of_each, groups, in_runs, in_time, numbered, otsu, restarts, unit_of_time
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,17 +55,10 @@ class Readings:
         return groups(self.labels, self.subjects, self.objects, self.sessions, self.trials)
 
 
-class Read(NamedTuple):
-    """The result of reading a table: `times_us`, None if unknown; `warnings` about oddities, `notes` on conversions."""
-
-    readings: Readings
-    times_us: NDArray[np.int64]
-    warnings: list[Oddity]
-    notes: list[str]
-
-
-def read_cells(table: Table, columns: ColumnRoles, selection: Selection) -> Read:
-    """Read the cells of `table`.
+def read_cells(
+    table: Table, columns: ColumnRoles, selection: Selection
+) -> tuple[Readings, NDArray[np.int64], list[Oddity], list[str]]:
+    """Return the content of `table`, its times in microseconds (none if unknown), oddities, and notes on conversions.
 
     Columns that are not named are "1" throughout. Raises TableError naming the first wrong or missing cells and their
     number.
@@ -109,7 +101,7 @@ def read_cells(table: Table, columns: ColumnRoles, selection: Selection) -> Read
     micros = _micros(table.what, columns, readings.time, notes)
     readings = _reduced(readings, columns.reduce, trial_ids, notes)
     times_us = np.rint(readings.time * micros).astype(np.int64) if micros else np.empty(0, np.int64)
-    return Read(readings, times_us, warnings, notes)
+    return readings, times_us, warnings, notes
 
 
 def _micros(what: str, columns: ColumnRoles, time: NDArray[np.float64], notes: list[str]) -> float:
@@ -270,21 +262,22 @@ def _reduced(readings: Readings, how: str, trial_ids: NDArray[np.intp], notes: l
     """Return one row per trial, computed from its frames; all rows if `how` is "none"."""
     if how == "none":
         return readings
-    frames = Frames(trial_ids)
-    reduced = replace(readings, switches=readings.switches[:, :0], joints=readings.joints[:, :0]).kept(frames.middle)
-    if how == "middle":
-        switches, joints = readings.switches[frames.middle], readings.joints[frames.middle]
-    else:
-        switches = _each(frames.any if how == "any" else frames.median, readings.switches, len(frames.middle))
-        joints = _each(frames.median, readings.joints, len(frames.middle))
-    notes.append(f"{len(trial_ids)} frames of {len(frames.middle)} trials were reduced to one row a trial ({how})")
+    middle = frame_of_each(trial_ids)
+    reduced = replace(readings, switches=readings.switches[:, :0], joints=readings.joints[:, :0]).kept(middle)
+    switches = _each(readings.switches, trial_ids, middle, how, how == "any")
+    joints = _each(readings.joints, trial_ids, middle, how)
+    notes.append(f"{len(trial_ids)} frames of {len(middle)} trials were reduced to one row a trial ({how})")
     return replace(reduced, switches=switches, joints=joints)
 
 
-def _each(make: Callable[[NDArray[Value]], NDArray[Value]], array: NDArray[Value], rows: int) -> NDArray[Value]:
-    made = np.empty((rows, array.shape[1]), array.dtype, order="F")
+def _each(
+    array: NDArray[Value], trial_ids: NDArray[np.intp], middle: NDArray[np.intp], how: str, largest: bool = False
+) -> NDArray[Value]:
+    if how == "middle":
+        return array[middle]
+    made = np.empty((len(middle), array.shape[1]), array.dtype, order="F")
     for number, column in enumerate(array.T):
-        made[:, number] = make(column)
+        made[:, number] = column[frame_of_each(trial_ids, column, largest)]
     return made
 
 
@@ -425,6 +418,7 @@ def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportRe
     table = _renamed(table, columns.rename)
     selection = select(columns, list(table.columns))
     readings, times_us, warnings, notes = read_cells(table, columns, selection)
+    table = replace(table, columns={})  # its cells were read: their memory is needed
     grasps, taxonomy, aliases = _labels(table, columns, readings)
     coded = [
         code_joint(name, entry, readings.joints[:, column], readings.rows)

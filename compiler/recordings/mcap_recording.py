@@ -10,7 +10,7 @@ was not calibrated, otherwise half degrees on one scale for all subjects. Taxels
 drift of their baselines; if they were calibrated, all counts are converted to the first calibration.
 """
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -34,8 +34,7 @@ from .coding import CodingCost, code_joint
 from .columns import CalibrationPoints, JointColumns
 from .errors import ColumnsError, TableError, list_rows
 from .graspset import CODES, GraspSet, Joint
-from .importer import ImportReport, import_file, import_table, report_of
-from .propose import propose_file
+from .importer import ImportReport, import_file, report_of
 from .summary import Oddity, find_oddities
 from .taxonomy import Taxonomy
 from .trial_files import Report
@@ -95,10 +94,8 @@ def import_files(
     """Import one table with the columns.toml in file `columns`, or self-describing recordings.
 
     A path with fields in braces, such as data/{label}_{trial}.csv, is a table in many files; `progress` takes how many
-    of how many were read.
-    Recordings are imported as a `stream` or trial by trial. Without `columns`, the roles of a table's columns are found
-    from their names and values. Raises TableError, ColumnsError, RecordingError or McapError naming file, rows and
-    columns, and OSError.
+    of how many were read. Recordings are imported as a `stream` or trial by trial. Raises TableError, ColumnsError,
+    RecordingError or McapError naming file, rows and columns, and OSError.
     """
     if all(path.suffix.lower() == ".mcap" for path in paths):
         if columns is not None:
@@ -114,10 +111,7 @@ def import_files(
             "name the pattern of their paths, such as 'data/{label}_{trial}.csv'"
         )
     if columns is None:
-        table, proposal = propose_file(paths[0], progress)
-        if proposal.lacks:
-            raise ColumnsError(f"{paths[0].name}: {proposal.lacks}, in a columns.toml")
-        return import_table(table, proposal.columns)
+        raise ColumnsError(f"{paths[0].name}: name the columns.toml that says what its columns are")
     return import_file(paths[0], columns, progress)
 
 
@@ -159,15 +153,12 @@ def _parts(reader: Reader, stream: bool) -> list[_Part]:
     parts: list[_Part] = []
     for watch in _watched(reader, stream):
         if watch.undone:
-            parts = [_without(part, watch.undone) for part in parts]
+            kept = (tuple(row for row in part.grasps if row.label.trial not in watch.undone) for part in parts)
+            parts = [replace(part, grasps=grasps) for part, grasps in zip(parts, kept, strict=True)]
         collection = watch.session.collection
         if collection is not None and (rows := _streamed(watch, collection) if stream else watch.rows()):
             parts.append(_Part(reader.path.name, watch.session, collection, rows))
     return [part for part in parts if part.grasps]
-
-
-def _without(part: _Part, trials: Set[int]) -> _Part:
-    return replace(part, grasps=tuple(grasp for grasp in part.grasps if grasp.label.trial not in trials))
 
 
 def _watched(reader: Reader, stream: bool) -> Iterator["_Watch"]:
@@ -239,18 +230,15 @@ class _Watch:
             accepted = label.event == "accepted" and label.trial == before.trial
             self.attempts[-1].accepted, self.attempts[-1].judged_us = accepted, label.time_us
         elif label.event == "undone":
-            self._undo(label.trial)
+            same = [each for each in self.attempts if each.accepted and each.captured.label.trial == label.trial]
+            if same:
+                same[-1].accepted = False
+            else:
+                self.undone.add(label.trial)
         if self._stream:
             self._due_us = label.time_us if self._due_us is None else self._due_us
         elif label.event != "begun":
             self._due_us = None
-
-    def _undo(self, trial: int) -> None:
-        here = [attempt for attempt in self.attempts if attempt.accepted and attempt.captured.label.trial == trial]
-        if here:
-            here[-1].accepted = False
-        else:
-            self.undone.add(trial)
 
     def _tick(self, until_us: int) -> None:
         """Add the rows that are due before `until_us`, while devices are read."""

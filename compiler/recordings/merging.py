@@ -64,27 +64,30 @@ def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
     timed = timed and any(found.times_us.size for found in own)
     joints, codes = _coded(names, [(found.joints, found.codes) for found in own])
     taxel_columns, taxels = _coded(names, [(found.taxel_columns, found.taxels) for found in own])
+    texts = {
+        name: np.concatenate([getattr(found, name) for found in own])
+        for name in ("grasps", "subjects", "objects", "sessions", "trials")
+    }
+    places = [dict(zip(found.switch_names, range(len(found.switch_names)), strict=True)) for found in own]
+    switches = [
+        found.switches[:, [place[name] for name in first.switch_names]]
+        for found, place in zip(own, places, strict=True)
+    ]
     return GraspSet(
-        switches=np.concatenate([found.switches[:, _places(first.switch_names, found.switch_names)] for found in own]),
+        switches=np.concatenate(switches),
         switch_names=first.switch_names,
         codes=codes,
         joints=joints,
-        grasps=np.concatenate([found.grasps for found in own]),
         taxonomy=taxonomy,
-        subjects=np.concatenate([found.subjects for found in own]),
-        objects=np.concatenate([found.objects for found in own]),
-        trials=np.concatenate([found.trials for found in own]),
         simulated=_origin(own),
-        sessions=np.concatenate([found.sessions for found in own]),
         independent=first.independent,
         taxels=taxels,
         taxel_columns=taxel_columns,
-        times_us=np.concatenate([_times(found) if timed else found.times_us[:0] for found in own]),
+        times_us=np.concatenate([found.times_us if found.times_us.size else np.zeros(len(found), int) for found in own])
+        if timed
+        else first.times_us[:0],
+        **texts,
     )
-
-
-def _times(found: GraspSet) -> NDArray[np.int64]:
-    return found.times_us if found.times_us.size else np.zeros(len(found), np.int64)
 
 
 def split(grasp_set: GraspSet, by: By) -> dict[str, GraspSet]:
@@ -250,11 +253,6 @@ def _moved(name: str, line: Joint, own: Joint, codes: NDArray[np.uint16]) -> NDA
     if moved.max(initial=0) >= CODES:
         raise RecordingError(f"{name}: {shortened(line.name)} gets codes above {CODES - 1}: import with a coarser grid")
     return moved
-
-
-def _places(wanted: tuple[str, ...], names: tuple[str, ...]) -> list[int]:
-    place = {name: number for number, name in enumerate(names)}
-    return [place[name] for name in wanted]
 
 
 def _origin(sets: list[GraspSet]) -> str:

@@ -12,7 +12,7 @@ from .summary import contacts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import SubFigure
 
 _BLUE = "#2f6690"
 _PALE = "#8fb3cc"
@@ -37,34 +37,21 @@ def draw(grasp_set: GraspSet, kind: str) -> bytes:
     with painting(font_size=8):
         from matplotlib.figure import Figure
 
-        size = _size(grasp_set)
+        types = 0.17 * len(_present(grasp_set)) + 0.9
+        rows_of_joints = -(-min(len(grasp_set.joints), _DRAWN_JOINTS) // _JOINTS_A_ROW)
+        heights = [types + 0.9, *([rows_of_joints * types + 0.4] if rows_of_joints else [])]
+        size = (max(9.0, 5.0 + 0.13 * min(len(grasp_set.element_names), 120)), sum(heights))  # inches
         figure = Figure(figsize=size, layout="constrained", dpi=min(130, _TALLEST / size[1]))
-        _compose(figure, grasp_set)
+        parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+        if grasp_set.element_names:
+            balance, contacts = parts[0].subplots(1, 2, width_ratios=(1, 3), sharey=True)
+            _draw_contacts(contacts, grasp_set)
+        else:
+            balance = parts[0].subplots()
+        _draw_balance(balance, grasp_set)
+        if grasp_set.joints:
+            _draw_joints(parts[-1], grasp_set)
         return rendered(figure, kind)
-
-
-def _size(grasp_set: GraspSet) -> tuple[float, float]:
-    """Return width and height in inches."""
-    width = max(9.0, 5.0 + 0.13 * min(len(grasp_set.element_names), 120))
-    return width, sum(_heights(grasp_set))
-
-
-def _heights(grasp_set: GraspSet) -> list[float]:
-    types = 0.17 * len(_present(grasp_set)) + 0.9
-    rows_of_joints = -(-min(len(grasp_set.joints), _DRAWN_JOINTS) // _JOINTS_A_ROW)
-    return [types + 0.9, *([rows_of_joints * types + 0.4] if rows_of_joints else [])]
-
-
-def _compose(figure: "Figure", grasp_set: GraspSet) -> None:
-    parts = figure.subfigures(len(_heights(grasp_set)), 1, height_ratios=_heights(grasp_set), squeeze=False)[:, 0]
-    if grasp_set.element_names:
-        balance, contacts = parts[0].subplots(1, 2, width_ratios=(1, 3), sharey=True)
-        _draw_contacts(contacts, grasp_set)
-    else:
-        balance = parts[0].subplots()
-    _draw_balance(balance, grasp_set)
-    if grasp_set.joints:
-        _draw_joints(parts[-1], grasp_set)
 
 
 def _present(grasp_set: GraspSet) -> NDArray[np.intp]:

@@ -6,7 +6,6 @@ from typing import Literal
 
 import msgspec
 import numpy as np
-import tomli_w
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
@@ -15,7 +14,7 @@ from thenar.runtime.published import NONE
 
 from .cells import names, numbers, times
 from .clocks import Course, is_time, numbers_trials
-from .columns import KEYS, PLAIN, ColumnRoles, TaxelColumns, TextFormat, TimeUnit
+from .columns import KEYS, PLAIN, ColumnRoles, TaxelColumns, TextFormat
 from .errors import FileRows, TableError, list_rows
 from .headers import skipped
 from .inputs import WORDS, Facts, Role, bits_of, facts_of, globs, inputs_of, joints_of, listed
@@ -49,9 +48,7 @@ class ColumnProposal(msgspec.Struct, frozen=True):
         """Return the text of the columns.toml, with the reasons."""
         said = [*self.remarks, *(f"{listed(role.columns)}: {role.role}: {role.reason}" for role in self.roles)]
         said += [f"TO DO: {self.lacks}"] if self.lacks else []
-        return (
-            "".join(f"# {printable(line)}\n" for line in said) + "\n" + tomli_w.dumps(msgspec.to_builtins(self.columns))
-        )
+        return "".join(f"# {printable(line)}\n" for line in said) + "\n" + self.columns.toml()
 
 
 def propose_file(path: Path, progress: Report = lambda _done, _total: None) -> tuple[Table, ColumnProposal]:
@@ -144,13 +141,17 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
     _trial_number(table, [column for column in found if column.name not in out], chosen, why)
     _constant_texts(table, found, chosen, why, out)
     frames, lacks = _frames(table, found, chosen, why, held)
-    if (unit := _unit(table, chosen)) is not None:
+    time = _time(table, chosen)
+    unit = None if time is None else unit_of_time(chosen["time"][0], time[~np.isnan(time)])
+    if unit is not None:
         why["time"] += f"; in {unit}"
     taken = {name for columns in chosen.values() for name in columns}
     rest = [column for column in found if column.name not in taken]
     inputs = inputs_of(rest, held, _counting(table, found, chosen) | out)
     if not any(role.role in ("switches", "taxels", "joints") for role in inputs):
-        raise TableError(f"{table.what}: no column holds numbers that change: it has no inputs{_left_out(inputs)}")
+        out_of = [f"{listed(role.columns)} ({role.reason})" for role in inputs if role.reason not in ("text", "empty")]
+        left = f"; left out are {list_names(out_of)}" if out_of else ""
+        raise TableError(f"{table.what}: no column holds numbers that change: it has no inputs{left}")
     used = taken | {name for role in inputs if role.role != "left out" for name in role.columns}
     excused = {name for key in ("label", "object", "session", "trial") for name in chosen.get(key, ())}
     missing = sum(
@@ -223,8 +224,9 @@ def _same(
             for other in found
             if other.name not in taken | out.keys() and _corresponds(table, other, column) and not other.bits
         ]
+        roles = WORDS.keys() & {*KEYS} - {key}
         names = [
-            other for other in alike if other.values is None and not _is_named(other, WORDS.keys() & {*KEYS} - {key})
+            other for other in alike if other.values is None and not any(other.words & WORDS[role] for role in roles)
         ]
         if column.values is not None and names:
             best = max(names, key=lambda other: bool(other.words & (WORDS[key] | WORDS["person"])))
@@ -237,10 +239,6 @@ def _same(
             if other.values is not None and other.distinct == 1 + np.ptp(other.values)
         }
     return out
-
-
-def _is_named(column: Facts, keys: Iterable[str]) -> bool:
-    return any(column.words & WORDS[key] for key in keys)
 
 
 def _corresponds(table: Table, other: Facts, column: Facts) -> bool:
@@ -347,12 +345,6 @@ def _counting(table: Table, found: Sequence[Facts], chosen: dict[str, tuple[str,
     return signs
 
 
-def _left_out(inputs: Sequence[Role]) -> str:
-    """Return which columns of numbers were left out, for the error that there are no inputs."""
-    out = [f"{listed(role.columns)} ({role.reason})" for role in inputs if role.reason not in ("text", "empty")]
-    return f"; left out are {list_names(out)}" if out else ""
-
-
 def _may_be(key: str, column: Facts) -> bool:
     if key == "time":
         return column.values is not None and column.distinct > 1 and is_time(column.words) and _dates(column)
@@ -384,11 +376,6 @@ def _none(labels: NDArray[np.str_]) -> tuple[str, ...]:
     if len({*found} - none - {""}) < 2:
         none = {label for label in none if plain(label) == NONE}
     return tuple(sorted(none))
-
-
-def _unit(table: Table, chosen: dict[str, tuple[str, ...]]) -> TimeUnit | None:
-    time = _time(table, chosen)
-    return None if time is None else unit_of_time(chosen["time"][0], time[~np.isnan(time)])
 
 
 def _label(what: str, found: Sequence[Facts], chosen: dict[str, tuple[str, ...]]) -> tuple[tuple[str, ...], str]:

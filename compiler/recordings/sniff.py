@@ -3,7 +3,7 @@
 import codecs
 import csv
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -18,7 +18,6 @@ from .table import csv_rows, named_by_comment, open_bytes, open_lines
 _LINES, _CELLS = 200, 200_000
 # Lines, and characters of each, given to clevercsv, whose run time is quadratic.
 _SEEN_LINES, _SEEN = 60, 400
-_CHUNK = 1 << 20
 # The bytes that Windows-1252 does not define: searching for them is many times faster than decoding.
 _NOT_WESTERN = b"\x81\x8d\x8f\x90\x9d"
 _DELIMITERS = (",", ";", "\t", "|", " ")
@@ -55,28 +54,16 @@ def sniff(path: Path) -> tuple[TextFormat, list[str]]:
 
 def _encoding(path: Path) -> tuple[str, str]:
     with open_bytes(path) as file:
-        start = file.read(_CHUNK)
-        if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-            return "utf-16", "its byte order mark says so"
-        marked = start.startswith(codecs.BOM_UTF8)
-        decoder = codecs.getincrementaldecoder("utf-8")()
-        utf8 = western = True
-        piece = start
-        while True:
-            if utf8:
-                try:
-                    decoder.decode(piece, final=not piece)
-                except UnicodeDecodeError:
-                    utf8 = False
-            western = western and not any(byte in piece for byte in _NOT_WESTERN)
-            if not piece or not (utf8 or western):
-                break
-            piece = file.read(_CHUNK)
-    if utf8:
-        return "utf-8", "its byte order mark says so" if marked else "all of it decodes so"
-    if western:
+        content = file.read()
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16", "its byte order mark says so"
+    try:
+        content.decode()
+    except UnicodeDecodeError:
+        if any(byte in content for byte in _NOT_WESTERN):
+            return "latin-1", "it is neither UTF-8 nor Windows-1252"
         return "cp1252", "it is not UTF-8; Windows-1252 is Latin-1 with more signs"
-    return "latin-1", "it is neither UTF-8 nor Windows-1252"
+    return "utf-8", "its byte order mark says so" if content.startswith(codecs.BOM_UTF8) else "all of it decodes so"
 
 
 def _dialect(lines: Iterable[str]) -> tuple[str, str]:
@@ -94,27 +81,17 @@ def _dialect(lines: Iterable[str]) -> tuple[str, str]:
 
 def _rows(lines: Sequence[str], delimiter: str, quote: str) -> tuple[list[list[str]], list[int]]:
     """Return the rows in `lines` that are not empty, and how many lines precede each."""
+    reader = csv_rows(lines, delimiter or "\0", quote or '"', strict=False)
     rows: list[list[str]] = []
     starts: list[int] = []
-    cells = 0
-    for start, row in _parsed(lines, delimiter, quote):
-        rows.append(named_by_comment([cell.strip() for cell in row], delimiter))
-        starts.append(start)
-        cells += len(row)
-        if cells > _CELLS:
-            break
-    return rows, starts
-
-
-def _parsed(lines: Sequence[str], delimiter: str, quote: str) -> Iterator[tuple[int, list[str]]]:
-    reader = csv_rows(lines, delimiter or "\0", quote or '"', strict=False)
-    while True:
+    row: list[str] | None = []
+    while row is not None and sum(map(len, rows)) <= _CELLS:
         start = reader.line_num
         try:
             row = next(reader, None)
         except csv.Error:
             continue
-        if row is None:
-            return
         if row:
-            yield start, row
+            rows.append(named_by_comment([cell.strip() for cell in row], delimiter))
+            starts.append(start)
+    return rows, starts

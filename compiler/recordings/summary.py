@@ -126,20 +126,6 @@ def _gaps(grasp_set: GraspSet) -> Iterator[Oddity]:
         yield Oddity("grasp types that a subject lacks", count, list_names(shown, count))
 
 
-class FrameCount(msgspec.Struct, frozen=True):
-    """The number of frames with `name`."""
-
-    name: str
-    frames: int
-
-
-class SwitchUse(msgspec.Struct, frozen=True):
-    """The share of frames in which a switch is closed, 0 to 1."""
-
-    name: str
-    closed: float
-
-
 class JointRange(msgspec.Struct, frozen=True):
     """The range of a joint or taxel in its unit, None in an empty set, and the number of distinct codes."""
 
@@ -159,7 +145,9 @@ class Summary(msgspec.Struct, frozen=True):
     seconds      total duration of the recordings; None if times are unknown
     simulated    the simulator of the grasps; empty: they were recorded
     independent  each row is stated to be a separate trial
+    grasps       number of frames of each grasp type that occurs; likewise subjects and objects
     balance      the rarest grasp type's count divided by the most frequent one's
+    switches     share of frames in which each switch is closed, 0 to 1
     """
 
     frames: int
@@ -172,12 +160,12 @@ class Summary(msgspec.Struct, frozen=True):
     independent: bool
     fingerprint: str
     taxonomy: str
-    grasps: tuple[FrameCount, ...]
+    grasps: dict[str, int]
     absent: tuple[str, ...]
     balance: float
-    subjects: tuple[FrameCount, ...]
-    objects: tuple[FrameCount, ...]
-    switches: tuple[SwitchUse, ...]
+    subjects: dict[str, int]
+    objects: dict[str, int]
+    switches: dict[str, float]
     taxels: tuple[JointRange, ...]
     joints: tuple[JointRange, ...]
     warnings: tuple[Oddity, ...]
@@ -186,7 +174,8 @@ class Summary(msgspec.Struct, frozen=True):
 def summarise(grasp_set: GraspSet) -> Summary:
     """Return the summary of `grasp_set`, with rows counted from 1."""
     counts = np.bincount(grasp_set.labels[~grasp_set.is_none], minlength=len(grasp_set.taxonomy.types))
-    grasps = [FrameCount(name, int(rows)) for name, rows in zip(grasp_set.taxonomy.types, counts, strict=True)]
+    grasps = dict(zip(grasp_set.taxonomy.types, counts.tolist(), strict=True))
+    closed = grasp_set.switches.sum(axis=0) / max(len(grasp_set), 1)
     present = counts[counts > 0]
     return Summary(
         frames=len(grasp_set),
@@ -199,12 +188,12 @@ def summarise(grasp_set: GraspSet) -> Summary:
         independent=grasp_set.independent,
         fingerprint=grasp_set.fingerprint(),
         taxonomy=grasp_set.taxonomy.name,
-        grasps=tuple(count for count in grasps if count.frames),
-        absent=tuple(count.name for count in grasps if not count.frames),
+        grasps={name: rows for name, rows in grasps.items() if rows},
+        absent=tuple(name for name, rows in grasps.items() if not rows),
         balance=float(present.min() / present.max()) if present.size else 0.0,
         subjects=_counts(grasp_set.subjects),
         objects=_counts(grasp_set.objects),
-        switches=_switches(grasp_set),
+        switches=dict(zip(grasp_set.switch_names, closed.tolist(), strict=True)),
         taxels=_ranges(grasp_set.taxel_columns, grasp_set.taxels),
         joints=_ranges(grasp_set.joints, grasp_set.codes),
         warnings=find_oddities(grasp_set, np.arange(1, len(grasp_set) + 1)),
@@ -220,14 +209,9 @@ def _seconds(grasp_set: GraspSet) -> float | None:
     return float(steps[steps > 0].sum() / 1e6)
 
 
-def _counts(names: NDArray[np.str_]) -> tuple[FrameCount, ...]:
+def _counts(names: NDArray[np.str_]) -> dict[str, int]:
     found, counts = np.unique(names, return_counts=True)
-    return tuple(map(FrameCount, found.tolist(), counts.tolist()))
-
-
-def _switches(grasp_set: GraspSet) -> tuple[SwitchUse, ...]:
-    closed = grasp_set.switches.sum(axis=0) / max(len(grasp_set), 1)
-    return tuple(map(SwitchUse, grasp_set.switch_names, closed.tolist()))
+    return dict(zip(found.tolist(), counts.tolist(), strict=True))
 
 
 def _ranges(joints: Sequence[Joint], columns: NDArray[np.uint16]) -> tuple[JointRange, ...]:

@@ -1,4 +1,4 @@
-"""Read tables of labelled grasps: delimited text, Weka's ARFF, and npz; foreign.py reads those of other programs.
+"""Read tables of labelled grasps: delimited text and Weka's ARFF; foreign.py reads those of other programs.
 
 ARFF has numeric and nominal attributes, quoted names and values, and `?` for a missing value. It is read here because
 the reader of scipy loses quotes in nominal values, reports no rows, and is not installed on a board.
@@ -12,21 +12,22 @@ import os
 import re
 import zlib
 from array import array
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import accumulate, chain, islice
+from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, overload
+from typing import TYPE_CHECKING, BinaryIO, TypeGuard
 
 import numpy as np
+from numpy.dtypes import StringDType
 from numpy.typing import NDArray
 
 from thenar.runtime.files import open_file
-from thenar.runtime.names import list_names, shortened
+from thenar.runtime.names import shortened
 
 from ..text import text_of
-from .arrays import AnyArray, read_arrays
+from .arrays import AnyArray
 from .columns import PLAIN, TextFormat
 from .errors import COLUMNS, LARGEST, LINES, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
 from .foreign import READERS, read_foreign
@@ -44,8 +45,16 @@ def open_bytes(path: Path) -> Iterator[BinaryIO]:
             size = os.fstat(raw.fileno()).st_size
             if size > LARGEST:
                 raise TableError(f"{path.name} is larger than {LARGEST} bytes, the most that is read of a table")
-            zipped = path.suffix.lower() == ".gz"
-            yield io.BufferedReader(_Unpacked(path.name, raw, unpacked(size))) if zipped else raw
+            if path.suffix.lower() != ".gz":
+                yield raw
+                return
+            content = gzip.GzipFile(fileobj=raw).read(unpacked(size) + 1)
+            if len(content) > unpacked(size):
+                raise TableError(
+                    f"{path.name} unpacks to more than {unpacked(size)} bytes, the most for a file of its size: "
+                    "unpack it and import the result"
+                )
+            yield io.BytesIO(content)
     except (gzip.BadGzipFile, EOFError, zlib.error) as reason:
         raise TableError(f"{path.name} is damaged: {reason}") from reason
 
@@ -67,31 +76,6 @@ def open_lines(path: Path, encoding: str = "utf-8") -> Iterator[Iterator[str]]:
         ) from reason
 
 
-class _Unpacked(io.RawIOBase):
-    """The content of a compressed file, limited to `limit` bytes."""
-
-    def __init__(self, what: str, packed: BinaryIO, limit: int) -> None:
-        super().__init__()
-        self._what = what
-        self._file = gzip.GzipFile(fileobj=packed)
-        self._limit = limit
-        self._left = limit
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: "memoryview[int]") -> int:  # type: ignore[override]
-        data = self._file.read(len(buffer))
-        self._left -= len(data)
-        if self._left < 0:
-            raise TableError(
-                f"{self._what} unpacks to more than {self._limit} bytes, the most for a file of its size: "
-                "unpack it and import the result"
-            )
-        buffer[: len(data)] = data
-        return len(data)
-
-
 def _lines(what: str, text: io.TextIOWrapper) -> Iterator[str]:
     number = 0
     while line := text.readline(LONGEST_LINE):
@@ -103,129 +87,35 @@ def _lines(what: str, text: io.TextIOWrapper) -> Iterator[str]:
         yield line
 
 
-# Cells kept as str at a time, while a block is filled or a column is read.
-_CELLS = 1 << 18
-_READ = 1 << 14
+# Cells kept as str at a time, while a table is filled or a column is read.
+_CELLS, _READ = 1 << 15, 1 << 14
+
+# Text as read, or an array of numbers or of str.
+Column = Sequence[str] | AnyArray
 
 
-@dataclass(frozen=True, slots=True)
-class _Block:
-    """Rows of a table, column by column: their `text`, the end of each column in it, and the cells' lengths."""
-
-    rows: int
-    text: bytes
-    ends: NDArray[np.unsignedinteger]  # (columns,) bytes
-    lengths: NDArray[np.unsignedinteger]  # (columns * rows,) characters
-
-    def column(self, number: int) -> list[str]:
-        """Return the cells of a column, in these rows."""
-        start = int(self.ends[number - 1]) if number else 0
-        text = self.text[start : int(self.ends[number])].decode()
-        lengths = self.lengths[number * self.rows : (number + 1) * self.rows].tolist()
-        if lengths.count(1) == self.rows:
-            return list(text)
-        return [text[end - length : end] for length, end in zip(lengths, accumulate(lengths), strict=True)]
+def is_numeric(column: Column) -> TypeGuard[AnyArray]:
+    """Return whether a column holds numbers, not text."""
+    return isinstance(column, np.ndarray) and column.dtype.kind not in "UT"
 
 
-class TextRows:
-    """Collects the rows of a table of `width` columns, each a list of cells; then returns its columns."""
-
-    def __init__(self, width: int) -> None:
-        self._width = width
-        self._rows: list[list[str]] = []
-        self._blocks: list[_Block] = []
-
-    def append(self, row: list[str]) -> None:
-        """Append the next row."""
-        self._rows.append(row)
-        if len(self._rows) * self._width >= _CELLS:
-            self._store()
-
-    def columns(self) -> "list[TextColumn]":
-        """Return the columns; no row may be appended afterwards."""
-        if self._rows:
-            self._store()
-        return [TextColumn([(self._blocks, number)]) for number in range(self._width)]
-
-    def _store(self) -> None:
-        columns = list(zip(*self._rows, strict=True))
-        texts = ["".join(column).encode() for column in columns]
-        lengths = np.fromiter(map(len, chain.from_iterable(columns)), np.uint32, len(self._rows) * self._width)
-        self._blocks.append(
-            _Block(
-                len(self._rows),
-                b"".join(texts),
-                _small(np.cumsum([*map(len, texts)], dtype=np.uint64)),
-                _small(lengths),
-            )
-        )
-        self._rows = []
-
-
-class TextColumn(Sequence[str]):
-    """One column of a table: in each of some lists of blocks, the column of a number."""
-
-    def __init__(self, parts: Sequence[tuple[list[_Block], int]]) -> None:
-        self._parts = parts
-
-    @classmethod
-    def joined(cls, columns: "Iterable[TextColumn]") -> "TextColumn":
-        """Return the cells of `columns`, one after the other."""
-        return cls([part for column in columns for part in column._parts])
-
-    def __len__(self) -> int:
-        return sum(block.rows for block, _ in self._blocks())
-
-    def __iter__(self) -> Iterator[str]:
-        return chain.from_iterable(block.column(number) for block, number in self._blocks())
-
-    def _blocks(self) -> "Iterator[tuple[_Block, int]]":
-        return ((block, number) for blocks, number in self._parts for block in blocks)
-
-    @overload
-    def __getitem__(self, row: int) -> str: ...
-
-    @overload
-    def __getitem__(self, row: slice) -> list[str]: ...
-
-    def __getitem__(self, row: int | slice) -> str | list[str]:
-        if isinstance(row, slice):
-            return list(self)[row]
-        for block, number in self._blocks():
-            if row < block.rows:
-                return block.column(number)[row]
-            row -= block.rows
-        raise IndexError("the column has fewer rows")
-
-    def pieces(self) -> Iterator[list[str]]:
-        """Yield the cells in lists of some thousands, which are slower to create than to iterate over."""
-        piece: list[str] = []
-        for block, number in self._blocks():
-            piece += block.column(number)
-            if len(piece) >= _READ:
-                yield piece
-                piece = []
-        if piece:
-            yield piece
-
-
-def pieces(column: Sequence[str] | NDArray[np.generic]) -> Iterator[list[str]]:
-    """Yield the cells of a text column of any type in lists of some thousands."""
-    if isinstance(column, TextColumn):
-        yield from column.pieces()
-        return
+def pieces(column: Column) -> Iterator[list[str]]:
+    """Yield the cells of a text column in lists of some thousands, so that few are kept as str."""
     for start in range(0, len(column), _READ):
         piece = column[start : start + _READ]
         yield piece.tolist() if isinstance(piece, np.ndarray) else list(piece)
 
 
-def _small(numbers: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
-    """Return `numbers` in the smallest type that holds the largest."""
-    return numbers.astype(np.min_scalar_type(int(numbers.max(initial=0))))
-
-
-# Text as read, or an array of numbers or of str.
-Column = Sequence[str] | AnyArray
+def _columns(what: str, names: Collection[str], rows: Iterator[list[str]]) -> dict[str, Column]:
+    """Return the cells of `rows` as columns of text, each cell in the memory that it needs. Raises TableError."""
+    check_names("column", names)
+    step = _CELLS // max(len(names), 1) + 1
+    blocks: list[AnyArray] = [np.zeros((0, len(names)), StringDType())]
+    while block := list(islice(rows, step)):
+        blocks.append(np.array(block, StringDType()))
+        if sum(map(len, blocks)) > ROWS:
+            raise TableError(f"{what} has more than {ROWS} rows, the most that are read of a table")
+    return dict(zip(names, np.concatenate(blocks).T, strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,7 +137,7 @@ class Table:
 
 
 _TEXTS = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz", ".txt.gz")
-SUFFIXES = (*_TEXTS, ".arff", ".arff.gz", ".npz", *READERS)
+SUFFIXES = (*_TEXTS, ".arff", ".arff.gz", *READERS)
 
 
 def is_text(path: Path) -> bool:
@@ -275,18 +165,18 @@ def read_tables(paths: Sequence[Path], text: TextFormat = PLAIN) -> Iterator[Tab
         foreign = read_foreign(batch, text.skip) if is_foreign else None
         for path in batch:
             try:
-                table = _read_ours(path, text) if foreign is None else _of_foreign(path, *next(foreign))
+                if foreign is None:
+                    table = _read_ours(path, text)
+                else:
+                    read, rows, skip = next(foreign)
+                    check_names("column", read)
+                    table = Table(path.name, read, rows, skip=skip)
                 columns = unlisted(table.what, table.columns, table.rows)
             except RecordingError as reason:
                 raise TableError(f"{path.name}: {reason}") from reason
             if not len(table.rows):
                 raise TableError(f"{path.name} has no rows")
             yield replace(table, columns=columns, size=path.stat().st_size)
-
-
-def _of_foreign(path: Path, columns: dict[str, AnyArray], rows: NDArray[np.int64], skip: int) -> Table:
-    check_names("column", columns)
-    return Table(path.name, columns, rows, skip=skip)
 
 
 def _read_ours(path: Path, text: TextFormat) -> Table:
@@ -298,8 +188,6 @@ def _read_ours(path: Path, text: TextFormat) -> Table:
     if name.endswith((".arff", ".arff.gz")):
         with open_lines(path) as lines:
             return read_arff(path.name, lines)
-    if name.endswith(".npz"):
-        return _read_npz(path)
     raise TableError(f"{path.name}: a table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
 
 
@@ -327,7 +215,18 @@ def named_by_comment(header: list[str], delimiter: str) -> list[str]:
 def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str) -> Table:
     skip = text.skip or 0
     reader = csv_rows(_narrow(what, islice(lines, skip, None), delimiter), delimiter, text.quote, strict=True)
-    rows = array("q")
+    numbers = array("q")
+
+    def checked(rows: Iterable[list[str]]) -> Iterator[list[str]]:
+        for row in rows:
+            numbers.append(skip + reader.line_num)
+            if len(row) > len(names) and not any(row[len(names) :]):
+                del row[len(names) :]
+            if len(row) != len(names):
+                top = "header" if text.header else "first row"
+                raise TableError(f"{what} row {numbers[-1]} has {len(row)} cells, its {top} {len(names)}")
+            yield row
+
     try:
         filled: Iterator[list[str]] = filter(None, reader)
         first: list[str] = next(filled, [])
@@ -335,25 +234,10 @@ def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str)
             first = named_by_comment(first, delimiter)
         names = [text_of(name.strip()) if text.header else "" for name in first]
         names = [name or f"column {number}" for number, name in enumerate(names, start=1)]
-        cells = TextRows(len(names))
-        if first and not text.header:
-            filled = chain([first], filled)
-        for row in filled:
-            number = skip + reader.line_num
-            if len(row) > len(names) and not any(row[len(names) :]):
-                del row[len(names) :]
-            if len(row) != len(names):
-                top = "header" if text.header else "first row"
-                raise TableError(f"{what} row {number} has {len(row)} cells, its {top} {len(names)}")
-            rows.append(number)
-            if len(rows) > ROWS:
-                raise TableError(f"{what} has more than {ROWS} rows, the most that are read of a table")
-            cells.append(row)
+        columns = _columns(what, names, checked(filled if text.header or not first else chain([first], filled)))
     except csv.Error as reason:
         raise TableError(f"{what} row {skip + reader.line_num}: {reason}") from reason
-    check_names("column", names)
-    columns = dict(zip(names, cells.columns(), strict=True))
-    return Table(what, columns, np.frombuffer(rows, np.int64), cells=True, decimal=text.decimal)
+    return Table(what, columns, np.frombuffer(numbers, np.int64), cells=True, decimal=text.decimal)
 
 
 def _narrow(what: str, lines: Iterable[str], delimiter: str) -> Iterator[str]:
@@ -362,17 +246,6 @@ def _narrow(what: str, lines: Iterable[str], delimiter: str) -> Iterator[str]:
         if line.count(delimiter) >= COLUMNS:
             raise TableError(f"{what} has more than {COLUMNS} columns, the most that are read of a table")
         yield line
-
-
-def _read_npz(path: Path) -> Table:
-    columns = read_arrays(path)
-    if not columns:
-        raise TableError(f"{path.name}: it holds no arrays")
-    lengths = {len(column) for column in columns.values()}
-    if len(lengths) > 1:
-        raise TableError(f"{path.name}: its arrays have unequal lengths, {list_names(list(map(str, sorted(lengths))))}")
-    check_names("column", columns)
-    return Table(path.name, columns, np.arange(1, lengths.pop() + 1))
 
 
 # A value: quoted, with backslash escapes, or a word; an unclosed quote takes the rest of the line. Commas and blanks
@@ -395,22 +268,15 @@ def read_arff(what: str, text: Iterable[str]) -> Table:
     """
     lines = enumerate(text, start=1)
     kinds = _header(what, lines)
-    cells, count = TextRows(len(kinds)), 0
-    for _, line in lines:
-        data = line.strip()
-        if data and not data.startswith("%"):
-            count += 1
-            if count > ROWS:
-                raise TableError(f"{what} has more than {ROWS} rows, the most that are read of a table")
-            cells.append(_values(f"{what} row {count}", data, len(kinds)))
-    check_names("column", kinds)
-    columns = dict(zip(kinds, cells.columns(), strict=True))
+    data = (line.strip() for _, line in lines)
+    numbered = enumerate((line for line in data if line and not line.startswith("%")), start=1)
+    columns = _columns(what, kinds, (_values(f"{what} row {row}", line, len(kinds)) for row, line in numbered))
     for name, values in kinds.items():
         for number, cell in enumerate(columns[name] if values else (), start=1):
             if cell != "?" and cell not in (values or ()):
                 shown = f"{shortened(repr(cell))} is not among the values of attribute {shortened(repr(name))}"
                 raise TableError(f"{what} row {number}: {shown}")
-    return Table(what, columns, np.arange(1, count + 1))
+    return Table(what, columns, np.arange(1, len(next(iter(columns.values()), ())) + 1))
 
 
 def _header(what: str, lines: Iterator[tuple[int, str]]) -> _Kinds:
@@ -474,7 +340,6 @@ def _unquote(where: str, value: str) -> str:
 # A list as pandas and numpy write it, with commas or blanks, and a number of numpy in it.
 _LIST = re.compile(r"[\[(](.*)[\])]", re.DOTALL)
 _SCALAR = re.compile(r"np\.\w+\(([^()]*)\)")
-_LISTS = 1 << 14
 
 
 def unlisted(what: str, columns: Mapping[str, Column], rows: NDArray[np.int64]) -> dict[str, Column]:
@@ -488,8 +353,7 @@ def unlisted(what: str, columns: Mapping[str, Column], rows: NDArray[np.int64]) 
     """
     made: list[tuple[str, Column]] = []
     for name, column in columns.items():
-        is_text = not isinstance(column, np.ndarray) or column.dtype.kind == "U"
-        first = next((cell for cell in column if cell), "") if is_text else ""
+        first = "" if is_numeric(column) else next((cell for cell in column if cell), "")
         if not _list_of(str(first)):
             made.append((name, column))
             continue
@@ -505,22 +369,19 @@ def unlisted(what: str, columns: Mapping[str, Column], rows: NDArray[np.int64]) 
 
 def _of_lists(where: str, column: Column, rows: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the numbers (n, k) of lists of k, NaN for missing ones. Raises TableError."""
-    cells = ((row, str(cell)) for row, cell in enumerate(column))
-    first_row, first = next((row, found) for row, cell in cells if (found := _list_of(cell)))
-    parts = [np.full((first_row, len(first)), np.nan), np.array([first])]
-    while piece := list(islice(cells, _LISTS)):
-        lists = []
-        for row, cell in piece:
-            found = _list_of(cell) if cell.strip() else []
-            if found is None:
-                shown = f"but row {rows[row]} has {shortened(repr(cell))}: write each list whole"
-                raise TableError(f"{where} holds lists of numbers, {shown}")
-            if len(found) not in (0, len(first)):
-                shown = f"{len(first)} in row {rows[first_row]} and {len(found)} in row {rows[row]}"
-                raise TableError(f"{where} holds lists of unequal lengths, {shown}: write lists of one length")
-            lists.append(found or [np.nan] * len(first))
-        parts.append(np.array(lists))
-    return np.concatenate(parts)
+    first, width = next((row, len(cells)) for row, cell in enumerate(column) if (cells := _list_of(str(cell))))
+    numbers = np.full((len(column), width), np.nan)
+    for row, cell in enumerate(map(str, column)):
+        cells = _list_of(cell) if cell.strip() else []
+        if cells is None:
+            shown = f"but row {rows[row]} has {shortened(repr(cell))}: write each list whole"
+            raise TableError(f"{where} holds lists of numbers, {shown}")
+        if len(cells) not in (0, width):
+            shown = f"{width} in row {rows[first]} and {len(cells)} in row {rows[row]}"
+            raise TableError(f"{where} holds lists of unequal lengths, {shown}: write lists of one length")
+        if cells:
+            numbers[row] = cells
+    return numbers
 
 
 def _list_of(cell: str) -> list[float] | None:

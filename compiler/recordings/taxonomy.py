@@ -190,7 +190,10 @@ def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[
     """
     if objects is None:
         types = published(taxonomy)
-        return types, (*(CollectionTask(grasp, (ANY,)) for grasp in types.types), *_nothing(tuple(MOVEMENTS), none))
+        return types, (
+            *(CollectionTask(grasp, (ANY,)) for grasp in types.types),
+            *(CollectionTask(NONE, tuple(MOVEMENTS)),) * none,
+        )
     source = read_source(objects, ColumnsError)
     tables = source.tables()
     listed = [key for key in tables if plain(key) == NONE]
@@ -207,11 +210,7 @@ def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[
         if grasp in tasks:
             raise source.error((key,), f"is {grasp}, which is listed already: list it once")
         tasks[grasp] = CollectionTask(grasp, _objects(source, key, value))
-    return types, (*tasks.values(), *_nothing(movements, none))
-
-
-def _nothing(movements: tuple[str, ...], none: bool) -> tuple[CollectionTask, ...]:
-    return (CollectionTask(NONE, movements),) if none else ()
+    return types, (*tasks.values(), *(CollectionTask(NONE, movements),) * none)
 
 
 def _objects(source: TomlText, key: str, value: object) -> tuple[str, ...]:

@@ -2,12 +2,10 @@
 
 import re
 from collections.abc import Sequence
-from typing import Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-
-Value = TypeVar("Value", bound=np.generic)
 
 _DIGITS = re.compile(r"(\d+)")
 
@@ -122,27 +120,21 @@ def fill(values: NDArray[np.generic], missing: NDArray[np.bool_], trials: NDArra
     return int((~there & ~known).sum())
 
 
-class Frames:
-    """The frames of each trial: rows in order, the start of each trial, and its middle frame."""
+def frame_of_each(
+    trials: NDArray[np.intp], values: NDArray[np.generic] | None = None, largest: bool = False
+) -> NDArray[np.intp]:
+    """Return a row of each of the `trials` (n,), in the order of their middle frames.
 
-    def __init__(self, trials: NDArray[np.intp]) -> None:
-        self.order = np.argsort(trials, kind="stable")
-        self._trials = trials[self.order]
-        self._starts = np.flatnonzero(np.diff(self._trials, prepend=-1))
-        self._middles = self._starts + (np.diff(self._starts, append=len(trials)) - 1) // 2
-        self.middle: NDArray[np.intp] = np.sort(self.order[self._middles])
-        # Trials in the order of their middle frames.
-        self._sorted = np.argsort(self.order[self._middles])
-
-    def median(self, values: NDArray[Value]) -> NDArray[Value]:
-        """Return the lower median (trials,) of `values` (n,): a value that occurred; for switches the majority."""
-        column = values[self.order]
-        middle: NDArray[Value] = column[np.lexsort((column, self._trials))][self._middles]
-        return middle[self._sorted]
-
-    def any(self, bits: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return (trials,) whether any of `bits` (n,) is set."""
-        return np.logical_or.reduceat(bits[self.order], self._starts)[self._sorted]
+    It is the middle frame; with `values` (n,) a frame with the lower median of them, for switches the majority, or with
+    the largest.
+    """
+    order = np.argsort(trials, kind="stable")
+    starts = np.flatnonzero(np.diff(trials[order], prepend=-1))
+    sizes = np.diff(starts, append=len(trials))
+    middles = starts + (sizes - 1) // 2
+    by_value = order if values is None else np.lexsort((values, trials))
+    chosen: NDArray[np.intp] = by_value[starts + sizes - 1 if largest else middles]
+    return chosen[np.argsort(order[middles])]
 
 
 def otsu(values: NDArray[np.float64]) -> float:

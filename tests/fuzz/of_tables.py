@@ -190,7 +190,7 @@ FORMATS = (
     Format("csv.gz", lambda: [gzip.compress(_csv(), mtime=0)], zipped(table_file), _table(".csv.gz")),
     Format("arff", lambda: [_arff()], table_file, _table(".arff")),
     Format("arff.gz", lambda: [gzip.compress(_arff(), mtime=0)], zipped(table_file), _table(".arff.gz")),
-    Format("npz", lambda: [_npz()], npz_file, _table(".npz")),
+    Format("npz", lambda: [_npz()], npz_file, _table(".npz"), weight=0.03),
     Format("columns.toml", lambda: [_COLUMNS.encode(), _OF_TYPES.encode()], toml_file, _columns),
     Format("grasps", lambda: [_grasps()], sealed(npz_file), _set),
 )

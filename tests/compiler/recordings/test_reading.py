@@ -3,7 +3,7 @@ import pytest
 
 from thenar.compiler.recordings.columns import ColumnRoles, JointColumns, select
 from thenar.compiler.recordings.errors import TableError
-from thenar.compiler.recordings.importer import Read, read_cells
+from thenar.compiler.recordings.importer import read_cells
 from thenar.compiler.recordings.table import Column, Table
 
 GOOD = {
@@ -15,9 +15,9 @@ GOOD = {
 }
 
 
-def read(columns: ColumnRoles, **cells: Column) -> Read:
+def read(columns: ColumnRoles, **cells: Column) -> None:
     table = Table("t.csv", GOOD | cells, np.array([2, 3, 5]))
-    return read_cells(table, columns, select(columns, list(table.columns)))
+    read_cells(table, columns, select(columns, list(table.columns)))
 
 
 ALL = ColumnRoles("g", subject="who", trial="n", switches=("s",), joints=(JointColumns(("j",)),))
