@@ -1,6 +1,5 @@
 """The decoder of segments: the core's files and the costs of a build in C, and the values for other languages."""
 
-from dataclasses import dataclass
 from typing import Any
 
 from thenar.firmware_templates.rendering import file_text, render
@@ -10,28 +9,7 @@ from . import FirmwareError
 
 LAG_US = 150_000
 _MOST_STATES = 255  # which a byte numbers
-
-
-@dataclass(frozen=True, slots=True)
-class _State:
-    """A state's cost, and where it waits until it has lasted long enough: a ring, and a place in its rows."""
-
-    enter: int
-    direct: int
-    leave: int
-    stay: int
-    least: int
-    ring: int
-    place: int
-
-
-@dataclass(frozen=True, slots=True)
-class _Ring:
-    """The rows in which states with the same shortest duration wait: places `begin` to `end`, `width` per row."""
-
-    begin: int
-    end: int
-    width: int
+_NO_CHANGE = {"enter": 0, "direct": 0, "leave": 0}
 
 
 SEGMENT_FILES = ("thenar_segments.h", "thenar_segments.c")
@@ -72,7 +50,7 @@ def decoder_values(model: SegmentModel) -> dict[str, Any]:
         "lag": lag_of(model),
         "states": states,
         "groups": rings,
-        "waiting": rings[-1].end if rings else 0,
+        "waiting": rings[-1]["end"] if rings else 0,
         "mask_bytes": -(-len(states) // 8),
     }
 
@@ -87,21 +65,24 @@ def times_of(model: SegmentModel) -> dict[str, str]:
     return {"tick_ms": f"{model.tick_us / 1000:g}", "lag_ms": f"{model.tick_us * lag_of(model) / 1000:g}"}
 
 
-def _laid_out(model: SegmentModel) -> tuple[list[_State], list[_Ring]]:
-    """Return the states, and the rings in which they wait."""
+def _laid_out(model: SegmentModel) -> tuple[list[dict[str, int]], list[dict[str, int]]]:
+    """Return the costs of each state, and its ring and place in it; and the rings in which states wait until they have
+    lasted long enough, one for each shortest duration: from `begin` to `end`, `width` a row.
+    """
     numbers: dict[int, int] = {}
-    rings: list[_Ring] = []
+    rings: list[dict[str, int]] = []
     end, K = 0, model.n_types
     for least in sorted({each for each in model.least if each > 1}, key=model.least.index):
         width, begin = model.least.count(least), end
         end = begin + width * (least - 1)
         numbers[least] = len(rings)
-        rings.append(_Ring(begin, end, width))
+        rings.append({"begin": begin, "end": end, "width": width})
     usual = max(model.stay, key=model.stay.count)
     states = []
     for k, least in enumerate(model.least):
-        change = (model.enter[k], model.direct[k], model.leave[k]) if k < K else (0, 0, 0)
+        change = {"enter": model.enter[k], "direct": model.direct[k], "leave": model.leave[k]} if k < K else _NO_CHANGE
         # Only differences between states matter, so the usual cost is subtracted; smaller ones wrap modulo 2^16.
         stay = (model.stay[k] - usual) % 65536
-        states.append(_State(*change, stay, least, numbers.get(least, 0), model.least[:k].count(least)))
+        place = {"ring": numbers.get(least, 0), "place": model.least[:k].count(least)}
+        states.append({**change, "stay": stay, "least": least, **place})
     return states, rings
