@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -120,6 +120,51 @@ class CoreTerm(Term):
         error in each bin; none where the contribution is stepped.
         """
         return ends[:0]
+
+
+class Tabulated(CoreTerm):
+    """A term that adds one of its rows (..., K); rows on a grid are multiples of it."""
+
+    __slots__ = ()
+    rows: Rows
+
+    @property
+    def cells(self) -> Rows:
+        """The rows, one after the other, (n_rows, K)."""
+        return self.rows.reshape(-1, self.rows.shape[-1])
+
+    @property
+    def n_rows(self) -> int:
+        """The number of its rows."""
+        return len(self.cells)
+
+    @property
+    def ends(self) -> Ends:
+        """The largest and the smallest contribution to each type, (K,) and (K,)."""
+        return self.cells.max(axis=0), self.cells.min(axis=0)
+
+    def grid_of(self, grid: int) -> int:
+        """Return the grid of its rows in tables on a `grid`."""
+        return 1
+
+    def relative(self) -> Self:
+        """Return the term of scores relative to the last class."""
+        return self._of_rows(less_last(self.rows))
+
+    def whole(self, scale: float, grid: int) -> Self:
+        """Return the term in whole steps."""
+        return self._of_rows(rounded(self.rows * scale, self.grid_of(grid)))
+
+    def rounding_error(self, scale: float, grid: int) -> float:
+        """Return half of the grid."""
+        return self.grid_of(grid) / 2
+
+    def integers(self) -> Self:
+        """Return the term with its rows as int16."""
+        return self._of_rows(self.rows.astype(np.int16))
+
+    def _of_rows(self, rows: Rows) -> Self:
+        return replace(self, rows=rows)  # type: ignore[type-var]
 
 
 def rounded(rows: Floats, grid: int = 1) -> Floats:

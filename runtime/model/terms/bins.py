@@ -1,16 +1,16 @@
 """A joint, by the bin of its code."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .base import CoreTerm, Ends, Rows, less_last, rounded
+from .base import Rows, Tabulated
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bins(CoreTerm):
+class Bins(Tabulated):
     """The contribution of a joint: the row of the bin of its code.
 
     thresholds (T,) uint16, strictly increasing; rows (T + 1, K). The bin is the number of thresholds below the code, so
@@ -33,24 +33,10 @@ class Bins(CoreTerm):
         """The thresholds."""
         return (self.thresholds,)
 
-    @property
-    def n_rows(self) -> int:
-        """The number of its rows."""
-        return len(self.rows)
-
-    @property
-    def ends(self) -> Ends:
-        """The largest and the smallest contribution, (K,) each."""
-        return self.rows.max(axis=0), self.rows.min(axis=0)
-
     def of(self, *values: NDArray[Any]) -> Rows:
         """Return the contribution (n, K) of codes (n,)."""
         rows: Rows = self.rows[np.searchsorted(self.thresholds, values[0])]
         return rows
-
-    def relative(self) -> "Bins":
-        """Return the term of scores relative to the last class."""
-        return replace(self, rows=less_last(self.rows))
 
     def plus(self, other: "Bins") -> "Bins":
         """Return the sum of both, which are of one joint."""
@@ -61,14 +47,6 @@ class Bins(CoreTerm):
     def grid_of(self, grid: int) -> int:
         """Return the grid of its rows: a joint's only row is part of the starting value, and needs none."""
         return grid if len(self.rows) > 1 else 1
-
-    def whole(self, scale: float, grid: int) -> "Bins":
-        """Return the term in whole steps, of multiples of `grid`."""
-        return replace(self, rows=rounded(self.rows * scale, self.grid_of(grid)))
-
-    def rounding_error(self, scale: float, grid: int) -> float:
-        """Return half of the grid."""
-        return self.grid_of(grid) / 2
 
     def integers(self) -> "Bins":
         """Return the term with its rows as int16, and without the thresholds that rounding has made redundant."""

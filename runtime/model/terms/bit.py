@@ -30,7 +30,7 @@ class Bit(CoreTerm):
 
     @property
     def ends(self) -> Ends:
-        """The largest and the smallest contribution, (K,) each."""
+        """The largest and the smallest contribution to each type, (K,) and (K,)."""
         return np.maximum(self.row, 0), np.minimum(self.row, 0)
 
     def of(self, *values: NDArray[Any]) -> Rows:

@@ -1,17 +1,17 @@
 """Two joints together, by the bins of both codes."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .base import CoreTerm, Ends, Rows, less_last, rounded
+from .base import Rows, Tabulated
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Grid(CoreTerm):
+class Grid(Tabulated):
     """The contribution of two joints together: the row of the cell of their codes.
 
     joints (a, b), a < b; thresholds (T_a,) and (T_b,) uint16, strictly increasing; rows (T_a + 1, T_b + 1, K). A joint
@@ -34,21 +34,6 @@ class Grid(CoreTerm):
         """The thresholds of both."""
         return self.thresholds
 
-    @property
-    def cells(self) -> Rows:
-        """The rows, one after the other (cells, K): the first joint's bins one by one, in each the other's."""
-        return self.rows.reshape(-1, self.rows.shape[-1])
-
-    @property
-    def n_rows(self) -> int:
-        """The number of its rows."""
-        return len(self.cells)
-
-    @property
-    def ends(self) -> Ends:
-        """The largest and the smallest contribution, (K,) each."""
-        return self.cells.max(axis=0), self.cells.min(axis=0)
-
     def of(self, *values: NDArray[Any]) -> Rows:
         """Return the contribution (n, K) of codes (n,) of both."""
         down, across = (np.searchsorted(steps, codes) for steps, codes in zip(self.thresholds, values, strict=True))
@@ -65,22 +50,6 @@ class Grid(CoreTerm):
         """Return the grid with these fields. Raises KeyError, TypeError or ValueError for others."""
         a, b = arrays["joints"].tolist()
         return cls((a, b), (arrays["down"], arrays["across"]), arrays["rows"])
-
-    def relative(self) -> "Grid":
-        """Return the term of scores relative to the last class."""
-        return replace(self, rows=less_last(self.rows))
-
-    def whole(self, scale: float, grid: int) -> "Grid":
-        """Return the term in whole steps."""
-        return replace(self, rows=rounded(self.rows * scale))
-
-    def rounding_error(self, scale: float, grid: int) -> float:
-        """Return half a step."""
-        return 0.5
-
-    def integers(self) -> "Grid":
-        """Return the term with its rows as int16."""
-        return replace(self, rows=self.rows.astype(np.int16))
 
 
 MEMBER = Grid
