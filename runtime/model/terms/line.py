@@ -115,7 +115,7 @@ class Slope(CoreTerm):
     `gain` is negative: 0 to `most`, at most 254. The distance is that minus `zero`. Raises BuildError.
     """
 
-    name = "slope"
+    name = "line"
     stepped = False
 
     joint: int
