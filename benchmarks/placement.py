@@ -17,10 +17,11 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from placementlines import CONSOLE, Data, measured, papers
-from placementtables import compared, saved
+from placementlines import CONSOLE, MOST, SHOWN, WITHIN, Data, Line, Point, measured, papers
+from rich.table import Table
 
 from thenar.compiler.evaluation.folds import weka_folds
+from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.workers import in_workers
@@ -51,6 +52,48 @@ def inputs(grasp_set: GraspSet, folds: int) -> tuple[Data, Data]:
     cut, prune = tuple(weka_folds(samples[0].labels, folds, SEED)), papers_prune(grasp_set)
     alone, both = (Data(part, grasp_set.switch_names, cut, prune) for part in samples)
     return alone, both
+
+
+def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:
+    """Return the table of smallest placements within half a point of the paper's accuracy."""
+    title = f"{kind(joints)}: fewest switches within {100 * WITHIN:g} points of the paper's"
+    times = ("scan, new glove, us", "less", "as wired, us", "less")
+    table = Table("method", "switches", "accuracy, %", "fewer switches", *times, title=title)
+    cells = (f"{paper.size:.1f}", f"{100 * paper.rate:.2f}", "", f"{paper.new_us:.0f}", "", f"{paper.wired_us:.0f}", "")
+    table.add_row("the paper's pruned ID3", *cells, end_section=True)
+    for line in lines:
+        if line.joints != joints or not METHODS[line.method].ours:
+            continue
+        point = line.smallest
+        if point is None:
+            table.add_row(line.method, f"none up to {MOST}", f"{100 * line.shown[-1].rate:.2f} at {SHOWN[joints][-1]}")
+            continue
+        fewer = f"{1 - point.size / paper.size:.0%}"
+        new = (f"{point.new_us:.0f}", f"{1 - point.new_us / paper.new_us:.0%}")
+        wired = (f"{point.wired_us:.0f}", f"{1 - point.wired_us / paper.wired_us:.0%}")
+        table.add_row(line.method, f"{point.size:.1f}", f"{100 * point.rate:.2f}", fewer, *new, *wired)
+    return table
+
+
+def compared(lines: Sequence[Line], joints: bool) -> Table:
+    """Return the table of rates at given numbers of switches; numbers that a tree misses are added in brackets."""
+    heads = (f"{size} switches, %" for size in SHOWN[joints])
+    table = Table("method", *heads, "seconds to choose", title=kind(joints))
+    for line in lines:
+        if line.joints == joints:
+            cells = (cell(point, size) for point, size in zip(line.shown, SHOWN[joints], strict=True))
+            table.add_row(line.method, *cells, f"{line.seconds:.1f}")
+    return table
+
+
+def cell(point: Point, size: int) -> str:
+    """Return a rate, with the mean number of switches if it differs from `size`."""
+    return f"{100 * point.rate:.2f}" + ("" if point.size == size else f" ({point.size:.1f})")
+
+
+def kind(joints: bool) -> str:
+    """Return the inputs, in words."""
+    return "switches and joints" if joints else "switches only"
 
 
 def main() -> None:
