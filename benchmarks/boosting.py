@@ -15,7 +15,6 @@ os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"  # befo
 
 import argparse
 import resource
-import shutil
 import subprocess
 import tempfile
 import time
@@ -29,12 +28,12 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from synthetic import grasp_like
+from weka import installed, logitboost, write_arff
 
 from thenar.compiler.additive.logit import fit_logit
 from thenar.compiler.boosting.boost import boost
 from thenar.runtime.model.tables import winners
 
-WEKA_JAR = Path("/usr/share/java/weka.jar")
 CLASSES, ROUNDS = 14, 100
 # Weka takes minutes with more rows.
 MOST_WEKA_ROWS = 4200
@@ -45,30 +44,14 @@ def weka(bits: NDArray[np.bool_], joints: NDArray[Any], labels: NDArray[np.intp]
     """Return the seconds of 100 rounds, the switches read as {0,1} or as numbers."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "train.arff"
-        _write_arff(path, bits, joints, labels, nominal)
+        write_arff(path, bits, joints, labels, CLASSES, "{0,1}" if nominal else "numeric")
         return _weka_process(path, ROUNDS) - _weka_process(path, 1)
 
 
-def _write_arff(
-    path: Path, bits: NDArray[np.bool_], joints: NDArray[Any], labels: NDArray[np.intp], nominal: bool
-) -> None:
-    switch = "{0,1}" if nominal else "numeric"
-    head = ["@relation grasps"]
-    head += [f"@attribute s{s} {switch}" for s in range(bits.shape[1])]
-    head += [f"@attribute j{j} numeric" for j in range(joints.shape[1])]
-    head += ["@attribute grasp {" + ",".join(f"g{k}" for k in range(CLASSES)) + "}", "@data"]
-    rows = [
-        ",".join([*map(str, b), *map(repr, c), f"g{k}"])
-        for b, c, k in zip(bits.astype(int).tolist(), joints.tolist(), labels.tolist(), strict=True)
-    ]
-    path.write_text("\n".join(head + rows) + "\n")
-
-
 def _weka_process(path: Path, rounds: int) -> float:
-    command = ["java", "-XX:+UseSerialGC", "-XX:ActiveProcessorCount=1", "-Xmx4g", "-cp", str(WEKA_JAR)]
-    command += ["weka.classifiers.meta.LogitBoost", "-t", str(path), "-no-cv", "-o", "-I", str(rounds)]
+    command = logitboost(rounds, "-t", str(path), "-no-cv", "-o")
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run([*command, "-W", "weka.classifiers.trees.DecisionStump"], capture_output=True, text=True)
+    done = subprocess.run(command, capture_output=True, text=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if "Time taken to build model" not in done.stdout:
         raise SystemExit(f"Weka failed:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
@@ -112,7 +95,7 @@ def measured(rows: int, joints: str, repeats: int) -> list[str]:
     ridge = least(lambda: fit_logit(X, labels, CLASSES), repeats)
     doubles = X.astype(np.float64)
     peers: list[float | None] = [None] * 4
-    if rows <= MOST_WEKA_ROWS and WEKA_JAR.exists() and shutil.which("java"):
+    if rows <= MOST_WEKA_ROWS and installed():
         peers[:2] = (weka(bits, values, labels, nominal) for nominal in (False, True))
     if find_spec("lightgbm"):
         peers[2] = min(
@@ -137,7 +120,7 @@ def main() -> None:
     console = Console(width=120)
     console.print(table)
     console.print("In brackets: how many times the time of thenar's LogitBoost that is.")
-    here = {"Weka": WEKA_JAR.exists() and shutil.which("java"), "LightGBM": find_spec("lightgbm")}
+    here = {"Weka": installed(), "LightGBM": find_spec("lightgbm")}
     if missing := [name for name, found in (here | {"XGBoost": find_spec("xgboost")}).items() if not found]:
         console.print(f"Not installed, and left out: {', '.join(missing)}")
     bits, codes, labels = grasp_like(1400, seed=1)

@@ -6,8 +6,6 @@ and is tested force by force on unseen trials. Taxels are read as switches that 
 codes.
 """
 
-import argparse
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -191,20 +189,3 @@ def draw(found: Onset, path: Path) -> None:
         axes.grid(color=on_paper("line"), lw=0.6)
         figure.legend(loc="outside right center", frameon=False)
         write_atomically(path, rendered(figure, "svg"))
-
-
-def main(arguments: list[str]) -> None:
-    """Draw the curves of a set, with the additive logit and three levels per taxel."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("set", type=Path, help="a .grasps file with taxels in newtons and frames of the beginning")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="the .svg to write")
-    parser.add_argument("--levels", type=int, default=3, help="levels of a taxel at most (default: %(default)s)")
-    asked = parser.parse_args(arguments)
-    found = onset(GraspSet.load(asked.set), levels=asked.levels)
-    draw(found, asked.output)
-    for curve in found.curves:
-        print(curve.title, *("-" if rate is None else f"{100 * rate.mean:.1f}" for rate in curve.rates), flush=True)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
