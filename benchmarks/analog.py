@@ -1,6 +1,6 @@
 """The gain of pads with levels over switches: the scenes `kamakura-analog` and `initial-contact`, simulated.
 
-    python benchmarks/analog.py [--quick] [-o FIGURE.svg]
+    python benchmarks/analog.py [-o FIGURE.svg]
 
 Prints what docs/project/results.md reports: accuracy with the 33 pads that ID3 chooses inside each fold as switches,
 read as switches that close at 1 N (the paper's), as three levels each, and as codes; and the accuracy by the force on
@@ -33,7 +33,7 @@ LOGIT = Recipe(trainer="logit")
 def read(learning: Samples, test: Samples, pads: GraspSet, reading: Reading) -> tuple[Samples, Samples]:
     """Return both with the pads that ID3 chooses on the first as switches, with one kind of reading."""
     closed = tuple(Element(pad, int(column.code(CLOSES_N))) for pad, column in enumerate(pads.taxel_columns))
-    kept = choose(bits_of(learning, closed)).columns[:KEPT]
+    kept = choose(bits_of(learning, closed))[0][:KEPT]
     if reading == "switches":
         elements = tuple(closed[pad] for pad in kept)
     elif reading == "levels":
@@ -69,12 +69,9 @@ def rates(pads: GraspSet) -> Iterator[tuple[Reading, Rate, Rate]]:
 def main() -> None:
     """Print both tables."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--quick", action="store_true", help="four repetitions: checks that it runs")
     parser.add_argument("-o", "--output", type=Path, help="the .svg to write")
     asked = parser.parse_args()
     analog, contact = (load_scene(name) for name in ("kamakura-analog", "initial-contact"))
-    if asked.quick:
-        analog, contact = analog.varied(repetitions=4), contact.varied(repetitions=2)
     print(f"| {KEPT} pads, read as | alone, % | with the joints, % |\n|---|---|---|")
     for reading, alone, both in rates(simulate(analog).grasp_set):
         cells = (f"{100 * rate.mean:.1f} [{100 * rate.low:.1f}, {100 * rate.high:.1f}]" for rate in (alone, both))

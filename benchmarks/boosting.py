@@ -110,9 +110,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="1400 rows only")
     quick = parser.parse_args().quick
-    table = Table(
-        title=f"{ROUNDS} rounds x {CLASSES} classes of decision stumps, 160 switches and 16 joints in half degrees, seconds"
-    )
+    inputs = "160 switches and 16 joints in half degrees"
+    table = Table(title=f"{ROUNDS} rounds x {CLASSES} classes of decision stumps, {inputs}, seconds")
     for heading in ("rows", "thenar", "logit", "Weka, numeric", "Weka, nominal", "LightGBM", "XGBoost"):
         table.add_column(heading, justify="right")
     for rows in (1400,) if quick else (1400, 4200, 50_000):

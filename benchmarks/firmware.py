@@ -1,18 +1,18 @@
 """The cost of recognition on a microcontroller, for thenar's firmware and its peers, from raw bytes to the grasp.
 
-    python benchmarks/firmware.py [--quick]
+    python benchmarks/firmware.py
 
 33 switches and 16 joints (a byte each) of the simulated scene kamakura, 14 grasp types. Switches are placed and models
 trained on the training rows of each fold; accuracy is that of the deployed integers, in four folds and with each
 subject left out. libsimavr counts cycles over the test rows of the first fold, median and maximum. Flash and RAM are
-those of the whole program. A row is on the Pareto front of both accuracies, maximum cycles and flash. Peers that are
-not installed are left out (`make bench` installs them), and those that do not fit an ATmega328P are not on the front.
+those of the whole program. Peers that are not installed are left out (`make bench` installs them), and those that do
+not fit an ATmega328P are measured on a larger part.
 """
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,7 @@ from thenar.runtime.model.quantise import quantise
 AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
 SLOW_ROWS = 20  # rows for a peer on the larger part
 CONSOLE = Console(width=170)
-COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "differing", "front")
+COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "differing")
 
 # Flags of thenar's Makefiles: functions that are not called are not linked.
 _HOW = ("-Os", "-w", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
@@ -180,18 +180,11 @@ def of_peer(
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A row of the table; `compared` if it competes for the front."""
+    """A row of the table."""
 
     name: str
     rates: tuple[float, ...]
     cost: Cost
-    compared: bool = field(default=True)
-
-    def beats(self, other: "Line") -> bool:
-        """Whether it is nowhere worse than the other, and better somewhere."""
-        mine = (*(-rate for rate in self.rates), self.cost.most, self.cost.flash)
-        theirs = (*(-rate for rate in other.rates), other.cost.most, other.cost.flash)
-        return all(one <= two for one, two in zip(mine, theirs, strict=True)) and mine != theirs
 
 
 def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Line:
@@ -221,40 +214,25 @@ def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Line]:
             except FirmwareError as also:
                 CONSOLE.print(f"{also}"[:200], markup=False)
             else:
-                yield Line(f"{peer.name} ({LARGER.part})", found, cost, compared=False)
-
-
-def table(title: str, lines: Sequence[Line], shown: Callable[[Line], bool]) -> Table:
-    """Return the lines that are `shown` as a table, with the front marked."""
-    made = Table(title=title, title_justify="left")
-    for column in COLUMNS:
-        made.add_column(column, justify="right" if column else "left")
-    for line in lines:
-        if shown(line):
-            mark = "*" if line.compared and _on_front(line, lines) else ""
-            made.add_row(line.name, *(f"{rate:.2f}" for rate in line.rates), *line.cost.cells, mark)
-    return made
-
-
-def _on_front(line: Line, lines: Sequence[Line]) -> bool:
-    return not any(other.beats(line) for other in lines if other.compared)
+                yield Line(f"{peer.name} ({LARGER.part})", found, cost)
 
 
 def main() -> None:
-    """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="only thenar's")
-    asked = parser.parse_args()
+    """Print the table."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     try:
         cuts = folds(CONSOLE)
         lines = [ours(cuts, what) for what in track(OURS, "thenar", console=CONSOLE)]
-        lines += [] if asked.quick else theirs(cuts)
+        lines += theirs(cuts)
     except FirmwareError as lack:
         sys.exit(f"benchmarks/firmware.py: {lack}")
-    lines.sort(key=lambda line: (line.cost.part != AVR.part, line.cost.most))
     title = f"{SWITCHES} switches in {PORTS} bytes + {JOINTS} joints, 14 grasp types, {AVR.part}, -Os, filling included"
-    CONSOLE.print(table(title, lines, lambda line: True))
-    CONSOLE.print(table("The front", lines, lambda line: line.compared and _on_front(line, lines)))
+    table = Table(title=title, title_justify="left")
+    for column in COLUMNS:
+        table.add_column(column, justify="right" if column else "left")
+    for line in sorted(lines, key=lambda line: (line.cost.part != AVR.part, line.cost.most)):
+        table.add_row(line.name, *(f"{rate:.2f}" for rate in line.rates), *line.cost.cells)
+    CONSOLE.print(table)
 
 
 if __name__ == "__main__":

@@ -48,12 +48,6 @@ class Found:
         """Frames that led to a grasp, as a share of the wire's limit."""
         return self.run.recognised_hz / self.allowed_hz
 
-    @property
-    def own_share(self) -> float:
-        """That share of a bus if system calls took the wire's time, with the measured time between them."""
-        wire_us = 1e6 / self.allowed_hz
-        return wire_us / (wire_us + self.run.between_us)
-
 
 def of_glove(scene: Played, joints: Path, sensors: Literal[18, 22], seconds: float) -> Found:
     """Measure a CyberGlove that streams at its maximum rate; `joints` is a build that uses no switches."""

@@ -8,16 +8,12 @@ Prints JSON: frames per second with all sinks on, and their cost.
 import sys
 import time
 from dataclasses import dataclass
-from fcntl import ioctl
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import msgspec
-import smbus2.smbus2
 from liveplay import read_along
 
-import thenar.drivers.i2c.node
 from thenar.runtime import Glove
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.live.sources import Snapshot, Sources
@@ -27,8 +23,7 @@ _START_S = 20.0
 
 class Rate(msgspec.Struct):
     """The rates of a run: frames per second received from each device; frames that led to a grasp, of the switches or,
-    without any, of the glove; microseconds of CPU per grasp, of the loop's thread and of the whole process; for a bus,
-    microseconds per scan between two system calls.
+    without any, of the glove; microseconds of CPU per grasp, of the loop's thread and of the whole process.
     """
 
     switches_hz: float
@@ -36,7 +31,6 @@ class Rate(msgspec.Struct):
     recognised_hz: float
     loop_us: float
     process_us: float
-    between_us: float
 
 
 @dataclass(eq=False)
@@ -79,15 +73,12 @@ def rate(build: str, glove: str, seconds: float) -> Rate:
 
 
 def _over(glove: Glove, feed: Counted, seconds: float) -> Rate:
-    ioctls = Ioctls()
-    ioctls.stand_in()
     counts, clocks = _counts(glove, feed), _clocks()
     _run(glove, seconds)
-    inside_s = ioctls.wall_ns / 1e9
     wall_s, loop_s, process_s = (now - then for now, then in zip(_clocks(), clocks, strict=True))
     switches, gloves, recognised, grasps = (now - then for now, then in zip(_counts(glove, feed), counts, strict=True))
-    each, between_us = 1e6 / grasps, 1e6 * (wall_s - inside_s) / switches if ioctls.count else 0.0
-    return Rate(switches / wall_s, gloves / wall_s, recognised / wall_s, loop_s * each, process_s * each, between_us)
+    each = 1e6 / grasps
+    return Rate(switches / wall_s, gloves / wall_s, recognised / wall_s, loop_s * each, process_s * each)
 
 
 def _counts(glove: Glove, feed: Counted) -> tuple[int, int, int, int]:
@@ -108,28 +99,6 @@ def _run(glove: Glove, seconds: float, *, until_well: bool = False) -> None:
             break
     if until_well:
         raise SystemExit(f"no frames arrived: {glove.sources.devices()}")
-
-
-@dataclass(eq=False)
-class Ioctls:
-    """Replaces ioctl in the I2C driver and in smbus2, and measures its time."""
-
-    count: int = 0
-    wall_ns: int = 0
-
-    def stand_in(self) -> None:
-        """Install the replacement."""
-        for module in (smbus2.smbus2, thenar.drivers.i2c.node):
-            vars(module)["ioctl"] = self
-
-    def __call__(self, *arguments: Any) -> Any:
-        """Call ioctl."""
-        start = time.perf_counter_ns()
-        try:
-            return ioctl(*arguments)
-        finally:
-            self.count += 1
-            self.wall_ns += time.perf_counter_ns() - start
 
 
 if __name__ == "__main__":

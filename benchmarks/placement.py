@@ -3,10 +3,11 @@
     python benchmarks/placement.py SET.grasps ...
 
 Each set is cut into stratified folds (Weka's, seed 1); placement and classifier (LogitBoost, 100 rounds) are trained on
-the training part only, and rates are means over the folds. The paper's S is 29 for 16 grasp types, else 62 if the set has that many rows per type, else 13. The smallest
-placement is found by bisection between sizes that are accurate enough and sizes that are not. Scan times are wire times
-of whole scans: of a new glove with only the kept switches, on MCP23017 at 400 kHz, and of the whole glove's chips as
-wired, reading only the ports with kept switches (the methods named -cost take these into account).
+the training part only, and rates are means over the folds. The paper's S is 29 for 16 grasp types, else 62 if the set
+has that many rows per type, else 13. The smallest placement is found by bisection between sizes that are accurate
+enough and sizes that are not. Scan times are wire times of whole scans: of a new glove with only the kept switches, on
+MCP23017 at 400 kHz, and of the whole glove's chips as wired, reading only the ports with kept switches (the methods
+named -cost take these into account).
 """
 
 import argparse
