@@ -1,12 +1,11 @@
-"""LogitBoost compared with Weka 3.6, LightGBM and XGBoost, in the same run, on one thread: 100 rounds of decision
+"""LogitBoost compared with Weka 3.6 and LightGBM, in the same run, on one thread: 100 rounds of decision
 stumps; and a fit of the additive logit on the same rows.
 
     python benchmarks/boosting.py [--quick]
 
 Times are processor times, so that other work on the machine matters little, and each is the minimum of several
 trainings, including reading and binning. Weka's is its process time minus that of a process that trains a single round.
-Peers that are not installed are named and left out: apt-get install weka default-jre-headless, pip install lightgbm
-xgboost.
+Peers that are not installed are named and left out: apt-get install weka default-jre-headless, pip install lightgbm.
 """
 
 import os
@@ -67,14 +66,6 @@ def lightgbm_by(rows: bool) -> Callable[[NDArray[Any], NDArray[np.intp]], object
     return lambda X, y: lightgbm.train(options, lightgbm.Dataset(X, y, params=options), ROUNDS)
 
 
-def xgboost(X: NDArray[Any], y: NDArray[np.intp]) -> object:
-    """Train XGBoost on histograms."""
-    import xgboost as library  # pyright: ignore[reportMissingImports]
-
-    options = {"objective": "multi:softprob", "num_class": CLASSES, "max_depth": 1, "tree_method": "hist", "nthread": 1}
-    return library.train(options, library.DMatrix(X, y, nthread=1), ROUNDS)
-
-
 def least(train: Callable[[], object], repeats: int) -> float:
     """Return the processor seconds of the fastest of several trainings."""
     times = []
@@ -92,7 +83,7 @@ def measured(rows: int, repeats: int) -> list[str]:
     ours = least(lambda: boost(X, labels, CLASSES, rounds=ROUNDS), repeats)
     ridge = least(lambda: fit_logit(X, labels, CLASSES), repeats)
     doubles = X.astype(np.float64)
-    peers: list[float | None] = [None] * 4
+    peers: list[float | None] = [None] * 3
     if rows <= MOST_WEKA_ROWS and installed():
         peers[:2] = (weka(bits, codes, labels, nominal) for nominal in (False, True))
     if find_spec("lightgbm"):
@@ -100,8 +91,6 @@ def measured(rows: int, repeats: int) -> list[str]:
             least(lambda train=train: train(doubles, labels), repeats)  # type: ignore[misc]
             for train in map(lightgbm_by, (True, False))
         )
-    if find_spec("xgboost"):
-        peers[3] = least(lambda: xgboost(doubles, labels), repeats)
     cells = ["-" if peer is None else f"{peer:.2f} ({peer / ours:.1f})" for peer in peers]
     return [str(rows), f"{ours:.3f}", f"{ridge:.2f} ({ridge / ours:.1f})", *cells]
 
@@ -112,7 +101,7 @@ def main() -> None:
     quick = parser.parse_args().quick
     inputs = "160 switches and 16 joints in half degrees"
     table = Table(title=f"{ROUNDS} rounds x {CLASSES} classes of decision stumps, {inputs}, seconds")
-    for heading in ("rows", "thenar", "logit", "Weka, numeric", "Weka, nominal", "LightGBM", "XGBoost"):
+    for heading in ("rows", "thenar", "logit", "Weka, numeric", "Weka, nominal", "LightGBM"):
         table.add_column(heading, justify="right")
     for rows in (1400,) if quick else (1400, 4200, 50_000):
         table.add_row(*measured(rows, 5 if rows < 50_000 else 2))
@@ -120,7 +109,7 @@ def main() -> None:
     console.print(table)
     console.print("In brackets: how many times the time of thenar's LogitBoost that is.")
     here = {"Weka": installed(), "LightGBM": find_spec("lightgbm")}
-    if missing := [name for name, found in (here | {"XGBoost": find_spec("xgboost")}).items() if not found]:
+    if missing := [name for name, found in here.items() if not found]:
         console.print(f"Not installed, and left out: {', '.join(missing)}")
     bits, codes, labels = grasp_like(1400, seed=1)
     X = np.hstack([bits, codes])

@@ -2,33 +2,25 @@
 
     python benchmarks/live.py [--seconds N]
 
-Prints frames per second on emulated devices compared with the wire's limit, with microseconds of CPU per grasp, and the
-peak memory of a `thenar run` compared with 80 MiB. Emulated buses need umockdev (Debian packages umockdev,
-gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers run on the same cores as the run, so a busy or
-single-core machine gives worse numbers than a glove would.
+Prints frames per second on emulated devices compared with the wire's limit, and microseconds of CPU per grasp. Emulated
+buses need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers run on the
+same cores as the run, so a busy or single-core machine gives worse numbers than a glove would.
 """
 
 import argparse
-import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from liveplay import Played, glove, joints_alone, machine, played, wired, with_glove
-from liverates import Found, of_board, of_bus, of_glove
+from liveplay import Played, joints_alone, machine, played, wired
+from liverates import of_board, of_bus, of_glove
 from rich.console import Console
 from rich.table import Table
 
-from thenar.runtime.harness.writing import harness_to_toml
-from thenar.simulator.playing.bench import Bench
-
-LEAST_SHARE, MOST_MIB = 0.9, 80
+LEAST_SHARE = 0.9
 # A clock so slow that the overhead of the emulation does not matter.
 SLOW_HZ = 10_000
-# Prints the peak of its only child in KiB: a process's own peak starts at the size of its parent.
-PEAK = "import os, subprocess, sys; print(os.wait4(subprocess.Popen(sys.argv[1:]).pid, 0)[2].ru_maxrss)"
 
 
 def rates(scene: Played, seconds: float, folder: Path) -> Table:
@@ -54,28 +46,11 @@ def rates(scene: Played, seconds: float, folder: Path) -> Table:
         what = f"I2C at {clock_hz // 1000} kHz, {len(own)} of {len(names)} switches"
         found.append(of_bus(scene, what, wired(scene, names, clock_hz), seconds))
     for each in found:
-        made.add_row(*_rate(each))
+        rates_hz = (each.allowed_hz, each.sent_hz, each.arrived_hz, each.run.recognised_hz)
+        share = f"{each.run.recognised_hz / each.allowed_hz:.0%}"
+        cost = f"{each.run.loop_us:.0f} us, {each.run.process_us:.0f} us"
+        made.add_row(each.what, *(f"{hz:.0f}" for hz in rates_hz), share, cost)
     return made
-
-
-def _rate(found: Found) -> tuple[str, ...]:
-    rates_hz = (found.allowed_hz, found.sent_hz, found.arrived_hz, found.run.recognised_hz)
-    cost = f"{found.run.loop_us:.0f} us, {found.run.process_us:.0f} us"
-    return found.what, *(f"{hz:.0f}" for hz in rates_hz), f"{found.share:.0%}", cost
-
-
-def peak_mib(scene: Played, folder: Path, seconds: float) -> float:
-    """Return the peak of a `thenar run` on a CyberGlove and a bus, with recording, socket and preshape."""
-    harness = wired(scene, scene.kept, 400_000)
-    with Bench(harness, scene.performance.switch_names, folder) as bench:
-        file = folder / "glove.toml"
-        file.write_text(harness_to_toml(with_glove(bench.harness, glove(scene, str(folder / "cyberglove")))))
-        options = ["--sink", f"unix:{folder}/socket", "--preshape", "barrett_bh8", "--record", folder / "peak.mcap"]
-        run = [sys.executable, "-m", "thenar.cli", "run", scene.folder, "--glove", file, "--status", *options]
-        run += ["--frames", str(int(400 * seconds))]
-        command = [sys.executable, "-c", PEAK, *map(str, run)]
-        done = subprocess.run(command, env=os.environ | bench.environment, capture_output=True, text=True, check=True)
-    return int(done.stdout) / 1024
 
 
 def main() -> None:
@@ -88,8 +63,7 @@ def main() -> None:
     with TemporaryDirectory() as name:
         folder = Path(name)
         scene = played("quick", folder)
-        console.print(rates(scene, seconds, folder), "")
-        console.print(f"Peak of `thenar run`: {peak_mib(scene, folder, seconds):.0f} MiB (at most {MOST_MIB})")
+        console.print(rates(scene, seconds, folder))
 
 
 if __name__ == "__main__":

@@ -43,11 +43,6 @@ class Found:
     arrived_hz: float
     run: Rate
 
-    @property
-    def share(self) -> float:
-        """Frames that led to a grasp, as a share of the wire's limit."""
-        return self.run.recognised_hz / self.allowed_hz
-
 
 def of_glove(scene: Played, joints: Path, sensors: Literal[18, 22], seconds: float) -> Found:
     """Measure a CyberGlove that streams at its maximum rate; `joints` is a build that uses no switches."""
