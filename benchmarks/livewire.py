@@ -69,24 +69,18 @@ def rate(build: str, glove: str, seconds: float) -> Rate:
             feed = Counted(run.sources)
             run.feed = feed
             _run(run, _START_S, until_well=True)
-            return _over(run, feed, seconds)
+            before = _state(run, feed)
+            _run(run, seconds)
+            counted = zip(_state(run, feed), before, strict=True)
+            wall_s, loop_s, process_s, switches, gloves, recognised, grasps = (now - then for now, then in counted)
+    us = 1e6 / grasps
+    return Rate(switches / wall_s, gloves / wall_s, recognised / wall_s, loop_s * us, process_s * us)
 
 
-def _over(glove: Glove, feed: Counted, seconds: float) -> Rate:
-    counts, clocks = _counts(glove, feed), _clocks()
-    _run(glove, seconds)
-    wall_s, loop_s, process_s = (now - then for now, then in zip(_clocks(), clocks, strict=True))
-    switches, gloves, recognised, grasps = (now - then for now, then in zip(_counts(glove, feed), counts, strict=True))
-    each = 1e6 / grasps
-    return Rate(switches / wall_s, gloves / wall_s, recognised / wall_s, loop_s * each, process_s * each)
-
-
-def _counts(glove: Glove, feed: Counted) -> tuple[int, int, int, int]:
-    return feed.switches, feed.gloves, feed.recognised, glove.frames
-
-
-def _clocks() -> tuple[float, float, float]:
-    return time.perf_counter(), time.thread_time(), time.process_time()
+def _state(glove: Glove, feed: Counted) -> tuple[float, ...]:
+    """Return the clocks of the wall, the loop's thread and the process, and the counts of frames and grasps."""
+    clocks = time.perf_counter(), time.thread_time(), time.process_time()
+    return *clocks, feed.switches, feed.gloves, feed.recognised, glove.frames
 
 
 def _run(glove: Glove, seconds: float, *, until_well: bool = False) -> None:

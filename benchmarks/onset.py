@@ -67,7 +67,6 @@ def onset(
     newtons: Sequence[float] = NEWTONS,
     closes_n: float = 1.0,
     n_folds: int = 4,
-    seed: int = 1,
     jobs: int = -1,
     options: Recipe | None = None,
     levels: int | None = None,
@@ -82,8 +81,8 @@ def onset(
         The forces, ascending. A row counts for a force within half the smallest step between them.
     closes_n : float
         The force that closes a switch: 1 N is the paper's.
-    n_folds, seed : int
-        Folds of trials, and their seed.
+    n_folds : int
+        Folds of trials.
     jobs : int
         Worker processes; the result does not depend on their number.
     options : Recipe, optional
@@ -111,7 +110,7 @@ def onset(
     kinds: list[tuple[Reading, bool]] = [(reading, False) for reading in READINGS]
     if grasp_set.joints:
         kinds += [("nothing", True), *((reading, True) for reading in READINGS)]
-    folds = trial_folds(samples.labels, samples.trials, n_folds, seed)
+    folds = trial_folds(samples.labels, samples.trials, n_folds, seed=1)
     training = Training.of(options or Recipe(trainer="logit"))
     tasks = ((samples, closed, levels, kind, fold, training) for kind in kinds for fold in folds)
     predicted = {kind: np.empty(len(samples.labels), np.intp) for kind in kinds}

@@ -37,14 +37,6 @@ def papers_prune(grasp_set: GraspSet) -> int:
     return 62 if len(grasp_set) >= 62 * types else 13
 
 
-def inputs(grasp_set: GraspSet) -> tuple[Data, Data]:
-    """Return the set with switches only, and with joints."""
-    samples = Samples.of(grasp_set, "switches"), Samples.of(grasp_set)
-    cut, prune = tuple(weka_folds(samples[0].labels, FOLDS, SEED)), papers_prune(grasp_set)
-    alone, both = (Data(part, grasp_set.switch_names, cut, prune) for part in samples)
-    return alone, both
-
-
 def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:
     """Return the table of smallest placements within half a point of the paper's accuracy."""
     title = f"{kind(joints)}: fewest switches within {100 * WITHIN:g} points of the paper's"
@@ -94,7 +86,9 @@ def main() -> None:
     options, jobs = parser.parse_args(), os.cpu_count() or 1
     for path in options.sets:
         began, grasp_set = perf_counter(), GraspSet.load(path)
-        alone, both = inputs(grasp_set)
+        samples = Samples.of(grasp_set, "switches"), Samples.of(grasp_set)
+        cut, prune = tuple(weka_folds(samples[0].labels, FOLDS, SEED)), papers_prune(grasp_set)
+        alone, both = (Data(part, grasp_set.switch_names, cut, prune) for part in samples)
         CONSOLE.rule(f"{path.stem}: {len(grasp_set)} rows, {len(alone.names)} switches, S = {alone.prune}")
         paper = dict(in_workers(papers, (both, alone), jobs))
         lines = measured(alone, both, paper, jobs)

@@ -59,10 +59,6 @@ def jaccard(pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> float:
     return float(both / either) if either else 1.0
 
 
-def together(found: Iterable[Contact], field: str) -> np.ndarray:
-    return np.concatenate([getattr(each, field) for each in found])
-
-
 def row(*cells: object) -> str:
     return f"| {' | '.join(map(str, cells))} |"
 
@@ -85,7 +81,7 @@ def outcome(batches: Sequence[Batch], contacts: Sequence[Contact], threshold_n: 
     lines = []
     for grasp, own, found in by_type(batches, contacts):
         on = [each.forces_n > threshold_n for each in found]
-        settled = together(found, "settled")
+        settled = np.concatenate([each.settled for each in found])
         lines.append(
             row(
                 grasp,
@@ -94,12 +90,10 @@ def outcome(batches: Sequence[Batch], contacts: Sequence[Contact], threshold_n: 
                 f"{np.concatenate(on).sum(axis=1).mean():.1f}",
                 f"{100 * (~np.concatenate(on).any(axis=1)).mean():.0f} %",
                 f"{100 * (~settled).mean():.1f} %",
-                f"{np.median(together(found, 'residual_n')[settled]):.2f}",
-                f"{np.median(together(found, 'residual_nmm')[settled]):.2f}",
             )
         )
     head = ("grasp type", "ms a grasp", "agreement of two repetitions", "switches ON", "none ON", "not settled")
-    return table((*head, "residual, N", "residual, N mm"), lines)
+    return table(head, lines)
 
 
 def memory(name: str) -> str:
