@@ -1,17 +1,19 @@
 """The gain of pads with levels over switches: the scenes `kamakura-analog` and `initial-contact`, simulated.
 
-`python benchmarks/analog.py [--quick]` prints what docs/project/results.md reports: accuracy with the 33 pads that ID3
-chooses inside each fold as switches, read as switches that close at 1 N (the paper's), as three levels each, and as
-codes; and the accuracy by the force on the hardest pressed pad. Folds of trials, additive logit.
+    python benchmarks/analog.py [-o FIGURE.svg]
+
+Prints what docs/project/results.md reports: accuracy with the 33 pads that ID3 chooses inside each fold as switches,
+read as switches that close at 1 N (the paper's), as three levels each, and as codes; and the accuracy by the force on
+the hardest pressed pad, which it draws. Folds of trials, additive logit.
 """
 
 import argparse
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
-from onset import READINGS, Reading, onset
+from onset import READINGS, Reading, draw, onset
 
 from thenar.compiler.evaluation.folds import trial_folds
 from thenar.compiler.evaluation.rates import Rate
@@ -31,7 +33,7 @@ LOGIT = Recipe(trainer="logit")
 def read(learning: Samples, test: Samples, pads: GraspSet, reading: Reading) -> tuple[Samples, Samples]:
     """Return both with the pads that ID3 chooses on the first as switches, with one kind of reading."""
     closed = tuple(Element(pad, int(column.code(CLOSES_N))) for pad, column in enumerate(pads.taxel_columns))
-    kept = choose(bits_of(learning, closed)).columns[:KEPT]
+    kept = choose(bits_of(learning, closed))[0][:KEPT]
     if reading == "switches":
         elements = tuple(closed[pad] for pad in kept)
     elif reading == "levels":
@@ -64,14 +66,12 @@ def rates(pads: GraspSet) -> Iterator[tuple[Reading, Rate, Rate]]:
         yield reading, alone, both
 
 
-def main(arguments: list[str]) -> None:
+def main() -> None:
     """Print both tables."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--quick", action="store_true", help="four repetitions: checks that it runs")
-    quick = parser.parse_args(arguments).quick
+    parser.add_argument("-o", "--output", type=Path, help="the .svg to write")
+    asked = parser.parse_args()
     analog, contact = (load_scene(name) for name in ("kamakura-analog", "initial-contact"))
-    if quick:
-        analog, contact = analog.varied(repetitions=4), contact.varied(repetitions=2)
     print(f"| {KEPT} pads, read as | alone, % | with the joints, % |\n|---|---|---|")
     for reading, alone, both in rates(simulate(analog).grasp_set):
         cells = (f"{100 * rate.mean:.1f} [{100 * rate.low:.1f}, {100 * rate.high:.1f}]" for rate in (alone, both))
@@ -84,7 +84,9 @@ def main(arguments: list[str]) -> None:
     for curve in found.curves:
         cells = ("" if rate is None else f"{100 * rate.mean:.1f}" for rate in curve.rates)
         print(f"| {curve.title} | {' | '.join(cells)} |", flush=True)
+    if asked.output:
+        draw(found, asked.output)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

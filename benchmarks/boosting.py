@@ -1,12 +1,11 @@
-"""LogitBoost compared with Weka 3.6, LightGBM and XGBoost, in the same run, on one thread: 100 rounds of decision
+"""LogitBoost compared with Weka 3.6 and LightGBM, in the same run, on one thread: 100 rounds of decision
 stumps; and a fit of the additive logit on the same rows.
 
     python benchmarks/boosting.py [--quick]
 
 Times are processor times, so that other work on the machine matters little, and each is the minimum of several
 trainings, including reading and binning. Weka's is its process time minus that of a process that trains a single round.
-Peers that are not installed are named and left out: apt-get install weka default-jre-headless, pip install lightgbm
-xgboost.
+Peers that are not installed are named and left out: apt-get install weka default-jre-headless, pip install lightgbm.
 """
 
 import os
@@ -15,7 +14,6 @@ os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"  # befo
 
 import argparse
 import resource
-import shutil
 import subprocess
 import tempfile
 import time
@@ -29,46 +27,29 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from synthetic import grasp_like
+from weka import installed, logitboost, write_arff
 
 from thenar.compiler.additive.logit import fit_logit
 from thenar.compiler.boosting.boost import boost
 from thenar.runtime.model.tables import winners
 
-WEKA_JAR = Path("/usr/share/java/weka.jar")
 CLASSES, ROUNDS = 14, 100
 # Weka takes minutes with more rows.
 MOST_WEKA_ROWS = 4200
-JOINTS = {"codes": "half degrees", "doubles": "doubles"}
 
 
 def weka(bits: NDArray[np.bool_], joints: NDArray[Any], labels: NDArray[np.intp], nominal: bool) -> float:
     """Return the seconds of 100 rounds, the switches read as {0,1} or as numbers."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "train.arff"
-        _write_arff(path, bits, joints, labels, nominal)
+        write_arff(path, bits, joints, labels, CLASSES, "{0,1}" if nominal else "numeric")
         return _weka_process(path, ROUNDS) - _weka_process(path, 1)
 
 
-def _write_arff(
-    path: Path, bits: NDArray[np.bool_], joints: NDArray[Any], labels: NDArray[np.intp], nominal: bool
-) -> None:
-    switch = "{0,1}" if nominal else "numeric"
-    head = ["@relation grasps"]
-    head += [f"@attribute s{s} {switch}" for s in range(bits.shape[1])]
-    head += [f"@attribute j{j} numeric" for j in range(joints.shape[1])]
-    head += ["@attribute grasp {" + ",".join(f"g{k}" for k in range(CLASSES)) + "}", "@data"]
-    rows = [
-        ",".join([*map(str, b), *map(repr, c), f"g{k}"])
-        for b, c, k in zip(bits.astype(int).tolist(), joints.tolist(), labels.tolist(), strict=True)
-    ]
-    path.write_text("\n".join(head + rows) + "\n")
-
-
 def _weka_process(path: Path, rounds: int) -> float:
-    command = ["java", "-XX:+UseSerialGC", "-XX:ActiveProcessorCount=1", "-Xmx4g", "-cp", str(WEKA_JAR)]
-    command += ["weka.classifiers.meta.LogitBoost", "-t", str(path), "-no-cv", "-o", "-I", str(rounds)]
+    command = logitboost(rounds, "-t", str(path), "-no-cv", "-o")
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run([*command, "-W", "weka.classifiers.trees.DecisionStump"], capture_output=True, text=True)
+    done = subprocess.run(command, capture_output=True, text=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if "Time taken to build model" not in done.stdout:
         raise SystemExit(f"Weka failed:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
@@ -85,14 +66,6 @@ def lightgbm_by(rows: bool) -> Callable[[NDArray[Any], NDArray[np.intp]], object
     return lambda X, y: lightgbm.train(options, lightgbm.Dataset(X, y, params=options), ROUNDS)
 
 
-def xgboost(X: NDArray[Any], y: NDArray[np.intp]) -> object:
-    """Train XGBoost on histograms."""
-    import xgboost as library  # pyright: ignore[reportMissingImports]
-
-    options = {"objective": "multi:softprob", "num_class": CLASSES, "max_depth": 1, "tree_method": "hist", "nthread": 1}
-    return library.train(options, library.DMatrix(X, y, nthread=1), ROUNDS)
-
-
 def least(train: Callable[[], object], repeats: int) -> float:
     """Return the processor seconds of the fastest of several trainings."""
     times = []
@@ -103,42 +76,40 @@ def least(train: Callable[[], object], repeats: int) -> float:
     return min(times)
 
 
-def measured(rows: int, joints: str, repeats: int) -> list[str]:
+def measured(rows: int, repeats: int) -> list[str]:
     """Return a line of the table."""
     bits, codes, labels = grasp_like(rows, seed=1)
-    values = codes + np.random.default_rng(2).uniform(-0.5, 0.5, codes.shape) if joints == "doubles" else codes
-    X = np.hstack([bits, values])
+    X = np.hstack([bits, codes])
     ours = least(lambda: boost(X, labels, CLASSES, rounds=ROUNDS), repeats)
     ridge = least(lambda: fit_logit(X, labels, CLASSES), repeats)
     doubles = X.astype(np.float64)
-    peers: list[float | None] = [None] * 4
-    if rows <= MOST_WEKA_ROWS and WEKA_JAR.exists() and shutil.which("java"):
-        peers[:2] = (weka(bits, values, labels, nominal) for nominal in (False, True))
+    peers: list[float | None] = [None] * 3
+    if rows <= MOST_WEKA_ROWS and installed():
+        peers[:2] = (weka(bits, codes, labels, nominal) for nominal in (False, True))
     if find_spec("lightgbm"):
         peers[2] = min(
             least(lambda train=train: train(doubles, labels), repeats)  # type: ignore[misc]
             for train in map(lightgbm_by, (True, False))
         )
-    if find_spec("xgboost"):
-        peers[3] = least(lambda: xgboost(doubles, labels), repeats)
     cells = ["-" if peer is None else f"{peer:.2f} ({peer / ours:.1f})" for peer in peers]
-    return [str(rows), JOINTS[joints], f"{ours:.3f}", f"{ridge:.2f} ({ridge / ours:.1f})", *cells]
+    return [str(rows), f"{ours:.3f}", f"{ridge:.2f} ({ridge / ours:.1f})", *cells]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="1400 rows only")
     quick = parser.parse_args().quick
-    table = Table(title=f"{ROUNDS} rounds x {CLASSES} classes of decision stumps, 160 switches and 16 joints, seconds")
-    for heading in ("rows", "joints", "thenar", "logit", "Weka, numeric", "Weka, nominal", "LightGBM", "XGBoost"):
+    inputs = "160 switches and 16 joints in half degrees"
+    table = Table(title=f"{ROUNDS} rounds x {CLASSES} classes of decision stumps, {inputs}, seconds")
+    for heading in ("rows", "thenar", "logit", "Weka, numeric", "Weka, nominal", "LightGBM"):
         table.add_column(heading, justify="right")
-    for rows, joints in ((1400, "codes"), (1400, "doubles"), (4200, "codes"), (50_000, "codes"))[: 2 if quick else 4]:
-        table.add_row(*measured(rows, joints, 5 if rows < 50_000 else 2))
+    for rows in (1400,) if quick else (1400, 4200, 50_000):
+        table.add_row(*measured(rows, 5 if rows < 50_000 else 2))
     console = Console(width=120)
     console.print(table)
     console.print("In brackets: how many times the time of thenar's LogitBoost that is.")
-    here = {"Weka": WEKA_JAR.exists() and shutil.which("java"), "LightGBM": find_spec("lightgbm")}
-    if missing := [name for name, found in (here | {"XGBoost": find_spec("xgboost")}).items() if not found]:
+    here = {"Weka": installed(), "LightGBM": find_spec("lightgbm")}
+    if missing := [name for name, found in here.items() if not found]:
         console.print(f"Not installed, and left out: {', '.join(missing)}")
     bits, codes, labels = grasp_like(1400, seed=1)
     X = np.hstack([bits, codes])

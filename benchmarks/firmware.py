@@ -1,24 +1,26 @@
 """The cost of recognition on a microcontroller, for thenar's firmware and its peers, from raw bytes to the grasp.
 
-    python benchmarks/firmware.py [--quick]
+    python benchmarks/firmware.py
 
 33 switches and 16 joints (a byte each) of the simulated scene kamakura, 14 grasp types. Switches are placed and models
 trained on the training rows of each fold; accuracy is that of the deployed integers, in four folds and with each
 subject left out. libsimavr counts cycles over the test rows of the first fold, median and maximum. Flash and RAM are
-those of the whole program. A row is on the Pareto front of both accuracies, maximum cycles and flash. Peers that are
-not installed are left out (`make bench` installs them), and those that do not fit an ATmega328P are not on the front.
+those of the whole program. Peers that are not installed are left out (`make bench` installs them), and those that do
+not fit an ATmega328P are measured on a larger part.
 """
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
-from firmwarecosts import Cost, of_ours, of_peer
+import numpy as np
 from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split
 from firmwarepeers import peers
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
@@ -26,7 +28,12 @@ from rich.table import Table
 from thenar.compiler import TRAINERS
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.choose import fit_for
-from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.layout import Layout
+from thenar.compiler.firmware.simavr import harness
+from thenar.compiler.firmware.targets import TARGETS, Target
+from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
+from thenar.compiler.firmware.words import numbered
 from thenar.compiler.model.collapse import Model, collapse
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import quantise
@@ -34,7 +41,11 @@ from thenar.runtime.model.quantise import quantise
 AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
 SLOW_ROWS = 20  # rows for a peer on the larger part
 CONSOLE = Console(width=170)
-COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "differing", "front")
+COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "differing")
+
+# Flags of thenar's Makefiles: functions that are not called are not linked.
+_HOW = ("-Os", "-w", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
+Frames = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -84,19 +95,96 @@ def _trained(trainer: str, settings: tuple[tuple[str, Any], ...], fold: Fold, jo
 
 
 @dataclass(frozen=True, slots=True)
+class Cost:
+    """The cost of a classifier on `part`: cycles per frame, median and maximum; bytes of flash, RAM and stack.
+
+    differing  how many of `rows` predictions differ from those in Python
+    """
+
+    part: str
+    cycles: int
+    most: int
+    flash: int
+    ram: int
+    stack: int
+    differing: int
+    rows: int
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The columns of the table that every classifier has."""
+        return (
+            f"{self.cycles:,} ({self.most:,})",
+            f"{self.flash:,}",
+            f"{self.ram} + {self.stack}",
+            f"{self.differing} of {self.rows}",
+        )
+
+
+def _linked(folder: Path, sources: Mapping[str, str], part: str, include: Sequence[str] = ()) -> tuple[int, int]:
+    """Link `program.elf` from the sources in the folder; return bytes of flash and RAM. Ignores warnings of peers."""
+    code = sorted(path for path in sources if path.endswith((".c", ".cpp", ".S")))
+    paths = [f"-I{path}" for path in include]
+    call([find(AVR_COMPILER), f"-mmcu={part}", *_HOW, *paths, *code, "-lm", "-o", "program.elf"], folder)
+    text, data, bss = call(["avr-size", "program.elf"], folder).decode().splitlines()[1].split()[:3]
+    return int(text) + int(data), int(data) + int(bss)
+
+
+def of_ours(layout: Layout, target: Target, frames: Frames, expected: NDArray[np.integer]) -> Cost:
+    """Return the cost of thenar's classifier for frames with known scores (n, K).
+
+    The bytes of a frame are written directly into its inputs: nothing has to be copied.
+    """
+    files = Library("glove", numbered(layout.tables), layout).files
+    body = "thenar_init(&hand, &thenar_glove_model, memory); for (;;) thenar_classify(&hand);"
+    state = "uint16_t memory[THENAR_GLOVE_MEMORY];\nthenar hand;\n"
+    program = {**files, "main.c": f'#include "thenar_glove.h"\n{state}int main(void) {{ {body} }}\n'}
+    with workshop(program) as folder:
+        flash, ram = _linked(folder, program, target.part)
+    results = target.run(files, "glove", layout, frames)
+    assert results.cost is not None
+    assert results.stack is not None
+    wrong = (results.scores != expected).any(axis=1) | (results.classes != expected.argmax(axis=1))
+    middle, most, differing = int(np.median(results.cost)), results.most, int(np.count_nonzero(wrong))
+    return Cost(target.part, middle, most, flash, ram, results.stack, differing, len(frames))
+
+
+def of_peer(
+    name: str,
+    files: Mapping[str, str],
+    frames: Frames,
+    expected: NDArray[np.intp],
+    target: Target,
+    include: Sequence[str] = (),
+) -> Cost:
+    """Return the cost of a peer's classifier for raw frames, including feature extraction.
+
+    `expected` are its predictions in Python. Raises FirmwareError if it does not fit.
+    """
+    program = {**files, "main.c": "int predict(void);\nint main(void) { for (;;) predict(); }\n"}
+    with workshop(program) as folder:
+        flash, ram = _linked(folder, program, target.part, include)
+        if flash > target.flash or ram > target.ram:
+            raise FirmwareError(f"{name} takes {flash} bytes of flash and {ram} of RAM: not on an {target.part}")
+        words = [line.split() for line in call(["avr-nm", "-P", "program.elf"], folder).decode().splitlines()]
+        at = {word[0]: f"0x{word[2]}" for word in words if len(word) > 2}
+        places = [at["predict"], at["_end"], f"{at['input']}:{frames.shape[1]}", f"{at['input']}:1"]
+        command = [str(harness("simavr_classify")), target.part, str(target.clock_hz), "program.elf", *places]
+        known = call(command, folder, frames.tobytes())
+    record = np.dtype([("echo", "u1"), ("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")])
+    found = np.frombuffer(known, record)
+    differing = int(np.count_nonzero(found["grasp"] != expected))
+    middle, most, stack = int(np.median(found["cycles"])), int(found["cycles"].max()), int(found["stack"].max())
+    return Cost(target.part, middle, most, flash, ram, stack, differing, len(found))
+
+
+@dataclass(frozen=True, slots=True)
 class Line:
-    """A row of the table; `compared` if it competes for the front."""
+    """A row of the table."""
 
     name: str
     rates: tuple[float, ...]
     cost: Cost
-    compared: bool = field(default=True)
-
-    def beats(self, other: "Line") -> bool:
-        """Whether it is nowhere worse than the other, and better somewhere."""
-        mine = (*(-rate for rate in self.rates), self.cost.most, self.cost.flash)
-        theirs = (*(-rate for rate in other.rates), other.cost.most, other.cost.flash)
-        return all(one <= two for one, two in zip(mine, theirs, strict=True)) and mine != theirs
 
 
 def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Line:
@@ -126,40 +214,25 @@ def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Line]:
             except FirmwareError as also:
                 CONSOLE.print(f"{also}"[:200], markup=False)
             else:
-                yield Line(f"{peer.name} ({LARGER.part})", found, cost, compared=False)
-
-
-def table(title: str, lines: Sequence[Line], shown: Callable[[Line], bool]) -> Table:
-    """Return the lines that are `shown` as a table, with the front marked."""
-    made = Table(title=title, title_justify="left")
-    for column in COLUMNS:
-        made.add_column(column, justify="right" if column else "left")
-    for line in lines:
-        if shown(line):
-            mark = "*" if line.compared and _on_front(line, lines) else ""
-            made.add_row(line.name, *(f"{rate:.2f}" for rate in line.rates), *line.cost.cells, mark)
-    return made
-
-
-def _on_front(line: Line, lines: Sequence[Line]) -> bool:
-    return not any(other.beats(line) for other in lines if other.compared)
+                yield Line(f"{peer.name} ({LARGER.part})", found, cost)
 
 
 def main() -> None:
-    """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="only thenar's")
-    asked = parser.parse_args()
+    """Print the table."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     try:
         cuts = folds(CONSOLE)
         lines = [ours(cuts, what) for what in track(OURS, "thenar", console=CONSOLE)]
-        lines += [] if asked.quick else theirs(cuts)
+        lines += theirs(cuts)
     except FirmwareError as lack:
         sys.exit(f"benchmarks/firmware.py: {lack}")
-    lines.sort(key=lambda line: (line.cost.part != AVR.part, line.cost.most))
     title = f"{SWITCHES} switches in {PORTS} bytes + {JOINTS} joints, 14 grasp types, {AVR.part}, -Os, filling included"
-    CONSOLE.print(table(title, lines, lambda line: True))
-    CONSOLE.print(table("The front", lines, lambda line: line.compared and _on_front(line, lines)))
+    table = Table(title=title, title_justify="left")
+    for column in COLUMNS:
+        table.add_column(column, justify="right" if column else "left")
+    for line in sorted(lines, key=lambda line: (line.cost.part != AVR.part, line.cost.most)):
+        table.add_row(line.name, *(f"{rate:.2f}" for rate in line.rates), *line.cost.cells)
+    CONSOLE.print(table)
 
 
 if __name__ == "__main__":

@@ -121,36 +121,6 @@ class IntegerLogit:
             f"    .balign 2\n    .text\n    .global predict\n    .type predict, @function\npredict:\n{text}"
         )
 
-    @property
-    def c_source(self) -> str:
-        """The same in C, for cores of 32 bits: `predict` over `input`, sums in variables, nothing left to loops."""
-        leasts = [table.min(axis=0) for table in self.tables]
-        starts = (self.bias + sum(leasts)) << self.groups.shift
-        classes, first, lines = range(len(starts)), 0, []
-        lines += [f"int32_t s{k} = {start};" for k, start in enumerate(starts.tolist())]
-        for joint, weights in enumerate(self.joints.tolist()):
-            low, high = int(self.low[joint]), int(self.high[joint])
-            lines += [
-                f"code = input[{PORTS + joint}];",
-                f"code = (code < {low} ? {low} : code > {high} ? {high} : code) - {low};",
-            ]
-            lines += [f"s{k} += {weight} * code;" for k, weight in enumerate(weights) if weight]
-        lines += [f"s{k} >>= {self.groups.shift};" for k in classes]
-        for fields, table in zip(self.groups.fields, self.tables, strict=True):
-            parts = (f"((input[{f.port}] >> {f.bit} & {(1 << f.width) - 1}) << {f.to})" for f in fields)
-            lines += [f"row = rows + {first} + {len(classes)} * ({' | '.join(parts)});"]
-            lines += [f"s{k} += row[{k}];" for k in classes]
-            first += table.size
-        lines += ["int best = 0;", "int32_t most = s0;"]
-        lines += [f"if (s{k} > most) {{ most = s{k}; best = {k}; }}" for k in classes[1:]]
-        rows = np.concatenate([(table - least).ravel() for table, least in zip(self.tables, leasts, strict=True)])
-        body = "".join(f"    {line}\n" for line in [*lines, f"return most < 0 ? {len(classes)} : best;"])
-        return (
-            f"#include <stdint.h>\nuint8_t input[{PORTS + JOINTS}];\n"
-            f"static const uint8_t rows[] = {{{', '.join(map(str, rows.tolist()))}}};\n"
-            f"int predict(void)\n{{\n    const uint8_t *row;\n    int32_t code;\n{body}}}\n"
-        )
-
     def _joint(self, joint: int) -> list[str]:
         low, span = int(self.low[joint]), int(self.high[joint] - self.low[joint])
         lines = [f"lds r17, input + {PORTS + joint}", f"subi r17, {low}", "brcc 1f", "ldi r17, 0"]

@@ -228,22 +228,16 @@ def _tl2cgen(model: Any) -> dict[str, str]:
     header = files.pop("header.h").replace("void predict(", "void forest_predict(")
     code = files.pop("main.c").replace("void predict(", "void forest_predict(")
     classes = len(model.classes_)
-    call = f"""#include <stdint.h>
-#include "header.h"
-{_filling("double", step=1)}
-int predict(void) {{
+    score = f"""#include "header.h"
+static void score(const double *values, double *scores)
+{{
     static union Entry entries[{FEATURES}];
-    static double scores[{classes}];
-    int best = 0;
-    fill();
-    for (uint8_t i = 0; i < {FEATURES}; i++) entries[i].fvalue = features[i];
+    for (uint8_t i = 0; i < {FEATURES}; i++) entries[i].fvalue = values[i];
     for (uint8_t k = 0; k < {classes}; k++) scores[k] = 0;
     forest_predict(entries, 0, scores);
-    for (uint8_t k = 1; k < {classes}; k++) if (scores[k] > scores[best]) best = k;
-    return best;
 }}
 """
-    return {"header.h": header, "forest.c": code, **files, "peer.c": call}
+    return {"header.h": header, "forest.c": code, **files, **_scores(score, classes)}
 
 
 def _with(trees: int, leaves: int, features: Callable[[Rows], Any] = _plain) -> Callable[[Fold], Any]:

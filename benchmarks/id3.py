@@ -5,7 +5,7 @@ scikit-learn's may grow as deep as thenar's. Every measurement runs in a separat
 is the growth of the process's peak resident size above interpreter and imports, in MiB, including the input matrix (one
 byte per bit for thenar, float32 for scikit-learn).
 
-    python benchmarks/id3.py [--quick] [--plot curves.png]
+    python benchmarks/id3.py [--quick]
 """
 
 import argparse
@@ -16,7 +16,8 @@ import resource
 import subprocess
 import sys
 import time
-from pathlib import Path
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 N_BITS, N_CLASSES, N_BLOCK, MIN_SAMPLES, FLIP = 160, 14, 20_000, 200, 0.1
@@ -60,29 +61,29 @@ def peak_mib() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def measure_thenar(n: int) -> Measured:
-    from thenar.compiler.placement.id3 import grow_id3
+def trainer(what: str, depth: int) -> Callable[[Any, Any], Any]:
+    """Return a training of thenar's tree, or of scikit-learn's with at most this depth."""
+    if what == "thenar":
+        from thenar.compiler.placement.id3 import grow_id3
 
-    before = peak_mib()
-    X, y = filled(n, "bool")
-    start = time.perf_counter()
-    tree = grow_id3(X, y, min_samples=MIN_SAMPLES)
-    seconds, mib = time.perf_counter() - start, peak_mib() - before
-    right = sum(int((tree.predict(bits) == labels).sum()) for _, bits, labels in blocks(n))
-    return Measured(seconds, mib, tree.depth, tree.n_leaves, right / n)
-
-
-def measure_sklearn(n: int, depth: int) -> Measured:
+        return partial(grow_id3, min_samples=MIN_SAMPLES)
     from sklearn.tree import DecisionTreeClassifier
 
-    before = peak_mib()
-    X, y = filled(n, "float32")
-    tree = DecisionTreeClassifier(criterion="entropy", max_depth=depth, min_samples_split=MIN_SAMPLES, random_state=0)
+    fit: Callable[[Any, Any], Any] = DecisionTreeClassifier(
+        criterion="entropy", max_depth=depth, min_samples_split=MIN_SAMPLES, random_state=0
+    ).fit
+    return fit
+
+
+def measure(what: str, n: int, depth: int) -> Measured:
+    train, before = trainer(what, depth), peak_mib()
+    X, y = filled(n, "bool" if what == "thenar" else "float32")
     start = time.perf_counter()
-    tree.fit(X, y)
+    tree = train(X, y)
     seconds, mib = time.perf_counter() - start, peak_mib() - before
+    depth, leaves = (tree.depth, tree.n_leaves) if what == "thenar" else (tree.get_depth(), tree.get_n_leaves())
     right = sum(int((tree.predict(bits) == labels).sum()) for _, bits, labels in blocks(n))
-    return Measured(seconds, mib, int(tree.get_depth()), int(tree.get_n_leaves()), right / n)
+    return Measured(seconds, mib, int(depth), int(leaves), right / n)
 
 
 def in_own_process(*arguments: str) -> Measured:
@@ -95,13 +96,6 @@ def in_own_process(*arguments: str) -> Measured:
     return min(runs)
 
 
-def one(arguments: list[str]) -> Measured:
-    what, n, *depth = arguments
-    if what == "sklearn":
-        return measure_sklearn(int(n), int(depth[0]))
-    return measure_thenar(int(n))
-
-
 def line(n: int, name: str, found: Measured, times: str) -> str:
     return (
         f"{n:9,}  {name:14}{found.seconds:9.3f} s {found.mib:8.0f} MiB"
@@ -109,48 +103,28 @@ def line(n: int, name: str, found: Measured, times: str) -> str:
     )
 
 
-def compare(rows: tuple[int, ...]) -> dict[str, list[Measured]]:
+def compare(rows: tuple[int, ...]) -> None:
     """Measure and print line by line."""
-    curves: dict[str, list[Measured]] = {"thenar": [], "scikit-learn": []}
     print(f"{platform.machine()}, one thread; {N_BITS} bits, {N_CLASSES} classes, S = {MIN_SAMPLES}, noise {FLIP}")
     print("     rows  what                  time       peak  depth  leaves    rate")
     for n in rows:
-        ours = in_own_process("thenar", str(n))
+        ours = in_own_process("thenar", str(n), "0")
         theirs = in_own_process("sklearn", str(n), str(ours.depth))
         allowed = 2 * n * N_BITS / 8 / MIB + 256
-        for (name, curve), found in zip(curves.items(), (ours, theirs), strict=True):
-            curve.append(found)
-            times = f"{theirs.seconds / found.seconds:.0f} times as fast; {allowed:.0f} MiB are allowed"
-            print(line(n, name, found, times if found is not theirs else ""), flush=True)
-    return curves
-
-
-def plot(path: Path, rows: tuple[int, ...], curves: dict[str, list[Measured]]) -> None:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9, 4), layout="constrained")
-    for axes, unit, value in zip(figure.subplots(1, 2), ("s", "MiB"), ("seconds", "mib"), strict=True):
-        for name, curve in curves.items():
-            axes.loglog(rows, [getattr(found, value) for found in curve], "o-", label=name)
-        axes.set(xlabel="rows", ylabel=f"{'time' if unit == 's' else 'peak memory'} ({unit})")
-        axes.grid(visible=True, alpha=0.3)
-    axes.legend()
-    figure.savefig(path, dpi=150)
+        times = f"{theirs.seconds / ours.seconds:.0f} times as fast; {allowed:.0f} MiB are allowed"
+        print(line(n, "thenar", ours, times), line(n, "scikit-learn", theirs, ""), sep="\n", flush=True)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="up to 100,000 rows only")
-    parser.add_argument("--plot", type=Path, help="draw both curves here")
-    parser.add_argument("--one", nargs="+", help=argparse.SUPPRESS)
+    parser.add_argument("--one", nargs=3, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
-        print(json.dumps(one(options.one)))
+        what, n, depth = options.one
+        print(json.dumps(measure(what, int(n), int(depth))))
         return
-    rows = ROWS[:-1] if options.quick else ROWS
-    curves = compare(rows)
-    if options.plot:
-        plot(options.plot, rows, curves)
+    compare(ROWS[:-1] if options.quick else ROWS)
 
 
 if __name__ == "__main__":

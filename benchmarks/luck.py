@@ -1,7 +1,7 @@
 """Coverage, on fresh grasps, of the interval that a frontier promises for the point that it selects.
 
 Usage:
-    python benchmarks/luck.py [--cases 100] [--jobs -1] [--by "new subject"]
+    python benchmarks/luck.py
 
 Each case records the switches of scene kamakura under another seed, a few repetitions, searches, selects the best point
 within a budget, and lets its tables, trained on all rows, classify fresh grasps: of the same hands, or of other ones.
@@ -9,7 +9,6 @@ The output is the number of intervals that cover the fresh rate, and the promise
 without its correction.
 """
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -39,6 +38,7 @@ SCENE, TARGET = "kamakura", "avr2560"
 # Repetitions of every grasp type by every subject: recorded; fresh, of the same hands; of hands that nobody recorded.
 REPETITIONS, MORE, OTHERS = 12, 16, 8
 BUDGET_US = 700.0
+CASES = 100
 FIRST_OTHER = 100_000
 
 
@@ -128,13 +128,9 @@ def summary(found: Sequence[Case]) -> str:
 
 def main() -> None:
     """Print, for each kind of rate, the number of covered cases and the mean errors of rates."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=100)
-    parser.add_argument("--jobs", type=int, default=-1)
-    parser.add_argument("--by", choices=("new subject", "pooled"), nargs="*", default=("new subject", "pooled"))
-    asked = parser.parse_args()
-    for by in asked.by:
-        found = cases(range(1, asked.cases + 1), by, asked.jobs)
+    kinds: tuple[By, ...] = ("new subject", "pooled")
+    for by in kinds:
+        found = cases(range(1, CASES + 1), by, -1)
         print(f"{by}, the best within {BUDGET_US:g} us: {summary(found)}")
 
 

@@ -6,7 +6,6 @@ marked `slow` use the first on sets of more than `FEW` rows.
 
 import importlib.util
 import re
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -18,6 +17,11 @@ from typing import Any
 import numpy as np
 from modelsets import Cut
 from numpy.typing import NDArray
+from sklearn.ensemble import ExtraTreesClassifier, HistGradientBoostingClassifier, RandomForestClassifier
+from sklearn.linear_model import LogisticRegression
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn.svm import SVC
+from weka import installed, logitboost, write_arff
 
 from thenar.compiler.evaluation.choosing import choose_training
 from thenar.compiler.model.collapse import collapse
@@ -26,7 +30,6 @@ from thenar.compiler.trainers.base import Training
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.recipe import AUTO, Recipe
 
-WEKA_JAR = Path("/usr/share/java/weka.jar")
 FEW, SEED = 2000, 1
 
 Classes = NDArray[np.intp]
@@ -56,7 +59,7 @@ class Model:
     def there(self) -> bool:
         """Whether its requirements are installed."""
         if self.needs == "java":
-            return WEKA_JAR.exists() and shutil.which("java") is not None
+            return installed()
         return importlib.util.find_spec(self.needs) is not None
 
     def predicted(self, cut: Cut) -> tuple[Classes, Classes | None]:
@@ -96,7 +99,7 @@ def _trained(name: str) -> Predicting:
     return predict
 
 
-def _fitted(make: Callable[[Given], Any], *, scaled: bool = False) -> Predicting:
+def _fitted(make: Callable[..., Any], *, scaled: bool = False, **fixed: Any) -> Predicting:
     def predict(cut: Cut, given: Given) -> tuple[Classes, None]:
         train = cut.train
         X, asked = (np.hstack([part.switches, part.codes]).astype(np.float64) for part in (train, cut.test))
@@ -107,87 +110,40 @@ def _fitted(make: Callable[[Given], Any], *, scaled: bool = False) -> Predicting
                 part[:, joints] = (part[:, joints] - mean) / np.where(spread > 0, spread, 1.0)
         # Boosters want classes 0, 1, ...: a training part may lack one.
         classes, labels = np.unique(train.labels, return_inverse=True)
-        return classes[np.asarray(make(given).fit(X, labels).predict(asked)).astype(np.intp).ravel()], None
+        return classes[np.asarray(make(**fixed, **given).fit(X, labels).predict(asked)).astype(np.intp).ravel()], None
 
     return predict
 
 
-def _logistic(given: Given) -> Any:
-    from sklearn.linear_model import LogisticRegression
-
-    return LogisticRegression(max_iter=2000, **given)
-
-
-def _neighbours(given: Given) -> Any:
-    from sklearn.neighbors import KNeighborsClassifier
-
-    return KNeighborsClassifier(weights="distance", **given)
-
-
-def _support(given: Given) -> Any:
-    from sklearn.svm import SVC
-
-    return SVC(**given)
-
-
-def _forest(given: Given) -> Any:
-    from sklearn.ensemble import RandomForestClassifier
-
-    return RandomForestClassifier(500, random_state=SEED, **given)
-
-
-def _extra_trees(given: Given) -> Any:
-    from sklearn.ensemble import ExtraTreesClassifier
-
-    return ExtraTreesClassifier(500, random_state=SEED, **given)
-
-
-def _histograms(given: Given) -> Any:
-    from sklearn.ensemble import HistGradientBoostingClassifier
-
-    return HistGradientBoostingClassifier(max_iter=150, min_samples_leaf=5, random_state=SEED, **given)
-
-
-def _xgboost(given: Given) -> Any:
+def _xgboost(**given: Any) -> Any:
     from xgboost import XGBClassifier  # pyright: ignore[reportMissingImports]
 
-    fixed = {"n_estimators": 200, "tree_method": "hist", "subsample": 0.8, "colsample_bytree": 0.5}
-    return XGBClassifier(**fixed, n_jobs=1, random_state=SEED, **given)
+    return XGBClassifier(n_estimators=200, tree_method="hist", subsample=0.8, colsample_bytree=0.5, n_jobs=1, **given)
 
 
-def _lightgbm(given: Given) -> Any:
+def _lightgbm(**given: Any) -> Any:
     from lightgbm import LGBMClassifier  # pyright: ignore[reportMissingImports]
 
     fixed = {"n_estimators": 200, "min_child_samples": 5, "subsample": 0.8, "subsample_freq": 1}
-    return LGBMClassifier(**fixed, colsample_bytree=0.5, n_jobs=1, random_state=SEED, verbose=-1, **given)
+    return LGBMClassifier(**fixed, colsample_bytree=0.5, n_jobs=1, verbose=-1, **given)
 
 
-def _ebm(given: Given) -> Any:
+def _ebm(**given: Any) -> Any:
     from interpret.glassbox import ExplainableBoostingClassifier  # pyright: ignore[reportMissingImports]
 
-    return ExplainableBoostingClassifier(outer_bags=4, n_jobs=1, random_state=SEED, **given)
+    return ExplainableBoostingClassifier(outer_bags=4, n_jobs=1, **given)
 
 
 def _weka(cut: Cut, _: Given) -> tuple[Classes, None]:
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / name for name in ("train.arff", "test.arff")]
         for path, part in zip(paths, (cut.train, cut.test), strict=True):
-            _write_arff(path, part)
-        command = ["java", "-XX:+UseSerialGC", "-XX:ActiveProcessorCount=1", "-Xmx4g", "-cp", str(WEKA_JAR)]
-        command += ["weka.classifiers.meta.LogitBoost", "-t", str(paths[0]), "-T", str(paths[1]), "-p", "0"]
-        command += ["-I", "100", "-W", "weka.classifiers.trees.DecisionStump"]
+            # Nominal switches are far worse on few rows.
+            write_arff(path, part.switches, part.codes, part.labels, part.n_classes)
+        command = logitboost(100, "-t", str(paths[0]), "-T", str(paths[1]), "-p", "0")
         printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     found = re.findall(r"^ *\d+ +\d+:g\d+ +\d+:g(\d+) ", printed, re.MULTILINE)
     return np.array(found, np.intp), None
-
-
-def _write_arff(path: Path, part: Samples) -> None:
-    head = ["@relation grasps"]
-    head += [f"@attribute s{s} numeric" for s in range(part.n_switches)]  # nominal ones are far worse on few rows
-    head += [f"@attribute j{j} numeric" for j in range(part.codes.shape[1])]
-    head += ["@attribute grasp {" + ",".join(f"g{k}" for k in range(part.n_classes)) + "}", "@data"]
-    inputs = zip(part.inputs.tolist(), part.labels.tolist(), strict=True)
-    path.write_text("\n".join(head + [",".join([*map(str, row), f"g{label}"]) for row, label in inputs]) + "\n")
 
 
 def _grid(**values: Sequence[Any]) -> tuple[Given, ...]:
@@ -204,29 +160,57 @@ OURS = tuple(
     )
 )
 PEERS = (
-    Model("logistic regression", "C of 4", _fitted(_logistic, scaled=True), _grid(C=[1, 0.1, 10, 100]), additive=True),
-    Model("k neighbours", "k of 4, by distance", _fitted(_neighbours, scaled=True), _grid(n_neighbors=[5, 1, 3, 10])),
+    Model(
+        "logistic regression",
+        "C of 4",
+        _fitted(LogisticRegression, scaled=True, max_iter=2000),
+        _grid(C=[1, 0.1, 10, 100]),
+        additive=True,
+    ),
+    Model(
+        "k neighbours",
+        "k of 4, by distance",
+        _fitted(KNeighborsClassifier, scaled=True, weights="distance"),
+        _grid(n_neighbors=[5, 1, 3, 10]),
+    ),
     Model(
         "RBF SVM",
         "C of 3, gamma of 4",
-        _fitted(_support, scaled=True),
+        _fitted(SVC, scaled=True),
         _grid(C=[10, 1, 100], gamma=[0.03, 0.01, 0.1, 0.3]),
     ),
-    Model("random forest", "500 trees", _fitted(_forest)),
-    Model("extra trees", "500 trees", _fitted(_extra_trees)),
+    Model("random forest", "500 trees", _fitted(RandomForestClassifier, n_estimators=500, random_state=SEED)),
+    Model("extra trees", "500 trees", _fitted(ExtraTreesClassifier, n_estimators=500, random_state=SEED)),
     Model(
-        "histogram boosting", "150 rounds, leaves of 2", _fitted(_histograms), _grid(max_leaf_nodes=[7, 31]), slow=True
+        "histogram boosting",
+        "150 rounds, leaves of 2",
+        _fitted(HistGradientBoostingClassifier, max_iter=150, min_samples_leaf=5, random_state=SEED),
+        _grid(max_leaf_nodes=[7, 31]),
+        slow=True,
     ),
-    Model("XGBoost", "200 rounds, depth of 2", _fitted(_xgboost), _grid(max_depth=[3, 6]), slow=True, needs="xgboost"),
+    Model(
+        "XGBoost",
+        "200 rounds, depth of 2",
+        _fitted(_xgboost, random_state=SEED),
+        _grid(max_depth=[3, 6]),
+        slow=True,
+        needs="xgboost",
+    ),
     Model(
         "LightGBM",
         "200 rounds",
-        _fitted(_lightgbm),
+        _fitted(_lightgbm, random_state=SEED),
         _grid(num_leaves=[7, 31]),
         slow=True,
         needs="lightgbm",
     ),
-    Model("EBM", "4 bags, no pairs", _fitted(_ebm), _grid(interactions=[0]), additive=True, needs="interpret"),
-    Model("EBM with pairs", "4 bags, 5 pairs", _fitted(_ebm), _grid(interactions=[5]), needs="interpret"),
+    Model(
+        "EBM",
+        "4 bags, no pairs",
+        _fitted(_ebm, random_state=SEED, interactions=0),
+        additive=True,
+        needs="interpret",
+    ),
+    Model("EBM with pairs", "4 bags, 5 pairs", _fitted(_ebm, random_state=SEED, interactions=5), needs="interpret"),
     Model("Weka LogitBoost", "100 rounds", _weka, additive=True, needs="java"),
 )

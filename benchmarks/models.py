@@ -1,13 +1,12 @@
 """Additive models compared with the best alternatives, on the same folds.
 
-    python benchmarks/models.py [--sets aml icub ...] [--models logit "RBF SVM" ...] [--data FOLDER] [--quick]
+    python benchmarks/models.py [--sets aml icub ...] [--models logit "RBF SVM" ...] [--data FOLDER]
     python benchmarks/models.py --learning-curve
 
 Folds separate trials, or subjects; the switches (the first 33 of ID3, or all if there are fewer) are placed inside each
 fold, and settings are chosen inside as well. Predictions are kept in --store, so an interrupted run can be resumed.
-`--again MODEL` recomputes that model, for example after a change of code or of a set. A set may be a .grasps file. Real
-recordings are read from --data; missing peers and sets are named and left out. A full run takes hours, `--quick` with
-two small sets takes minutes.
+After a change of code or of a set, remove the store. A set may be a .grasps file. Real recordings are read from --data;
+missing peers and sets are named and left out. A full run takes hours, `--sets icub aml` takes minutes.
 """
 
 import argparse
@@ -33,7 +32,6 @@ from thenar.compiler.workers import in_workers
 from thenar.runtime.manifest import Of
 
 CONSOLE = Console(width=150)
-QUICK_SETS = ("icub", "aml")
 CURVE_MODELS = (
     "logitboost",
     "logit",
@@ -230,12 +228,10 @@ def learnt(work: Cuts, models: Sequence[Model], store: Store) -> Table:
 def asked() -> argparse.Namespace:
     """Return the command line options."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sets", nargs="+", default=None, help=f"of {', '.join(SETS)}, or .grasps files")
+    parser.add_argument("--sets", nargs="+", default=SETS, help=f"of {', '.join(SETS)}, or .grasps files")
     parser.add_argument("--models", nargs="+", help="of " + ", ".join(model.name for model in OURS + PEERS))
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the real recordings")
     parser.add_argument("--store", type=Path, default=Path("build/models.jsonl"))
-    parser.add_argument("--again", nargs="+", default=[], help="models whose stored predictions are not used")
-    parser.add_argument("--quick", action="store_true", help=f"sets {' and '.join(QUICK_SETS)} only")
     parser.add_argument("--learning-curve", action="store_true")
     parser.add_argument("--jobs", type=int, default=1)
     return parser.parse_args()
@@ -248,7 +244,7 @@ def worked(options: argparse.Namespace) -> Cuts:
         for repetitions, cut in curve():
             work.setdefault(f"{CURVE_SCENE}, {repetitions} repetitions", []).append(cut)
         return work
-    for name in options.sets or (QUICK_SETS if options.quick else SETS):
+    for name in options.sets:
         try:
             work[name] = list(cuts(load(name, options.data)))
         except FileNotFoundError as reason:
@@ -272,7 +268,7 @@ def main() -> None:
     """Compute the predictions, and print the tables."""
     options = asked()
     models, work = list(wanted(options)), worked(options)
-    store = {key: each for key, each in stored(options.store).items() if each.model not in options.again}
+    store = stored(options.store)
     fill(store, options.store, work, models, options.jobs)
     if options.learning_curve:
         CONSOLE.print(learnt(work, models, store))

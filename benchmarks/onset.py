@@ -6,8 +6,6 @@ and is tested force by force on unseen trials. Taxels are read as switches that 
 codes.
 """
 
-import argparse
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -69,7 +67,6 @@ def onset(
     newtons: Sequence[float] = NEWTONS,
     closes_n: float = 1.0,
     n_folds: int = 4,
-    seed: int = 1,
     jobs: int = -1,
     options: Recipe | None = None,
     levels: int | None = None,
@@ -84,8 +81,8 @@ def onset(
         The forces, ascending. A row counts for a force within half the smallest step between them.
     closes_n : float
         The force that closes a switch: 1 N is the paper's.
-    n_folds, seed : int
-        Folds of trials, and their seed.
+    n_folds : int
+        Folds of trials.
     jobs : int
         Worker processes; the result does not depend on their number.
     options : Recipe, optional
@@ -113,7 +110,7 @@ def onset(
     kinds: list[tuple[Reading, bool]] = [(reading, False) for reading in READINGS]
     if grasp_set.joints:
         kinds += [("nothing", True), *((reading, True) for reading in READINGS)]
-    folds = trial_folds(samples.labels, samples.trials, n_folds, seed)
+    folds = trial_folds(samples.labels, samples.trials, n_folds, seed=1)
     training = Training.of(options or Recipe(trainer="logit"))
     tasks = ((samples, closed, levels, kind, fold, training) for kind in kinds for fold in folds)
     predicted = {kind: np.empty(len(samples.labels), np.intp) for kind in kinds}
@@ -191,20 +188,3 @@ def draw(found: Onset, path: Path) -> None:
         axes.grid(color=on_paper("line"), lw=0.6)
         figure.legend(loc="outside right center", frameon=False)
         write_atomically(path, rendered(figure, "svg"))
-
-
-def main(arguments: list[str]) -> None:
-    """Draw the curves of a set, with the additive logit and three levels per taxel."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("set", type=Path, help="a .grasps file with taxels in newtons and frames of the beginning")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="the .svg to write")
-    parser.add_argument("--levels", type=int, default=3, help="levels of a taxel at most (default: %(default)s)")
-    asked = parser.parse_args(arguments)
-    found = onset(GraspSet.load(asked.set), levels=asked.levels)
-    draw(found, asked.output)
-    for curve in found.curves:
-        print(curve.title, *("-" if rate is None else f"{100 * rate.mean:.1f}" for rate in curve.rates), flush=True)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

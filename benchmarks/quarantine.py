@@ -23,6 +23,7 @@ from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.policy import Policy
 
 GRASPS = 30
+OPEN_US = 50_000
 _HELD_US = 3 * SETTLED_US
 
 
@@ -46,21 +47,20 @@ def held(
     grasps: Sequence[int],
     quarantine: bool,
     *,
-    open_us: int = 50_000,
     at: int = 0,
     stuck: int = 0,
     dead: int = 0,
     lost: int = 0,
 ) -> Iterator[tuple[str, frozenset[str]]]:
     """Yield the candidate for each grasp, and the quarantined inputs after it; from grasp `at` on, switches are stuck
-    closed, or open, or lost. The hand is open for `open_us` between them.
+    closed, or open, or lost. The hand is open for OPEN_US between them.
     """
     policy = Policy(lead=0, dwell_us=0, hold_us=0, lag_us=None, quarantine=quarantine)
     live, now_us = LiveRecognizer(build, switch_period_us=_HELD_US, policy=policy), 0
     for number, closed in enumerate(grasps):
         late = number >= at
         # The evidence of a grasp counts in the next frame, and so in this grasp.
-        for pause_us, shown in ((open_us, 0), (1, 0), *[(SETTLED_US, closed)] * (_HELD_US // SETTLED_US)):
+        for pause_us, shown in ((OPEN_US, 0), (1, 0), *[(SETTLED_US, closed)] * (_HELD_US // SETTLED_US)):
             frame = SwitchFrame(now_us, (shown | stuck * late) & ~(dead * late), lost * late)
             grasp = live.step(now_us, 0, frame, None).grasp
             now_us += pause_us
@@ -81,18 +81,18 @@ def orders(grasp_set: GraspSet, draws: int, seed: int = 0) -> Iterator[np.ndarra
         yield np.random.default_rng((seed, draw)).permutation(own)
 
 
-def false_alarms(build: Build, grasp_set: GraspSet, draws: int, open_us: int = 50_000) -> tuple[int, int]:
+def false_alarms(build: Build, grasp_set: GraspSet, draws: int) -> tuple[int, int]:
     """Return how often an input was quarantined without a fault, and in how many grasps."""
     masks, alarms, grasps = masks_of(build, grasp_set), 0, 0
     for order in orders(grasp_set, draws, seed=1):
         before: frozenset[str] = frozenset()
-        for _, found in held(build, [masks[row] for row in order], True, open_us=open_us):
+        for _, found in held(build, [masks[row] for row in order], True):
             alarms, before = alarms + len(found - before), found
         grasps += len(order)
     return alarms, grasps
 
 
-def cost(build: Build, grasp_set: GraspSet, closed: bool, draws: int, switch: int, open_us: int = 50_000) -> Cost:
+def cost(build: Build, grasp_set: GraspSet, closed: bool, draws: int, switch: int) -> Cost:
     """Return the cost of a switch that is stuck closed, or open."""
     masks, name = masks_of(build, grasp_set), build.manifest.switches[switch].name
     points = np.zeros((3, 2))
@@ -103,7 +103,7 @@ def cost(build: Build, grasp_set: GraspSet, closed: bool, draws: int, switch: in
         grasps, right = [masks[row] for row in rows], []
         fault = {"stuck" if closed else "dead": bit}
         for quarantine, faults in ((False, {}), (False, fault), (False, {"lost": bit}), (True, fault)):
-            seen = list(held(build, grasps, quarantine, open_us=open_us, at=at, **faults))
+            seen = list(held(build, grasps, quarantine, at=at, **faults))
             same = np.array([grasp for grasp, _ in seen]) == grasp_set.grasps[rows]
             right.append(same[at:].reshape(2, GRASPS).mean(axis=1))
         points += 100 * (right[0] - np.array(right[1:])) / draws
@@ -120,15 +120,13 @@ def main() -> None:
     parser.add_argument("build")
     parser.add_argument("grasps")
     parser.add_argument("--draws", type=int, default=6, help="orders of the grasps, each of a subject")
-    parser.add_argument("--open-ms", type=int, default=50, help="how long the hand is open between grasps")
     asked = parser.parse_args()
-    open_us = 1000 * asked.open_ms
     build, grasp_set = Build.load(asked.build), GraspSet.load(asked.grasps)
-    alarms, grasps = false_alarms(build, grasp_set, asked.draws, open_us)
+    alarms, grasps = false_alarms(build, grasp_set, asked.draws)
     print(f"without a fault: {alarms} false alarms in {grasps} grasps")
     for closed, what in ((True, "closed"), (False, "open")):
         switches = range(build.tables.n_switches)
-        every = [cost(build, grasp_set, closed, asked.draws, switch, open_us) for switch in switches]
+        every = [cost(build, grasp_set, closed, asked.draws, switch) for switch in switches]
         found = sorted(every, key=lambda each: -each.without[1])
         print(f"stuck {what}: points lost, grasps 1 to {GRASPS} and {GRASPS + 1} to {2 * GRASPS}; found after")
         for each in found:

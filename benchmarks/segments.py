@@ -1,26 +1,17 @@
-"""The cost of a tick of the segment decoder, with 14 types and none, 10 ms a tick, a lag of 150 ms; and a live frame.
+"""The cost of a tick of the segment decoder, with 14 types and none, 10 ms a tick, a lag of 150 ms.
 
     python benchmarks/segments.py
-    python benchmarks/segments.py --frames
 
-The first prints a table for the usual costs, for those that `thenar compile` learns from the scene continuous-rest, for
-separate costs of each type, and for a build without a class "none": Python's us on this machine, cycles on an
-ATmega328P in libsimavr, flash, RAM and stack. Every compiled result is compared with Python's. The second plays whole
-movements of the scene `continuous`, 1,000 frames of the switches and 100 records of the joints per second, repeatedly,
-and prints the us of a step by what is new in it: the minimum over all turns of each frame, so that other load matters
-little, and over these the median and the mean.
+Prints a table for the usual costs, for those that `thenar compile` learns from the scene continuous-rest, for separate
+costs of each type, and for a build without a class "none": Python's us on this machine, cycles on an ATmega328P in
+libsimavr, flash, RAM and stack. Every compiled result is compared with Python's.
 """
 
-import argparse
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
-from liveplay import STATUS, board, glove, played, with_glove
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
@@ -35,8 +26,6 @@ from thenar.compiler.firmware.tools import (
     workshop,
 )
 from thenar.firmware_templates.rendering import file_text
-from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import SegmentModel
 
@@ -228,49 +217,8 @@ def models() -> dict[str, SegmentModel]:
     return {"usual": usual, "learnt": learnt, "each type its own": own, "no class none": without}
 
 
-def frame_costs(rows: int = 800, turns: int = 15) -> dict[str, list[float]]:
-    """Return the us of each step, the minimum over all turns, by what is new in it; for `rows` rows of 10 ms each."""
-    with TemporaryDirectory() as name:
-        scene = played("continuous", Path(name))
-        system = LiveSystem.of(scene.build, with_glove(board(scene), glove(scene)))
-    row_us, tick_us = scene.performance.period_us, scene.build.manifest.segmenting.tick_us
-    keys, records = scene.keys[:rows], [record.tobytes() for record in scene.performance.sensors[:rows]]
-    found: dict[str, list[float]] = {}
-    # Records of the joints come together with the ticks, and then between them.
-    for late_us in (0, row_us // 2):
-        gloves = [GloveFrame(row * row_us + late_us, record, STATUS) for row, record in enumerate(records)]
-        times = range(row_us, rows * row_us, 1000)
-        frames = [
-            (SwitchFrame(time_us, keys[time_us // row_us]), gloves[(time_us - late_us) // row_us]) for time_us in times
-        ]
-        us = (np.array([_turn(system, frames) for _ in range(turns)]).min(axis=0) / 1000).tolist()
-        for number, (before, after) in enumerate(pairwise(frames), start=1):
-            changed = before[0].closed != after[0].closed, before[1].sensors != after[1].sensors
-            new = *changed, (after[0].time_us - row_us) % tick_us == 0
-            what = ", ".join(word for word, true in zip(("contacts", "joints", "a tick"), new, strict=True) if true)
-            found.setdefault(what or "nothing", []).append(us[number])
-    return found
-
-
-def _turn(system: LiveSystem, frames: Sequence[tuple[SwitchFrame, GloveFrame]]) -> list[int]:
-    """Return the ns of each step of a run."""
-    live, took = system.recognizer(), list[int]()
-    for switches, record in frames:
-        began = time.perf_counter_ns()
-        live.step(switches.time_us, switches.time_us, switches, record)
-        took.append(time.perf_counter_ns() - began)
-    return took
-
-
-def print_frames() -> None:
-    """Print the table of live frames."""
-    print("what is new in a frame   | us: median,  mean | frames")
-    for what, us in sorted(frame_costs().items(), key=lambda each: np.median(each[1])):
-        print(f"{what:24} | {np.median(us):10.1f}, {np.mean(us):5.1f} | {len(us):6,}")
-
-
-def print_ticks() -> None:
-    """Print the table of ticks."""
+def main() -> None:
+    """Print the table."""
     print("costs             | Python us: median, 99 % | AVR cycles: mean, most | flash | RAM + stack | differing")
     for name, model in models().items():
         lag, ticks = 150_000 // model.tick_us, 4000
@@ -287,14 +235,6 @@ def print_ticks() -> None:
             f"{name:17} | {python:23} | {run.cycles.mean():8.0f}, {run.cycles.max():12,} | {run.flash:5,} | "
             f"{run.ram:3} + {run.stack:5} | {np.count_nonzero(run.states != expected)} of {len(expected)}"
         )
-
-
-def main() -> None:
-    """Print a table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frames", action="store_true", help="live frames instead of ticks")
-    asked = parser.parse_args()
-    (print_frames if asked.frames else print_ticks)()
 
 
 if __name__ == "__main__":

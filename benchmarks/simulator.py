@@ -1,9 +1,9 @@
 """The cost of the contact model on every grasp of a scene, what it finds, and the memory of a simulation.
 
-    python benchmarks/simulator.py [SCENE] [--repetitions N] [--no-memory]
+    python benchmarks/simulator.py [SCENE]
 
 The scene's effects vary posture, object and grip. A grasp's ON set are the switches that bear more than the scene's
-threshold. Prints the tables of docs/explanation/simulator.md.
+threshold. Prints what docs/explanation/simulator.md reports.
 """
 
 import argparse
@@ -31,7 +31,7 @@ from thenar.simulator.scenes.scene import Scene
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 CONTACT = 200  # the order of the contact model
 MOST_MS = 0.5  # that a grasp may take
-DIGITS = ("thumb", "index", "middle", "ring", "little", "palm")
+REPETITIONS = 50  # of every condition
 MEMORY_REPETITIONS = (25, 100, 400)
 
 
@@ -59,10 +59,6 @@ def jaccard(pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> float:
     return float(both / either) if either else 1.0
 
 
-def together(found: Iterable[Contact], field: str) -> np.ndarray:
-    return np.concatenate([getattr(each, field) for each in found])
-
-
 def row(*cells: object) -> str:
     return f"| {' | '.join(map(str, cells))} |"
 
@@ -85,7 +81,7 @@ def outcome(batches: Sequence[Batch], contacts: Sequence[Contact], threshold_n: 
     lines = []
     for grasp, own, found in by_type(batches, contacts):
         on = [each.forces_n > threshold_n for each in found]
-        settled = together(found, "settled")
+        settled = np.concatenate([each.settled for each in found])
         lines.append(
             row(
                 grasp,
@@ -94,22 +90,10 @@ def outcome(batches: Sequence[Batch], contacts: Sequence[Contact], threshold_n: 
                 f"{np.concatenate(on).sum(axis=1).mean():.1f}",
                 f"{100 * (~np.concatenate(on).any(axis=1)).mean():.0f} %",
                 f"{100 * (~settled).mean():.1f} %",
-                f"{np.median(together(found, 'residual_n')[settled]):.2f}",
-                f"{np.median(together(found, 'residual_nmm')[settled]):.2f}",
             )
         )
     head = ("grasp type", "ms a grasp", "agreement of two repetitions", "switches ON", "none ON", "not settled")
-    return table((*head, "residual, N", "residual, N mm"), lines)
-
-
-def forces(batches: Sequence[Batch], contacts: Sequence[Contact]) -> str:
-    """Return a line per grasp type: the mean force on every digit, for settled grasps only."""
-    lines = []
-    for grasp, _, found in by_type(batches, contacts):
-        capsules_n = together(found, "capsules_n")[together(found, "settled")].mean(axis=0)
-        digits = [*capsules_n[:15].reshape(5, 3).sum(axis=1), capsules_n[15:].sum(), capsules_n.sum()]
-        lines.append(row(grasp, *(f"{newtons:.1f}" for newtons in digits)))
-    return table(("grasp type", *DIGITS, "all"), lines)
+    return table(head, lines)
 
 
 def memory(name: str) -> str:
@@ -135,23 +119,19 @@ def one(scene: Scene, repetitions: int) -> tuple[int, float, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene", nargs="?", default="kamakura")
-    parser.add_argument("--repetitions", type=int, default=50, help="of every condition (default 50)")
-    parser.add_argument("--no-memory", action="store_true", help="leave the memory out")
     parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
     scene = load_scene(options.scene)
     if options.one:
         print(json.dumps(one(scene, options.one)))
         return
-    batches = list(poses(scene, options.repetitions))
+    batches = list(poses(scene, REPETITIONS))
     solved(batches[:1])
     contacts, milliseconds = solved(batches)
-    print(f"{platform.machine()}, one thread; scene {options.scene}, {options.repetitions} repetitions a condition")
+    print(f"{platform.machine()}, one thread; scene {options.scene}, {REPETITIONS} repetitions a condition")
     print(f"All together: {milliseconds:.2f} ms a grasp (at most {MOST_MS}).\n")
-    for lines in (outcome(batches, contacts, scene.glove.threshold_n), forces(batches, contacts)):
-        print(lines, end="\n\n", flush=True)
-    if not options.no_memory:
-        print(memory(options.scene))
+    print(outcome(batches, contacts, scene.glove.threshold_n), end="\n\n", flush=True)
+    print(memory(options.scene))
 
 
 if __name__ == "__main__":
