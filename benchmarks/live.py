@@ -1,42 +1,131 @@
-"""How close the rate of the live loop comes to the limit of the wires, and its cost.
+"""The cost of the live loop, and how close its rate comes to the limit of the wires.
 
     python benchmarks/live.py [--seconds N]
 
-Prints frames per second on emulated devices compared with the wire's limit, and microseconds of CPU per grasp. Emulated
-buses need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers run on the
-same cores as the run, so a busy or single-core machine gives worse numbers than a glove would.
+Prints four tables and the path of a frame: microseconds of CPU per frame compared with 150; frames per second on
+emulated devices compared with the wire's limit; the scan of the kept switches compared with that of all 160; the files
+that a frame passes from the bytes on the wire to a published grasp, and the calls per grasp; the peak memory of a
+`thenar run` compared with 80 MiB. Emulated buses need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0,
+python3-gi). Emulated devices and readers run on the same cores as the run, so a busy or single-core machine gives worse
+numbers than a glove would.
 """
 
 import argparse
+import os
+import platform
 import signal
+import subprocess
 import sys
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from liveplay import Played, joints_alone, machine, played, wired
-from liverates import of_board, of_bus, of_glove
+import numpy as np
+from liveplay import (
+    Memory,
+    Played,
+    board,
+    glove,
+    joints_alone,
+    played,
+    read_along,
+    restless,
+    with_glove,
+)
+from liverates import Found, of_board, of_bus, of_glove
+from livescans import compared, wired
+from liveway import way
 from rich.console import Console
 from rich.table import Table
 
-LEAST_SHARE = 0.9
+from thenar.runtime import Glove
+from thenar.runtime.frames import now_us
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.live.system import LiveSystem
+from thenar.simulator.playing.bench import Bench
+
+MOST_US, LEAST_SHARE, MOST_MIB, MOST_FILES = 150, 0.9, 80, 20
+FRAMES, TURNS = 500, 8
 # A clock so slow that the overhead of the emulation does not matter.
 SLOW_HZ = 10_000
+STAGES = ("the step alone", "and JSON lines, preshape, angles, health", "and MCAP", "and reports", "and a socket")
+# Prints the peak of its only child in KiB: a process's own peak starts at the size of its parent.
+PEAK = "import os, subprocess, sys; print(os.wait4(subprocess.Popen(sys.argv[1:]).pid, 0)[2].ru_maxrss)"
+
+
+def table(title: str, *columns: str) -> Table:
+    made = Table(title=title, title_justify="left")
+    for column in columns:
+        made.add_column(column, justify="right" if made.columns else "left")
+    return made
+
+
+def loop_costs(scenes: Sequence[Played], folder: Path) -> Table:
+    """Return a line per stage: CPU of the thread, median and 99th percentile, with everything changing in memory."""
+    sizes = (f"{len(scene.kept)} switches: median, 99 %" for scene in scenes)
+    made = table(f"CPU of the live thread a frame, all switches and joints changing (at most {MOST_US} us)", "", *sizes)
+    found = [[np.percentile(spent, (50, 99)) for spent in _stages_us(scene, folder)] for scene in scenes]
+    for what, each in zip(STAGES, zip(*found, strict=True), strict=True):
+        made.add_row(what, *(f"{median:.0f} us, {high:.0f} us" for median, high in each))
+    return made
+
+
+def _stages_us(scene: Played, folder: Path) -> list[list[float]]:
+    """Return microseconds per frame for every stage. Stages alternate, so that other load affects all."""
+    frames = restless(len(scene.kept), FRAMES, seed=1)
+    with ExitStack() as stack:
+        gloves = [_stage(stage, scene, folder, stack) for stage in range(len(STAGES))]
+        turns = [[[_step_us(*each, *frame) for frame in frames] for each in gloves] for _ in range(1 + TURNS)]
+    # The first turn fills caches.
+    return [list(chain(*stage)) for stage in zip(*turns[1:], strict=True)]
+
+
+def _step_us(run: Callable[[], object], feed: Memory, closed: int, sensors: bytes) -> float:
+    feed.put(now_us(), closed, sensors)
+    start = time.thread_time_ns()
+    run()
+    return (time.thread_time_ns() - start) / 1e3
+
+
+def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[Callable[[], object], Memory]:
+    """Return a function that processes one moment with everything up to this stage, and its feed."""
+    own = Path(stack.enter_context(TemporaryDirectory(dir=folder)))
+    harness, feed = with_glove(board(scene), glove(scene)), Memory(len(scene.kept))
+    if stage == 0:
+        recognizer = LiveSystem.of(scene.build, harness).recognizer()
+
+        def step() -> None:
+            taken = feed.take()
+            recognizer.step(now_us(), time.time_ns() // 1000, taken.switches, taken.glove)
+
+        return step, feed
+    sinks = ["jsonl:/dev/null", f"unix:{own}/socket"] if stage >= 4 else ["jsonl:/dev/null"]
+    record = own / "run.mcap" if stage >= 2 else None
+    run = Glove(
+        scene.build,
+        harness,
+        preshapes="barrett_bh8",
+        sinks=sinks,
+        record=record,
+        status=stage >= 3,
+        feed=feed,
+    )
+    stack.enter_context(run)
+    if stage >= 4:
+        stack.enter_context(read_along(own / "socket"))
+    return lambda: next(run), feed
 
 
 def rates(scene: Played, seconds: float, folder: Path) -> Table:
     """Return a line per wire: frames per second, with all sinks and the recording on."""
-    title = f"Frames a second with everything on (at least {LEAST_SHARE:.0%} of what the wire allows)"
-    made = Table(title=title, title_justify="left")
-    for column in (
-        "",
-        "wire allows",
-        "device sent",
-        "arrived",
-        "in a grasp",
-        "of the wire",
-        "CPU a grasp: loop, process",
-    ):
-        made.add_column(column, justify="right" if column else "left")
+    made = table(
+        f"Frames a second with everything on (at least {LEAST_SHARE:.0%} of what the wire allows)",
+        *("", "wire allows", "device sent", "arrived", "in a grasp", "of the wire", "CPU a grasp: loop, process"),
+        "between system calls",
+    )
     joints, own, whole = joints_alone("quick", folder), scene.kept, scene.performance.switch_names
     found = [of_glove(scene, joints, sensors, seconds) for sensors in (18, 22)]
     for keys, baud, hz in ((len(own), 115_200, 0), (len(whole), 115_200, 0), (len(whole), 1_000_000, 1000)):
@@ -46,24 +135,73 @@ def rates(scene: Played, seconds: float, folder: Path) -> Table:
         what = f"I2C at {clock_hz // 1000} kHz, {len(own)} of {len(names)} switches"
         found.append(of_bus(scene, what, wired(scene, names, clock_hz), seconds))
     for each in found:
-        rates_hz = (each.allowed_hz, each.sent_hz, each.arrived_hz, each.run.recognised_hz)
-        share = f"{each.run.recognised_hz / each.allowed_hz:.0%}"
-        cost = f"{each.run.loop_us:.0f} us, {each.run.process_us:.0f} us"
-        made.add_row(each.what, *(f"{hz:.0f}" for hz in rates_hz), share, cost)
+        made.add_row(*_rate(each))
     return made
+
+
+def _rate(found: Found) -> tuple[str, ...]:
+    rates_hz = (found.allowed_hz, found.sent_hz, found.arrived_hz, found.run.recognised_hz)
+    cost = f"{found.run.loop_us:.0f} us, {found.run.process_us:.0f} us"
+    split = f"{found.run.between_us:.0f} us a scan: {found.own_share:.0%}" if found.run.between_us else ""
+    return found.what, *(f"{hz:.0f}" for hz in rates_hz), f"{found.share:.0%}", cost, split
+
+
+def scans(scene: Played) -> Table:
+    """Return a line per way to scan, and one for all 160 switches."""
+    made = table(
+        "A scan of the kept switches compared with all 160, MCP23017 at 100 kHz",
+        *("", "on the wire", "times less", "measured", "times less", "of it Python", "bytes", "system calls"),
+    )
+    every = list(compared(scene))
+    for each in every:
+        made.add_row(
+            each.what,
+            f"{each.predicted_us:.0f} us",
+            f"{every[0].predicted_us / each.predicted_us:.1f}",
+            f"{each.measured_us:.0f} us",
+            f"{every[0].measured_us / each.measured_us:.1f}",
+            f"{each.python_us:.0f} us",
+            f"{each.bytes:.1f}",
+            f"{each.ioctls:.1f}",
+        )
+    return made
+
+
+def peak_mib(scene: Played, folder: Path, seconds: float) -> float:
+    """Return the peak of a `thenar run` on a CyberGlove and a bus, with recording, socket and preshape."""
+    harness = wired(scene, scene.kept, 400_000)
+    with Bench(harness, scene.performance.switch_names, folder) as bench:
+        file = folder / "glove.toml"
+        file.write_text(harness_to_toml(with_glove(bench.harness, glove(scene, str(folder / "cyberglove")))))
+        options = ["--sink", f"unix:{folder}/socket", "--preshape", "barrett_bh8", "--record", folder / "peak.mcap"]
+        run = [sys.executable, "-m", "thenar.cli", "run", scene.folder, "--glove", file, "--status", *options]
+        run += ["--frames", str(int(400 * seconds))]
+        command = [sys.executable, "-c", PEAK, *map(str, run)]
+        done = subprocess.run(command, env=os.environ | bench.environment, capture_output=True, text=True, check=True)
+    return int(done.stdout) / 1024
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=3.0, help="of each run on a wire (default 3)")
-    seconds = parser.parse_args().seconds
+    options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that devices are taken away again
     console = Console(width=180)
-    console.print(machine(), "")
+    busy = f"{os.getloadavg()[0]:.1f} processes were busy on {os.cpu_count()} cores when it began"
+    console.print(f"{platform.machine()}, Python {platform.python_version()}; {busy}\n")
     with TemporaryDirectory() as name:
         folder = Path(name)
-        scene = played("quick", folder)
-        console.print(rates(scene, seconds, folder))
+        scenes = [played("quick", folder), played("kamakura", folder, prune=20)]
+        console.print(loop_costs(scenes, folder), "")
+        console.print(rates(scenes[0], options.seconds, folder), "")
+        console.print(scans(scenes[0]), "")
+        passed = way(scenes[0])
+        calls = ", ".join(f"{calls:.0f} in {thread}" for thread, calls in sorted(passed.calls.items()))
+        console.print(f"A frame passes {len(passed.files)} files (at most {MOST_FILES}); calls a grasp: {calls}")
+        console.print("\n".join(passed.files), "")
+        console.print(
+            f"Peak of `thenar run`: {peak_mib(scenes[0], folder, options.seconds):.0f} MiB (at most {MOST_MIB})"
+        )
 
 
 if __name__ == "__main__":

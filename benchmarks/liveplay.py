@@ -1,7 +1,5 @@
-"""Inputs for the benchmarks of the live loop: scenes, their builds, and gloves wired for them."""
+"""Inputs for the benchmarks of the live loop: scenes, their builds, gloves wired for them, and frames in memory."""
 
-import os
-import platform
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -12,24 +10,24 @@ from pathlib import Path
 from typing import Literal
 
 import msgspec
+import numpy as np
 
 from thenar.compiler import compile_build
+from thenar.drivers.cyberglove_protocol import ALWAYS, PLUGGED
 from thenar.runtime import Build
+from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.live.sources import FrameBuffer, Snapshot
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.playing.performance import Performance, of_scene
 
 # Reads a socket as fast as lines come, so that they are sent and not lost.
 _READER = "import socket, sys; s = socket.socket(socket.AF_UNIX); s.connect(sys.argv[1])\nwhile s.recv(65536): pass"
 SENSORS: Literal[18] = 18
-
-
-def machine() -> str:
-    """Return what ran the benchmark, and how busy it was."""
-    busy = f"{os.getloadavg()[0]:.1f} processes were busy on {os.cpu_count()} cores when it began"
-    return f"{platform.machine()}, Python {platform.python_version()}; {busy}"
+STATUS = ALWAYS | PLUGGED
+# How long a frame from memory counts as fresh: even a busy computer makes none of them old.
+_LONGEST_US = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +51,10 @@ class Played:
         return [mask(row) for row in self.performance.switches[:, columns].tolist()]
 
 
-def played(name: str, folder: Path) -> Played:
+def played(name: str, folder: Path, prune: int = 0) -> Played:
     """Simulate and compile a shipped scene; the first subject performs."""
     scene = load_scene(name)
-    compiled = compile_build(simulate(scene, 1).grasp_set, folder / name, rounds=100, folds=0).folder
+    compiled = compile_build(simulate(scene, 1).grasp_set, folder / name, rounds=100, folds=0, prune=prune).folder
     performance = of_scene(scene, jobs=1)
     calibration = folder / f"{name}.toml"
     calibration.write_text(performance.calibration.to_toml())
@@ -87,11 +85,28 @@ def with_glove(harness: Harness, wiring: GloveWiring) -> Harness:
     return msgspec.structs.replace(harness, cyberglove=wiring)
 
 
-def wired(scene: Played, names: tuple[str, ...], clock_hz: int) -> Harness:
-    """Return a glove with these switches on MCP23017, and a CyberGlove."""
-    proposed = propose_harness(names, device="/dev/i2c-7")
-    bus = msgspec.structs.replace(proposed.buses[0], clock_hz=clock_hz)
-    return with_glove(msgspec.structs.replace(proposed, buses=(bus,)), glove(scene))
+class Memory:
+    """A feed for a glove that returns what was put into it: no device, no thread, no waiting."""
+
+    def __init__(self, switches: int) -> None:
+        self._arrivals = FrameBuffer(switches, [(1 << switches) - 1])
+
+    def put(self, time_us: int, closed: int, sensors: bytes | None) -> None:
+        """Add a frame of the switches, preceded by one of the glove unless that is None."""
+        if sensors is not None:
+            self._arrivals.put_glove(GloveFrame(time_us, sensors, STATUS), _LONGEST_US)
+        self._arrivals.put_switches(0, SwitchFrame(time_us, closed), _LONGEST_US)
+
+    def take(self) -> Snapshot:
+        """Return the frames that were put in."""
+        return self._arrivals.take()
+
+
+def restless(switches: int, frames: int, seed: int) -> list[tuple[int, bytes]]:
+    """Return frames that differ as much as chance allows: half of the switches, and all sensors, change."""
+    rng = np.random.default_rng(seed)
+    bits, sensors = rng.random((frames, switches)) < 0.5, rng.integers(1, 256, (frames, SENSORS), dtype=np.uint8)
+    return [(mask(row.tolist()), raw.tobytes()) for row, raw in zip(bits, sensors, strict=True)]
 
 
 def mask(closed: Sequence[bool]) -> int:

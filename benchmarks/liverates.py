@@ -43,6 +43,17 @@ class Found:
     arrived_hz: float
     run: Rate
 
+    @property
+    def share(self) -> float:
+        """Frames that led to a grasp, as a share of the wire's limit."""
+        return self.run.recognised_hz / self.allowed_hz
+
+    @property
+    def own_share(self) -> float:
+        """That share of a bus if system calls took the wire's time, with the measured time between them."""
+        wire_us = 1e6 / self.allowed_hz
+        return wire_us / (wire_us + self.run.between_us)
+
 
 def of_glove(scene: Played, joints: Path, sensors: Literal[18, 22], seconds: float) -> Found:
     """Measure a CyberGlove that streams at its maximum rate; `joints` is a build that uses no switches."""
@@ -109,7 +120,7 @@ def _ran(
     """Run livewire.py on the emulated devices."""
     path = Path(folder, "glove.toml")
     path.write_text(harness_to_toml(harness))
-    command = [sys.executable, str(LIVEWIRE), str(build), str(path), str(seconds)]
+    command = [sys.executable, str(LIVEWIRE), "rate", str(build), str(path), str(seconds)]
     done = subprocess.run(
         command, env=os.environ | dict(environment or {}), capture_output=True, text=True, check=False
     )

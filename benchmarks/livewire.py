@@ -1,29 +1,41 @@
 """The live side of the benchmark's wires, in a separate process like `thenar run`; benchmarks/live.py starts it.
 
-    python benchmarks/livewire.py BUILD GLOVE.toml SECONDS
+    python benchmarks/livewire.py rate BUILD GLOVE.toml SECONDS    all sinks on: frames per second, and their cost
+    python benchmarks/livewire.py scans BUILD GLOVE.toml all|kept  one bus: the times of some scans a line out, for each
+                                                                   line in
 
-Prints JSON: frames per second with all sinks on, and their cost.
+Both print JSON.
 """
 
 import sys
 import time
 from dataclasses import dataclass
+from fcntl import ioctl
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import msgspec
+import smbus2.smbus2
 from liveplay import read_along
 
-from thenar.runtime import Glove
+import thenar.drivers.i2c.node
+from thenar.runtime import Build, Glove
 from thenar.runtime.frames import SwitchFrame
+from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live.sources import Snapshot, Sources
+from thenar.runtime.live.system import LiveSystem
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.sources.i2c import I2cDevice
 
+SCANS = 4
 _START_S = 20.0
 
 
 class Rate(msgspec.Struct):
     """The rates of a run: frames per second received from each device; frames that led to a grasp, of the switches or,
-    without any, of the glove; microseconds of CPU per grasp, of the loop's thread and of the whole process.
+    without any, of the glove; microseconds of CPU per grasp, of the loop's thread and of the whole process; for a bus,
+    microseconds per scan between two system calls.
     """
 
     switches_hz: float
@@ -31,6 +43,15 @@ class Rate(msgspec.Struct):
     recognised_hz: float
     loop_us: float
     process_us: float
+    between_us: float
+
+
+class Scanned(msgspec.Struct):
+    """Times of scans: microseconds each, and the part in Python outside system calls."""
+
+    us: list[float]
+    python_us: list[float]
+    ioctls: int
 
 
 @dataclass(eq=False)
@@ -69,18 +90,27 @@ def rate(build: str, glove: str, seconds: float) -> Rate:
             feed = Counted(run.sources)
             run.feed = feed
             _run(run, _START_S, until_well=True)
-            before = _state(run, feed)
-            _run(run, seconds)
-            counted = zip(_state(run, feed), before, strict=True)
-            wall_s, loop_s, process_s, switches, gloves, recognised, grasps = (now - then for now, then in counted)
-    us = 1e6 / grasps
-    return Rate(switches / wall_s, gloves / wall_s, recognised / wall_s, loop_s * us, process_s * us)
+            return _over(run, feed, seconds)
 
 
-def _state(glove: Glove, feed: Counted) -> tuple[float, ...]:
-    """Return the clocks of the wall, the loop's thread and the process, and the counts of frames and grasps."""
-    clocks = time.perf_counter(), time.thread_time(), time.process_time()
-    return *clocks, feed.switches, feed.gloves, feed.recognised, glove.frames
+def _over(glove: Glove, feed: Counted, seconds: float) -> Rate:
+    ioctls = Ioctls()
+    ioctls.stand_in()
+    counts, clocks = _counts(glove, feed), _clocks()
+    _run(glove, seconds)
+    inside_s = ioctls.wall_ns / 1e9
+    wall_s, loop_s, process_s = (now - then for now, then in zip(_clocks(), clocks, strict=True))
+    switches, gloves, recognised, grasps = (now - then for now, then in zip(_counts(glove, feed), counts, strict=True))
+    each, between_us = 1e6 / grasps, 1e6 * (wall_s - inside_s) / switches if ioctls.count else 0.0
+    return Rate(switches / wall_s, gloves / wall_s, recognised / wall_s, loop_s * each, process_s * each, between_us)
+
+
+def _counts(glove: Glove, feed: Counted) -> tuple[int, int, int, int]:
+    return feed.switches, feed.gloves, feed.recognised, glove.frames
+
+
+def _clocks() -> tuple[float, float, float]:
+    return time.perf_counter(), time.thread_time(), time.process_time()
 
 
 def _run(glove: Glove, seconds: float, *, until_well: bool = False) -> None:
@@ -95,5 +125,54 @@ def _run(glove: Glove, seconds: float, *, until_well: bool = False) -> None:
         raise SystemExit(f"no frames arrived: {glove.sources.devices()}")
 
 
+@dataclass(eq=False)
+class Ioctls:
+    """Replaces ioctl in the I2C driver and in smbus2, and measures its time."""
+
+    count: int = 0
+    cpu_ns: int = 0
+    wall_ns: int = 0
+
+    def stand_in(self) -> None:
+        """Install the replacement."""
+        for module in (smbus2.smbus2, thenar.drivers.i2c.node):
+            vars(module)["ioctl"] = self
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call ioctl."""
+        start, cpu_ns = time.perf_counter_ns(), time.thread_time_ns()
+        try:
+            return ioctl(*arguments)
+        finally:
+            self.count += 1
+            self.cpu_ns += time.thread_time_ns() - cpu_ns
+            self.wall_ns += time.perf_counter_ns() - start
+
+
+def scans(build: str, glove: str, which: str) -> None:
+    """Scan the only bus: all wired switches, or the kept ones."""
+    system = LiveSystem.of(Build.load(build), load_harness(glove))
+    scan = whole_scan(system.harness, system.harness.switches) if which == "all" else system.scan
+    device = I2cDevice(system.harness, 0, scan)
+    device.open()
+    ioctls = Ioctls()
+    ioctls.stand_in()
+    print(device.bus.way, flush=True)
+    for _ in sys.stdin:
+        found, before = Scanned([], [], 0), ioctls.count
+        for _ in range(SCANS):
+            start, cpu_ns, inside_ns = time.perf_counter(), time.thread_time_ns(), ioctls.cpu_ns
+            device.read(1.0)
+            python_ns = time.thread_time_ns() - cpu_ns - (ioctls.cpu_ns - inside_ns)
+            found.us.append(1e6 * (time.perf_counter() - start))
+            found.python_us.append(python_ns / 1e3)
+        found.ioctls = ioctls.count - before
+        print(msgspec.json.encode(found).decode(), flush=True)
+
+
 if __name__ == "__main__":
-    print(msgspec.json.encode(rate(sys.argv[1], sys.argv[2], float(sys.argv[3]))).decode())
+    verb, *arguments = sys.argv[1:]
+    if verb == "rate":
+        print(msgspec.json.encode(rate(arguments[0], arguments[1], float(arguments[2]))).decode())
+    else:
+        scans(*arguments)

@@ -9,6 +9,8 @@ readers received. Readers are WebSockets in a separate process, on the same core
 """
 
 import argparse
+import os
+import platform
 import subprocess
 import sys
 import time
@@ -20,19 +22,15 @@ from tempfile import TemporaryDirectory
 from urllib.parse import urlsplit
 
 import numpy as np
-from liveplay import SENSORS, Played, board, glove, machine, mask, played, with_glove
+from liveplay import Memory, Played, board, glove, played, restless, with_glove
 from rich.console import Console
 from rich.table import Table
 
-from thenar.drivers.cyberglove_protocol import ALWAYS, PLUGGED
 from thenar.runtime import Glove
-from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
-from thenar.runtime.live.sources import FrameBuffer, Snapshot
+from thenar.runtime.frames import now_us
 from thenar.runtime.web.live import LivePage
 
 MOST_US, HZ, WARM = 20, 400, 200
-# How long a frame from memory counts as fresh: even a busy computer makes none of them old.
-LONGEST_US = 1_000_000
 # Says when all are connected; at the end of its input, how many frames each reader got.
 READERS = """
 import asyncio, sys
@@ -52,29 +50,6 @@ async def main():
     for each in live: each.transport.abort()
 asyncio.run(main())
 """
-
-
-class Memory:
-    """A feed for a glove that returns what was put into it: no device, no thread, no waiting."""
-
-    def __init__(self, switches: int) -> None:
-        self._arrivals = FrameBuffer(switches, [(1 << switches) - 1])
-
-    def put(self, time_us: int, closed: int, sensors: bytes) -> None:
-        """Add a frame of the glove, and one of the switches."""
-        self._arrivals.put_glove(GloveFrame(time_us, sensors, ALWAYS | PLUGGED), LONGEST_US)
-        self._arrivals.put_switches(0, SwitchFrame(time_us, closed), LONGEST_US)
-
-    def take(self) -> Snapshot:
-        """Return the frames that were put in."""
-        return self._arrivals.take()
-
-
-def restless(switches: int, frames: int, seed: int) -> list[tuple[int, bytes]]:
-    """Return frames that differ as much as chance allows: half of the switches, and all sensors, change."""
-    rng = np.random.default_rng(seed)
-    bits, sensors = rng.random((frames, switches)) < 0.5, rng.integers(1, 256, (frames, SENSORS), dtype=np.uint8)
-    return [(mask(row.tolist()), raw.tobytes()) for row, raw in zip(bits, sensors, strict=True)]
 
 
 @dataclass
@@ -139,7 +114,8 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=4000, help="per case (default 4000)")
     options = parser.parse_args()
     console = Console(width=180)
-    console.print(machine(), "")
+    busy = f"{os.getloadavg()[0]:.1f} processes were busy on {os.cpu_count()} cores when it began"
+    console.print(f"{platform.machine()}, Python {platform.python_version()}; {busy}\n")
     table = Table(title=f"A frame of a run that shows itself (at most {MOST_US} us more of the run's thread)")
     for name in ("", "run's thread: median, 99 %", "more", "frame to grasp: median, 99 %", "server", "frames/s shown"):
         table.add_column(name, justify="right" if table.columns else "left")

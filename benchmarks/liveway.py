@@ -1,0 +1,92 @@
+"""The path of a live frame, from the bytes on the wire to a published grasp: its files, and the number of calls.
+
+python benchmarks/liveway.py COUNTS ARGUMENT...   runs `thenar ARGUMENT...` and writes the calls it made to COUNTS
+"""
+
+import os
+import subprocess
+import sys
+import threading
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import FrameType
+
+import msgspec
+from liveplay import Played, board, glove, with_glove
+from liverates import changing
+
+from thenar.cli import run
+from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
+from thenar.drivers.emulated.lines import BoardSender
+from thenar.drivers.emulated.serial_line import PtyLine
+from thenar.runtime.harness.writing import harness_to_toml
+
+# Runs of two lengths, whose difference is the path of a frame without start and end.
+SHORT, LONG = 200, 1200
+# The path of a frame is called at least once in this many grasps; functions called once a second are not.
+_EVERY = 10
+_OURS = f"{os.sep}thenar{os.sep}"
+Calls = dict[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """Files that a frame passes, and calls of functions in them per grasp, by the thread that makes them."""
+
+    files: tuple[str, ...]
+    calls: dict[str, float]
+
+
+def way(scene: Played) -> Way:
+    """Return the path of a row of a board and a CyberGlove, to JSON lines and a preshape."""
+    before, after = _calls(scene, SHORT), _calls(scene, LONG)
+    grasps = LONG - SHORT
+    found = {key: (count - before.get(key, 0)) / grasps for key, count in after.items()}
+    files = {key.split("|")[1] for key, each in found.items() if each * _EVERY >= 1}
+    threads = sorted({key.split("|")[0] for key in found})
+    calls = {name: sum(each for key, each in found.items() if key.split("|")[0] == name) for name in threads}
+    return Way(tuple(sorted(files)), calls)
+
+
+def _calls(scene: Played, frames: int) -> Calls:
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        harness = with_glove(board(scene, f"{folder}/board"), glove(scene, f"{folder}/glove"))
+        (folder / "glove.toml").write_text(harness_to_toml(harness))
+        options = ("--sink", "jsonl:/dev/null", "--preshape", "barrett_bh8", "--frames", str(frames))
+        with (
+            PtyLine(folder / "board", 115_200) as line,
+            PtyLine(folder / "glove") as other,
+            BoardSender(line.send, scene.kept, (), harness.streams[0].rate_hz) as device,
+            EmulatedCyberGlove(other) as hand,
+            changing(scene, lambda closed, _: device.show(closed)),
+            changing(scene, lambda _, raw: hand.set(raw)),
+        ):
+            command = [sys.executable, __file__, str(folder / "calls"), "run", str(scene.folder)]
+            command += ["--glove", str(folder / "glove.toml"), *options]
+            subprocess.run(command, check=True, capture_output=True)
+        return msgspec.json.decode((folder / "calls").read_bytes(), type=Calls)
+
+
+def _profiled(path: Path, arguments: list[str]) -> None:
+    """Run `thenar` and write how often each function of ours was called in each thread."""
+    counts = Counter[str]()
+
+    def hook(frame: FrameType, event: str, _: object) -> None:
+        code = frame.f_code
+        if event == "call" and _OURS in code.co_filename:
+            thread = threading.current_thread().name.partition(" at ")[0]
+            counts[f"{thread}|{code.co_filename.rpartition(_OURS)[2]}|{code.co_qualname}"] += 1
+
+    threading.setprofile(hook)
+    sys.setprofile(hook)
+    run(arguments)
+    sys.setprofile(None)
+    threading.setprofile(None)
+    path.write_bytes(msgspec.json.encode(counts))
+
+
+if __name__ == "__main__":
+    _profiled(Path(sys.argv[1]), sys.argv[2:])
