@@ -84,8 +84,8 @@ FAULTS = (
     Fault(
         "of tied classes the build takes the last",
         "runtime/build.py",
-        "self.manifest.classes[lanes.index(max(lanes))]",
-        "self.manifest.classes[len(lanes) - 1 - lanes[::-1].index(max(lanes))]",
+        "self.manifest.classes[biased_scores.index(max(biased_scores))]",
+        "self.manifest.classes[len(biased_scores) - 1 - biased_scores[::-1].index(max(biased_scores))]",
         "tests/runtime/test_build.py",
     ),
     Fault(
