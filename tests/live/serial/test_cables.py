@@ -82,8 +82,8 @@ def test_a_glove_pulled_from_its_box_gives_no_answers(run: MakeRun, outage: Outa
     glove = running.bench.glove
     outage(
         running.scene,
-        lambda: setattr(glove, "plugged", False),
-        lambda: setattr(glove, "plugged", True),
+        lambda: setattr(glove.box, "plugged", False),
+        lambda: setattr(glove.box, "plugged", True),
         lost=set(running.scene.truth.joint_names),
         period_us=running.periods_us()[0],
     )
