@@ -66,6 +66,7 @@ def test_id3_keeps_its_tree_and_what_each_switch_brought(data: tuple[Any, Any]) 
     X, y = data
     selector = SwitchSelector("id3", min_samples=50).fit(X, y)
     tree = grow_id3(X, y, min_samples=50)
+    assert selector.tree_ is not None
     assert selector.tree_.nodes == tree.nodes
     assert selector.classes_.tolist() == list(tree.classes)
     assert selector.gains_.tolist() == list(tree.gains)
