@@ -1,4 +1,4 @@
-"""Weka's LogitBoost on decision stumps, as a process of its own, and the files that it reads."""
+"""Weka's LogitBoost on decision stumps, as a separate process, and the files that it reads."""
 
 import shutil
 from pathlib import Path
@@ -15,7 +15,7 @@ def installed() -> bool:
 
 
 def logitboost(rounds: int, *options: str) -> list[str]:
-    """Return the command that trains so many rounds on one thread."""
+    """Return the command that trains this number of rounds on one thread."""
     command = ["java", "-XX:+UseSerialGC", "-XX:ActiveProcessorCount=1", "-Xmx4g", "-cp", str(JAR)]
     command += ["weka.classifiers.meta.LogitBoost", *options, "-I", str(rounds)]
     return [*command, "-W", "weka.classifiers.trees.DecisionStump"]
