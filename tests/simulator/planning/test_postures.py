@@ -165,7 +165,8 @@ BROKEN = {
 
 @pytest.mark.parametrize(("content", "told"), BROKEN.values(), ids=BROKEN)
 def test_a_file_that_holds_no_postures_is_refused(content: bytes, told: str) -> None:
-    with pytest.raises(ValueError, match=re.escape(told)):
+    # Releases of msgspec spell the name of the encoding in either case.
+    with pytest.raises(ValueError, match=f"(?i){re.escape(told)}"):
         Postures.decode(content)
 
 
