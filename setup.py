@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from setuptools import setup
 
@@ -10,4 +11,7 @@ if not Path("src/thenar/runtime/__init__.py").exists():
         "this checkout has no symbolic links, which src/thenar consists of: install a wheel (make dist, on Linux or "
         "macOS), or clone again with git clone -c core.symlinks=true"
     )
-setup()
+# Nothing is left in build/ of the checkout. The README's `thenar compile -o build/` would refuse that folder, and the
+# next wheel would hold modules that were deleted meanwhile.
+with TemporaryDirectory() as folder:
+    setup(options={"build": {"build_base": folder}})

@@ -17,7 +17,6 @@ from thenar.runtime.rejection import refused
 from .artifact import CompileError
 from .artifact.ensemble import model_fault
 from .artifact.rejecting import rejection_of
-from .boosting.stumps import Stumps
 from .evaluation.choosing import choose_training
 from .evaluation.populations import OF
 from .limits import check_inputs
@@ -195,12 +194,12 @@ class Recogniser:
     @property
     def rounds(self) -> int:
         """The number of boosting rounds in the model."""
-        return self.model.n_rounds if isinstance(self.model, Stumps) else 0
+        return self.model.n_rounds
 
     @property
     def stopped_after(self) -> int:
         """The number of rounds after which a tolerance ended the training; 0 if none did."""
-        return self.rounds if isinstance(self.model, Stumps) and self.model.stopped_early else 0
+        return self.rounds if self.model.stopped_early else 0
 
     @property
     def zero_gain_nodes(self) -> int:

@@ -85,7 +85,7 @@ class Members(Mapping[str, M], Generic[M]):
 
     def _loaded(self, point: EntryPoint) -> M:
         try:
-            member = point.load()
+            member: M = point.load()
         except KeyboardInterrupt:
             raise
         except BaseException as error:
@@ -93,10 +93,13 @@ class Members(Mapping[str, M], Generic[M]):
             what = str(error) if isinstance(error, Exception) else repr(error)
             said = f"cannot be loaded: {shortened(what)}; fix or uninstall it"
             raise MemberError(f"{self._where(point)} {said}") from error
-        if not isinstance(member, self.shape):
-            said = f"is not a {self.shape.__name__}: docs/how-to/extend.md says what to define"
-            raise MemberError(f"{self._where(point)} {said}")
+        if reason := self.unfit(member):
+            raise MemberError(f"{self._where(point)} {reason}: docs/how-to/extend.md says what to define")
         return member
+
+    def unfit(self, member: object) -> str:
+        """Return why something is no member; "" if it is one."""
+        return "" if isinstance(member, self.shape) else f"is not a {self.shape.__name__}"
 
     def __getitem__(self, name: str) -> M:
         return self._members[name]

@@ -133,7 +133,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     ] = 0.01
 
     def __hash__(self) -> int:
-        # Of what a search varies; settings are a dict.
+        # Only what a search varies: settings are a dict, which has no hash.
         chosen = self.placement, self.prune, self.keep, self.inputs, self.levels, self.keep_joints, self.trainer
         return hash((*chosen, self.rounds, self.width, self.table_bits))
 

@@ -89,6 +89,15 @@ def test_the_sdist_has_no_links_and_builds_where_there_are_none(distributions: P
 
 
 @pytest.mark.slow
+def test_an_installation_leaves_no_build_folder_in_the_checkout(tmp_path: Path) -> None:
+    checkout(tmp_path / "source")
+    wheel = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", str(tmp_path)]
+    subprocess.run([*wheel, str(tmp_path / "source")], capture_output=True, check=True)
+    assert list(tmp_path.glob("thenar-*.whl"))
+    assert not (tmp_path / "source" / "build").exists()  # where README's `thenar compile -o build/` writes
+
+
+@pytest.mark.slow
 def test_a_checkout_without_links_says_what_to_do_and_builds_nothing(tmp_path: Path) -> None:
     """As git makes it with core.symlinks=false: a link is a file that holds its target."""
     checkout(tmp_path / "source")

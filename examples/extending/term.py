@@ -1,4 +1,4 @@
-"""A kind of term from another package, and a trainer that uses it: what two joints say by being bent together."""
+"""A kind of term from another package, which adds a row where two joints are bent together, and a trainer of it."""
 
 from dataclasses import dataclass, replace
 
@@ -35,7 +35,7 @@ class Corner(Term):
 
 
 class LogitWithCorner(Trainer):
-    """The logit, and what the first two joints say together: how much likelier both are bent than each by itself."""
+    """Add to the logit how much likelier each type bends the first two joints together than one by one."""
 
     name = "logit-corner"
     what = "the logit, with a corner of the first two joints"

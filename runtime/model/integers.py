@@ -158,28 +158,25 @@ class IntegerTables(Additive):
         """Return the terms of a joint alone: its bins, and its slope if it has one."""
         return (self.bins[joint], *(slope for slope in self.slopes if slope.joint == joint))
 
-    def turning_codes(self, joint: int) -> Steps:
-        """Return codes at which the contribution of each bin of a joint, and of its grid, is greatest and least."""
-        steps = self.steps_of(joint)
+    def turning_codes(self, joint: int, steps: Steps) -> Steps:
+        """Return codes at which a joint's contribution is greatest and least between the codes `steps`, after which its
+        bins, or its grid, change.
+        """
         if len(self.of_joint(joint)) == 1:
             return np.append(0, steps + 1)
         codes = np.unique(np.concatenate([[0, HIGHEST_CODE], steps, steps + 1]))
         return codes[codes <= HIGHEST_CODE]
 
     def choices(self, joint: int) -> tuple[Steps, Steps]:
-        """Return codes (c,) at which a joint alone adds most and least in each bin, and what it adds (c, K)."""
-        bins = self.bins[joint]
-        codes = np.append(0, bins.thresholds.astype(np.int64) + 1)
-        if len(terms := self.of_joint(joint)) > 1:
-            codes = np.unique(np.concatenate([[HIGHEST_CODE], codes, bins.thresholds.astype(np.int64)]))
-            codes = codes[codes <= HIGHEST_CODE]
-        return codes, np.sum([term.of(codes) for term in terms], axis=0, dtype=np.int64)
+        """Return codes (c,) at which a joint alone adds most and least in each bin, and what it adds there (c, K)."""
+        codes = self.turning_codes(joint, self.bins[joint].thresholds.astype(np.int64))
+        return codes, np.sum([term.of(codes) for term in self.of_joint(joint)], axis=0, dtype=np.int64)
 
     def states(self, unit: tuple[int, ...]) -> tuple[Steps, Steps]:
         """Return all states of a unit's joints, codes or LOST (c, joints), and the contributions in each (t, c, K): of
         the bins of each joint, or the mean that replaces it, and of further terms. The last is that all are lost.
         """
-        codes = [np.append(self.turning_codes(joint), LOST) for joint in unit]
+        codes = [np.append(self.turning_codes(joint, self.steps_of(joint)), LOST) for joint in unit]
         states = np.stack([each.ravel() for each in np.meshgrid(*codes, indexing="ij")], axis=1)
         contributions = []
         for joint, own in zip(unit, states.T, strict=True):

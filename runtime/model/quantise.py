@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from .integers import COARSE, FINEST_SCALE, IntegerTables
 from .tables import ScoreTables, winners
-from .terms.base import CoreTerm, Floats, rounded
+from .terms.base import Floats, ScoreTerm, StepTerm, rounded
 from .terms.line import LARGEST_SLOPE, WIDEST, Line
 
 # The most consecutive switches that firmware looks up together in tables of narrow entries. Every group of this many
@@ -66,9 +66,9 @@ def as_deployed(tables: ScoreTables, grid: int) -> ScoreTables:
     return ScoreTables(tables.bias - tables.bias[-1:], tuple(term.relative() for term in _core(tables)))
 
 
-def _core(tables: ScoreTables) -> list[CoreTerm]:
+def _core(tables: ScoreTables) -> list[ScoreTerm]:
     """Return the terms. Raises ValueError where one is of another kind: `collapse` returns tables without such."""
-    terms = [term for term in tables.terms if isinstance(term, CoreTerm)]
+    terms = [term for term in tables.terms if isinstance(term, ScoreTerm)]
     if len(terms) < len(tables.terms):
         raise ValueError("the tables have terms of other kinds: collapse them first")
     return terms
@@ -205,7 +205,7 @@ def _leads(scores: Floats) -> Floats:
     return leads
 
 
-def _whole(tables: ScoreTables, scale: float, grid: int) -> list[CoreTerm]:
+def _whole(tables: ScoreTables, scale: float, grid: int) -> list[StepTerm]:
     """Return the terms in whole steps."""
     return [term.whole(scale, grid) for term in _core(_centred(tables, scale))]
 

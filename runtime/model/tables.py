@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .terms.base import HIGHEST_CODE, Floats, Rows, Term
+from .terms.base import Floats, Rows, Term
 from .terms.bins import Bins
 from .terms.bit import Bit
 from .terms.grid import Grid
@@ -184,15 +184,6 @@ class ScoreTables(Additive):
         for term in self.terms:
             scores += term.of(*self.values(term, bits, codes))
         return scores
-
-
-def first_codes(*thresholds: NDArray[np.uint16]) -> NDArray[np.int64]:
-    """Return the smallest code of each bin of a joint, where bins are intersections of those of several `thresholds`.
-
-    Such a code represents all codes of its bin; a bin beyond the range of codes has none.
-    """
-    codes = np.unique(np.concatenate([[0], *(each.astype(np.int64) + 1 for each in thresholds)]))
-    return codes[codes <= HIGHEST_CODE]
 
 
 def winners(scores: Floats) -> NDArray[np.intp]:

@@ -58,3 +58,12 @@ def test_a_build_runs_without_the_package_but_is_not_verified(
     assert {line.get("grasp") for line in map(json.loads, replayed)} >= {"cup", "pen", "plate"}
     refused = installed.thenar("verify", str(build), str(recordings), code=2)
     assert "there is no kind of term 'corner'" in refused
+
+
+def test_a_kind_that_is_no_class_of_terms_is_refused(
+    install: Callable[..., Any], recordings: Path, tmp_path: Path
+) -> None:
+    installed, build = install("term.py", "thenar.trainers", others={"thenar.terms": "MEMBER"}), tmp_path / "build"
+    installed.thenar("compile", str(recordings), "-o", str(build), "--trainer", "logit-corner", "--folds", "0")
+    refused = installed.thenar("verify", str(build), str(recordings), code=2)
+    assert "is not a class derived from Term: docs/how-to/extend.md says what to define" in " ".join(refused.split())

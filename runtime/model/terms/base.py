@@ -21,7 +21,7 @@ class Term(ABC):
     """One summand of an additive model: a row of K numbers, one a grasp type, that depends on one or two inputs.
 
     Integer tables, proofs, files for boards and C know four kinds, the `CoreTerm`s: `Bit`, `Bins`, `Line` and `Grid`.
-    Any other kind says which of them it is made of. It is a frozen dataclass of arrays: those are what a build stores.
+    Any other kind says which of these its terms consist of. It is a frozen dataclass of arrays, which a build stores.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Term(ABC):
 
 
 class CoreTerm(Term):
-    """A term that boards read: one of the four kinds, with rows of scores, or of whole steps.
+    """A term of one of the four kinds that boards read.
 
     Attributes
     ----------
@@ -91,24 +91,6 @@ class CoreTerm(Term):
         """The largest absolute contribution to any type."""
         return max(float(np.abs(end).max()) for end in self.ends)
 
-    @abstractmethod
-    def relative(self) -> Self:
-        """Return the term of scores relative to the last class."""
-
-    @abstractmethod
-    def whole(self, scale: float, grid: int) -> "CoreTerm":
-        """Return the term in whole steps, `scale` a unit of score; rows of switches and bins are multiples of `grid`.
-        They are doubles still; `integers` converts them.
-        """
-
-    @abstractmethod
-    def rounding_error(self, scale: float, grid: int) -> float:
-        """Return the most steps by which `whole` moves the contribution."""
-
-    @abstractmethod
-    def integers(self) -> Self:
-        """Return the term with the rows of `whole` as integers."""
-
     def parts(self, *values: NDArray[Any]) -> tuple[Rows, NDArray[np.int64]]:
         """Return rows (n, K), or (1, K), and the whole numbers (n, 1), or (1, 1), by which they count at these values:
         their products are the contribution, exactly.
@@ -122,7 +104,37 @@ class CoreTerm(Term):
         return ends[:0]
 
 
-class Tabulated(CoreTerm):
+class ScoreTerm(CoreTerm):
+    """A core term of a model: its rows are scores."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def relative(self) -> Self:
+        """Return the term of scores relative to the last class."""
+
+    @abstractmethod
+    def whole(self, scale: float, grid: int) -> "StepTerm":
+        """Return the term in whole steps, `scale` a unit of score; rows of switches and bins are multiples of `grid`.
+        They are doubles still.
+        """
+
+    @abstractmethod
+    def rounding_error(self, scale: float, grid: int) -> float:
+        """Return the most steps by which `whole` moves the contribution."""
+
+
+class StepTerm(CoreTerm):
+    """A core term of integer tables: its rows are whole steps."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def integers(self) -> Self:
+        """Return the term with its rows as integers."""
+
+
+class Tabulated(ScoreTerm, StepTerm):
     """A term that adds one of its rows (..., K); rows on a grid are multiples of it."""
 
     __slots__ = ()
@@ -179,4 +191,12 @@ def less_last(rows: Rows) -> Rows:
     return relative
 
 
-TERMS: Members[type[Term]] = Members("kind of term", type, "thenar.runtime.model.terms", "thenar.terms")
+class Kinds(Members[type[Term]]):
+    """The kinds of terms by name: members are classes."""
+
+    def unfit(self, member: object) -> str:
+        """Return why something is no kind of term; "" if it is one."""
+        return "" if isinstance(member, type) and issubclass(member, Term) else "is not a class derived from Term"
+
+
+TERMS = Kinds("kind of term", type, "thenar.runtime.model.terms", "thenar.terms")

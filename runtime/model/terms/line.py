@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import BuildError
-from .base import HIGHEST_CODE, CoreTerm, Ends, Floats, Rows, less_last
+from .base import HIGHEST_CODE, Ends, Floats, Rows, ScoreTerm, StepTerm, less_last
 
 # Largest scaled range of codes: a distance from its middle, and its negative, must fit one byte.
 WIDEST = 254
@@ -16,7 +16,7 @@ LARGEST_SLOPE = 127  # entry of a slope's row
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Line(CoreTerm):
+class Line(ScoreTerm):
     """The contribution of a joint in proportion to its code: row_k * (clamp(code, low, high) - low).
 
     Parameters
@@ -102,13 +102,9 @@ class Line(CoreTerm):
         shared = max(2.0**-slope.gain - 1, 0)
         return slope.zero / 2 + float(np.abs(self.row).max()) * scale * shared / 2
 
-    def integers(self) -> "Line":
-        """Raise ValueError: only the slope that `whole` returns has integers."""
-        raise ValueError("a line has no integers before it is in whole steps")
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Slope(CoreTerm):
+class Slope(StepTerm):
     """A line in steps: row (K,), int8 where it is deployed, times the code's distance from the middle of its range.
 
     A code is clipped to `low` to `high`. Its distance from low is multiplied by 2^gain, or divided and rounded down if
@@ -196,18 +192,6 @@ class Slope(CoreTerm):
         firsts = self.low + (np.clip(ends, self.low, self.high) - self.low) // self.cell * self.cell
         about = (firsts + near for near in (-1, 0, self.cell - 1, self.cell))
         return np.concatenate([[self.low, self.high], *about])
-
-    def relative(self) -> "Slope":
-        """Return the term of scores relative to the last class."""
-        return replace(self, row=less_last(self.row))
-
-    def whole(self, scale: float, grid: int) -> "Slope":
-        """It is in whole steps."""
-        return self
-
-    def rounding_error(self, scale: float, grid: int) -> float:
-        """Nothing is rounded again."""
-        return 0.0
 
     def integers(self) -> "Slope":
         """Return the term with its row as int8."""
