@@ -133,7 +133,7 @@ def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) ->
     if fault := _lines_fault(tables) or _grids_fault(tables):
         return fault
     # Written so that NaN fails as well.
-    if not all(term.largest <= _LARGEST_VALUE for term in tables.terms if isinstance(term, CoreTerm)) or not (
+    if not all(term.largest <= _LARGEST_VALUE for term in tables.core_terms) or not (
         (np.abs(tables.bias) <= _LARGEST_VALUE).all()
     ):
         return "holds numbers beyond a million, or NaN"

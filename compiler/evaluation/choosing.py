@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Compared, Fitting, Of
 from thenar.runtime.model.tables import ScoreTables
-from thenar.runtime.model.terms.base import CoreTerm
 
 from ..elementary import softmax_and_loss
 from ..model.collapse import Model, collapse
@@ -187,7 +186,7 @@ def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
 
 def _table_rows(tables: ScoreTables) -> int:
     """Return the number of rows of scores for the inputs in use: of each switch, bin, cell of a grid, and line."""
-    return sum(term.n_rows for term in tables.terms if isinstance(term, CoreTerm) and term.largest > 0)
+    return sum(term.n_rows for term in tables.core_terms if term.largest > 0)
 
 
 def _error(gains: NDArray[np.intp], clusters: Rows) -> float:

@@ -11,7 +11,6 @@ from thenar.runtime.model.integers import LIMIT, IntegerTables
 from thenar.runtime.model.proof import Rounding, furthest
 from thenar.runtime.model.quantise import as_deployed, rounding_error
 from thenar.runtime.model.tables import TIE, ScoreTables, winners
-from thenar.runtime.model.terms.base import CoreTerm
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 
 from .collapse import Floats, Model, collapse
@@ -118,8 +117,7 @@ def float_slack(tables: ScoreTables, scale: float) -> float:
     and 1 for scaling them; and 2 for products of u. A line is two more rows, each at its maximum, and adds 4: a
     product, a sum, and two by which its middle moves. A grid is one more row, and adds 1.
     """
-    terms = [term for term in (*tables.terms, *tables.lines) if isinstance(term, CoreTerm)]
-    largest = sum((term.largest for term in terms), float(np.abs(tables.bias).max()))
+    largest = sum((term.largest for term in (*tables.core_terms, *tables.lines)), float(np.abs(tables.bias).max()))
     operations = len(tables.terms) + tables.n_joints + 3 * len(tables.lines) + 8
     return operations * 2.0**-53 * largest * scale
 

@@ -7,7 +7,6 @@ import msgspec
 import numpy as np
 
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.terms.base import CoreTerm
 from thenar.runtime.model.terms.bit import Bit
 from thenar.runtime.recipe import AUTO
 from thenar.runtime.scanning.timing import port_us, reading_of
@@ -193,8 +192,7 @@ def term_bars(content: ReportContent) -> tuple[tuple[str, float], ...]:
     joints = [joint.name for joint in content.manifest.joints]
     spans = [
         (" and ".join((content.switch_names if isinstance(term, Bit) else joints)[one] for one in term.inputs), term)
-        for term in content.tables.terms
-        if isinstance(term, CoreTerm)
+        for term in content.tables.core_terms
     ]
     rows = [(int(np.subtract(*term.ends, dtype=np.int64).max()), f"{name}, {term.name}") for name, term in spans]
     rows = sorted(((span, text) for span, text in rows if span), key=lambda row: (-row[0], row[1]))

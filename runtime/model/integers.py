@@ -37,7 +37,7 @@ Tables with n > 0 grids of two joints, and no slopes, are of format 3: offset 6 
 """
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -48,7 +48,7 @@ from numpy.typing import NDArray
 from ..errors import BuildError
 from ..sealed import seal, unseal
 from .tables import Additive, terms_of
-from .terms.base import HIGHEST_CODE, CoreTerm
+from .terms.base import HIGHEST_CODE
 from .terms.bins import Bins
 from .terms.bit import Bit
 from .terms.grid import Grid
@@ -147,12 +147,8 @@ class IntegerTables(Additive):
     @property
     def relative(self) -> bool:
         """Whether scores are relative to the last class, to which no input adds anything."""
-        rows = [self.bias, self.switch_means, self.joint_means, *(end for term in self._core for end in term.ends)]
+        rows = [self.bias, self.switch_means, self.joint_means, *(end for term in self.core_terms for end in term.ends)]
         return not any(each[..., -1].any() for each in rows)
-
-    @property
-    def _core(self) -> Iterator[CoreTerm]:
-        return (term for term in self.terms if isinstance(term, CoreTerm))
 
     def of_joint(self, joint: int) -> tuple[Bins | Slope, ...]:
         """Return the terms of a joint alone: its bins, and its slope if it has one."""

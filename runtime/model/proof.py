@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from .integers import LOST, IntegerTables
 from .tables import ScoreTables
 from .terms.base import HIGHEST_CODE, CoreTerm, Floats
+from .terms.bit import Bit
 
 Exact = NDArray[np.object_]  # of Python integers
 
@@ -183,7 +184,7 @@ def _choices(tables: ScoreTables, integers: IntegerTables) -> Iterator[_Choice]:
         yield _Choice(states[:, np.newaxis], (bit.parts(states),), whole.of(states))
     for unit in integers.units:
         ours, theirs = (
-            [term for term in (*of.bins, *of.further) if isinstance(term, CoreTerm) and set(term.inputs) <= set(unit)]
+            [term for term in of.core_terms if not isinstance(term, Bit) and set(term.inputs) <= set(unit)]
             for of in (tables, integers)
         )
         codes = np.meshgrid(*(_turning_codes(joint, [*ours, *theirs]) for joint in unit), indexing="ij")

@@ -63,15 +63,11 @@ def as_deployed(tables: ScoreTables, grid: int) -> ScoreTables:
     """Return the tables before rounding to a `grid`: scores relative to the last class if rows are on one."""
     if grid == 1:
         return tables
-    return ScoreTables(tables.bias - tables.bias[-1:], tuple(term.relative() for term in _core(tables)))
+    return ScoreTables(tables.bias - tables.bias[-1:], tuple(term.relative() for term in _score_terms(tables)))
 
 
-def _core(tables: ScoreTables) -> list[ScoreTerm]:
-    """Return the terms. Raises ValueError where one is of another kind: `collapse` returns tables without such."""
-    terms = [term for term in tables.terms if isinstance(term, ScoreTerm)]
-    if len(terms) < len(tables.terms):
-        raise ValueError("the tables have terms of other kinds: collapse them first")
-    return terms
+def _score_terms(tables: ScoreTables) -> list[ScoreTerm]:
+    return [term for term in tables.core_terms if isinstance(term, ScoreTerm)]
 
 
 def _centred(tables: ScoreTables, scale: float) -> ScoreTables:
@@ -129,7 +125,7 @@ def least_disruptive_scale(
 
 def rounding_error(tables: ScoreTables, scale: float, grid: int = 1) -> float:
     """Return the most steps by which rounding can move a score: half a step for the bias, and that of each term."""
-    return sum((term.rounding_error(scale, grid) for term in _core(tables)), 0.5)
+    return sum((term.rounding_error(scale, grid) for term in _score_terms(tables)), 0.5)
 
 
 def reach(tables: ScoreTables, scale: float, *, whole: bool = True, grid: int = 1) -> float:
@@ -153,7 +149,7 @@ class _Extremes:
     """The largest and smallest contributions of bias and terms, at any scale: rounding keeps them extreme."""
 
     def __init__(self, tables: ScoreTables, grid: int) -> None:
-        fixed = [term for term in _core(tables) if not isinstance(term, Line)]
+        fixed = [term for term in _score_terms(tables) if not isinstance(term, Line)]
         ends = [(tables.bias, tables.bias), *(term.ends for term in fixed)]
         self._n_switches, self._lines = tables.n_switches, tables.lines
         self._upper, self._lower = (np.stack(rows) for rows in zip(*ends, strict=True))
@@ -207,7 +203,7 @@ def _leads(scores: Floats) -> Floats:
 
 def _whole(tables: ScoreTables, scale: float, grid: int) -> list[StepTerm]:
     """Return the terms in whole steps."""
-    return [term.whole(scale, grid) for term in _core(_centred(tables, scale))]
+    return [term.whole(scale, grid) for term in _score_terms(_centred(tables, scale))]
 
 
 def _whole_bias(tables: ScoreTables, scale: float, grid: int, means: Floats) -> Floats:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .terms.base import Floats, Rows, Term
+from .terms.base import CoreTerm, Floats, Rows, Term
 from .terms.bins import Bins
 from .terms.bit import Bit
 from .terms.grid import Grid
@@ -59,6 +59,17 @@ class Additive(ABC):
     def further(self) -> tuple[Term, ...]:
         """All other terms."""
         return tuple(term for term in self.terms if not isinstance(term, Bit | Bins))
+
+    @cached_property
+    def core_terms(self) -> tuple[CoreTerm, ...]:
+        """All terms.
+
+        Raises ValueError where one is of another kind than the four: `collapse` returns tables without such.
+        """
+        terms = tuple(term for term in self.terms if isinstance(term, CoreTerm))
+        if len(terms) < len(self.terms):
+            raise ValueError("the tables have terms of other kinds: collapse them first")
+        return terms
 
     @cached_property
     def grids(self) -> tuple[Grid, ...]:

@@ -1,12 +1,19 @@
 import tracemalloc
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.boosting.stumps import Stumps, centred, spread
 from thenar.compiler.model.collapse import _contributions, _joint, collapse
+from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.base import CoreTerm, Term
+from thenar.runtime.model.terms.bins import Bins
+from thenar.runtime.model.terms.line import Line
 
 MakeStumps = Callable[..., Stumps]
 MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
@@ -115,3 +122,48 @@ def test_a_thousand_classes_are_collapsed_without_every_stump_writing_to_every_c
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 10 * 1000**2  # written out, the answers of one branch alone are 80 MB
+
+
+@dataclass(frozen=True, eq=False)
+class Ramp(Term):
+    """A step at a code, and a line from there: one of the four kinds alone does not say this."""
+
+    name = "ramp"
+
+    joint: np.ndarray
+    start: np.ndarray
+    rows: np.ndarray
+
+    @property
+    def inputs(self) -> tuple[int, ...]:
+        return (int(self.joint),)
+
+    def of(self, *values: np.ndarray) -> np.ndarray:
+        above = np.clip(values[0].astype(int) - int(self.start), 0, 65535 - int(self.start))[:, np.newaxis]
+        return (above > 0) * self.rows[0] + above * self.rows[1]
+
+    def core(self) -> tuple[CoreTerm, ...]:
+        joint, start = int(self.joint), int(self.start)
+        step = Bins(joint, np.array([start], np.uint16), np.stack([0 * self.rows[0], self.rows[0]]))
+        return Line(joint, start, 65535, self.rows[1]), step
+
+
+@given(seed=st.integers(0, 10_000))
+def test_a_term_of_another_kind_becomes_the_terms_of_its_core(
+    make_stumps: MakeStumps, make_rows: MakeRows, seed: int
+) -> None:
+    random, (bits, codes) = np.random.default_rng(seed), make_rows(seed)
+    plain = collapse(make_stumps(seed), 6)
+    ramps = [
+        Ramp(np.array(joint), random.integers(0, 300), random.normal(size=(2, 4)) * [[1.0], [0.01]])
+        for joint in random.permutation(3)[:2].tolist()
+    ]
+    model = ScoreTables(plain.bias, (*plain.terms, *ramps))
+    tables = collapse(model, 6)
+    assert [line.joint for line in tables.lines] == sorted(ramp.inputs[0] for ramp in ramps)
+    assert tables.n_joints == 3
+    assert model.magnitude > 0
+    assert np.abs(tables.scores(bits, codes) - model.scores(bits, codes)).max() <= 1e-12 * model.magnitude
+    with pytest.raises(ValueError, match="collapse them first"):
+        quantise(model, bits, codes)
+    assert quantise(tables, bits, codes).slopes
