@@ -196,22 +196,29 @@ class StreamWiring(_Table, frozen=True):
         return round(1e6 / self.rate_hz)
 
 
+# A hand changes some ten times a second; a press is seen within 5 ms.
+SCANS_HZ = 200.0
+ScanRate = Annotated[float, Meta(ge=0.1, le=10_000.0)]
+
+
 class BusWiring(_Table, frozen=True):
-    """An I2C bus and the chips on it."""
+    """An I2C bus and the chips on it; rate_hz: scans a second, at most."""
 
     device: Text
     clock_hz: Annotated[int, Meta(ge=SLOWEST_HZ, le=1_700_000)] = 100_000
+    rate_hz: ScanRate = SCANS_HZ
     chips: tuple[ChipWiring, ...] = field(default=(), name="chip")
 
 
 class SpiWiring(_Table, frozen=True):
-    """A converter on SPI: its device, its kind (a key of SPI_CHIPS), its clock (None: its fastest at 3.3 V), and the
-    taxel on each of its channels.
+    """A converter on SPI: its device, its kind (a key of SPI_CHIPS), its clock (None: its fastest at 3.3 V), the
+    taxel on each of its channels, and how often it is read at most, in times a second.
     """
 
     device: Text
     kind: str
     hz: Annotated[int, Meta(ge=SLOWEST_HZ, le=50_000_000)] | None = field(default=None, name="clock_hz")
+    rate_hz: ScanRate = SCANS_HZ
     pins: dict[str, str] = {}
 
     @property

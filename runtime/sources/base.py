@@ -1,5 +1,6 @@
 """The interface of all sources: a device that is read in a separate thread, and reopened when it comes back."""
 
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
@@ -16,6 +17,25 @@ from ..scanning.scanmap import ScanMap
 # A device is expected back at least this often, however fast it is: a shorter limit would mistake a busy computer, or
 # the 16 ms for which a USB serial adapter may buffer bytes, for a cut cable.
 SHORTEST_US = 10_000
+
+
+class Pace:
+    """Lets a device be read at most `rate_hz` times a second: what is read faster only has to be stored and sent."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._period_s, self._due_s = 1.0 / rate_hz, 0.0
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until the next reading is due, but no longer than `timeout_s`; return whether it is."""
+        left_s = self._due_s - time.monotonic()
+        if left_s > 0.0:
+            time.sleep(min(left_s, timeout_s))
+        if left_s > timeout_s:
+            return False
+        now_s, next_s = time.monotonic(), self._due_s + self._period_s
+        # A reading that was late is not made up for.
+        self._due_s = next_s if next_s > now_s else now_s + self._period_s
+        return True
 
 
 class Source(ABC):
@@ -108,6 +128,11 @@ def slowest_us(harness: Harness, scan: ScanMap, reads: Literal["switches", "join
     """Return the longest expected period of switches or joints; None if nothing reads them."""
     kinds = [kind for kind in SOURCES.values() if kind.reads == reads]
     return max((us for kind in kinds for us in kind.periods_us(harness, scan)), default=None)
+
+
+def paced_us(rate_hz: float) -> int:
+    """Return the longest period that is expected of a device that is read `rate_hz` times a second."""
+    return max(SHORTEST_US, round(1e6 / rate_hz))
 
 
 def counted(counts: Any) -> tuple[Count, ...]:

@@ -1,6 +1,5 @@
 """I2C buses of a harness, their ports read in the order of a scan map."""
 
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
@@ -15,10 +14,7 @@ from ..published import Count
 from ..scanning.scanmap import Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
 from ..taxels import TaxelCalibration, Taxels, calibration_of
-from .base import SHORTEST_US, Source, SourceKind, debouncer_of
-
-# Delay between attempts on a bus without any chip, to avoid a busy loop.
-_NOBODY_THERE_S = 0.01
+from .base import Pace, Source, SourceKind, debouncer_of, paced_us
 
 
 class _Port(ABC):
@@ -82,7 +78,7 @@ class I2cDevice(Source):
         wiring = harness.buses[number]
         ports = [port for port in scan.ports if port.bus == number]
         self.name = f"i2c at {wiring.device}"
-        self.period_us = _bus_period_us(scan, harness)
+        self.period_us = _bus_period_us(harness, number, scan)
         self.longest_us = PERIODS * self.period_us
         calibration = calibration_of(harness.taxel_settings)
         self._ports = [
@@ -97,7 +93,7 @@ class I2cDevice(Source):
         self._reads = [PortRead(chips.index(port.chip), reading_of(port, harness)) for port in ports]
         self._scan: Interleaved | None = None
         self._groups: list[list[int]] = []
-        self._held_up = 0
+        self._pace, self._held_up = Pace(wiring.rate_hz), 0
 
     @property
     def taxels(self) -> tuple[PortLevels, ...]:
@@ -122,15 +118,15 @@ class I2cDevice(Source):
         return [*([together] if together else []), *([port] for port in slow)]
 
     def read(self, timeout_s: float) -> SwitchFrame | None:
-        """Scan once."""
+        """Scan once, when it is due."""
+        if not self._pace.wait(timeout_s):
+            return None
         began_us = now_us()
         frame = self._scanned()
         if frame.time_us - began_us > self.longest_us:
             # A chip held the bus: the readings before that are out of date.
             frame = SwitchFrame(frame.time_us, 0, self.owned)
             self._held_up += 1
-        elif not self.owned & ~frame.lost:
-            time.sleep(min(timeout_s, _NOBODY_THERE_S))
         return frame
 
     def _scanned(self) -> SwitchFrame:
@@ -182,9 +178,9 @@ def _chip_at(harness: Harness, bus: int, number: int, ports: list[Port]) -> Chip
     return ChipAt(chip.chip, chip.address, used, mux, channel)
 
 
-def _bus_period_us(scan: ScanMap, harness: Harness) -> int:
-    """Return the longest period at which the switches on I2C buses should be read."""
-    return max(SHORTEST_US, round(scan_us(scan, harness).us))
+def _bus_period_us(harness: Harness, bus: int, scan: ScanMap) -> int:
+    """Return the longest period at which the switches on an I2C bus should be read."""
+    return max(paced_us(harness.buses[bus].rate_hz), round(scan_us(scan, harness).us))
 
 
 def _sources(harness: Harness, _names: Sequence[str], scan: ScanMap) -> Iterator[Source]:
@@ -192,8 +188,7 @@ def _sources(harness: Harness, _names: Sequence[str], scan: ScanMap) -> Iterator
 
 
 def _periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
-    if _buses(harness, scan):
-        yield _bus_period_us(scan, harness)
+    return (_bus_period_us(harness, bus, scan) for bus in _buses(harness, scan))
 
 
 def _buses(harness: Harness, scan: ScanMap) -> set[int]:

@@ -1,6 +1,5 @@
 """Converters on SPI of a harness: all levels of one in one call of the kernel."""
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 
 from thenar.drivers.spi.device import SpiDevice
@@ -11,11 +10,8 @@ from ..published import Count
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import reading_of
 from ..taxels import calibration_of
-from .base import SHORTEST_US, Source, SourceKind
+from .base import Pace, Source, SourceKind, paced_us
 from .i2c import PortLevels, taxel_faults
-
-# Conversions take tens of microseconds: a converter is read no more often than this.
-_PERIOD_S = 0.001
 
 
 class SpiConverter(Source):
@@ -31,11 +27,12 @@ class SpiConverter(Source):
         self.name = f"spi at {wiring.device}"
         self.taxels = tuple(PortLevels(port, harness, calibration) for port in ports)
         self.owned: Mask = sum(port.targets for port in self.taxels)
-        self.period_us, self.longest_us = SHORTEST_US, PERIODS * SHORTEST_US
+        self.period_us = paced_us(wiring.rate_hz)
+        self.longest_us = PERIODS * self.period_us
         self.device = SpiDevice(wiring.device, wiring.chip, wiring.clock_hz)
         self.run: Callable[[], list[int | None]] = self.device.prepare([reading_of(port, harness) for port in ports])
         self._everything = len(harness.taxel_names)
-        self._due = 0.0
+        self._pace = Pace(wiring.rate_hz)
         self.silent = False
 
     def open(self) -> None:
@@ -43,9 +40,9 @@ class SpiConverter(Source):
         self.device.open()
 
     def read(self, timeout_s: float) -> SwitchFrame | None:
-        """Convert all channels once."""
-        time.sleep(min(max(0.0, self._due - time.monotonic()), timeout_s))
-        self._due = time.monotonic() + _PERIOD_S
+        """Convert all channels once, when it is due."""
+        if not self._pace.wait(timeout_s):
+            return None
         replies = self.run()
         self.silent = None in replies
         closed = lost = 0
@@ -75,7 +72,7 @@ def _sources(harness: Harness, _names: Sequence[str], scan: ScanMap) -> Iterator
 
 
 def _periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
-    return (SHORTEST_US for _ in _numbers(harness, scan))
+    return (paced_us(harness.spi[number].rate_hz) for number in _numbers(harness, scan))
 
 
 def _numbers(harness: Harness, scan: ScanMap) -> list[int]:

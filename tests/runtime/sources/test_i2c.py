@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
+import numpy as np
 import pytest
 
 from thenar.runtime import Build
@@ -17,14 +18,16 @@ HIGH = 0xFF
 
 
 class Bench:
-    """A clock that only the answers move, and the answers of two PCF8574 in the order in which they are asked for."""
+    """A clock that only answers and sleep move, and the answers of two PCF8574 in the order of their requests."""
 
     def __init__(self) -> None:
         self.now = 1_000_000
         self.answers: list[list[int | None]] = []
-        self.slept: list[float] = []
         self.takes_us = 100
         self.groups = 1
+
+    def sleep(self, seconds: float) -> None:
+        self.now += round(1e6 * seconds)
 
     def __iter__(self) -> Iterator[list[int | None]]:
         for _ in range(self.groups):
@@ -51,16 +54,18 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
     Bus.bench = bench
     monkeypatch.setattr(module, "I2cBus", Bus)
     monkeypatch.setattr(module, "now_us", lambda: bench.now)
-    monkeypatch.setattr("time.sleep", bench.slept.append)
+    monkeypatch.setattr("time.monotonic", lambda: bench.now / 1e6)
+    monkeypatch.setattr("time.sleep", bench.sleep)
     return bench
 
 
-def device(debounce: Debounce) -> I2cDevice:
+def device(debounce: Debounce, rate_hz: float = 200.0) -> I2cDevice:
     chips = tuple(
         ChipWiring(kind="pcf8574", address=0x20 + chip, pins={f"P{pin}": NAMES[3 * chip + pin] for pin in range(3)})
         for chip in range(2)
     )
-    harness = Harness(name="two", buses=(BusWiring(device="/dev/i2c-1", chips=chips),), debounce=debounce)
+    bus = BusWiring(device="/dev/i2c-1", rate_hz=rate_hz, chips=chips)
+    harness = Harness(name="two", buses=(bus,), debounce=debounce)
     return I2cDevice(harness, 0, whole_scan(harness, NAMES))
 
 
@@ -82,13 +87,29 @@ def test_a_pin_that_is_pulled_down_is_a_closed_switch(bench: Bench) -> None:
 def test_a_port_without_an_answer_is_lost_and_the_other_is_not(bench: Bench) -> None:
     bench.answers = [[None, HIGH & ~0b010]]
     assert frame(device(OFF)) == SwitchFrame(bench.now, 0b010_000, lost=0b000_111)
-    assert not bench.slept
 
 
-def test_a_dead_bus_is_not_polled_in_a_busy_loop(bench: Bench) -> None:
-    bench.answers = [[None, None]]
-    assert frame(device(OFF)).lost == 0b111_111
-    assert bench.slept
+@pytest.mark.parametrize(("rate_hz", "scans"), [(200.0, 21), (50.0, 6), (0.5, 1)])
+def test_a_bus_is_scanned_at_its_rate(bench: Bench, rate_hz: float, scans: int) -> None:
+    made = device(OFF, rate_hz)
+    made.open()
+    bench.answers = [[None, None]] * 21
+    began_us, read = bench.now, 0
+    while bench.now < began_us + 100_000:
+        read += made.read(0.1) is not None
+    assert read == scans
+
+
+def test_a_late_scan_is_not_made_up_for(bench: Bench) -> None:
+    made = device(OFF)
+    made.open()
+    bench.answers = [[HIGH, HIGH]] * 4
+    times_us = []
+    for stall_us in (0, 12_000, 0, 0):
+        bench.now += stall_us
+        assert made.read(0.1) is not None
+        times_us.append(bench.now)
+    assert np.diff(times_us).tolist() == [12_100, 5_000, 5_000]
 
 
 def test_readings_before_a_stalled_bus_are_not_new(bench: Bench) -> None:
