@@ -36,9 +36,13 @@ _MOST_WAITING = 1024
 
 def _sinks_help() -> str:
     from thenar.runtime.sinks import SINKS
+    from thenar.runtime.sinks.base import PACES
 
     kinds = "; ".join(f"{kind.spelling}, {kind.help}" for kind in SINKS.values())
-    return f"Where grasps are sent: {kinds}. Repeatable."
+    return (
+        f"Where grasps are sent: {kinds}. {PACES} sends every frame, on change and HZ times a second, or on change "
+        "alone. Repeatable."
+    )
 
 
 @click.command("run")
@@ -112,8 +116,9 @@ def command(
 ) -> None:
     """Recognise grasps: live on the glove that --glove describes, or in the recorded frames of --replay.
 
-    Live, a terminal shows the grasp and its confidence; a pipe or a file gets one JSON line per frame. Devices may be
-    disconnected and connected again: missing inputs make the state "degraded", or "unknown" if too few are left.
+    Live, a terminal shows the grasp and its confidence; a pipe or a file gets JSON lines, on change and ten times a
+    second. A replay gives one line per frame. Devices may be disconnected and connected again: missing inputs make the
+    state "degraded", or "unknown" if too few are left.
     SIGINT, SIGTERM and SIGHUP end a run cleanly, with exit code 0.
 
     \b

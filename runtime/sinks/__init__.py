@@ -3,7 +3,7 @@
 from ..published import JointAngles
 from ..task import ProgressLine
 from .base import SINKS, Fanout, Sink, SinkError, SinkKind, SinkPlace, SinkReport, open_sink
-from .jsonl import DetailLine, GraspLine, HealthLine, JsonLines
+from .jsonl import DetailLine, GraspLine, HeaderLine, HealthLine, JsonLines, Line
 from .sockets import SocketLines
 
 __all__ = [
@@ -11,9 +11,11 @@ __all__ = [
     "DetailLine",
     "Fanout",
     "GraspLine",
+    "HeaderLine",
     "HealthLine",
     "JointAngles",
     "JsonLines",
+    "Line",
     "ProgressLine",
     "Sink",
     "SinkError",

@@ -3,8 +3,8 @@
 import logging
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -57,13 +57,18 @@ class SinkReport(msgspec.Struct, frozen=True):
 
 
 class Sink(ABC):
-    """An open sink: it takes every frame's result. To write your own, derive from this; only `publish` is required.
+    """An open sink: it takes the results of frames. To write your own, derive from this; only `publish` is required.
 
     None but the constructor raises: what cannot be sent is lost, and counted. In a live run all but the constructor and
     `report` run on a thread that serves this sink alone.
+
+    Attributes
+    ----------
+    pace : PublishPace or None
+        When it gets a result; None: it gets every frame's. `open_sink` sets it.
     """
 
-    __slots__ = ()
+    pace: "PublishPace | None" = None
 
     def begin(self, build: "Build") -> None:  # noqa: B027
         """Take the build that recognises, before the first frame."""
@@ -98,13 +103,13 @@ class SinkPlace:
 
     text     as the user wrote it: "ros:/thenar?public&rate=50"
     place    what follows the name: "/thenar"
-    options  the options that are given, and their values: {"public": "", "rate": "50"}
+    options  the given options of the kind: {"public"}
     wait     whether to wait for a slow reader rather than lose lines: right for a replay, wrong for a live glove
     """
 
     text: str
     place: str
-    options: Mapping[str, str] = field(default_factory=dict)
+    options: frozenset[str] = frozenset()
     wait: bool = False
 
 
@@ -127,7 +132,10 @@ class SinkKind:
         `open(where)` returns an open `Sink` at a `SinkPlace`. It raises SettingError for an invalid place, SinkError
         for one that cannot be opened. A package that only this sink needs is imported in it.
     options : tuple of str
-        Words that may follow the place after a question mark, separated by &: "public"; "rate=HZ" takes a value.
+        Words that may follow the place after a question mark, separated by &, in addition to those of all kinds:
+        "public".
+    rate : int, optional
+        How often a live grasp is sent that does not change, in times a second; None: every one is sent.
     rank : int
         Orders the kinds.
     """
@@ -137,68 +145,76 @@ class SinkKind:
     help: str
     open: Callable[[SinkPlace], Sink]
     options: tuple[str, ...] = ()
+    rate: int | None = None
     rank: int = 0
 
     @property
     def spelling(self) -> str:
-        """Its form in `--sink`: "ros:/NAMESPACE[?public][?rate=HZ]"."""
+        """Its form in `--sink`: "ros:/NAMESPACE[?public]"."""
         return f"{self.name}:{self.place}" + "".join(f"[?{option}]" for option in self.options)
 
 
 SINKS = Members("sink", SinkKind, "thenar.runtime.sinks", "thenar.sinks")
 
 
-def open_sink(where: str, *, wait: bool = False) -> Sink:
-    """Return the sink that `where` names: NAME:PLACE, spelled as in the kinds of `SINKS`.
+# Options of all kinds. With a rate, a grasp is sent when it changes, and so often while it does not.
+PACES = "?every, ?rate=HZ or ?on=change"
+_FASTEST_HZ = 1000
 
-    With `wait`, it waits for a slow reader rather than lose lines. Raises SettingError for an invalid name, SinkError
-    for one that cannot be opened.
+
+def open_sink(where: str, *, wait: bool = False) -> Sink:
+    """Return the sink that `where` names: NAME:PLACE, spelled as in the kinds of `SINKS`, with their options and PACES.
+
+    With `wait`, it waits for a slow reader rather than lose lines, and gets every grasp unless a pace is given. Raises
+    SettingError for an invalid name, SinkError for one that cannot be opened.
     """
     name, _, place = where.partition(":")
     if not place or name not in SINKS:
         kinds = ", ".join(kind.spelling for kind in SINKS.values())
         wrong = f"there is no kind of sink called {shortened(name)!r}" if place else "names no sink"
         raise SettingError(f"{shortened(repr(where))}: {wrong}: use one of {kinds}")
-    kind, options = SINKS[name], dict[str, str]()
-    if kind.options:
-        place, mark, given = place.partition("?")
-        parts = [option.partition("=") for option in given.split("&")] if mark else []
-        known = {option.partition("=")[:2] for option in kind.options}
-        if not {part[:2] for part in parts} <= known:
-            spelled = " or ".join(f"`{option}`" for option in kind.options)
-            raise SettingError(f"{shortened(repr(where))}: after the question mark only {spelled} can follow")
-        options = {option: value for option, _, value in parts}
-    return kind.open(SinkPlace(where, place, options, wait))
-
-
-# Rates of sinks that repeat what has not changed.
-_FASTEST_HZ = 1000
-
-
-def rate_of(where: SinkPlace, usual: int) -> int:
-    """Return the option `rate` of a place, or `usual`. Raises SettingError for a rate that is not possible."""
-    rate = where.options.get("rate", str(usual))
-    if not re.fullmatch("[0-9]{1,9}", rate) or not 1 <= int(rate) <= _FASTEST_HZ:
+    kind = SINKS[name]
+    place, mark, text = place.partition("?")
+    options = set(text.split("&")) if mark else set[str]()
+    paces = {option for option in options if option in ("every", "on=change") or option.startswith("rate=")}
+    if len(paces) > 1 or not options - paces <= set(kind.options):
+        known = ", ".join(f"?{option}" for option in kind.options)
         raise SettingError(
-            f"{where.text}: a rate of {shortened(repr(rate))} is not possible: use 1 to {_FASTEST_HZ} a second"
+            f"{shortened(repr(where))}: after the question mark only {known}{' and ' * bool(known)}one of {PACES} can "
+            "follow, separated by &"
         )
-    return int(rate)
+    pace = _pace(where, "every" if wait else "", kind.rate) if not paces else _pace(where, paces.pop(), kind.rate)
+    sink = kind.open(SinkPlace(where, place, frozenset(options - paces), wait))
+    sink.pace = pace
+    return sink
+
+
+def _pace(where: str, option: str, usual: int | None) -> "PublishPace | None":
+    """Return the pace of an option, "" for the usual one; None: every grasp is sent."""
+    if option == "every" or (not option and usual is None):
+        return None
+    rate = option.removeprefix("rate=") if option.startswith("rate=") else "0" if option else str(usual)
+    if not re.fullmatch("[0-9]{1,9}", rate) or not (option == "on=change" or 1 <= int(rate) <= _FASTEST_HZ):
+        raise SettingError(
+            f"{where}: a rate of {shortened(repr(rate))} is not possible: use 1 to {_FASTEST_HZ} a second"
+        )
+    return PublishPace(int(rate))
 
 
 class PublishPace:
-    """When a grasp is to be published: when what is shown of it changes, and `rate` times a second."""
+    """When a grasp is to be published: when what is shown of it changes, and `rate` times a second; 0: only then."""
 
     def __init__(self, rate: int) -> None:
-        self._period_us, self._last_us = 1_000_000 // rate, 0
+        self._period_us, self._last_us = 1_000_000 // rate if rate else None, 0
         self._shown: tuple[object, ...] = ()
 
-    def due(self, time_us: int, shown: tuple[object, ...]) -> tuple[bool, bool]:
-        """Return whether a grasp of this time that shows this is to be published, and whether its period has passed."""
+    def due(self, time_us: int, shown: tuple[object, ...]) -> bool:
+        """Return whether a grasp of this time that shows this is to be published."""
+        first, changed, self._shown = not self._shown, shown != self._shown, shown
         # The recording of several sessions may go back in time.
-        due = not self._shown or not 0 <= time_us - self._last_us < self._period_us
+        due = self._period_us is not None and (first or not 0 <= time_us - self._last_us < self._period_us)
         self._last_us = time_us if due else self._last_us
-        changed, self._shown = shown != self._shown, shown
-        return due or changed, due
+        return due or changed
 
 
 class _Receiver:
@@ -206,7 +222,7 @@ class _Receiver:
 
     def __init__(self, sink: Sink, *, live: bool) -> None:
         name = f"{type(sink).__module__}.{type(sink).__qualname__}"
-        self._sink, self._fault, self._lost = sink, "", 0
+        self.sink, self._fault, self._lost = sink, "", 0
         self._thread = WriterThread(name, _MOST_WAITING) if live else None
         self._said = self._nothing = SinkReport(name, None, 0, 0)
 
@@ -261,7 +277,7 @@ class _Receiver:
     def _carried_out(self, call: Callable[[Sink], None]) -> bool:
         """Return whether the sink did its part; one that raises is left out from then on."""
         try:
-            call(self._sink)
+            call(self.sink)
         except BaseException as reason:
             # On the caller's thread it is the user's Ctrl-C.
             if self._thread is None and isinstance(reason, KeyboardInterrupt):
@@ -296,14 +312,19 @@ class Fanout:
         angles: JointAngles | None,
         moment: "Moment | None" = None,
     ) -> None:
-        """Publish to all sinks that work, with the moment behind the grasp if there is one."""
+        """Publish to all sinks that work, as far as their paces make it due, with the moment behind the grasp."""
 
         def send(sink: Sink) -> None:
             sink.publish(grasp, preshape, angles)
             if moment is not None:
                 sink.moment(moment)
 
-        self._all(send, LATE_US)
+        health = "ok" if grasp.health == "changing" else grasp.health
+        shown = (grasp.grasp, health, grasp.state, grasp.segment, grasp.segment_type, preshape)
+        for receiver in self._receivers:
+            pace = receiver.sink.pace
+            if pace is None or pace.due(grasp.time_us, shown):
+                receiver.send(send, LATE_US)
 
     def health(self, report: HealthReport) -> None:
         """Send the glove's health to all sinks that work."""

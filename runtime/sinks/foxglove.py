@@ -1,6 +1,6 @@
 """Live topics for Foxglove, over Foxglove's WebSocket protocol (extra `foxglove`); messages are JSON, with schemas.
 
-    /thenar/grasp     the grasp type, probability, state, segment and health, on change and `rate` times a second
+    /thenar/grasp     the grasp type, probability, state, segment and health
     /thenar/scores    score and probability of every grasp type, with `grasp`
     /thenar/switches  names of the switches that are closed or lost, with `grasp`
     /thenar/joints    angles of calibrated joints in rad, and the codes that are scored, with `grasp`
@@ -8,9 +8,10 @@
     /thenar/task      if a task is followed: its step, on change and once a second
     /thenar/health    once a second, if requested: the glove's health
 
-A message has the time of its frame. A topic without subscribers costs nothing. A reader's queue is bounded and drops
-the oldest first: a reader that stops delays nobody. The SDK's server runs on separate threads; readers can only request
-topics. A web page open in a browser of this machine may read as Foxglove does.
+A grasp comes on change and 50 times a second, unless the sink's options set another pace. A message has the time of its
+frame. A topic without subscribers costs nothing. A reader's queue is bounded and drops the oldest first: a reader that
+stops delays nobody. The SDK's server runs on separate threads; readers can only request topics. A web page open in a
+browser of this machine may read as Foxglove does.
 
 Foxglove's schemas have no null, no alternatives and no references: None is left out of its message.
 """
@@ -29,14 +30,14 @@ from thenar.drivers.extras import optional
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
-from .base import PublishPace, Sink, SinkError, SinkKind, SinkPlace, SinkReport, rate_of
+from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 from .sockets import resolve
 
 if TYPE_CHECKING:
     from ..build import Build
     from ..live.recogniser import Moment
 
-RATE_HZ = 50
+_RATE_HZ = 50
 _REPEAT_US = 1_000_000
 # Messages queued for one reader, over all topics: about two seconds.
 BACKLOG = 512
@@ -131,7 +132,7 @@ class FoxgloveServer(Sink):
     `host` is an address, `port` 0 any free one: the attribute `port` is the one in use.
     """
 
-    def __init__(self, host: str = "127.0.0.1", port: int = 8765, *, rate: int = RATE_HZ, where: str = "") -> None:
+    def __init__(self, host: str = "127.0.0.1", port: int = 8765, *, where: str = "") -> None:
         # The SDK is an extra.
         import foxglove
         from foxglove.websocket import ServerListener
@@ -158,7 +159,7 @@ class FoxgloveServer(Sink):
             hint = ": another process serves that port; use another" if "in use" in said else ""
             raise SinkError(f"{self._where} cannot be opened: {said}{hint}") from None
         self.port: int = self._server.port
-        self._pace, self._due, self._closed = PublishPace(rate), False, False
+        self._closed = False
         self._repeated_us = self._unix_us = self._time_us = 0
         # Preshape and task, by topic: late readers get them within a second.
         self._kept: dict[str, msgspec.Struct] = {}
@@ -171,12 +172,9 @@ class FoxgloveServer(Sink):
         self._build = build
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Publish the grasp if it changed or is due, and the kept messages."""
+        """Publish the grasp, and the kept messages."""
         self._time_us, self._unix_us = grasp.time_us, grasp.unix_us
-        shown = (grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type)
-        self._due, _ = self._pace.due(grasp.time_us, shown)
-        if self._due:
-            self._log("/thenar/grasp", grasp)
+        self._log("/thenar/grasp", grasp)
         if preshape is not None and preshape is not self._kept.get("/thenar/preshape"):
             self._keep("/thenar/preshape", preshape)
         if not 0 <= grasp.time_us - self._repeated_us < _REPEAT_US:
@@ -186,7 +184,7 @@ class FoxgloveServer(Sink):
 
     def moment(self, moment: "Moment") -> None:
         """Publish the details with the grasp."""
-        if self._due and self._build is not None and self._subscribed:
+        if self._build is not None and self._subscribed:
             self._log("/thenar/scores", _scores(moment, self._build))
             if moment.switches is not None:
                 self._log("/thenar/switches", _switches(moment, self._build))
@@ -274,7 +272,6 @@ def _joints(moment: "Moment", build: "Build") -> JointValues:
 
 
 def _open(where: SinkPlace) -> Sink:
-    rate = rate_of(where, RATE_HZ)
     _, address = resolve(where.place, where.text, "foxglove:127.0.0.1:8765")
     if "public" not in where.options and not ipaddress.ip_address(address[0].partition("%")[0]).is_loopback:
         raise SettingError(
@@ -282,14 +279,15 @@ def _open(where: SinkPlace) -> Sink:
             f"foxglove:{where.place}?public to let them"
         )
     with optional(SinkError, where.text):
-        return FoxgloveServer(*address[:2], rate=rate, where=where.text)
+        return FoxgloveServer(*address[:2], where=where.text)
 
 
 MEMBER = SinkKind(
     "foxglove",
     "127.0.0.1:PORT",
-    f"live topics for Foxglove, {RATE_HZ} or HZ times a second and on change; with public also for other machines",
+    "live topics for Foxglove; with public also for other machines",
     _open,
-    ("public", "rate=HZ"),
+    ("public",),
+    _RATE_HZ,
     rank=6,
 )

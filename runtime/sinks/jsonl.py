@@ -1,7 +1,8 @@
 """JSON lines to a file: stdout, a pipe, a file on disk, or anything else that takes bytes.
 
-Lines describe grasps, and now and then the glove's health and the hand's progress in a task. Readers distinguish them
-by `kind`; msgspec does so automatically: `msgspec.json.decode(line, type=GraspLine | HealthLine | ProgressLine)`.
+Lines describe grasps, and now and then the glove's health and the hand's progress in a task. A header before the first
+line with angles, and wherever the joints change, names the joints. Readers distinguish lines by `kind`; msgspec does so
+automatically: `msgspec.json.decode(line, type=Line)`.
 
 A line is sent whole or not at all.
 """
@@ -14,6 +15,7 @@ from io import UnsupportedOperation
 from pathlib import Path
 from typing import BinaryIO
 
+import msgspec
 from msgspec import json, structs
 
 from ..detail import Detail
@@ -23,11 +25,20 @@ from ..task import Progress, ProgressLine
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 
+class HeaderLine(msgspec.Struct, frozen=True, tag_field="kind", tag="header"):
+    """The names of the joints whose angles are in the lines that follow."""
+
+    joints: tuple[str, ...]
+
+
 class GraspLine(LiveGrasp, frozen=True, tag_field="kind", tag="grasp"):
-    """The fields of `LiveGrasp`, followed by the preshape and the angles, null if there are none."""
+    """The fields of `LiveGrasp`, followed by the preshape and the angles in rad, null if there are none.
+
+    Probabilities and angles have four decimals.
+    """
 
     preshape: Preshape | None = None
-    angles: JointAngles | None = None
+    angles: tuple[float, ...] | None = None
 
 
 class DetailLine(Detail, frozen=True, tag_field="kind", tag="detail"):
@@ -41,6 +52,10 @@ class HealthLine(HealthReport, frozen=True, tag_field="kind", tag="health"):
     """The fields of `HealthReport`."""
 
 
+Line = HeaderLine | GraspLine | DetailLine | HealthLine | ProgressLine
+
+# While nothing changes, in a live run.
+_RATE_HZ = 10
 _encode = json.Encoder().encode
 _GRASP, _PRESHAPE, _ANGLES = b'{"kind":"grasp",', b',"preshape":', b',"angles":'
 
@@ -50,8 +65,17 @@ def encode(grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | No
 
     The bytes equal those of a `GraspLine`, without making one.
     """
-    parts = (_GRASP, _encode(grasp)[1:-1], _PRESHAPE, _encode(preshape), _ANGLES, _encode(angles), b"}\n")
+    grasp = structs.replace(
+        grasp, probability=round(grasp.probability, 4), segment_probability=round(grasp.segment_probability, 4)
+    )
+    positions = None if angles is None else [round(position, 4) for position in angles.positions_rad]
+    parts = (_GRASP, _encode(grasp)[1:-1], _PRESHAPE, _encode(preshape), _ANGLES, _encode(positions), b"}\n")
     return b"".join(parts)
+
+
+def encode_header(angles: JointAngles) -> bytes:
+    """Return the line that names the joints of these angles."""
+    return _encode(HeaderLine(angles.names)) + b"\n"
 
 
 def encode_detail(detail: Detail, number: int, build: str) -> bytes:
@@ -70,12 +94,10 @@ def encode_task(progress: Progress) -> bytes:
 
 
 class JsonLines(Sink):
-    """Writes one line per frame to `file`, and waits for a slow reader, in a live run on its own thread (`Fanout`).
+    """Writes the lines to `file`, and waits for a slow reader, in a live run on its own thread (`Fanout`).
 
     A reader that is gone (`head`) is noted in the report. A full disk loses lines until it has room again.
     """
-
-    __slots__ = ("_error", "_file", "_gone", "_lost", "_owned", "_rest", "_sent", "_where")
 
     def __init__(self, file: BinaryIO, *, where: str = "jsonl", owned: bool = False) -> None:
         """Write into `file`, which `close` closes only if it is `owned`."""
@@ -86,9 +108,13 @@ class JsonLines(Sink):
         self._where = where
         self._sent = self._lost = 0
         self._error, self._gone = "", False
+        self._joints: tuple[str, ...] = ()
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Write one line, or lose it."""
+        """Write one line, after a header if the joints are others than before, or lose it."""
+        if angles is not None and angles.names != self._joints:
+            self._joints = angles.names
+            self._send(encode_header(angles))
         self._send(encode(grasp, preshape, angles))
 
     def health(self, report: HealthReport) -> None:
@@ -179,4 +205,4 @@ def _finish_line(descriptor: int, path: str) -> None:
         os.write(descriptor, b"\n")
 
 
-MEMBER = SinkKind("jsonl", "FILE", "JSON lines at the end of a file; - is stdout", _open)
+MEMBER = SinkKind("jsonl", "FILE", "JSON lines at the end of a file; - is stdout", _open, rate=_RATE_HZ)

@@ -7,10 +7,10 @@
     NAMESPACE/task      diagnostic_msgs/DiagnosticArray  if a task is followed: its step, on change
     NAMESPACE/health    std_msgs/String                  once a second, if requested: the glove's health, as JSON
 
-Grasp and segment are published when they change, and they and the angles `rate` times a second. Reliable, with the
-last 10 kept, which serves reliable and best-effort readers alike. Grasp, segment, preshape and task are transient
-local: late readers get the newest at once. Nodes of this machine can read, others if CYCLONEDDS_URI or `?public` allows
-them; ROS_DOMAIN_ID sets the domain, as for a ROS 2 node.
+Grasp, segment and angles are published on change and 20 times a second, unless the sink's options set another pace.
+Reliable, with the last 10 kept, which serves reliable and best-effort readers alike. Grasp, segment, preshape and task
+are transient local: late readers get the newest at once. Nodes of this machine can read, others if CYCLONEDDS_URI or
+`?public` allows them; ROS_DOMAIN_ID sets the domain, as for a ROS 2 node.
 """
 
 from collections.abc import Callable
@@ -22,17 +22,16 @@ from thenar.drivers.extras import optional
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
-from .base import PublishPace, Sink, SinkError, SinkKind, SinkPlace, SinkReport, rate_of
+from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
-RATE_HZ = 20
+_RATE_HZ = 20
 
 
 class RosTopics(Sink):
     """Publishes under a namespace of ROS. Messages that DDS refuses are counted as lost in the report."""
 
-    def __init__(self, name: str = "/thenar", *, public: bool = False, rate: int = RATE_HZ) -> None:
-        """Publish under `name` to this machine, or to all networks that Cyclone DDS finds if `public`; repeat unchanged
-        values `rate` times a second.
+    def __init__(self, name: str = "/thenar", *, public: bool = False) -> None:
+        """Publish under `name` to this machine, or to all networks that Cyclone DDS finds if `public`.
 
         Raise SettingError for an invalid name or domain, SinkError if DDS does not start.
         """
@@ -63,48 +62,43 @@ class RosTopics(Sink):
                 f"ros:{name}?public lets other machines read"
             ) from None
         self._closed = False
-        self._pace = PublishPace(rate)
         self._told: Preshape | None = None
         self._sent = self._lost = self._unix_us = 0
         self._error = ""
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Publish the changes, and once a period everything."""
+        """Publish everything, but the preshape only if it changed."""
         self._unix_us = grasp.unix_us
         self._try(lambda: self._write(grasp, preshape, angles))
 
     def health(self, report: HealthReport) -> None:
         """Publish the glove's health."""
-        self._try(lambda: self._health.write(self._messages.String(json.encode(report).decode())) is None)
+        self._try(lambda: self._health.write(self._messages.String(json.encode(report).decode())))
 
     def task(self, progress: Progress) -> None:
         """Publish the hand's progress, with the stamp of the newest frame."""
-        self._try(lambda: self._task.write(self._messages.task(self._name, self._unix_us, progress)) is None)
+        self._try(lambda: self._task.write(self._messages.task(self._name, self._unix_us, progress)))
 
-    def _try(self, write: Callable[[], bool]) -> None:
+    def _try(self, write: Callable[[], None]) -> None:
         if self._closed:
             self._lost += 1
             return
         try:
-            self._sent += write()
+            write()
+            self._sent += 1
         except Exception as reason:  # Cyclone's Python side raises many kinds for what it cannot serialise
             self._lost += 1
             self._error = str(reason)
 
-    def _write(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> bool:
-        """Return whether anything was published."""
+    def _write(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         messages = self._messages
-        shown = (grasp.grasp, messages.LEVELS[grasp.health], grasp.state, grasp.segment, grasp.segment_type)
-        news, due = self._pace.due(grasp.time_us, shown)
-        if news:
-            self._grasp.write(messages.String(grasp.grasp))
-            self._segment.write(messages.segment(self._name, grasp))
-        if due and angles is not None:
+        self._grasp.write(messages.String(grasp.grasp))
+        self._segment.write(messages.segment(self._name, grasp))
+        if angles is not None:
             self._angles.write(messages.joint_state(grasp.unix_us, angles))
         if preshape is not None and preshape != self._told:
             self._preshape.write(messages.trajectory(preshape))
-            self._told, news = preshape, True
-        return news
+            self._told = preshape
 
     def report(self) -> SinkReport:
         """Return the state of this sink; its readers are those of the grasp type."""
@@ -121,16 +115,16 @@ class RosTopics(Sink):
 
 
 def _open(where: SinkPlace) -> Sink:
-    rate = rate_of(where, RATE_HZ)
     with optional(SinkError, f"ros:{where.place}"):
-        return RosTopics(where.place, public="public" in where.options, rate=rate)
+        return RosTopics(where.place, public="public" in where.options)
 
 
 MEMBER = SinkKind(
     "ros",
     "/NAMESPACE",
-    f"topics of ROS 2, {RATE_HZ} or HZ times a second and on change, on this machine; with public also for others",
+    "topics of ROS 2 on this machine; with public also for others",
     _open,
-    ("public", "rate=HZ"),
+    ("public",),
+    _RATE_HZ,
     rank=4,
 )

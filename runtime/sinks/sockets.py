@@ -27,7 +27,7 @@ from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkReport
-from .jsonl import encode, encode_detail, encode_health, encode_task
+from .jsonl import encode, encode_detail, encode_header, encode_health, encode_task
 
 if TYPE_CHECKING:
     from ..build import Build
@@ -51,22 +51,6 @@ _HERE = frozenset({"127.0.0.1", "::1"})
 class SocketLines(Sink):
     """Serves the readers of a listening socket, which it takes over; `tidy` is called once, at the end."""
 
-    __slots__ = (
-        "_build",
-        "_clock",
-        "_detail_us",
-        "_details",
-        "_dropped",
-        "_error",
-        "_listener",
-        "_listener_poll",
-        "_lost",
-        "_readers",
-        "_sent",
-        "_tidy",
-        "_where",
-    )
-
     def __init__(
         self,
         listener: socket.socket,
@@ -86,6 +70,8 @@ class SocketLines(Sink):
         self._readers: list[_Reader] = []
         self._sent = self._lost = self._dropped = 0
         self._error = ""
+        self._joints: tuple[str, ...] = ()
+        self._header = b""
         self._details: Details | None = None
         self._build, self._detail_us = "" if detail else None, 0
 
@@ -101,8 +87,11 @@ class SocketLines(Sink):
         return name if isinstance(name, str) else name[:2]
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Accept new readers, and send every reader the line."""
+        """Accept new readers, and send every reader the line, after a header if the joints are others than before."""
         self._accept_clients()
+        if angles is not None and angles.names != self._joints:
+            self._joints, self._header = angles.names, encode_header(angles)
+            self._send_all(self._header)
         if self._readers:
             self._send_all(encode(grasp, preshape, angles))
 
@@ -114,7 +103,8 @@ class SocketLines(Sink):
             self._send_all(encode_detail(details(moment), grasp.number, self._build or ""))
 
     def health(self, report: HealthReport) -> None:
-        """Send every reader the report's line."""
+        """Accept new readers, and send every reader the report's line."""
+        self._accept_clients()
         if self._readers:
             self._send_all(encode_health(report))
 
@@ -137,6 +127,8 @@ class SocketLines(Sink):
         host = _host(reader, peer)
         if self._has_room(host):
             self._readers.append(_Reader(reader, host))
+            if self._header:
+                self._send(self._readers[-1], self._header, self._clock())
         else:
             reader.close()
 

@@ -21,7 +21,7 @@ from ..detail import Detail
 from ..frames import now_us
 from ..hand import load_hand
 from ..names import shortened
-from ..sinks.jsonl import DetailLine, GraspLine, HealthLine
+from ..sinks.jsonl import DetailLine, GraspLine, HealthLine, Line
 from ..task import ProgressLine
 from .live import Past, build_message
 from .server import Server, message
@@ -30,7 +30,7 @@ RETRY_S, _WAIT_S = 1.0, 0.2
 # Longer than any line of a run: more bytes without a newline are not from a run.
 LONGEST_LINE = 1 << 20
 _TCP = re.compile(r"tcp:(?:\[([^][]+)\]|([^][:]+)):([0-9]{1,5})")
-_decode = msgspec.json.Decoder(GraspLine | DetailLine | HealthLine | ProgressLine).decode
+_decode = msgspec.json.Decoder(Line).decode
 # A stream counts as one with details for this long after the last detail; moments without are left out.
 _DETAILED_US = 1_000_000
 
@@ -115,7 +115,7 @@ class StreamMonitor(Closing):
             self._detail(line)
         elif isinstance(line, HealthLine):
             self.server.publish("health", partial(message, "health", line))
-        else:
+        elif isinstance(line, ProgressLine):
             self.server.publish("task", partial(message, "task", text=line.text))
 
     def _detail(self, detail: DetailLine) -> None:

@@ -194,7 +194,7 @@ def grasps_of(path: Path) -> list[LiveGrasp]:
 
 def test_a_frozen_recording_is_reported_delays_nothing_and_stays_whole(start: Start, tmp_path: Path) -> None:
     path = tmp_path / "disk" / "run.mcap"
-    run = start("--sink", "jsonl:-", "--record", path)
+    run = start("--sink", "jsonl:-?every", "--record", path)
     run.goes_on()
     run.freeze()
     said = run.line(lambda line: line["kind"] == "health" and line["outputs"])
@@ -215,22 +215,24 @@ def test_a_frozen_recording_is_reported_delays_nothing_and_stays_whole(start: St
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_a_run_whose_disk_is_frozen(start: Start, tmp_path: Path, number: signal.Signals) -> None:
     path = tmp_path / "disk" / "run.mcap"
-    run = start("--sink", "jsonl:-", "--sink", f"jsonl:{tmp_path}/disk/lines", "--record", path)
+    run = start("--sink", "jsonl:-?every", "--sink", f"jsonl:{tmp_path}/disk/lines?every", "--record", path)
     run.goes_on()
     run.freeze()
     run.goes_on()
     assert run.end(number) == 1
     assert "moments lost; " in run.said
-    assert f"jsonl:{tmp_path}/disk/lines: " in run.said
+    assert f"jsonl:{tmp_path}/disk/lines?every: " in run.said
 
 
 def test_a_frozen_disk_delays_no_other_sink(start: Start, tmp_path: Path) -> None:
     path = tmp_path / "disk" / "lines"
-    run = start("--sink", f"jsonl:{path}", "--sink", "jsonl:-")
+    run = start("--sink", f"jsonl:{path}?every", "--sink", "jsonl:-?every")
     run.goes_on()
     frozen_us = run.freeze()
     said = run.line(lambda line: line["kind"] == "health" and line["outputs"])
-    assert said["outputs"] == [{"name": f"jsonl:{path}", "what": "does not respond: what comes meanwhile is lost"}]
+    assert said["outputs"] == [
+        {"name": f"jsonl:{path}?every", "what": "does not respond: what comes meanwhile is lost"}
+    ]
     run.goes_on()
     thawed_us = run.thaw()
     run.goes_on()
@@ -242,7 +244,7 @@ def test_a_frozen_disk_delays_no_other_sink(start: Start, tmp_path: Path) -> Non
     assert sum(frozen_us < time_us < thawed_us - LATE_US for time_us in times) <= 1
     lost = len(run.lines) - len(lines)
     assert lost > 0
-    assert f"jsonl:{path}: {len(lines)} frames sent, {lost} lost" in run.said
+    assert f"jsonl:{path}?every: {len(lines)} frames sent, {lost} lost" in run.said
 
 
 @pytest.fixture
@@ -258,7 +260,7 @@ def full_pipe() -> Iterator[int]:
 
 
 def test_notices_that_nobody_reads_stop_nothing(start: Start, full_pipe: int) -> None:
-    run = start("--sink", "jsonl:-", stderr=full_pipe)
+    run = start("--sink", "jsonl:-?every", stderr=full_pipe)
     run.goes_on()
     assert run.end() == 0
 
@@ -286,7 +288,7 @@ def test_a_terminal_that_is_held_stops_nothing(start: Start, tmp_path: Path) -> 
 
 def test_on_a_full_disk_files_go_on_once_there_is_room(start: Start, tmp_path: Path) -> None:
     path, lines = tmp_path / "run.mcap", tmp_path / "lines"
-    run = start("--sink", "jsonl:-", "--sink", f"jsonl:{lines}", "--record", path)
+    run = start("--sink", "jsonl:-?every", "--sink", f"jsonl:{lines}?every", "--record", path)
     run.goes_on()
     limits = resource.prlimit(run.process.pid, resource.RLIMIT_FSIZE)
     resource.prlimit(run.process.pid, resource.RLIMIT_FSIZE, (lines.stat().st_size + 5000, limits[1]))
@@ -309,12 +311,13 @@ def test_on_a_full_disk_files_go_on_once_there_is_room(start: Start, tmp_path: P
     assert len(kept) < len(run.lines)
     assert "recording: works again" in run.said
     assert "messages lost" in run.said
-    assert f"jsonl:{lines}: {len(kept)} frames sent, {len(run.lines) - len(kept)} lost: File too large" in run.said
+    sent, lost = len(kept), len(run.lines) - len(kept)
+    assert f"jsonl:{lines}?every: {sent} frames sent, {lost} lost: File too large" in run.said
 
 
 def test_a_kill_leaves_all_that_was_in_the_file(start: Start, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    run = start("--sink", "jsonl:-", "--record", path)
+    run = start("--sink", "jsonl:-?every", "--record", path)
     run.until(lambda: path.exists() and len(grasps_of(path)) > 100)
     before = grasps_of(path)
     assert run.end(signal.SIGKILL) == -signal.SIGKILL
@@ -322,7 +325,7 @@ def test_a_kill_leaves_all_that_was_in_the_file(start: Start, tmp_path: Path) ->
 
 
 def test_a_signal_ends_a_run_whose_device_is_slow_and_silent(start: Start) -> None:
-    run = start("--sink", "jsonl:-", rate=0.1)
+    run = start("--sink", "jsonl:-?every", rate=0.1)
     run.line(lambda line: line["kind"] == "grasp" and line["health"] == "ok")
     run._done.set()
     run.line(lambda line: line["kind"] == "grasp" and line["switch_age_us"] > 1_000_000)

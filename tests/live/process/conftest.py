@@ -19,10 +19,10 @@ from thenar.drivers.emulated.i2c import WireCounters
 from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.sinks.jsonl import GraspLine, HealthLine
+from thenar.runtime.sinks.jsonl import GraspLine, HealthLine, Line
 from thenar.simulator.playing.bench import Bench
 
-_line = msgspec.json.Decoder(GraspLine | HealthLine)
+_line = msgspec.json.Decoder(Line)
 ENDING_S = 20.0
 
 
@@ -51,7 +51,7 @@ class Client:
             line = _line.decode(text)
             if isinstance(line, GraspLine):
                 self._scene.grasps.add(line)
-            else:
+            elif isinstance(line, HealthLine):
                 self.reports.append(line)
 
     @property
@@ -110,7 +110,14 @@ class Run:
         """Start a run, of this bench or of another `glove`, once the file `after` is there."""
         if after is not None:
             self.eventually(after.exists)
-        where = [str(self.build), "--glove", str(glove or self._folder / "glove.toml"), "--sink", "jsonl:-", "--status"]
+        where = [
+            str(self.build),
+            "--glove",
+            str(glove or self._folder / "glove.toml"),
+            "--sink",
+            "jsonl:-?every",
+            "--status",
+        ]
         arguments = ["run", *where, "--lead", "0", "--dwell-ms", "0", *map(str, options)]
         client = Client(arguments, self.bench.environment, self._folder, self.scene)
         self._stack.callback(client.close)

@@ -1,16 +1,20 @@
 """A line of JSON holds everything that was published, and nothing but itself."""
 
+import io
 import json
+import socket
 from collections.abc import Callable
+from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import json as typed_json
-from msgspec.structs import asdict
+from msgspec.structs import asdict, replace
 
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import HealthReport, LiveGrasp
-from thenar.runtime.sinks import GraspLine, HealthLine, JointAngles
+from thenar.runtime.sinks import GraspLine, HeaderLine, HealthLine, JointAngles, JsonLines, Line, open_sink
 from thenar.runtime.sinks.jsonl import encode, encode_health
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
@@ -27,7 +31,41 @@ def test_a_line_comes_back_as_it_was_published(
     line = encode(grasp, preshape, angle)
     assert line.endswith(b"\n")
     assert line.count(b"\n") == 1
-    assert typed_json.decode(line, type=GraspLine) == GraspLine(**asdict(grasp), preshape=preshape, angles=angle)
+    rounded = replace(
+        grasp, probability=round(grasp.probability, 4), segment_probability=round(grasp.segment_probability, 4)
+    )
+    positions = None if angle is None else tuple(round(position, 4) for position in angle.positions_rad)
+    assert typed_json.decode(line, type=GraspLine) == GraspLine(**asdict(rounded), preshape=preshape, angles=positions)
+
+
+@pytest.mark.parametrize("kind", ["jsonl", "unix"])
+def test_a_header_names_the_joints_before_their_angles(
+    make_grasp: Callable[..., LiveGrasp], tmp_path: Path, kind: str
+) -> None:
+    file, path = io.BytesIO(), str(tmp_path / "socket")
+    sink = JsonLines(file) if kind == "jsonl" else open_sink(f"unix:{path}")
+    reader = socket.socket(socket.AF_UNIX)
+    late = socket.socket(socket.AF_UNIX)
+    if kind == "unix":
+        reader.connect(path)
+    one, other = JointAngles(("a", "b"), (0.12345, -1.0)), JointAngles(("c",), (2.0,))
+    for number, angle in enumerate([None, one, one, other]):
+        if number == 2 and kind == "unix":
+            late.connect(path)
+        sink.publish(make_grasp(number), None, angle)
+    sink.close()
+    lines = [typed_json.decode(line, type=Line) for line in (file.getvalue() or read_all(reader)).splitlines()]
+    kinds = [line.joints if isinstance(line, HeaderLine) else line.angles for line in lines]
+    assert kinds == [None, ("a", "b"), (0.1235, -1.0), (0.1235, -1.0), ("c",), (2.0,)]
+    if kind == "unix":
+        assert [typed_json.decode(line, type=Line) for line in read_all(late).splitlines()] == [lines[1], *lines[3:]]
+    reader.close()
+    late.close()
+
+
+def read_all(reader: socket.socket) -> bytes:
+    with reader.makefile("rb") as file:
+        return file.read()
 
 
 def test_any_json_parser_reads_it(make_grasp: Callable[..., LiveGrasp], preshape: Preshape) -> None:
