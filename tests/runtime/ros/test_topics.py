@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from itertools import count, cycle
+from itertools import count
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -203,20 +203,26 @@ def test_a_preshape_is_sent_when_it_changes_and_kept_for_late_readers(
             between.append(first.said.get(timeout=20))
         return [said for said in between if said.get("topic") == "preshape"]
 
-    first, other = listen(), Preshape("other", preshape.joint_names, (1.0, 1.0), 0.5)
+    def publish_another() -> None:
+        sink.publish(again(), Preshape("another", preshape.joint_names, (next(numbers), 1.0), 0.5), None)
+
+    def hear_positions(positions: tuple[float, ...]) -> None:
+        while first.hear("topic", "preshape")["message"]["points"][0]["positions"] != [*positions]:
+            pass
+
+    first, numbers = listen(), count(2.0)
     # What is sent before the two know each other is not heard.
-    shapes = cycle((preshape, other))
-    first.hear("topic", "preshape", lambda: sink.publish(again(), next(shapes), None))
-    told_by("first")
+    first.hear("topic", "preshape", publish_another)
+    publish()
+    hear_positions(preshape.positions)
     # Many frames later the hand has not been told again, and one that asks for what is kept is told without it.
     for _ in range(50):
         publish()
     assert not told_by("many")
     listen("kept").hear("topic", "preshape")
     assert not told_by("kept")
-    heard = first.hear("topic", "preshape", lambda: sink.publish(again(), other, None))
-    while heard["message"]["points"][0]["positions"] != [1.0, 1.0]:
-        heard = first.hear("topic", "preshape")
+    sink.publish(again(), Preshape("other", preshape.joint_names, (1.0, 1.0), 0.5), None)
+    hear_positions((1.0, 1.0))
 
 
 def test_a_node_that_comes_late_has_the_newest_at_once(
