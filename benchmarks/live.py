@@ -102,7 +102,7 @@ def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[C
             recognizer.step(now_us(), time.time_ns() // 1000, taken.switches, taken.glove)
 
         return step, feed
-    sinks = ["jsonl:/dev/null", f"unix:{own}/socket"] if stage >= 4 else ["jsonl:/dev/null"]
+    sinks = ["jsonl:/dev/null?every", f"unix:{own}/socket"] if stage >= 4 else ["jsonl:/dev/null"]
     record = own / "run.mcap" if stage >= 2 else None
     run = Glove(
         scene.build,

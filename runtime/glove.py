@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
 from threading import Event
@@ -252,6 +251,9 @@ class Glove:
         return (*recording, *self._fanout.troubles())
 
     def _session(self) -> Session:
+        # It takes a third as long to import as everything else.
+        from importlib.metadata import version
+
         system = self.system
         return Session(
             thenar=version("thenar"),

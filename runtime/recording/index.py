@@ -10,10 +10,9 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from pathlib import Path
 
-from mcap.opcode import Opcode
-
 from ..errors import McapError
 from .layout import GLOVE, GRASP, RECOGNITION, SWITCHES, TAXELS, Tail
+from .mcap import Opcode
 from .reader import Entry, EntryDecoder, Reader
 from .records import End, RawRecord, RecordStream
 from .session import Session

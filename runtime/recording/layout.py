@@ -7,15 +7,12 @@ with their definitions embedded: Foxglove shows them, `ros2 bag` plays them, and
 """
 
 from dataclasses import dataclass, field
-from typing import Any
 from zlib import crc32
-
-from mcap.data_stream import RecordBuilder
-from mcap.records import Channel, DataEnd, Footer, Header, McapRecord, Metadata, MetadataIndex, Schema, Statistics
 
 from thenar.drivers.errors import SettingError
 
 from ..errors import McapError
+from .mcap import Opcode, encode
 from .messages import BYTES, DEFINITIONS, STRING
 from .session import METADATA, Session, from_metadata, to_metadata
 
@@ -73,7 +70,7 @@ def beginning(version: str, tail: Tail | None = None) -> bytes:
     """Return the first bytes of a recording by this version of thenar, with the channels that `tail` counts, up to its
     first session.
     """
-    return MAGIC + _written(Header("ros2", f"{WRITER}{version}"), *_schemas(), *_channels(tail or Tail()))
+    return MAGIC + encode(Opcode.HEADER, "ros2", f"{WRITER}{version}") + _schemas() + _channels(tail or Tail())
 
 
 def session_record(session: Session) -> bytes:
@@ -83,7 +80,7 @@ def session_record(session: Session) -> bytes:
         from_metadata(texts)
     except McapError as wrong:
         raise SettingError(f"this cannot be recorded: {wrong}") from None
-    record = _written(Metadata(METADATA, texts))
+    record = encode(Opcode.METADATA, METADATA, texts)
     if len(record) > LARGEST_RECORD:
         raise SettingError(
             f"the description of this glove takes {len(record)} bytes, and at most {LARGEST_RECORD} are recorded: "
@@ -94,47 +91,33 @@ def session_record(session: Session) -> bytes:
 
 def ending(tail: Tail) -> bytes:
     """Return the bytes that close a recording: the end of its data, a summary, the footer."""
-    data_end = _written(DataEnd(tail.crc))
-    indices = [MetadataIndex(offset, length, METADATA) for offset, length in tail.sessions]
-    summary = _written(*_schemas(), *_channels(tail), _statistics(tail), *indices)
+    data_end = encode(Opcode.DATA_END, tail.crc)
+    indices = b"".join(encode(Opcode.METADATA_INDEX, offset, length, METADATA) for offset, length in tail.sessions)
+    summary = _schemas() + _channels(tail) + _statistics(tail) + indices
     start = tail.size + len(data_end)
     # The CRC of a summary covers the footer up to the CRC itself.
-    open_footer = _written(Footer(start, 0, 0))[:-4]
-    footer = _written(Footer(start, 0, crc32(open_footer, crc32(summary))))
+    open_footer = encode(Opcode.FOOTER, start, 0, 0)[:-4]
+    footer = encode(Opcode.FOOTER, start, 0, crc32(open_footer, crc32(summary)))
     return data_end + summary + footer + MAGIC
 
 
-def _schemas() -> list[McapRecord]:
-    return [Schema(_SCHEMAS[name], text.encode(), "ros2msg", name) for name, text in DEFINITIONS.items()]
-
-
-def _channels(tail: Tail) -> list[McapRecord]:
-    # The profile requires the key; if it is empty, a player uses its own settings.
-    qos = {"offered_qos_profiles": ""}
-    return [
-        Channel(number, topic, "cdr", qos, _SCHEMAS[name])
-        for number, (topic, name) in CHANNELS.items()
-        if number in tail.counts
-    ]
-
-
-def _statistics(tail: Tail) -> Statistics:
-    return Statistics(
-        attachment_count=0,
-        channel_count=len(tail.counts),
-        channel_message_counts=tail.counts,
-        chunk_count=0,
-        message_count=sum(tail.counts.values()),
-        message_end_time=tail.last_ns,
-        message_start_time=tail.first_ns or 0,
-        metadata_count=len(tail.sessions),
-        schema_count=len(_SCHEMAS),
+def _schemas() -> bytes:
+    return b"".join(
+        encode(Opcode.SCHEMA, _SCHEMAS[name], name, "ros2msg", text.encode()) for name, text in DEFINITIONS.items()
     )
 
 
-def _written(*records: McapRecord) -> bytes:
-    builder: Any = RecordBuilder()
-    for record in records:
-        record.write(builder)
-    data: bytes = builder.end()
-    return data
+def _channels(tail: Tail) -> bytes:
+    # The profile requires the key; if it is empty, a player uses its own settings.
+    qos = {"offered_qos_profiles": ""}
+    return b"".join(
+        encode(Opcode.CHANNEL, number, _SCHEMAS[name], topic, "cdr", qos)
+        for number, (topic, name) in CHANNELS.items()
+        if number in tail.counts
+    )
+
+
+def _statistics(tail: Tail) -> bytes:
+    messages, attachments, chunks = sum(tail.counts.values()), 0, 0
+    numbers = messages, len(_SCHEMAS), len(tail.counts), attachments, len(tail.sessions), chunks
+    return encode(Opcode.STATISTICS, *numbers, tail.first_ns or 0, tail.last_ns, tail.counts)

@@ -2,24 +2,19 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
-from struct import Struct, error, pack
+from struct import Struct, pack
 from typing import Any
 from zlib import crc32
 
 import msgspec
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import EndOfFile
-from mcap.exceptions import McapError as LibraryError
-from mcap.opcode import Opcode
-from mcap.records import Channel, DataEnd, Footer, Header, Metadata, Schema
 
 from ..errors import McapError
 from ..frames import GloveFrame, SwitchFrame
 from ..names import SHOWN, list_names, shortened
 from ..published import LiveGrasp
 from .layout import CHANNELS, GLOVE, MARKS, RECOGNITION, SWITCHES, TAXELS, TRIALS, WRITER, Tail
+from .mcap import Opcode, decode
 from .messages import decode_bytes, decode_text, glove_frame, switch_frame, taxel_codes
 from .records import End, RawRecord, RecordStream, kind_of
 from .session import METADATA, Label, Mark, Session, from_metadata
@@ -32,8 +27,6 @@ _DECODERS: dict[int, Callable[[bytes], LiveGrasp | Label | Mark]] = {
     TRIALS: msgspec.json.Decoder(Label).decode,
     MARKS: msgspec.json.Decoder(Mark).decode,
 }
-# Errors that the library's records raise on bad bytes.
-_UNREADABLE = (LibraryError, error, UnicodeDecodeError, OverflowError)
 # Limits that no valid time or count of a recording exceeds.
 _LEAST, _LARGEST = -(2**63), 2**63 - 1
 _REASON = 200
@@ -102,22 +95,23 @@ class EntryDecoder:
     def _described(self, record: RawRecord, content: bytes) -> Iterator[Session]:
         """Take a record that describes others."""
         if record.opcode == Opcode.HEADER:
-            self.ours = self._parsed(Header, record, content).library.startswith(WRITER)
+            _, library = self._parsed(Opcode.HEADER, record, content)
+            self.ours = library.startswith(WRITER)
         elif record.opcode == Opcode.METADATA:
-            yield from self._sessions(record, self._parsed(Metadata, record, content))
+            yield from self._sessions(record, *self._parsed(Opcode.METADATA, record, content))
         elif record.opcode == Opcode.CHANNEL:
-            self._name(self._parsed(Channel, record, content))
+            self._name(*self._parsed(Opcode.CHANNEL, record, content))
         elif record.opcode == Opcode.SCHEMA:
-            schema = self._parsed(Schema, record, content)
-            self._schemas[schema.id] = schema.name
+            number, name, *_ = self._parsed(Opcode.SCHEMA, record, content)
+            self._schemas[number] = name
 
-    def _parsed(self, kind: type[Any], record: RawRecord, content: bytes) -> Any:
-        """Return the content of a record as the library's `kind`. Raises McapError."""
-        found, rest = parsed(kind, content)
+    def _parsed(self, opcode: Opcode, record: RawRecord, content: bytes) -> list[Any]:
+        """Return the fields of a record. Raises McapError."""
+        found, rest = parsed(opcode, content)
         if rest:
             # MCAP lets later versions add fields. This version of the record has none.
             self.foreign = True
-            self._skip(f"{rest} bytes more than a {kind.__name__.lower()} has", record.end - rest)
+            self._skip(f"{rest} bytes more than a {kind_of(opcode)} has", record.end - rest)
         return found
 
     def _message(self, content: bytes) -> Entry | None:
@@ -145,12 +139,12 @@ class EntryDecoder:
             return glove_frame(time_us, decode_bytes(data), len(session.sensors))
         return _from_json(channel, decode_text(data))
 
-    def _sessions(self, record: RawRecord, metadata: Metadata) -> Iterator[Session]:
-        if metadata.name != METADATA:
+    def _sessions(self, record: RawRecord, name: str, texts: dict[str, str]) -> Iterator[Session]:
+        if name != METADATA:
             self.foreign = True
-            self._skip(f"metadata {shortened(repr(metadata.name))}", record.offset)
+            self._skip(f"metadata {shortened(repr(name))}", record.offset)
             return
-        before, session = self.session, from_metadata(metadata.metadata)
+        before, session = self.session, from_metadata(texts)
         if before is not None and _wired(before) != _wired(session):
             raise McapError(
                 "begins a session of another glove than the one before: its switches, taxels or sensors differ"
@@ -159,42 +153,30 @@ class EntryDecoder:
         self._tail.add_session(record.end - record.offset)
         yield self.session
 
-    def _name(self, channel: Channel) -> None:
-        for ours, (topic, schema) in CHANNELS.items():
-            if topic == channel.topic:
-                found = self._schemas.get(channel.schema_id, "nothing")
-                if (found, channel.message_encoding) != (schema, "cdr"):
-                    found = shortened(f"{channel.message_encoding} of {found}")
-                    raise McapError(f"says that {topic} holds {found}, not cdr of {schema}")
-                self._channels[channel.id] = ours
-                self.foreign |= channel.id != ours
+    def _name(self, number: int, schema: int, topic: str, encoding: str, _metadata: dict[str, str]) -> None:
+        for ours, (known, name) in CHANNELS.items():
+            if topic == known:
+                found = self._schemas.get(schema, "nothing")
+                if (found, encoding) != (name, "cdr"):
+                    found = shortened(f"{encoding} of {found}")
+                    raise McapError(f"says that {topic} holds {found}, not cdr of {name}")
+                self._channels[number] = ours
+                self.foreign |= number != ours
                 return
         self.foreign = True
-        self._channels.setdefault(channel.id, None)
+        self._channels.setdefault(number, None)
 
 
 def _wired(session: Session) -> tuple[tuple[str, ...], ...]:
     return session.switches, session.taxels, session.sensors
 
 
-class _Whole(ReadDataStream):
-    """Reads exactly the requested number of bytes, or none."""
-
-    def read(self, length: int) -> bytes:
-        data = super().read(length)
-        if len(data) < length:
-            raise EndOfFile
-        return data
-
-
-def parsed(kind: type[Any], content: bytes) -> tuple[Any, int]:
-    """Return the content of a record as the library's `kind`, and the number of bytes left. Raises McapError."""
-    stream = _Whole(BytesIO(content))
+def parsed(opcode: Opcode, content: bytes) -> tuple[list[Any], int]:
+    """Return the fields of a record, and the number of bytes left. Raises McapError."""
     try:
-        return kind.read(stream), len(content) - stream.count
-    except _UNREADABLE as wrong:
-        reason = shortened(str(wrong)) or type(wrong).__name__
-        raise McapError(f"is not a valid {kind.__name__.lower()}: {reason}") from None
+        return decode(opcode, content)
+    except ValueError as wrong:
+        raise McapError(f"is not a valid {kind_of(opcode)}: {shortened(str(wrong))}") from None
 
 
 def _from_json(channel: int, text: bytes) -> LiveGrasp | Label | Mark | None:
@@ -307,14 +289,14 @@ class Reader:
     def _end_data(self, record: RawRecord) -> None:
         self._in_data = False
         self._records.begin_section()
-        found, rest = parsed(DataEnd, record.content or b"")
-        self._check("its data", found.data_section_crc, record.before, rest)
+        (crc,), rest = parsed(Opcode.DATA_END, record.content or b"")
+        self._check("its data", crc, record.before, rest)
 
     def _end_summary(self, record: RawRecord) -> None:
         content = record.content or b""
-        found, rest = parsed(Footer, content)
+        (_, _, crc), rest = parsed(Opcode.FOOTER, content)
         checked = pack("<BQ", record.opcode, len(content)) + content[:_CHECKED_FOOTER]
-        self._check("its summary", found.summary_crc, crc32(checked, record.before), rest)
+        self._check("its summary", crc, crc32(checked, record.before), rest)
         if self._in_data:
             self._wrong.append("the end of its data is missing, and their checksum with it")
 

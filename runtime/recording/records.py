@@ -11,11 +11,10 @@ from struct import Struct
 from typing import BinaryIO
 from zlib import crc32
 
-from mcap.opcode import Opcode
-
 from ..errors import McapError
 from ..files import open_file
 from .layout import LARGEST_RECORD, MAGIC
+from .mcap import Opcode
 
 _OPENING = Struct("<BQ")
 _PIECE = 1 << 20

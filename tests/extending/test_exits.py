@@ -80,7 +80,7 @@ def test_a_method_failing_at_work_ends_commands_with_a_sentence(
 def test_a_sink_that_does_so_is_left_out_of_a_replay(plug_in: Callable[[str, str], Any], material: Path) -> None:
     there, lines = plug_in(SINK, "thenar.sinks"), material / "replayed"
     command = ("run", str(material / "build"), "--replay", str(material / "set.grasps"))
-    said = there.thenar(*command, "--sink", "exits:x", "--sink", f"jsonl:{lines}", code=1)
+    said = there.thenar(*command, "--sink", "exits:x", "--sink", f"jsonl:{lines}?every", code=1)
     assert "somebody_elses_exits.Exits: 0 frames sent, 60 lost: SystemExit: 0" in said
     assert [json.loads(line)["number"] for line in lines.read_text().splitlines()] == list(range(60))
 
@@ -88,7 +88,7 @@ def test_a_sink_that_does_so_is_left_out_of_a_replay(plug_in: Callable[[str, str
 def test_a_sink_that_does_so_stops_no_live_run(plug_in: Callable[[str, str], Any], material: Path) -> None:
     there, lines = plug_in(SINK, "thenar.sinks"), material / "live"
     command = ("run", str(material / "build"), "--glove", str(material / "glove.toml"), "--frames", "60", "--status")
-    said = there.thenar(*command, "--sink", "exits:x", "--sink", f"jsonl:{lines}", code=1)
+    said = there.thenar(*command, "--sink", "exits:x", "--sink", f"jsonl:{lines}?every", code=1)
     assert "somebody_elses_exits.Exits: SystemExit: 0" in said
     assert "somebody_elses_exits.Exits: 0 frames sent, " in said
     assert sum(json.loads(line)["kind"] == "grasp" for line in lines.read_text().splitlines()) == 60
