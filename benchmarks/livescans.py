@@ -54,9 +54,9 @@ def compared(scene: Played, clock_hz: int = CLOCK_HZ) -> Iterator[Scan]:
 
 
 def wired(scene: Played, names: tuple[str, ...], clock_hz: int) -> Harness:
-    """Return a glove with these switches on MCP23017, and a CyberGlove."""
+    """Return a glove with these switches on MCP23017, scanned as often as the wire allows, and a CyberGlove."""
     proposed = propose_harness(names, device="/dev/i2c-7")
-    bus = msgspec.structs.replace(proposed.buses[0], clock_hz=clock_hz)
+    bus = msgspec.structs.replace(proposed.buses[0], clock_hz=clock_hz, rate_hz=10_000.0)
     return with_glove(msgspec.structs.replace(proposed, buses=(bus,)), glove(scene))
 
 

@@ -18,7 +18,6 @@ from typing import Any
 import msgspec
 import smbus2.smbus2
 from liveplay import read_along
-from msgspec.structs import replace
 
 import thenar.drivers.i2c.node
 from thenar.runtime import Build, Glove
@@ -152,10 +151,7 @@ class Ioctls:
 
 def scans(build: str, glove: str, which: str) -> None:
     """Scan the only bus: all wired switches, or the kept ones."""
-    harness = load_harness(glove)
-    # As fast as it can.
-    harness = replace(harness, buses=tuple(replace(bus, rate_hz=10_000.0) for bus in harness.buses))
-    system = LiveSystem.of(Build.load(build), harness)
+    system = LiveSystem.of(Build.load(build), load_harness(glove))
     scan = whole_scan(system.harness, system.harness.switches) if which == "all" else system.scan
     device = I2cDevice(system.harness, 0, scan)
     device.open()
