@@ -112,16 +112,14 @@ class Build:
         biased_scores: tuple[int, ...],
         bits: ArrayLike,
         codes: ArrayLike,
-        lost_switches: ArrayLike = False,
-        lost_joints: ArrayLike = False,
+        lost_switches: Mask = 0,
+        lost_joints: Mask = 0,
     ) -> tuple[int, ...]:
         """Return the scores of all classes, with one for none if the build may refuse the frame."""
         if self.rejector is None:
             return biased_scores
-        n_switches, n_joints = self.tables.n_switches, self.tables.n_joints
-        closed, lost = (_mask(np.broadcast_to(flags, n_switches)) for flags in (bits, lost_switches))
-        joints = _mask(np.broadcast_to(lost_joints, n_joints))
-        refused = self.rejector.refuses(biased_scores, closed, lost, np.asarray(codes).tolist(), lost_joints=joints)
+        values = np.asarray(codes).tolist()
+        refused = self.rejector.refuses(biased_scores, _mask(bits), lost_switches, values, lost_joints=lost_joints)
         return (*biased_scores, max(biased_scores) + self.none_leads[refused])
 
     def recognise(
@@ -156,7 +154,7 @@ class Build:
             joints = np.zeros(self.tables.n_joints, bool) if lost_joints is None else lost_joints
             biased_scores = self.scorer.biased_scores_without(bits, codes, switches, joints)
             degraded = bool(np.any(switches) or np.any(joints))
-            biased_scores = self._all_scores(biased_scores, bits, codes, switches, joints)
+            biased_scores = self._all_scores(biased_scores, bits, codes, _mask(switches), _mask(joints))
         second, best = sorted(biased_scores)[-2:]
         winner = biased_scores.index(best)
         probability = softmax(biased_scores, winner, self.tables.scale)
