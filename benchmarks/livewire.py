@@ -82,7 +82,7 @@ def rate(build: str, glove: str, seconds: float) -> Rate:
             build,
             glove,
             preshapes="barrett_bh8",
-            sinks=["jsonl:/dev/null", f"unix:{folder}/socket"],
+            sinks=[f"jsonl:{folder}/lines?every", f"unix:{folder}/socket"],
             record=folder / "run.mcap",
             status=True,
         )
