@@ -140,7 +140,8 @@ class Ramp(Term):
 
     def of(self, *values: np.ndarray) -> np.ndarray:
         above = np.clip(values[0].astype(int) - int(self.start), 0, 65535 - int(self.start))[:, np.newaxis]
-        return (above > 0) * self.rows[0] + above * self.rows[1]
+        scores: np.ndarray = (above > 0) * self.rows[0] + above * self.rows[1]
+        return scores
 
     def core(self) -> tuple[CoreTerm, ...]:
         joint, start = int(self.joint), int(self.start)
@@ -155,7 +156,7 @@ def test_a_term_of_another_kind_becomes_the_terms_of_its_core(
     random, (bits, codes) = np.random.default_rng(seed), make_rows(seed)
     plain = collapse(make_stumps(seed), 6)
     ramps = [
-        Ramp(np.array(joint), random.integers(0, 300), random.normal(size=(2, 4)) * [[1.0], [0.01]])
+        Ramp(np.array(joint), np.array(random.integers(0, 300)), random.normal(size=(2, 4)) * [[1.0], [0.01]])
         for joint in random.permutation(3)[:2].tolist()
     ]
     model = ScoreTables(plain.bias, (*plain.terms, *ramps))
