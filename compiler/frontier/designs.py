@@ -16,12 +16,11 @@ from ..trainers.base import TRAINERS, Training
 from .finalists import EvaluatedFinalist
 from .latency import POLICIES
 from .points import DecisionKind, FrontierPoint, Latency, PointSetting, PointTime, front
-from .price import PricedTables
+from .price import Classified, PricedTables
 from .screen import Screened
 from .search import placement_of
 from .survey import Cuts, Survey, TrialAccuracy
-from .timing.classify_times import Classified
-from .timing.scan_times import NO_TIME, ScanTimes
+from .wirings import NO_TIME, ScanTimes
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,12 +12,11 @@ from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.find import FRONTIER_NAME, find_frontier
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.points import Frontier, FrontierPoint
-from thenar.compiler.frontier.price import Equipment
+from thenar.compiler.frontier.price import ClassifyModel, Equipment
 from thenar.compiler.frontier.replay import replay_of
 from thenar.compiler.frontier.search import TAXEL_LEVELS, Search, placed
 from thenar.compiler.frontier.survey import Cuts, Survey
-from thenar.compiler.frontier.timing.classify_times import ClassifyModel
-from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY
+from thenar.compiler.frontier.wirings import WIRE_ONLY
 from thenar.compiler.frontier.words import inputs_of, summary
 from thenar.compiler.placement.elements import bits_of, elements_of, ports_of
 from thenar.compiler.placement.methods.base import METHODS
