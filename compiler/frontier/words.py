@@ -140,7 +140,10 @@ def summary(frontier: Frontier) -> str:
         f"Point {point.number}: {_inputs(frontier, point)}{trained} read and classified in "
         f"{duration(point.frame.us)} on {frontier.machine}, reach {interval(point.rate)} % accuracy ({point.rate.what})"
     )
-    against = [_mark(mark, frontier) for mark in frontier.marks]
+    against = [
+        f"{percent(mark.rate.mean)} in {duration(mark.frame_us)} with {mark_name(mark, frontier)}"
+        for mark in frontier.marks
+    ]
     return ". ".join(filter(None, (f"{said}, against {listed(against)}" if against else said, luck_of(point)))) + "."
 
 
@@ -188,10 +191,10 @@ def _inputs(frontier: Frontier, point: FrontierPoint) -> str:
     return str(SensorCount(*kept, joints if inputs != "switches" else none, levels))
 
 
-def _mark(mark: ReferencePoint, frontier: Frontier) -> str:
+def mark_name(mark: ReferencePoint, frontier: Frontier) -> str:
+    """Return a mark's name with its number of elements: "all 160 switches", "35 switches (paper, S = 62)"."""
     named = str(mark.n_switches) in mark.name
-    name = mark.name if named else f"{counted_elements(frontier, mark.n_switches)} ({mark.name})"
-    return f"{percent(mark.rate.mean)} in {duration(mark.frame_us)} with {name}"
+    return mark.name if named else f"{counted_elements(frontier, mark.n_switches)} ({mark.name})"
 
 
 def of_time(frontier: Frontier, what: str) -> str:
