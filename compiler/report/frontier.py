@@ -29,8 +29,7 @@ from ..frontier.words import (
 from ..hand import HandShape
 from ..pictures import PALETTE
 from ..text import DASH, NBSP, counted, interval, microseconds, sentence
-from .content import PlainTable
-from .hand import HandPicture, hand_picture
+from .content import HandPicture, PlainTable, hand_picture
 
 with optional():
     from markupsafe import Markup
