@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 
 from thenar.runtime.manifest import in_words
 from thenar.runtime.names import printable, taxel_and_code
@@ -12,30 +12,6 @@ from ..evaluation.rates import Rate
 from ..sensors import SensorCount
 from ..text import cells, counted, duration, interval, listed, percent
 from .points import Frontier, FrontierPoint, PointSetting, PointTime, ReferencePoint
-
-COLUMNS = (
-    *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width"),
-    *("wiring", "clock_hz", "decision", "rate_of", "rate", "rate_low", "rate_high", "luck"),
-    *(
-        "frames_of",
-        "frames",
-        "frames_low",
-        "frames_high",
-        "other_rate_of",
-        "other_rate",
-        "other_rate_low",
-        "other_rate_high",
-        "scan_us",
-        "scan_how",
-        "transfer_us",
-        "transfer_how",
-    ),
-    *("classify_us", "classify_how", "frame_us", "frame_how", "latency_mean_us", "latency_p99_us", "missed", "wrong"),
-    *("flash", "ram", "ports", "chips", "switches", "joints"),
-)
-
-# Only written if a point's trainer, or one of its settings, is not the default.
-TRAINER_COLUMNS = ("trainer", "settings")
 
 _LONGEST = 40  # letters of a name on a picture
 _SPARED = 0.005  # rates within half a point count as equal
@@ -144,7 +120,13 @@ def summary(frontier: Frontier) -> str:
         f"{percent(mark.rate.mean)} in {duration(mark.frame_us)} with {mark_name(mark, frontier)}"
         for mark in frontier.marks
     ]
-    return ". ".join(filter(None, (f"{said}, against {listed(against)}" if against else said, luck_of(point)))) + "."
+    said += f", against {listed(against)}." if against else "."
+    if round(100 * point.luck, 1):
+        said += (
+            f" Cross-validation gave {percent(point.rate.mean + point.luck)}; {100 * point.luck:.1f} points are "
+            "subtracted, because the best of many is picked by its luck, too."
+        )
+    return said
 
 
 LUCK = (
@@ -159,16 +141,6 @@ def folds_of(frontier: Frontier) -> str:
         return f"New subject, trials: the {counted(frontier.subjects, 'subject')} left out in turn"
     repeats = counted(frontier.repeats, "repeat")
     return f"Pooled, trials: {counted(frontier.folds, 'fold')} of whole trials, {repeats}"
-
-
-def luck_of(point: FrontierPoint) -> str:
-    """Return the correction of a point's rate, with the reason, in a sentence without a full stop; or ""."""
-    if round(100 * point.luck, 1) == 0:
-        return ""
-    return (
-        f"Cross-validation gave {percent(point.rate.mean + point.luck)}; {100 * point.luck:.1f} points are subtracted, "
-        "because the best of many is picked by its luck, too"
-    )
 
 
 def rates_of(frontier: Frontier) -> dict[str, Callable[[FrontierPoint], Rate | None]]:
@@ -203,42 +175,41 @@ def of_time(frontier: Frontier, what: str) -> str:
 
 
 def csv_bytes(frontier: Frontier) -> bytes:
-    """Return `frontier.csv`: UTF-8, a line of COLUMNS, perhaps with TRAINER_COLUMNS, and a line for each point.
+    """Return `frontier.csv`: UTF-8, a line of names, and a line for each point.
 
-    Rates are in 0..1, times in microseconds; `frames` and `other_rate` may be empty.
-    `fronts`, `switches` and `settings` are lists within a cell, separated by semicolons; names with a semicolon or a
-    quote are quoted as in CSV.
+    The columns of trainer and settings are only there if a point's are not the defaults. Rates are in 0..1, times in
+    microseconds; `frames` and `other_rate` may be empty. `fronts`, `switches` and `settings` are lists within a cell,
+    separated by semicolons; names with a semicolon or a quote are quoted as in CSV.
     """
     file = io.StringIO(newline="")
-    rows = csv.writer(file, lineterminator="\n")
-    usual = all(is_usual(point.setting) for point in frontier.points)
-    rows.writerow(COLUMNS if usual else COLUMNS + TRAINER_COLUMNS)
-    for point in frontier.points:
-        setting = point.setting
-        trained = () if usual else (setting.trainer, _list(_settings(setting)))
-        rows.writerow(cells((*_values(point), *trained)))
+    writer = csv.writer(file, lineterminator="\n")
+    rows = [_cells(point) for point in frontier.points]
+    if not all(is_usual(point.setting) for point in frontier.points):
+        for row, point in zip(rows, frontier.points, strict=True):
+            row.update(trainer=point.setting.trainer, settings=_list(_settings(point.setting)))
+    writer.writerows(list(row) for row in rows[:1])
+    writer.writerows(cells(row.values()) for row in rows)
     return file.getvalue().encode()
 
 
-def _values(point: FrontierPoint) -> Iterator[object]:
-    setting, latency = point.setting, point.latency
-    yield from (point.number, _list(point.fronts), len(point.switches), setting.inputs)
-    yield from (setting.placement.method, setting.placement.parameter, setting.rounds, setting.width)
-    yield from (setting.wiring, setting.clock_hz, setting.decision)
-    yield from (*_rate(point.rate), point.luck, *_rate(point.frames), *_rate(point.other_rate))
-    for time in (point.scan, point.transfer, point.classify, point.frame):
-        yield from _time(time)
-    yield from (latency.mean_us, latency.p99_us, latency.missed, latency.wrong)
-    yield from (point.flash, point.ram, point.ports, point.chips)
-    yield from (_list(point.switches), _list(point.joints))
-
-
-def _rate(rate: Rate | None) -> tuple[object, ...]:
-    return ("", "", "", "") if rate is None else (rate.what, rate.mean, rate.low, rate.high)
-
-
-def _time(time: PointTime) -> tuple[object, ...]:
-    return time.us, time.how
+def _cells(point: FrontierPoint) -> dict[str, object]:
+    setting, placement, latency = point.setting, point.setting.placement, point.latency
+    row: dict[str, object] = {"number": point.number, "fronts": _list(point.fronts), "n_switches": len(point.switches)}
+    row |= {"inputs": setting.inputs, "method": placement.method, "parameter": placement.parameter}
+    row |= {"rounds": setting.rounds, "width": setting.width, "wiring": setting.wiring, "clock_hz": setting.clock_hz}
+    row["decision"] = setting.decision
+    for name, rate in (("rate", point.rate), ("frames", point.frames), ("other_rate", point.other_rate)):
+        numbers = ("", "", "", "") if rate is None else (rate.what, rate.mean, rate.low, rate.high)
+        row |= zip((f"{name}_of", name, f"{name}_low", f"{name}_high"), numbers, strict=True)
+        if name == "rate":
+            row["luck"] = point.luck
+    for name in ("scan", "transfer", "classify", "frame"):
+        time: PointTime = getattr(point, name)
+        row |= {f"{name}_us": time.us, f"{name}_how": time.how}
+    row |= {"latency_mean_us": latency.mean_us, "latency_p99_us": latency.p99_us}
+    row |= {"missed": latency.missed, "wrong": latency.wrong}
+    row |= {"flash": point.flash, "ram": point.ram, "ports": point.ports, "chips": point.chips}
+    return row | {"switches": _list(point.switches), "joints": _list(point.joints)}
 
 
 def _list(names: Iterable[str]) -> str:
