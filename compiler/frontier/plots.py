@@ -146,14 +146,14 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     _draw_whiskers(axes, [(x, mark.rate) for x, mark in marks], _INK)
     for number, (x, mark) in enumerate(marks):
         look: dict[str, Any] = {"marker": _MARKS[number % len(_MARKS)], "color": _INK, "edgecolor": _WHITE, "lw": 0.8}
-        named = _named(mark_name(mark, frontier), said(x), mark.rate)
+        named = _named(shorten(mark_name(mark, frontier)), said(x), mark.rate)
         axes.scatter([x], [mark.rate.mean], s=_MARK_SIZE, zorder=4.5, label=named, **look)
     spoken_of = featured(frontier)
     _draw_numbers(axes, sorted(points, key=lambda place: place[1] is not spoken_of))
     for x, point in points:
         if point is spoken_of:
             ring: dict[str, Any] = {"facecolor": "none", "edgecolor": _PICKED, "lw": 1.6, "zorder": 5}
-            named = _named(f"point {point.number}: {inputs_of(point)}", said(x), point.rate)
+            named = _named(f"point {point.number}: {inputs_of(frontier, point)}", said(x), point.rate)
             axes.scatter([x], [point.rate.mean], s=4.5 * _SIZE, gid=RING_ID, **ring)
             axes.scatter([], [], s=2 * _SIZE, label=named, **ring)
     if axes.get_legend_handles_labels()[0]:
@@ -162,7 +162,7 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
 
 
 def _named(name: str, cost: str, rate: Rate) -> str:
-    return ", ".join(filter(None, (shorten(name), cost, percent(rate.mean))))
+    return ", ".join(filter(None, (name, cost, percent(rate.mean))))
 
 
 # Call inside `painting`.

@@ -256,12 +256,12 @@ class Equipment:
 
 
 def equipment_for(
-    target: str, wirings: tuple[WiringOption, ...], cache: Cache, records: ReadingCost = NO_RECORDS
+    target: str, options: tuple[WiringOption, ...], cache: Cache, records: ReadingCost = NO_RECORDS
 ) -> Equipment:
     """Return the hardware options for `target`; where it classifies in Python, that is timed here once."""
     in_python = target not in TARGETS or TARGETS[target].clock_hz is None
     costs = cache.ask(fit_here, [()] if in_python else [])
-    return Equipment(ClassifyModel(target, python=costs[0] if costs else None), wirings, overhead_of(target), records)
+    return Equipment(ClassifyModel(target, python=costs[0] if costs else None), options, overhead_of(target), records)
 
 
 class PricedTables(Struct, frozen=True):

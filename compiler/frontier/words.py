@@ -17,23 +17,18 @@ _LONGEST = 40  # letters of a name on a picture
 _SPARED = 0.005  # rates within half a point count as equal
 
 
-def inputs_of(point: FrontierPoint) -> str:
-    """Return a point's inputs in words: "33 switches", "joints alone", "8 switches + joints"."""
-    if point.setting.inputs == "joints":
-        return f"{counted(len(point.joints), 'joint')} alone" if point.joints else "joints alone"
-    joints = [counted(len(point.joints), "joint") if point.joints else "joints"]
-    switches, levels, taxels = _kinds(point)
-    kept = [counted(switches, "switch", "switches")] if switches or not levels else []
-    kept += [f"{counted(levels, 'level')} of {counted(taxels, 'taxel')}"] if levels else []
-    return " + ".join(kept + (joints if point.setting.inputs == "both" else []))
-
-
-def _kinds(point: FrontierPoint) -> tuple[int, int, int]:
-    """Return how many switches and levels a point keeps, and of how many taxels."""
-    if point.setting.levels is None:
-        return len(point.switches), 0, 0
-    taxels = [level[0] for name in point.switches if (level := taxel_and_code(name))]
-    return len(point.switches) - len(taxels), len(taxels), len(set(taxels))
+def inputs_of(frontier: Frontier, point: FrontierPoint) -> str:
+    """Return what a point reads: "33 of 160 switches and 16 of 16 joints", "6 of 24 pads (14 levels)"."""
+    setting = point.setting
+    taxels = [level[0] for name in point.switches if setting.levels is not None and (level := taxel_and_code(name))]
+    switches, kept, inputs = len(point.switches) - len(taxels), len(set(taxels)), setting.inputs
+    count = SensorCount(
+        switches=(switches, frontier.n_switches) if inputs != "joints" else (0, 0),
+        pads=(kept, frontier.n_taxels) if inputs != "joints" else (0, 0),
+        joints=(len(point.joints) or frontier.n_joints, frontier.n_joints) if inputs != "switches" else (0, 0),
+        levels=len(taxels),
+    )
+    return str(count)
 
 
 def elements_of(frontier: Frontier) -> str:
@@ -113,7 +108,7 @@ def summary(frontier: Frontier) -> str:
         return f"Of {frontier.combinations:,} combinations none is a point of the frontier."
     trained = f", trained by {trainer_of(point.setting)}," if len(frontier.trainers) > 1 else ","
     said = (
-        f"Point {point.number}: {_inputs(frontier, point)}{trained} read and classified in "
+        f"Point {point.number}: {inputs_of(frontier, point)}{trained} read and classified in "
         f"{duration(point.frame.us)} on {frontier.machine}, reach {interval(point.rate)} % accuracy ({point.rate.what})"
     )
     against = [
@@ -153,14 +148,6 @@ def rates_of(frontier: Frontier) -> dict[str, Callable[[FrontierPoint], Rate | N
     if frontier.other is not None:
         found[frontier.other] = lambda point: point.other_rate
     return found
-
-
-def _inputs(frontier: Frontier, point: FrontierPoint) -> str:
-    switches, levels, taxels = _kinds(point)
-    joints, none = (len(point.joints) or frontier.n_joints, frontier.n_joints), (0, 0)
-    elements, inputs = ((switches, frontier.n_switches), (taxels, frontier.n_taxels)), point.setting.inputs
-    kept = elements if inputs != "joints" else (none, none)
-    return str(SensorCount(*kept, joints if inputs != "switches" else none, levels))
 
 
 def mark_name(mark: ReferencePoint, frontier: Frontier) -> str:

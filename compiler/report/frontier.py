@@ -170,7 +170,7 @@ def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
 
 def _detail(point: FrontierPoint, frontier: Frontier, hand: HandShape | None) -> PointDetail:
     setting = point.setting
-    what = (inputs_of(point), setting.placement.method, trainer_of(setting), f"{setting.width} bits")
+    what = (inputs_of(frontier, point), setting.placement.method, trainer_of(setting), f"{setting.width} bits")
     words = ", ".join(filter(None, (*what, _wiring(point))))
     return PointDetail(
         number=point.number,

@@ -22,6 +22,7 @@ from ..facts import recognises
 from ..movements.transitions import Transitions
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
+from ..placement.tree import Tree
 from ..text import NBSP, counted, microseconds, percent, sentence
 from ..trainers.base import TRAINERS
 from .content import PlainTable, ReportContent
@@ -127,15 +128,14 @@ def fit_table(manifest: Manifest) -> PlainTable | None:
     return PlainTable(caption, columns, tuple(rows)) if rows else None
 
 
-def tree_text(content: ReportContent) -> tuple[str, str]:
-    """Return the tree that chose the switches, a line for each node, or "" without one; and a sentence on it."""
-    tree, manifest = content.tree, content.manifest
+def tree_text(tree: Tree | None, manifest: Manifest) -> tuple[str, str]:
+    """Return the tree that chose a build's switches, a line for each node, or "" without one; and a sentence on it."""
     if not manifest.switches:
         return "", "No tree: no switches were chosen."
     if tree is None:
         return "", f"No tree: the switches were chosen by {manifest.options.placement}."
     # The kept elements are the inputs of the tree, in the order of its nodes.
-    kept = dict(zip(tree.inputs, content.switch_names, strict=True))
+    kept = dict(zip(tree.inputs, (switch.name for switch in manifest.switches), strict=True))
     names = [kept.get(number, f"switch {number}") for number in range(tree.n_inputs)]
     *lines, summary = tree.text(names, [manifest.grasps[int(label)] for label in tree.classes]).split("\n")
     said = sentence(f"{summary}; 0 leads to where the switch is open, 1 to where it is closed")

@@ -94,7 +94,7 @@ def test_words_name_levels_and_taxels(found: tuple[Path, Frontier]) -> None:
     frontier = found[1]
     point = next(point for point in frontier.points if point.setting.levels and len(conversions(point)) > 1)
     levels = len([name for name in point.switches if taxel_and_code(name)])
-    assert f"{levels} levels of {len(conversions(point))} taxels" in inputs_of(point)
+    assert f"{len(conversions(point))} of 4 pads ({levels} levels)" in inputs_of(frontier, point)
     assert " of 4 taxels" in summary(frontier) or "joints, read" in summary(frontier)
 
 

@@ -132,7 +132,7 @@ def test_a_click_on_a_point_shows_its_switches_on_the_hand(opened: Reader, front
 
 def test_hovering_over_a_point_describes_it_and_marks_its_row(opened: Reader) -> None:
     marker = opened.marker("by-frontier", 2)
-    assert opened.script("return arguments[0].querySelector('title').textContent", marker).startswith("Point 2: 10 swi")  # type: ignore[attr-defined]
+    assert opened.script("return arguments[0].querySelector('title').textContent", marker).startswith("Point 2: 10 of ")  # type: ignore[attr-defined]
     ActionChains(opened.driver).move_to_element(marker.find_element(By.CSS_SELECTOR, ".target")).perform()
     opened.wait(lambda: opened.driver.find_elements(By.CSS_SELECTOR, "#points tr.near[data-point='2']"))
     ActionChains(opened.driver).move_to_element(opened.driver.find_element(By.ID, "picked-heading")).perform()

@@ -1,6 +1,5 @@
 """What the sections are made of."""
 
-from copy import copy
 from dataclasses import replace
 
 import msgspec
@@ -47,17 +46,14 @@ def test_the_commonest_mistakes_are_named_first_and_hits_never(counts: np.ndarra
 
 def test_the_tree_has_a_line_for_each_node_and_a_large_one_is_cut(bare: ReportContent) -> None:
     assert bare.tree is not None
-    lines, said = tree_text(bare)
+    lines, said = tree_text(bare.tree, bare.manifest)
     assert len(lines.split("\n")) == len(bare.tree.nodes)
     assert all(name in lines for name in bare.switch_names)
     assert "shown" not in said
     random = np.random.default_rng(3)
     tree = grow_id3(random.random((6000, 30)) < 0.5, random.integers(0, 4, 6000))
-    names = [replaced(bare.manifest.switches[0], name=f"x{number}") for number in range(len(tree.inputs))]
-    large = copy(bare)
-    object.__setattr__(large, "tree", tree)
-    object.__setattr__(large, "manifest", replaced(bare.manifest, switches=tuple(names)))
-    lines, said = tree_text(large)
+    names = tuple(replaced(bare.manifest.switches[0], name=f"x{number}") for number in range(len(tree.inputs)))
+    lines, said = tree_text(tree, replaced(bare.manifest, switches=names))
     assert len(lines.split("\n")) == MOST_LINES < len(tree.nodes)
     assert "thenar place --draw draws all of them" in said
 
@@ -97,7 +93,7 @@ def test_a_placement_without_a_tree_names_its_method_and_shows_no_shares(bare: R
     chosen = msgspec.structs.replace(bare.manifest.options, **options)
     content = replace(bare, manifest=msgspec.structs.replace(bare.manifest, options=chosen), tree=None)
     assert "Together" not in kept_table(content).columns
-    assert tree_text(content) == ("", "No tree: the switches were chosen by elimination.")
+    assert tree_text(content.tree, content.manifest) == ("", "No tree: the switches were chosen by elimination.")
     how, bits = placement_sentences(content)
     assert how.endswith("(--method elimination).")
     assert "together" not in bits
