@@ -99,7 +99,7 @@ mutants: $(VENV)/installed  ## 200 small deliberate faults, drawn over all rooms
 	env -u THENAR_REQUIRE_ALL $(BIN)/python tests/mutants/mutants.py .mutants
 
 bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in the same run
-	@$(BIN)/python -c "from thenar.compiler.frontier.timing.classify_times import machine_name; print(machine_name())"
+	@$(BIN)/python -c "from thenar.compiler.frontier.price import machine_name; print(machine_name())"
 	$(BIN)/python benchmarks/id3.py
 	$(BIN)/python benchmarks/boosting.py
 	$(BIN)/python benchmarks/runtime.py

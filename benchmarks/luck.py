@@ -26,7 +26,7 @@ from thenar.compiler.frontier.price import Equipment, equipment_for
 from thenar.compiler.frontier.screen import screen
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, Survey
-from thenar.compiler.frontier.timing.wirings import wirings
+from thenar.compiler.frontier.wirings import wirings
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.merging import merge
 from thenar.compiler.samples import Samples

@@ -20,7 +20,7 @@ from sklearn.ensemble import GradientBoostingClassifier
 from synthetic import grasp_like
 
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.frontier.timing.classify_times import machine_name
+from thenar.compiler.frontier.price import machine_name
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime import Build

@@ -29,15 +29,6 @@ PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
             "baseline-2": ("#a3457c", "#ec9bc6"),
             "baseline-3": ("#6b6b6b", "#a9a9a9"),
         },
-        # The same nearer to the ink, for letters.
-        **{
-            "switches-text": ("#10405d", "#b6d3f6"),
-            "joints-text": ("#105244", "#a9dbc7"),
-            "both-text": ("#653816", "#f1ccb5"),
-            "baseline-1-text": ("#533f16", "#e4d3ae"),
-            "baseline-2-text": ("#512e47", "#e9cbdf"),
-            "baseline-3-text": ("#3b3d40", "#ced1d4"),
-        },
         **{"picked": ("#d1242f", "#ff6b74"), "hit": ("#1f5fa8", "#4b93dd"), "miss": ("#c2410c", "#e8743b")},
         **{"leaf": ("#cfe6d4", "#23482f"), "decision": ("#d3e0f2", "#24405f")},
         **{"skin": ("#f9f1e9", "#2a2622"), "side": ("#eee3d8", "#221f1c"), "outline": ("#57493e", "#b8a594")},
@@ -49,12 +40,6 @@ PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
 def on_paper(name: str) -> str:
     """Return a colour of PALETTE for files."""
     return PALETTE[name][0]
-
-
-def for_letters(colour: str) -> str:
-    """Return the colour of letters that belong to something drawn in a light colour of PALETTE."""
-    names = [name for name, (light, _) in PALETTE.items() if light == colour and f"{name}-text" in PALETTE]
-    return on_paper(f"{names[0]}-text") if names else colour
 
 
 def colour_variables(names: Collection[str] = PALETTE) -> str:

@@ -311,7 +311,7 @@ class BuildAssembly:
         return drawn_hand(manifest, self.hand, names[:taxels], names[taxels:], codes)
 
     def _page(self, manifest: Manifest, tables: bytes, hand: bytes) -> bytes | None:
-        from ..tryout.writing import try_html
+        from ..report.tryout import try_html
 
         kept = self.recogniser.read(self.recogniser.samples)
         rows = kept.switches, kept.codes, kept.labels

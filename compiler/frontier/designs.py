@@ -16,12 +16,11 @@ from ..trainers.base import TRAINERS, Training
 from .finalists import EvaluatedFinalist
 from .latency import POLICIES
 from .points import DecisionKind, FrontierPoint, Latency, PointSetting, PointTime, front
-from .price import PricedTables
+from .price import Classified, PricedTables
 from .screen import Screened
 from .search import placement_of
 from .survey import Cuts, Survey, TrialAccuracy
-from .timing.classify_times import Classified
-from .timing.scan_times import NO_TIME, ScanTimes
+from .wirings import NO_TIME, ScanTimes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,11 +85,10 @@ def best_designs(several: Sequence[Design]) -> tuple[list[Design], list[Design]]
 
     Of equal designs, take the one with fewer chips, then fewer ports, less reading and less flash.
     """
-    times = {design: design.frame.us for design in several}
-    cheapest = sorted(several, key=_effort)
-    by_time = front(cheapest, times.__getitem__, lambda design: design.rate)
-    cheapest.sort(key=times.__getitem__)
-    return by_time, front(cheapest, lambda design: design.n_switches, lambda design: design.rate)
+    several = sorted(several, key=_effort)
+    by_time = front(several, lambda design: design.frame.us, lambda design: design.rate)
+    several.sort(key=lambda design: design.frame.us)
+    return by_time, front(several, lambda design: design.n_switches, lambda design: design.rate)
 
 
 def lucks(
@@ -106,10 +104,10 @@ def lucks(
     were only screened. Of two fronts the greater optimism counts.
     """
     # Not all tables were priced: those of the same shape take nearly the same time.
-    quickest: dict[tuple[EvaluatedFinalist, Recipe], float] = {}
+    quickest = dict[tuple[EvaluatedFinalist, Recipe], float]()
     for design in several:
-        key = (design.close, changed_to(design.tables.recipe, rounds=None))
-        quickest[key] = min(design.frame.us, quickest.get(key, np.inf))
+        recipe = changed_to(design.tables.recipe, rounds=None)
+        quickest[design.close, recipe] = min(design.frame.us, quickest.get((design.close, recipe), np.inf))
     closes = list(dict.fromkeys(design.close for design in several))
     chosen = {close.screened.choice for close in closes}
     picked_from = [
@@ -126,8 +124,8 @@ def lucks(
     found: dict[TrialAccuracy, float] = {}
     prices: tuple[Callable[[Design], float], ...] = (lambda design: design.frame.us, lambda design: design.n_switches)
     for best, price, cost in zip(fronts, prices, costs, strict=True):
-        limits = [*(price(design) for design in best[1:]), np.inf]
-        for design, luck in zip(best, draws.luck(np.array(cost), limits), strict=True):
+        beyond = [price(design) for design in best[1:]]
+        for design, luck in zip(best, draws.luck(np.array(cost), [*beyond, np.inf]), strict=True):
             # As a share: the draws count hits in all repeats.
             found[design.judged] = max(luck / most, found.get(design.judged, 0.0))
     return found
@@ -148,14 +146,14 @@ def points_of(
     points = []
     for number, (design, kind) in enumerate(found, 1):
         wired, close, recipe = design.wired, design.close, design.tables.recipe
-        choice, lucky = close.screened.choice, luck[design.judged]
+        choice = close.screened.choice
         points.append(
             FrontierPoint(
                 number=number,
-                setting=_setting(recipe, kind, wired, survey.training(choice)),
+                setting=_setting(design, kind, survey.training(choice)),
                 switches=survey.names(choice),
-                rate=corrected(design.judged.rate, lucky),
-                luck=lucky,
+                rate=corrected(design.judged.rate, luck[design.judged]),
+                luck=luck[design.judged],
                 frames=close.frames.get(recipe),
                 other_rate=close.other.get(recipe),
                 scan=design.scan,
@@ -180,8 +178,8 @@ def _fronts(several: Sequence[Design], latencies: Latencies) -> dict[tuple[Desig
         for design in best:
             found[design, "single"] += (name,)
     for kind in POLICIES:
-        waits = {design: latencies[design, kind].mean_us for design in several}
-        for design in front(list(waits), waits.__getitem__, lambda design: design.rate):
+        waiting = ((latencies[design, kind].mean_us, design) for design in several)
+        for _, design in front(list(waiting), lambda pair: pair[0], lambda pair: pair[1].rate):
             found[design, kind] += ("latency",)
     return found
 
@@ -193,9 +191,9 @@ def corrected(rate: Rate, luck: float) -> Rate:
     return replace(rate, mean=max(rate.mean - luck, 0.0), low=max(rate.low - luck, 0.0))
 
 
-def _setting(recipe: Recipe, kind: DecisionKind, wired: ScanTimes | None, training: Training) -> PointSetting:
+def _setting(design: Design, kind: DecisionKind, training: Training) -> PointSetting:
     """Return the choices of a point: of its recipe, and what the recipe leaves open."""
-    trainer = TRAINERS.named(training.trainer)
+    wired, recipe, trainer = design.wired, design.tables.recipe, TRAINERS.named(training.trainer)
     usual = {setting.name: setting.default for setting in trainer.settings}
     own: dict[str, Any] = {name: value for name, value in training.settings.items() if value not in (usual[name], None)}
     return PointSetting(

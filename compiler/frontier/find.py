@@ -39,8 +39,7 @@ from .replay import Replay, replay_of
 from .screen import Screened, screen, screen_fewer, screen_others
 from .search import TAXEL_LEVELS, Search, placement_of
 from .survey import Cuts, Survey
-from .timing.scan_times import records_of
-from .timing.wirings import is_avr, wirings
+from .wirings import is_avr, records_of, wirings
 from .words import csv_bytes
 
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.sqlite"

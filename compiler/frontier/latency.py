@@ -72,7 +72,7 @@ def latencies(
     movements  the same rows with those in which nothing is held: segments use tables trained with these rows, and costs
                learnt from them. None: segments have the default costs; seed: of the folds for that
     """
-    replay, columns = replay.reading(selection.kept, selection.joints), range(len(selection.kept))
+    replay = replay.reading(selection.kept, selection.joints)
     recipes = tuple(dict.fromkeys(recipe for recipe, _ in frames))
     tables = dict(tables_of(samples, rows, selection, recipes, training))
     segments = segment_tables(movements, seed, selection, recipes, training) if movements else {}
@@ -80,8 +80,8 @@ def latencies(
     def of(recipe: Recipe, frame_us: float, kind: DecisionKind) -> Latency:
         if kind == "segments" and recipe in segments:
             made, model = segments[recipe]
-            return latency(made, columns, replay, frame_us, model)
-        return latency(tables[recipe], columns, replay, frame_us, POLICIES[kind])
+            return latency(made, replay, frame_us, model)
+        return latency(tables[recipe], replay, frame_us, POLICIES[kind])
 
     return tuple(tuple(of(recipe, frame_us, kind) for kind in POLICIES) for recipe, frame_us in frames)
 
@@ -132,13 +132,9 @@ def segment_tables(
     }
 
 
-def latency(
-    tables: IntegerTables, columns: Sequence[int], replay: Replay, frame_us: float, policy: Deciding
-) -> Latency:
+def latency(tables: IntegerTables, replay: Replay, frame_us: float, policy: Deciding) -> Latency:
     """Return the latency of tables on a replay with one frame every frame_us, in integer microseconds; one every
-    LEAST_STEP_US if frames are shorter.
-
-    columns  the tables' switches as columns of the replay, in the tables' order; of its joints they take all, or none
+    LEAST_STEP_US if frames are shorter. The tables take all switches of the replay, and all of its joints or none.
 
     Only grasps whose type differs from the one before count: the same type may still be decided on from before.
 
@@ -150,10 +146,10 @@ def latency(
 
     Raises FrontierError if the tables are not for these inputs, the replay has no grasps, or a frame takes no time.
     """
-    _check(tables, columns, replay, frame_us)
+    _check(tables, replay, frame_us)
     takes_us = max(round(frame_us), 1)
     step_us = max(takes_us, LEAST_STEP_US)
-    frames, types = decided_on(tables, columns, replay, step_us, policy)
+    frames, types = decided_on(tables, replay, step_us, policy)
     # From predicted_us[i] on types[i] is predicted.
     predicted_us = frames * step_us + takes_us
     counted = list(_grasps(replay))
@@ -198,14 +194,12 @@ def _bounds_us(replay: Replay) -> Times:
     return np.append(replay.stream.at_us, np.int64(replay.stream.end_us))
 
 
-def decided_on(
-    tables: IntegerTables, columns: Sequence[int], replay: Replay, step_us: int, policy: Deciding
-) -> tuple[Times, NDArray[np.intp]]:
+def decided_on(tables: IntegerTables, replay: Replay, step_us: int, policy: Deciding) -> tuple[Times, NDArray[np.intp]]:
     """Return the decisions under `policy` on a replay with a frame every step_us, the first at its start; of segments,
     the held types. Both devices show each frame whole, at the same time.
     """
     rows, codes = replay.stream.rows, replay.codes[:, : None if tables.n_joints else 0]
-    scores = tables.scores(replay.bits[rows][:, list(columns)], codes[rows])
+    scores = tables.scores(replay.bits[rows], codes[rows])
     return decisions(scores, _bounds_us(replay), step_us, decider_of(tables, policy))
 
 
@@ -249,18 +243,15 @@ def _by_segments(tables: IntegerTables, model: SegmentModel | None) -> Decide:
     return decide
 
 
-def _check(tables: IntegerTables, columns: Sequence[int], replay: Replay, frame_us: float) -> None:
+def _check(tables: IntegerTables, replay: Replay, frame_us: float) -> None:
     switches, joints = replay.bits.shape[1], replay.codes.shape[1]
-    if tables.n_switches != len(columns) or tables.n_joints not in (0, joints):
+    if tables.n_switches != switches or tables.n_joints not in (0, joints):
         raise FrontierError(
-            f"tables of {tables.n_switches} switches and {tables.n_joints} joints, for {len(columns)} and {joints}"
+            f"tables of {tables.n_switches} switches and {tables.n_joints} joints, for {switches} and {joints}"
         )
     most = max((grasp.state for grasp in replay.grasps), default=NOTHING)
-    if any(not 0 <= column < switches for column in columns) or most >= tables.n_classes:
-        raise FrontierError(
-            f"a stream of {switches} switches and types up to {most} does not fit these switches and "
-            f"{tables.n_classes} types"
-        )
+    if most >= tables.n_classes:
+        raise FrontierError(f"a stream of types up to {most} does not fit {tables.n_classes} types")
     if not (math.isfinite(frame_us) and frame_us > 0):
         raise FrontierError(f"a frame of {frame_us} us: it must take some time")
     if not replay.grasps:

@@ -15,7 +15,7 @@ from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
 from ..trainers.base import TRAINERS
 from .points import MAX_BYTES, Frontier, FrontierError, FrontierPoint, frontier_from_bytes
-from .timing.wirings import AS_WIRED, BOARD, WiringOption
+from .wirings import AS_WIRED, BOARD, WiringOption
 
 
 @dataclass(frozen=True, slots=True)

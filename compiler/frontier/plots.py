@@ -1,7 +1,7 @@
 """A frontier's pictures: accuracy against the time of a frame, the number of switches and the decision latency."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
@@ -12,9 +12,8 @@ from thenar.runtime.recipe import Inputs
 from ..evaluation.rates import Rate
 from ..pictures import on_paper, painting, rendered
 from ..text import counted, duration, percent
-from .labels import ChartLabel, Labels
 from .points import Curve, Frontier, FrontierPoint, ReferencePoint, Tried, front
-from .words import counted_elements, elements_of, featured, inputs_of, of_time, shorten
+from .words import elements_of, featured, inputs_of, mark_name, of_time, shorten
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +26,7 @@ _INK, _GREY, _PALE, _WHITE, _PICKED = map(on_paper, ("ink", "soft", "line", "pap
 # Shapes as well as colours, for the colour-blind.
 _COLOURS: dict[Inputs, str] = {inputs: on_paper(inputs) for inputs in ("switches", "joints", "both")}
 _SHAPES: dict[Inputs, str] = {"switches": "o", "joints": "^", "both": "s"}
+_MARKS = ("X", "P", "D", "v")
 _NAMES: dict[Inputs, str] = {"switches": "switches alone", "joints": "joints alone", "both": "switches and joints"}
 # Our curves are blue, like switches alone everywhere; dashes distinguish curves of one colour.
 _BASELINES = tuple(on_paper(f"baseline-{number}") for number in (1, 2, 3))
@@ -35,11 +35,11 @@ _DASHES: "tuple[Dash, ...]" = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 
 POINT_ID, RING_ID = "point-", "featured"
 
 _WIDTH, _HEIGHT = 9.0, 5.4  # inches
-_LEFT, _RIGHT, _BOTTOM, _TOP = 0.72, 0.18, 0.58, 1.02  # inches around the axes
+_LEFT, _RIGHT, _BOTTOM, _TOP = 0.72, 0.18, 0.58, 0.72  # inches around the axes
 _SIZE, _MARK_SIZE, _TRIED_SIZE = 34.0, 52.0, 9.0  # square points
+_NUMBER = (13.0, 9.0)  # width and height of a number, in points of 1/72 inch
 _LOWEST = 1.0  # microseconds or switches: a logarithmic axis has no 0, and nothing takes less
 _FEW = 16  # switches: curves may leave the picture below the rate of this many
-_DECISIONS = {"single": "one frame", "dwell": "dwell", "sequential": "sequential test", "segments": "segments"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,6 @@ class _Cost:
     front       the front whose points are filled and joined by a line called `best`; "": all are filled, none joined
     of_point, of_mark, of_tried  horizontal positions; None: not on this picture
     end         right end of a line from a point; None: no line
-    words       label of a point
     """
 
     title: str
@@ -60,7 +59,6 @@ class _Cost:
     front: str = ""
     best: str = ""
     end: Callable[[FrontierPoint], float | None] = lambda _: None
-    words: Callable[[FrontierPoint], str] = lambda _: ""
 
     @property
     def is_time(self) -> bool:
@@ -77,7 +75,6 @@ _FRAME = _Cost(
     of_tried=lambda tried: tried.frame_us,
     front="frame",
     best="the best for its time",
-    words=inputs_of,
 )
 _SWITCHES = _Cost(
     title="Accuracy against the number of switches",
@@ -95,7 +92,6 @@ _LATENCY = _Cost(
     front="latency",
     best="the best for its latency",
     end=lambda point: point.latency.p99_us if point.latency.p99_us != point.latency.mean_us else None,
-    words=lambda point: _DECISIONS[point.setting.decision],
 )
 
 
@@ -138,34 +134,35 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     axis = of_time(frontier, axis) if cost.is_time else axis
     axes.set_xlabel(axis + "; reading the joints is left out" * untimed, color=_INK)
 
-    labels, spoken_of = Labels(axes), featured(frontier)
+    said = duration if cost.is_time else lambda _: ""
     _draw_tried(axes, tried)
     if cost.front == "frame" and len(frontier.trainers) > 1:
         _draw_trainers(axes, tried)
     if cost.is_time:
         _draw_best(axes, [(x, point.rate.mean) for x, point in points if cost.front in point.fronts], cost.best)
     _draw_ends(axes, ends)
-    names = list(_draw_curves(axes, curves))
-    _draw_points(labels, points, cost.front, elements_of(frontier))
-    _draw_marks(labels, marks)
+    _draw_curves(axes, curves)
+    _draw_points(axes, points, cost.front, elements_of(frontier))
+    _draw_whiskers(axes, [(x, mark.rate) for x, mark in marks], _INK)
+    for number, (x, mark) in enumerate(marks):
+        look: dict[str, Any] = {"marker": _MARKS[number % len(_MARKS)], "color": _INK, "edgecolor": _WHITE, "lw": 0.8}
+        named = _named(shorten(mark_name(mark, frontier)), said(x), mark.rate)
+        axes.scatter([x], [mark.rate.mean], s=_MARK_SIZE, zorder=4.5, label=named, **look)
+    spoken_of = featured(frontier)
+    _draw_numbers(axes, sorted(points, key=lambda place: place[1] is not spoken_of))
     for x, point in points:
         if point is spoken_of:
-            y = point.rate.mean
-            axes.scatter(
-                [x], [y], s=4.5 * _SIZE, marker="o", facecolor="none", edgecolor=_PICKED, lw=1.6, zorder=5, gid=RING_ID
-            )
-            axes.scatter([], [], s=2 * _SIZE, facecolor="none", edgecolor=_PICKED, lw=1.6, label="picked")
-    _draw_key(axes)
-    # Largest labels first.
-    said = duration if cost.is_time else lambda _: ""
-    labels.write(*(_loud_label(x, point, said(x)) for x, point in points if point is spoken_of))
-    labels.write(*names, *(_mark_label(x, mark, said(x), frontier) for x, mark in marks))
-    several = len(frontier.trainers) > 1
-    for x, point in points:
-        if point is not spoken_of:
-            words = (cost.words(point), *([point.setting.trainer] if several else ()))
-            labels.write(_point_label(x, point, ", ".join(words) if words[0] else ""))
+            ring: dict[str, Any] = {"facecolor": "none", "edgecolor": _PICKED, "lw": 1.6, "zorder": 5}
+            named = _named(f"point {point.number}: {inputs_of(frontier, point)}", said(x), point.rate)
+            axes.scatter([x], [point.rate.mean], s=4.5 * _SIZE, gid=RING_ID, **ring)
+            axes.scatter([], [], s=2 * _SIZE, label=named, **ring)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="best", fontsize=FONT - 1, edgecolor=_PALE, labelspacing=0.35)
     return figure
+
+
+def _named(name: str, cost: str, rate: Rate) -> str:
+    return ", ".join(filter(None, (name, cost, percent(rate.mean))))
 
 
 # Call inside `painting`.
@@ -241,13 +238,6 @@ def _scale_rates(axes: "Axes", shown: Sequence[Rate], by: str) -> None:
     axes.set_ylabel(f"accuracy: trials, {by}", color=_INK)
 
 
-def _draw_key(axes: "Axes") -> None:
-    """Draw the legend of all labelled shapes and lines above the axes."""
-    if axes.get_legend_handles_labels()[0]:
-        place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.012, 0.995), "ncols": 6, "frameon": False}
-        axes.legend(**place, fontsize=FONT, handletextpad=0.35, columnspacing=1.4, handlelength=1.3)
-
-
 def _draw_tried(axes: "Axes", tried: Sequence[tuple[float, Tried]]) -> None:
     """Draw the screened placements, faintly."""
     if not tried:
@@ -283,29 +273,35 @@ def _draw_best(axes: "Axes", best: Iterable[tuple[float, float]], name: str) -> 
     axes.fill_between(xs, ys, axes.get_ylim()[0], step="post", color=_INK, alpha=0.04, lw=0, zorder=0.5)
 
 
-def _draw_points(labels: Labels, points: Sequence[tuple[float, FrontierPoint]], best: str, kept: str) -> None:
+def _draw_points(axes: "Axes", points: Sequence[tuple[float, FrontierPoint]], best: str, kept: str) -> None:
     """Draw points with intervals: those of the front `best` filled, the others hollow; all filled without a front.
     `kept` names the elements, such as "switches".
     """
-    hollow = [point for _, point in points if best and best not in point.fronts]
     for inputs, colour in _COLOURS.items():
         some = [(x, point) for x, point in points if point.setting.inputs == inputs]
-        _draw_whiskers(labels.axes, [(x, point.rate) for x, point in some], colour)
-        for face, drawn in (
-            (colour, [(x, point) for x, point in some if point not in hollow]),
-            (_WHITE, [(x, point) for x, point in some if point in hollow]),
-        ):
-            for x, point in drawn:
-                look: dict[str, Any] = {"marker": _SHAPES[inputs], "facecolor": face, "edgecolor": colour}
-                gid = f"{POINT_ID}{point.number}"
-                labels.axes.scatter([x], [point.rate.mean], s=_SIZE, lw=1.2, zorder=4, gid=gid, **look)
-            labels.avoid([x for x, _ in drawn], [point.rate.mean for _, point in drawn])
+        _draw_whiskers(axes, [(x, point.rate) for x, point in some], colour)
+        for x, point in some:
+            y, face = point.rate.mean, _WHITE if best and best not in point.fronts else colour
+            look: dict[str, Any] = {"marker": _SHAPES[inputs], "facecolor": face, "edgecolor": colour}
+            axes.scatter([x], [y], s=_SIZE, lw=1.2, zorder=4, gid=f"{POINT_ID}{point.number}", **look)
         if some:
-            labels.axes.scatter(
-                [], [], s=_SIZE, marker=_SHAPES[inputs], color=colour, label=_NAMES[inputs].replace("switches", kept)
-            )
-    if hollow:
-        labels.axes.scatter([], [], s=_SIZE, facecolor=_WHITE, edgecolor=_GREY, lw=1.2, label="not the best here")
+            name = _NAMES[inputs].replace("switches", kept)
+            axes.scatter([], [], s=_SIZE, marker=_SHAPES[inputs], color=colour, label=name)
+    if best and any(best not in point.fronts for _, point in points):
+        axes.scatter([], [], s=_SIZE, facecolor=_WHITE, edgecolor=_GREY, lw=1.2, label="not the best here")
+
+
+def _draw_numbers(axes: "Axes", points: Iterable[tuple[float, FrontierPoint]]) -> None:
+    """Write the number of each point beside it, unless it would lie on the number of one before it."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    written: list[tuple[float, float]] = []
+    for x, point in points:
+        right, up = axes.transData.transform((x, point.rate.mean)) * (72 / figure.dpi)
+        if all(abs(right - left) > _NUMBER[0] or abs(up - low) > _NUMBER[1] for left, low in written):
+            written.append((right, up))
+            style: dict[str, Any] = {"textcoords": "offset points", "fontsize": FONT - 1, "color": _INK, "zorder": 6}
+            axes.annotate(f"{point.number}", (x, point.rate.mean), (4, 3), **style)
 
 
 def _draw_ends(axes: "Axes", ends: Iterable[tuple[float, float, FrontierPoint]]) -> None:
@@ -314,14 +310,6 @@ def _draw_ends(axes: "Axes", ends: Iterable[tuple[float, float, FrontierPoint]])
         level = (point.rate.mean, point.rate.mean)
         colour = _COLOURS[point.setting.inputs]
         axes.plot((start, end), level, color=colour, lw=0.9, alpha=0.45, marker="|", ms=5, markevery=[1])
-
-
-def _draw_marks(labels: Labels, marks: Sequence[tuple[float, ReferencePoint]]) -> None:
-    """Draw marks with their intervals."""
-    _draw_whiskers(labels.axes, [(x, mark.rate) for x, mark in marks], _INK)
-    xs, ys = [x for x, _ in marks], [mark.rate.mean for _, mark in marks]
-    labels.axes.scatter(xs, ys, s=_MARK_SIZE, marker="X", color=_INK, edgecolor=_WHITE, lw=0.8, zorder=4.5)
-    labels.avoid(xs, ys)
 
 
 def _draw_whiskers(axes: "Axes", shown: Sequence[tuple[float, Rate]], colour: str) -> None:
@@ -334,47 +322,18 @@ def _shown(curves: tuple[Curve, ...]) -> list[Rate]:
     return [rate for size, rate in pairs if size >= _FEW] or [rate for _, rate in pairs]
 
 
-def _draw_curves(axes: "Axes", curves: Sequence[Curve]) -> Iterator[ChartLabel]:
-    """Draw ours and the baselines' curves, and yield their names, ours first."""
-    ours, baselines = ([curve for curve in curves if curve.ours == wanted] for wanted in (True, False))
-    for number, curve in enumerate(ours):
-        yield from _draw_curve(axes, curve, _COLOURS["switches"], _DASHES[number % len(_DASHES)])
-    for number, curve in enumerate(baselines):
-        turn, colour = divmod(number, len(_BASELINES))
-        yield from _draw_curve(axes, curve, _BASELINES[colour], _DASHES[turn % len(_DASHES)])
-
-
-def _draw_curve(axes: "Axes", curve: Curve, colour: str, dash: "Dash") -> Iterator[ChartLabel]:
-    pairs = [(size, rate) for size, rate in zip(curve.sizes, curve.rates, strict=True) if size >= 1]
-    if not pairs:
-        return
-    xs, means = [size for size, _ in pairs], [rate.mean for _, rate in pairs]
-    width, shade, above = (2.4, 0.10, 3) if curve.ours else (1.1, 0.04, 2)
-    axes.plot(xs, means, color=colour, lw=width, ls=dash, zorder=above)
-    lows, highs = [rate.low for _, rate in pairs], [rate.high for _, rate in pairs]
-    axes.fill_between(xs, lows, highs, color=colour, alpha=shade, lw=0, zorder=1)
-    places = tuple(zip(xs, means, strict=True))
-    seen = tuple(place for place in places if place[1] >= axes.get_ylim()[0])
-    yield ChartLabel(seen or places, (shorten(curve.method),), colour, size=9.0 if curve.ours else 8.0, bold=curve.ours)
-
-
-def _loud_label(x: float, point: FrontierPoint, cost: str) -> ChartLabel:
-    text = f"point {point.number}: {inputs_of(point)}\n{_and_rate(cost, point.rate)}"
-    return ChartLabel(((x, point.rate.mean),), (text,), _INK, size=9.5, bold=True)
-
-
-def _point_label(x: float, point: FrontierPoint, words: str) -> ChartLabel:
-    """Return the label of a point, with just its number as the short variant."""
-    texts = (f"{point.number}: {words}", str(point.number)) if words else (str(point.number),)
-    return ChartLabel(((x, point.rate.mean),), texts, _COLOURS[point.setting.inputs])
-
-
-def _mark_label(x: float, mark: ReferencePoint, cost: str, frontier: Frontier) -> ChartLabel:
-    name = shorten(mark.name)
-    if str(mark.n_switches) not in name:
-        name = f"{name} ({counted_elements(frontier, mark.n_switches)})"
-    return ChartLabel(((x, mark.rate.mean),), (f"{name}\n{_and_rate(cost, mark.rate)}",), _INK)
-
-
-def _and_rate(cost: str, rate: Rate) -> str:
-    return f"{cost}, {percent(rate.mean)}" if cost else percent(rate.mean)
+def _draw_curves(axes: "Axes", curves: Sequence[Curve]) -> None:
+    """Draw ours and the baselines' curves, ours first."""
+    ours, baselines = ([curve for curve in curves if curve.ours == whether] for whether in (True, False))
+    looks = [(_COLOURS["switches"], _DASHES[number % len(_DASHES)]) for number in range(len(ours))]
+    for number in range(len(baselines)):
+        turn, place = divmod(number, len(_BASELINES))
+        looks.append((_BASELINES[place], _DASHES[turn % len(_DASHES)]))
+    for curve, (colour, dash) in zip((*ours, *baselines), looks, strict=True):
+        pairs = [(size, rate) for size, rate in zip(curve.sizes, curve.rates, strict=True) if size >= 1]
+        xs, rates = [size for size, _ in pairs], [rate for _, rate in pairs]
+        width, shade, above = (2.4, 0.10, 3) if curve.ours else (1.1, 0.04, 2)
+        means, name = [rate.mean for rate in rates], shorten(curve.method)
+        axes.plot(xs, means, color=colour, lw=width, ls=dash, zorder=above, label=name if pairs else None)
+        lows, highs = [rate.low for rate in rates], [rate.high for rate in rates]
+        axes.fill_between(xs, lows, highs, color=colour, alpha=shade, lw=0, zorder=1)

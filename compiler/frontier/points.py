@@ -225,16 +225,16 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 def front(
-    items: Sequence[_T], price: Callable[[_T], float], worth: Callable[[_T], float], step: float = STEP
+    several: Sequence[_T], price: Callable[[_T], float], worth: Callable[[_T], float], step: float = STEP
 ) -> list[_T]:
-    """Return the Pareto front, cheapest first: each item is worth more, by `step`, than every cheaper one before it.
+    """Return the Pareto front, cheapest first: each is worth more, by `step`, than every cheaper one before it.
 
-    Of equal prices the item worth most is taken, of equal worth too the first.
+    Of equal prices the one worth most is taken, of equal worth too the first.
     """
     best: list[_T] = []
-    for item in sorted(items, key=lambda item: (price(item), -worth(item))):
-        if not best or worth(item) >= worth(best[-1]) + step:
-            best.append(item)
+    for one in sorted(several, key=lambda one: (price(one), -worth(one))):
+        if not best or worth(one) >= worth(best[-1]) + step:
+            best.append(one)
     return best
 
 

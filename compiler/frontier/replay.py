@@ -147,8 +147,8 @@ def composed(trials: GraspSet, labels: Rows, *, seed: int, grasps: int = GRASPS)
     rest = np.append(np.zeros(n_switches, np.uint16), rest)
     contacts = np.hstack([trials.switches, trials.taxels], dtype=np.uint16)
     random = np.random.default_rng(seed)
-    order = _order(labels, grasps, random)
-    legs = list(_legs(contacts, rest, trials.codes, _open_hand(trials.codes, trials.joints), order, random))
+    rows = _order(labels, grasps, random)
+    legs = list(_legs(contacts, rest, trials.codes, _open_hand(trials.codes, trials.joints), rows, random))
     readings, poses, at_us = map(np.concatenate, zip(*legs, strict=True))
     ends = np.cumsum([len(leg_us) for _, _, leg_us in legs])
     # A leg ends with the state in which its grasp is complete.
@@ -157,7 +157,7 @@ def composed(trials: GraspSet, labels: Rows, *, seed: int, grasps: int = GRASPS)
         poses,
         readings[:, n_switches:],
         Stream(np.arange(len(at_us)), at_us, int(at_us[-1]) + HOLD_US[0]),
-        tuple(map(Span, (ends - 1).tolist(), ends.tolist(), labels[order].tolist())),
+        tuple(map(Span, (ends - 1).tolist(), ends.tolist(), labels[rows].tolist())),
         f"Latencies are over a stream composed of {grasps} single trials, each held for {HOLD_US[0] / 1e6:g} to "
         f"{HOLD_US[1] / 1e6:g} s, up to {TRANSITION_US / 1e6:g} s from one to the next: the recordings hold no whole "
         "movements.",
@@ -191,36 +191,30 @@ def _legs(
     rest: Codes,
     codes: Codes,
     opened: NDArray[np.float64],
-    order: list[int],
+    rows: list[int],
     random: np.random.Generator,
 ) -> Iterator[tuple[Codes, Codes, Times]]:
     """Yield the transition from each grasp to the next: contacts, codes and times of its states, the last its hold."""
     contact, pose, leaves_us = rest, opened, 0
-    for row in order:
-        lets_go = leaves_us + random.integers(0, RELEASE_US, len(rest))
-        grips = leaves_us + RELEASE_US + TRAVEL_US + random.integers(0, GRIP_US, len(rest))
-        open_us = np.where(contact != rest, lets_go, -_NEVER)
-        close_us = np.where(contacts[row] != rest, grips, _NEVER)
-        at_us, travelled = _changes(leaves_us, open_us, close_us, _path(pose, codes[row].astype(np.float64), opened))
+    for row in rows:
+        path, travels_us = _path(pose, codes[row].astype(np.float64), opened), leaves_us + RELEASE_US
+        opens_us = np.where(contact != rest, leaves_us + random.integers(0, RELEASE_US, len(rest)), -_NEVER)
+        grips_us = travels_us + TRAVEL_US + random.integers(0, GRIP_US, len(rest))
+        closes_us = np.where(contacts[row] != rest, grips_us, _NEVER)
+        records_us = travels_us + RECORD_US * np.arange(len(path)) if len(pose) else np.array([travels_us + TRAVEL_US])
+        contacts_us = opens_us[opens_us > -_NEVER], closes_us[closes_us < _NEVER]
+        at_us = np.unique(np.concatenate([[leaves_us], records_us, *contacts_us]).astype(np.int64))
         now = at_us[:, np.newaxis]
-        yield np.where(now < open_us, contact, np.where(now >= close_us, contacts[row], rest)), travelled, at_us
+        shown = np.where(now < opens_us, contact, np.where(now >= closes_us, contacts[row], rest))
+        yield shown, path[np.clip((at_us - travels_us) // RECORD_US, 0, len(path) - 1)], at_us
         contact, pose = contacts[row], codes[row].astype(np.float64)
         leaves_us = int(at_us[-1]) + int(random.integers(*HOLD_US))
 
 
-def _path(start: NDArray[np.float64], end: NDArray[np.float64], opened: NDArray[np.float64]) -> Codes:
-    """Return the codes (TRAVEL_US / RECORD_US + 1, j) along the path, including both ends."""
+def _path(pose: NDArray[np.float64], target: NDArray[np.float64], opened: NDArray[np.float64]) -> Codes:
+    """Return the codes (TRAVEL_US / RECORD_US + 1, j) along the path from a pose to another, including both."""
     t = np.arange(TRAVEL_US // RECORD_US + 1)[:, np.newaxis] / (TRAVEL_US // RECORD_US)
-    cubed, left = t * t * t, 1.0 - t
-    straight = start + (end - start) * (cubed * (10.0 - t * (15.0 - 6.0 * t)))
-    bent = straight + (opened - straight) * (_OPENING * _BUMP * cubed * cubed * left * left * left)
+    cubed, rest = t * t * t, 1.0 - t
+    straight = pose + (target - pose) * (cubed * (10.0 - t * (15.0 - 6.0 * t)))
+    bent = straight + (opened - straight) * (_OPENING * _BUMP * cubed * cubed * rest * rest * rest)
     return np.rint(bent).astype(np.uint16)
-
-
-def _changes(leaves_us: int, open_us: Times, close_us: Times, path: Codes) -> tuple[Times, Codes]:
-    """Return the times of all changes from the beginning of the release to the last, and the joints at these times."""
-    starts_us = leaves_us + RELEASE_US
-    records_us = starts_us + RECORD_US * np.arange(len(path)) if path.shape[1] else np.array([starts_us + TRAVEL_US])
-    changes = np.concatenate([[leaves_us], open_us[open_us > -_NEVER], records_us, close_us[close_us < _NEVER]])
-    at_us = np.unique(changes.astype(np.int64))
-    return at_us, path[np.clip((at_us - starts_us) // RECORD_US, 0, len(path) - 1)]

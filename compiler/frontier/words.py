@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 
 from thenar.runtime.manifest import in_words
 from thenar.runtime.names import printable, taxel_and_code
@@ -13,51 +13,22 @@ from ..sensors import SensorCount
 from ..text import cells, counted, duration, interval, listed, percent
 from .points import Frontier, FrontierPoint, PointSetting, PointTime, ReferencePoint
 
-COLUMNS = (
-    *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width"),
-    *("wiring", "clock_hz", "decision", "rate_of", "rate", "rate_low", "rate_high", "luck"),
-    *(
-        "frames_of",
-        "frames",
-        "frames_low",
-        "frames_high",
-        "other_rate_of",
-        "other_rate",
-        "other_rate_low",
-        "other_rate_high",
-        "scan_us",
-        "scan_how",
-        "transfer_us",
-        "transfer_how",
-    ),
-    *("classify_us", "classify_how", "frame_us", "frame_how", "latency_mean_us", "latency_p99_us", "missed", "wrong"),
-    *("flash", "ram", "ports", "chips", "switches", "joints"),
-)
-
-# Only written if a point's trainer, or one of its settings, is not the default.
-TRAINER_COLUMNS = ("trainer", "settings")
-
 _LONGEST = 40  # letters of a name on a picture
 _SPARED = 0.005  # rates within half a point count as equal
 
 
-def inputs_of(point: FrontierPoint) -> str:
-    """Return a point's inputs in words: "33 switches", "joints alone", "8 switches + joints"."""
-    if point.setting.inputs == "joints":
-        return f"{counted(len(point.joints), 'joint')} alone" if point.joints else "joints alone"
-    joints = [counted(len(point.joints), "joint") if point.joints else "joints"]
-    switches, levels, taxels = _kinds(point)
-    kept = [counted(switches, "switch", "switches")] if switches or not levels else []
-    kept += [f"{counted(levels, 'level')} of {counted(taxels, 'taxel')}"] if levels else []
-    return " + ".join(kept + (joints if point.setting.inputs == "both" else []))
-
-
-def _kinds(point: FrontierPoint) -> tuple[int, int, int]:
-    """Return how many switches and levels a point keeps, and of how many taxels."""
-    if point.setting.levels is None:
-        return len(point.switches), 0, 0
-    taxels = [level[0] for name in point.switches if (level := taxel_and_code(name))]
-    return len(point.switches) - len(taxels), len(taxels), len(set(taxels))
+def inputs_of(frontier: Frontier, point: FrontierPoint) -> str:
+    """Return what a point reads: "33 of 160 switches and 16 of 16 joints", "6 of 24 pads (14 levels)"."""
+    setting = point.setting
+    taxels = [level[0] for name in point.switches if setting.levels is not None and (level := taxel_and_code(name))]
+    switches, kept, inputs = len(point.switches) - len(taxels), len(set(taxels)), setting.inputs
+    count = SensorCount(
+        switches=(switches, frontier.n_switches) if inputs != "joints" else (0, 0),
+        pads=(kept, frontier.n_taxels) if inputs != "joints" else (0, 0),
+        joints=(len(point.joints) or frontier.n_joints, frontier.n_joints) if inputs != "switches" else (0, 0),
+        levels=len(taxels),
+    )
+    return str(count)
 
 
 def elements_of(frontier: Frontier) -> str:
@@ -137,11 +108,20 @@ def summary(frontier: Frontier) -> str:
         return f"Of {frontier.combinations:,} combinations none is a point of the frontier."
     trained = f", trained by {trainer_of(point.setting)}," if len(frontier.trainers) > 1 else ","
     said = (
-        f"Point {point.number}: {_inputs(frontier, point)}{trained} read and classified in "
+        f"Point {point.number}: {inputs_of(frontier, point)}{trained} read and classified in "
         f"{duration(point.frame.us)} on {frontier.machine}, reach {interval(point.rate)} % accuracy ({point.rate.what})"
     )
-    against = [_mark(mark, frontier) for mark in frontier.marks]
-    return ". ".join(filter(None, (f"{said}, against {listed(against)}" if against else said, luck_of(point)))) + "."
+    against = [
+        f"{percent(mark.rate.mean)} in {duration(mark.frame_us)} with {mark_name(mark, frontier)}"
+        for mark in frontier.marks
+    ]
+    said += f", against {listed(against)}." if against else "."
+    if round(100 * point.luck, 1):
+        said += (
+            f" Cross-validation gave {percent(point.rate.mean + point.luck)}; {100 * point.luck:.1f} points are "
+            "subtracted, because the best of many is picked by its luck, too."
+        )
+    return said
 
 
 LUCK = (
@@ -158,16 +138,6 @@ def folds_of(frontier: Frontier) -> str:
     return f"Pooled, trials: {counted(frontier.folds, 'fold')} of whole trials, {repeats}"
 
 
-def luck_of(point: FrontierPoint) -> str:
-    """Return the correction of a point's rate, with the reason, in a sentence without a full stop; or ""."""
-    if round(100 * point.luck, 1) == 0:
-        return ""
-    return (
-        f"Cross-validation gave {percent(point.rate.mean + point.luck)}; {100 * point.luck:.1f} points are subtracted, "
-        "because the best of many is picked by its luck, too"
-    )
-
-
 def rates_of(frontier: Frontier) -> dict[str, Callable[[FrontierPoint], Rate | None]]:
     """Return the kinds of rates of a point with their getters, first the one by which points are chosen; of trials
     unless the kind says frames.
@@ -180,18 +150,10 @@ def rates_of(frontier: Frontier) -> dict[str, Callable[[FrontierPoint], Rate | N
     return found
 
 
-def _inputs(frontier: Frontier, point: FrontierPoint) -> str:
-    switches, levels, taxels = _kinds(point)
-    joints, none = (len(point.joints) or frontier.n_joints, frontier.n_joints), (0, 0)
-    elements, inputs = ((switches, frontier.n_switches), (taxels, frontier.n_taxels)), point.setting.inputs
-    kept = elements if inputs != "joints" else (none, none)
-    return str(SensorCount(*kept, joints if inputs != "switches" else none, levels))
-
-
-def _mark(mark: ReferencePoint, frontier: Frontier) -> str:
+def mark_name(mark: ReferencePoint, frontier: Frontier) -> str:
+    """Return a mark's name with its number of elements: "all 160 switches", "35 switches (paper, S = 62)"."""
     named = str(mark.n_switches) in mark.name
-    name = mark.name if named else f"{counted_elements(frontier, mark.n_switches)} ({mark.name})"
-    return f"{percent(mark.rate.mean)} in {duration(mark.frame_us)} with {name}"
+    return mark.name if named else f"{counted_elements(frontier, mark.n_switches)} ({mark.name})"
 
 
 def of_time(frontier: Frontier, what: str) -> str:
@@ -200,42 +162,41 @@ def of_time(frontier: Frontier, what: str) -> str:
 
 
 def csv_bytes(frontier: Frontier) -> bytes:
-    """Return `frontier.csv`: UTF-8, a line of COLUMNS, perhaps with TRAINER_COLUMNS, and a line for each point.
+    """Return `frontier.csv`: UTF-8, a line of names, and a line for each point.
 
-    Rates are in 0..1, times in microseconds; `frames` and `other_rate` may be empty.
-    `fronts`, `switches` and `settings` are lists within a cell, separated by semicolons; names with a semicolon or a
-    quote are quoted as in CSV.
+    The columns of trainer and settings are only there if a point's are not the defaults. Rates are in 0..1, times in
+    microseconds; `frames` and `other_rate` may be empty. `fronts`, `switches` and `settings` are lists within a cell,
+    separated by semicolons; names with a semicolon or a quote are quoted as in CSV.
     """
     file = io.StringIO(newline="")
-    rows = csv.writer(file, lineterminator="\n")
-    usual = all(is_usual(point.setting) for point in frontier.points)
-    rows.writerow(COLUMNS if usual else COLUMNS + TRAINER_COLUMNS)
-    for point in frontier.points:
-        setting = point.setting
-        trained = () if usual else (setting.trainer, _list(_settings(setting)))
-        rows.writerow(cells((*_values(point), *trained)))
+    writer = csv.writer(file, lineterminator="\n")
+    rows = [_cells(point) for point in frontier.points]
+    if not all(is_usual(point.setting) for point in frontier.points):
+        for row, point in zip(rows, frontier.points, strict=True):
+            row.update(trainer=point.setting.trainer, settings=_list(_settings(point.setting)))
+    writer.writerows(list(row) for row in rows[:1])
+    writer.writerows(cells(row.values()) for row in rows)
     return file.getvalue().encode()
 
 
-def _values(point: FrontierPoint) -> Iterator[object]:
-    setting, latency = point.setting, point.latency
-    yield from (point.number, _list(point.fronts), len(point.switches), setting.inputs)
-    yield from (setting.placement.method, setting.placement.parameter, setting.rounds, setting.width)
-    yield from (setting.wiring, setting.clock_hz, setting.decision)
-    yield from (*_rate(point.rate), point.luck, *_rate(point.frames), *_rate(point.other_rate))
-    for time in (point.scan, point.transfer, point.classify, point.frame):
-        yield from _time(time)
-    yield from (latency.mean_us, latency.p99_us, latency.missed, latency.wrong)
-    yield from (point.flash, point.ram, point.ports, point.chips)
-    yield from (_list(point.switches), _list(point.joints))
-
-
-def _rate(rate: Rate | None) -> tuple[object, ...]:
-    return ("", "", "", "") if rate is None else (rate.what, rate.mean, rate.low, rate.high)
-
-
-def _time(time: PointTime) -> tuple[object, ...]:
-    return time.us, time.how
+def _cells(point: FrontierPoint) -> dict[str, object]:
+    setting, placement, latency = point.setting, point.setting.placement, point.latency
+    row: dict[str, object] = {"number": point.number, "fronts": _list(point.fronts), "n_switches": len(point.switches)}
+    row |= {"inputs": setting.inputs, "method": placement.method, "parameter": placement.parameter}
+    row |= {"rounds": setting.rounds, "width": setting.width, "wiring": setting.wiring, "clock_hz": setting.clock_hz}
+    row["decision"] = setting.decision
+    for name, rate in (("rate", point.rate), ("frames", point.frames), ("other_rate", point.other_rate)):
+        numbers = ("", "", "", "") if rate is None else (rate.what, rate.mean, rate.low, rate.high)
+        row |= zip((f"{name}_of", name, f"{name}_low", f"{name}_high"), numbers, strict=True)
+        if name == "rate":
+            row["luck"] = point.luck
+    for name in ("scan", "transfer", "classify", "frame"):
+        time: PointTime = getattr(point, name)
+        row |= {f"{name}_us": time.us, f"{name}_how": time.how}
+    row |= {"latency_mean_us": latency.mean_us, "latency_p99_us": latency.p99_us}
+    row |= {"missed": latency.missed, "wrong": latency.wrong}
+    row |= {"flash": point.flash, "ram": point.ram, "ports": point.ports, "chips": point.chips}
+    return row | {"switches": _list(point.switches), "joints": _list(point.joints)}
 
 
 def _list(names: Iterable[str]) -> str:

@@ -173,9 +173,9 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
         return "\n".join([*lines, _summary(self)])
 
 
-def sizes_of(tree: Tree, deepest: int | None = None) -> list[int]:
-    """Return the size of each node's subtree, the node included; only of nodes down to level `deepest`."""
-    sizes = [int(deepest is None or depth <= deepest) for depth in tree.depths]
+def sizes_of(tree: Tree) -> list[int]:
+    """Return the size of each node's subtree, the node included."""
+    sizes = [1] * len(tree.nodes)
     for number in reversed(range(1, len(tree.nodes))):
         sizes[tree.parents[number]] += sizes[number]
     return sizes

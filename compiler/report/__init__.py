@@ -1,1 +1,1 @@
-"""`report.html`: everything known about a build, in one file that works offline."""
+"""The pages of a build, each in one file that works offline: `report.html` shows it, `try.html` lets one try it."""

@@ -29,8 +29,7 @@ from ..frontier.words import (
 from ..hand import HandShape
 from ..pictures import PALETTE
 from ..text import DASH, NBSP, counted, interval, microseconds, sentence
-from .content import PlainTable
-from .hand import HandPicture, hand_picture
+from .content import HandPicture, PlainTable, hand_picture
 
 with optional():
     from markupsafe import Markup
@@ -171,7 +170,7 @@ def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
 
 def _detail(point: FrontierPoint, frontier: Frontier, hand: HandShape | None) -> PointDetail:
     setting = point.setting
-    what = (inputs_of(point), setting.placement.method, trainer_of(setting), f"{setting.width} bits")
+    what = (inputs_of(frontier, point), setting.placement.method, trainer_of(setting), f"{setting.width} bits")
     words = ", ".join(filter(None, (*what, _wiring(point))))
     return PointDetail(
         number=point.number,

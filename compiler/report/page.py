@@ -5,16 +5,13 @@ from functools import lru_cache, partial
 
 from thenar.drivers.extras import optional
 
-from ..movements.transitions import graph_of
 from ..pages import embedded, policy_hash, templates
 from ..pictures import colour_variables
 from ..sensors import SensorCount
 from ..text import sentence
-from . import results, sections
-from .content import ReportContent
+from . import sections
+from .content import HandPicture, ReportContent, hand_picture
 from .frontier import frontier_view
-from .hand import HandPicture, hand_picture
-from .tree import LINE, STEP, WORDS, TreeView, tree_view
 
 with optional():
     from jinja2 import Environment
@@ -36,13 +33,9 @@ def report_html(content: ReportContent) -> bytes:
         manifest=manifest,
         facts=partial(_facts, content),
         sections=sections,
-        results=results,
         hand=_hand(content),
-        tree=_tree(content),
-        icicle_size=(STEP, LINE, WORDS),
-        confusions=tuple(results.confusions(content)),
+        confusions=tuple(sections.confusions(content)),
         frontier=frontier,
-        graph=None if content.transitions is None else graph_of(content.transitions),
         style=Markup(colour_variables()) + _file(environment, "report.css"),
         script=script,
         script_sha256=policy_hash(script),
@@ -68,16 +61,6 @@ def _file(environment: Environment, name: str) -> Markup:
     """Return a file of the templates' folder verbatim."""
     assert environment.loader is not None
     return Markup(environment.loader.get_source(environment, name)[0])
-
-
-def _tree(content: ReportContent) -> TreeView | None:
-    tree = content.tree
-    if tree is None or not tree.inputs:
-        return None
-    # The kept elements are the inputs of the tree, in the order of its nodes.
-    kept = dict(zip(tree.inputs, content.switch_names, strict=True))
-    names = [kept.get(number, f"switch {number}") for number in range(tree.n_inputs)]
-    return tree_view(tree, names, content.manifest.grasps)
 
 
 def _hand(content: ReportContent) -> HandPicture | None:

@@ -1,26 +1,39 @@
-"""The sections on the build itself: summary, placement, guarantee, scan map and provenance."""
+"""The sections of a report, but for that on the frontier: the build itself, its accuracy, and its provenance."""
 
 import shlex
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import accumulate
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.model.terms.bit import Bit
 from thenar.runtime.recipe import AUTO
 from thenar.runtime.scanning.timing import port_us, reading_of
 
+from ..evaluation.populations import PROTOCOLS
 from ..evaluation.rates import RecipeWords, placement_words
+from ..evaluation.study import Study
+from ..evaluation.tables import RateTable, both
 from ..facts import recognises
-from ..model.faults import FaultCounts
+from ..movements.transitions import Transitions
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
-from ..text import NBSP, counted, microseconds, percent
+from ..placement.tree import Tree
+from ..text import NBSP, counted, microseconds, percent, sentence
 from ..trainers.base import TRAINERS
 from .content import PlainTable, ReportContent
 
 Pairs = tuple[tuple[str, str], ...]
+# Wider matrices are illegible; the list of the most frequent mistakes is not.
+WIDEST = 40
+_MOST = 5
+_SHADES = 9
+# Of a large tree, these lines are shown.
+MOST_LINES = 1000
 
 
 def headline(content: ReportContent) -> str:
@@ -115,11 +128,20 @@ def fit_table(manifest: Manifest) -> PlainTable | None:
     return PlainTable(caption, columns, tuple(rows)) if rows else None
 
 
-def no_tree(manifest: Manifest) -> str:
-    """Return why there is no tree."""
+def tree_text(tree: Tree | None, manifest: Manifest) -> tuple[str, str]:
+    """Return the tree that chose a build's switches, a line for each node, or "" without one; and a sentence on it."""
     if not manifest.switches:
-        return "No tree: no switches were chosen."
-    return f"No tree: the switches were chosen by {manifest.options.placement}."
+        return "", "No tree: no switches were chosen."
+    if tree is None:
+        return "", f"No tree: the switches were chosen by {manifest.options.placement}."
+    # The kept elements are the inputs of the tree, in the order of its nodes.
+    kept = dict(zip(tree.inputs, (switch.name for switch in manifest.switches), strict=True))
+    names = [kept.get(number, f"switch {number}") for number in range(tree.n_inputs)]
+    *lines, summary = tree.text(names, [manifest.grasps[int(label)] for label in tree.classes]).split("\n")
+    said = sentence(f"{summary}; 0 leads to where the switch is open, 1 to where it is closed")
+    if len(lines) > MOST_LINES:
+        said += f" The first {MOST_LINES:,} nodes are shown; thenar place --draw draws all of them."
+    return "\n".join(lines[:MOST_LINES]), said
 
 
 def worst_sentence(content: ReportContent) -> str:
@@ -158,7 +180,7 @@ def fault_table(content: ReportContent) -> PlainTable | None:
         return None
     names = (*content.switch_names, *(joint.name for joint in content.manifest.joints))
     rows = []
-    for one in _worst_first(found):
+    for one in sorted(range(len(found.lost)), key=found.lost.__getitem__):
         left, value = min(zip(found.stuck[one], found.values[one], strict=True), key=lambda pair: pair[0])
         rates = (f"{100 * count / found.total:.1f}" for count in (found.lost[one], left))
         less = f"{100 * (found.correct - found.lost[one]) / found.total:.1f}"
@@ -171,32 +193,20 @@ def fault_table(content: ReportContent) -> PlainTable | None:
     return PlainTable(caption, ("Input", "Lost", "Points less", "Stuck", "At"), tuple(rows), words=(0, 4))
 
 
-def _worst_first(found: FaultCounts) -> list[int]:
-    return sorted(range(len(found.lost)), key=found.lost.__getitem__)
-
-
-def fault_bars(content: ReportContent) -> tuple[tuple[str, float], ...]:
-    """Return the name of each input and the accuracy without it, the worst first: as a text, and as a share."""
-    found = content.faults
-    if found is None:
-        return ()
-    names = (*content.switch_names, *(joint.name for joint in content.manifest.joints))
-    shares = ((names[one], found.lost[one] / found.total) for one in _worst_first(found))
-    return tuple((f"{name} {100 * share:.1f} %", share) for name, share in shares)
-
-
-def term_bars(content: ReportContent) -> tuple[tuple[str, float], ...]:
-    """Return each term of the model, the weightiest first: what it reads and by how much it can move a score, as a text
-    and as a share of the largest.
+def term_table(content: ReportContent) -> PlainTable | None:
+    """Return the terms of the model, the weightiest first: what each reads, and by how much it can move a score; None
+    without any.
     """
     joints = [joint.name for joint in content.manifest.joints]
-    spans = [
-        (" and ".join((content.switch_names if isinstance(term, Bit) else joints)[one] for one in term.inputs), term)
-        for term in content.tables.core_terms
-    ]
-    rows = [(int(np.subtract(*term.ends, dtype=np.int64).max()), f"{name}, {term.name}") for name, term in spans]
-    rows = sorted(((span, text) for span, text in rows if span), key=lambda row: (-row[0], row[1]))
-    return tuple((f"{text} {span / content.tables.scale:.2f}", span / rows[0][0]) for span, text in rows)
+    rows = []
+    for term in content.tables.core_terms:
+        names = content.switch_names if isinstance(term, Bit) else joints
+        span = int(np.subtract(*term.ends, dtype=np.int64).max())
+        rows.append((span, " and ".join(names[one] for one in term.inputs), term.name))
+    rows = sorted((row for row in rows if row[0]), key=lambda row: (-row[0], *row[1:]))
+    texts = tuple((reads, kind, f"{span / content.tables.scale:.2f}") for span, reads, kind in rows)
+    caption = "Terms of the model, the weightiest first, and by how much each can move the score of a grasp type"
+    return PlainTable(caption, ("Reads", "Kind", "Moves a score by"), texts, words=(0, 1)) if rows else None
 
 
 def _share(count: int, total: int) -> str:
@@ -269,3 +279,103 @@ def _plain(value: object) -> str:
     if isinstance(value, tuple):
         return ",".join(value)
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
+
+
+def protocols(study: Study) -> tuple[tuple[str, str], ...]:
+    """Return the study's protocols and their meanings."""
+    return tuple((f"{each.name} protocol", each.meaning) for each in PROTOCOLS if each.name in study.options.protocols)
+
+
+def study_tables(study: Study) -> tuple[PlainTable, ...]:
+    """Return the paper's tables."""
+    return tuple(map(_table, study.tables))
+
+
+def study_notes(study: Study) -> Iterator[str]:
+    """Yield how the rows were split, the caveats, and the missing tables with the reasons."""
+    yield sentence(str(study))
+    yield from map(sentence, study.warnings)
+    for left in study.left_out:
+        yield f"No table of {left.name}: {left.reason}."
+
+
+def _table(table: RateTable) -> PlainTable:
+    several = len(table.columns) > 1
+    columns = ("Row", "What", "Elements", *table.columns, *(["all"] * several))
+    rows = tuple(
+        (row.name, row.what, str(row.switches), *map(str, row.cells), *([both(row.rate, row.frames)] * several))
+        for row in table.rows
+    )
+    return PlainTable(table.title, columns, rows, words=(0, 1), note=table.note)
+
+
+def transition_table(found: Transitions) -> PlainTable:
+    """Return the changes from type to type, the most frequent first."""
+    counts, shares = found.counts, found.probabilities
+    changes = sorted(np.argwhere(counts).tolist(), key=lambda each: (-counts[tuple(each)], each))
+    rows = tuple(
+        (found.types[a], found.types[b], str(counts[a, b]), percent(float(shares[a, b]), NBSP)) for a, b in changes
+    )
+    return PlainTable("Changes of grasp type", ("From", "To", "Count", "Of its changes"), rows, words=(0, 1))
+
+
+@dataclass(frozen=True, slots=True)
+class ConfusionView:
+    """Counts as a table: their source, the grasp types, a row for each of these, and the most frequent mistakes.
+
+    rows  grasp type; its counts, each with its shading class ("hit1" to "miss9", "" for none); its number of rows; the
+          share of them predicted correctly. Empty where the table would be too wide.
+    """
+
+    title: str
+    grasps: tuple[str, ...]
+    rows: tuple[tuple[str, tuple[tuple[str, str], ...], str, str], ...]
+    mistaken: tuple[str, ...]
+
+
+def confusion_view(title: str, grasps: Sequence[str], counts: NDArray[np.intp]) -> ConfusionView:
+    """Return the table of `counts` (K, K), row: true, column: predicted; a shade is a share of its row."""
+    rows = []
+    for number, (grasp, line) in enumerate(zip(grasps, counts.tolist(), strict=True)):
+        total = sum(line)
+        cells = tuple(_shaded(count, total, column == number) for column, count in enumerate(line))
+        rows.append((grasp, cells, f"{total:,}", percent(line[number] / total, NBSP) if total else ""))
+    shown = tuple(rows) if len(grasps) <= WIDEST else ()
+    return ConfusionView(title, tuple(grasps), shown, tuple(_mistaken(grasps, counts)))
+
+
+def confusions(content: ReportContent) -> Iterator[ConfusionView]:
+    """Yield the build's own matrix, then those of the compositions, nested folds, all subjects together."""
+    if content.confusion is not None:
+        rate = content.manifest.headline
+        folds = "" if rate is None else f", {rate.title}, {counted(rate.folds, 'nested fold')}"
+        title = f"This build's recipe ({recipe(content.manifest)}){folds}"
+        yield confusion_view(title, content.manifest.classes[: len(content.confusion)], content.confusion)
+    if content.study is None:
+        return
+    for table in content.study.tables:
+        if (table.name, table.protocol) == ("compositions", "nested"):
+            one = len(table.columns) == 1
+            whose = f"subject {table.columns[0]}" if one else f"{len(table.columns)} subjects together"
+            for row in table.rows:
+                counts = [cell.confusion for cell in row.cells if cell.confusion is not None]
+                if counts:
+                    title = f"{row.name}: {row.what}, nested folds of {whose} ({table.recipe})"
+                    yield confusion_view(title, content.study.grasps, np.sum(counts, axis=0))
+
+
+def _shaded(count: int, total: int, hit: bool) -> tuple[str, str]:
+    if not count:
+        return "·", ""
+    return f"{count:,}", f"{'hit' if hit else 'miss'}{1 + (_SHADES - 1) * count // total}"
+
+
+def _mistaken(grasps: Sequence[str], counts: NDArray[np.intp]) -> Iterator[str]:
+    """Yield sentences on the most frequent mistakes; ties are in the order of the table."""
+    wrong = counts.copy()
+    np.fill_diagonal(wrong, 0)
+    for place in np.argsort(-wrong, axis=None, kind="stable")[:_MOST].tolist():
+        true, found = divmod(place, len(grasps))
+        if wrong[true, found]:
+            total = int(counts[true].sum())
+            yield f"{grasps[true]} mistaken for {grasps[found]}: {wrong[true, found]:,} of {total:,} rows"

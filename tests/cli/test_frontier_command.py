@@ -12,7 +12,7 @@ import pytest
 
 from thenar.compiler import GraspSet
 from thenar.compiler.frontier.points import Frontier, frontier_from_bytes
-from thenar.compiler.frontier.timing.classify_times import machine_name
+from thenar.compiler.frontier.price import machine_name
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime import Build
 

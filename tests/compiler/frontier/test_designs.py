@@ -11,12 +11,11 @@ from thenar.compiler.frontier.designs import Design, best_designs, designs, luck
 from thenar.compiler.frontier.finalists import EvaluatedFinalist
 from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, PointTime
-from thenar.compiler.frontier.price import PricedTables
+from thenar.compiler.frontier.price import Classified, PricedTables
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Search, placed, tabled
 from thenar.compiler.frontier.survey import Cuts, TrialAccuracy
-from thenar.compiler.frontier.timing.classify_times import Classified
-from thenar.compiler.frontier.timing.scan_times import ScanTimes, records_of
+from thenar.compiler.frontier.wirings import ScanTimes, records_of
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS, Training

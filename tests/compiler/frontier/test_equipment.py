@@ -2,11 +2,9 @@ import numpy as np
 from msgspec.structs import replace
 
 from thenar.compiler.frontier.cache import question
-from thenar.compiler.frontier.price import Equipment, price
+from thenar.compiler.frontier.price import ClassifyModel, Equipment, price
 from thenar.compiler.frontier.search import Search
-from thenar.compiler.frontier.timing.classify_times import ClassifyModel
-from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, ReadingCost
-from thenar.compiler.frontier.timing.wirings import wirings
+from thenar.compiler.frontier.wirings import WIRE_ONLY, ReadingCost, wirings
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.recordings.graspset import GraspSet

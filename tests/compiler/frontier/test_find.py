@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.evaluation.folds import weka_folds
-from thenar.compiler.frontier import find
+from thenar.compiler.frontier import find, price
+from thenar.compiler.frontier.cache import stored
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.plots import pictures
 from thenar.compiler.frontier.points import Frontier, FrontierError, FrontierPoint, frontier_from_bytes
+from thenar.compiler.frontier.price import fit_here
 from thenar.compiler.frontier.replay import replay_of
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
-from thenar.compiler.frontier.timing import classify_times
-from thenar.compiler.frontier.timing.classify_times import fit_here
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.methods.base import METHODS
@@ -52,7 +52,7 @@ def _short_streams() -> Iterator[None]:
     """Let latencies be those of 30 grasps, and this machine be timed once: how long either takes is no matter here."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(find, "replay_of", partial(replay_of, grasps=30))
-        patched.setattr(classify_times, "fit_here", cache(fit_here))
+        patched.setattr(price, "fit_here", stored(1, where="process")(cache(fit_here)))
         yield
 
 
@@ -104,10 +104,10 @@ def test_every_point_lies_on_a_front_without_dominating_others(first: tuple[Requ
     points = first[1].points
     assert points
     assert all(point.fronts for point in points)
-    for name, price in (("frame", lambda p: p.frame.us), ("switches", lambda p: len(p.switches))):
+    for name, cost in (("frame", lambda p: p.frame.us), ("switches", lambda p: len(p.switches))):
         front = [point for point in points if name in point.fronts]
         assert front
-        assert not any(price(a) < price(b) and chosen_by(a) >= chosen_by(b) for a in front for b in front)
+        assert not any(cost(a) < cost(b) and chosen_by(a) >= chosen_by(b) for a in front for b in front)
 
 
 def chosen_by(point: FrontierPoint) -> float:

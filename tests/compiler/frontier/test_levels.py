@@ -12,12 +12,11 @@ from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.find import FRONTIER_NAME, find_frontier
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.points import Frontier, FrontierPoint
-from thenar.compiler.frontier.price import Equipment
+from thenar.compiler.frontier.price import ClassifyModel, Equipment
 from thenar.compiler.frontier.replay import replay_of
 from thenar.compiler.frontier.search import TAXEL_LEVELS, Search, placed
 from thenar.compiler.frontier.survey import Cuts, Survey
-from thenar.compiler.frontier.timing.classify_times import ClassifyModel
-from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY
+from thenar.compiler.frontier.wirings import WIRE_ONLY
 from thenar.compiler.frontier.words import inputs_of, summary
 from thenar.compiler.placement.elements import bits_of, elements_of, ports_of
 from thenar.compiler.placement.methods.base import METHODS
@@ -95,7 +94,7 @@ def test_words_name_levels_and_taxels(found: tuple[Path, Frontier]) -> None:
     frontier = found[1]
     point = next(point for point in frontier.points if point.setting.levels and len(conversions(point)) > 1)
     levels = len([name for name in point.switches if taxel_and_code(name)])
-    assert f"{levels} levels of {len(conversions(point))} taxels" in inputs_of(point)
+    assert f"{len(conversions(point))} of 4 pads ({levels} levels)" in inputs_of(frontier, point)
     assert " of 4 taxels" in summary(frontier) or "joints, read" in summary(frontier)
 
 

@@ -7,8 +7,7 @@ import pytest
 
 from thenar.compiler.cluster import dask_cluster
 from thenar.compiler.frontier.cache import Cache, Store
-from thenar.compiler.frontier.price import measured
-from thenar.compiler.frontier.timing.classify_times import ClassifyModel, random_tables
+from thenar.compiler.frontier.price import ClassifyModel, measured, random_tables
 from thenar.runtime.model.integers import tables_to_bytes
 
 TABLES = random_tables(6, 0, 4)

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from thenar.compiler.frontier.price import Equipment, price
-from thenar.compiler.frontier.timing.classify_times import ClassifyModel
-from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY
-from thenar.compiler.frontier.timing.wirings import wirings
+from thenar.compiler.frontier.price import ClassifyModel, Equipment, price
+from thenar.compiler.frontier.wirings import WIRE_ONLY, wirings
 from thenar.compiler.placement.elements import names_of
 from thenar.compiler.recogniser import Recogniser
 from thenar.compiler.recordings.graspset import GraspSet

@@ -6,10 +6,9 @@ import pytest
 from thenar.compiler.frontier.finalists import choices_to_mark
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.frontier.price import PricedTables
+from thenar.compiler.frontier.price import Classified, PricedTables
 from thenar.compiler.frontier.search import Search, candidates, placed
-from thenar.compiler.frontier.timing.classify_times import Classified
-from thenar.compiler.frontier.timing.scan_times import ScanTimes
+from thenar.compiler.frontier.wirings import ScanTimes
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.recipe import PAPERS_TRAINER, Recipe
 

@@ -100,7 +100,7 @@ def test_only_segments_use_learnt_costs_and_the_class_none(make_set: Make) -> No
     assert others == before
     made, model = segment_tables(moving, 1, KEPT, [RECIPE], training)[RECIPE]
     assert made.n_classes == held.n_classes + 1
-    assert segments == latency(made, range(14), replay, 3000.0, model)
+    assert segments == latency(made, replay, 3000.0, model)
     assert segments != usual
     assert segments.missed == 0
     assert segments.wrong == 0

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from thenar.compiler.frontier.points import Frontier
-from thenar.compiler.frontier.words import COLUMNS, csv_bytes, featured, rates_of, summary, training_of, wiring_of
+from thenar.compiler.frontier.words import csv_bytes, featured, rates_of, summary, training_of, wiring_of
 from thenar.compiler.text import text_of
 
 
@@ -67,7 +67,7 @@ def test_a_trainer_is_named_where_it_is_not_the_papers(examples: Any, changes: d
     written = msgspec.json.decode(msgspec.json.encode(setting))
     assert {"trainer", "settings"} & set(written) == {"trainer", "settings"} & set(changes)
     table = csv_bytes(examples.example_frontier(points=(msgspec.structs.replace(point, setting=setting),), picked=None))
-    assert table.split(b"\n")[0].decode().split(",")[len(COLUMNS) :] == (["trainer", "settings"] if changes else [])
+    assert table.split(b"\n")[0].endswith(b",trainer,settings" if changes else b",switches,joints")
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,6 @@ def test_what_is_read_again_are_the_points(examples: Any) -> None:
     assert len(rows) == len(frontier.points)
     for row, point in zip(rows, frontier.points, strict=True):
         way, setting = point.setting.placement, point.setting
-        assert tuple(row) == COLUMNS
         assert (int(row["number"]), int(row["n_switches"])) == (point.number, len(point.switches))
         assert (row["method"], float(row["parameter"])) == (way.method, way.parameter)
         for name in ("inputs", "wiring", "decision"):

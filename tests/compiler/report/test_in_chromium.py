@@ -110,7 +110,7 @@ def switches(frontier: Frontier, number: int) -> list[str]:
 
 def test_the_report_opens_with_all_its_charts_and_the_picked_point(opened: Reader, frontier: Frontier) -> None:
     drawn = opened.driver.find_elements(By.CSS_SELECTOR, "figure:has(.scroll > svg)")
-    charts = ["tree-chart", "term-chart", "by-frontier", "by-switches", "by-latency"]
+    charts = ["by-frontier", "by-switches", "by-latency"]
     assert [chart.get_attribute("id") for chart in drawn] == charts
     assert all(chart.find_element(By.TAG_NAME, "svg").size["height"] > 100 for chart in drawn)
     assert frontier.picked is not None
@@ -132,21 +132,11 @@ def test_a_click_on_a_point_shows_its_switches_on_the_hand(opened: Reader, front
 
 def test_hovering_over_a_point_describes_it_and_marks_its_row(opened: Reader) -> None:
     marker = opened.marker("by-frontier", 2)
-    assert opened.script("return arguments[0].querySelector('title').textContent", marker).startswith("Point 2: 10 swi")  # type: ignore[attr-defined]
+    assert opened.script("return arguments[0].querySelector('title').textContent", marker).startswith("Point 2: 10 of ")  # type: ignore[attr-defined]
     ActionChains(opened.driver).move_to_element(marker.find_element(By.CSS_SELECTOR, ".target")).perform()
     opened.wait(lambda: opened.driver.find_elements(By.CSS_SELECTOR, "#points tr.near[data-point='2']"))
     ActionChains(opened.driver).move_to_element(opened.driver.find_element(By.ID, "picked-heading")).perform()
     opened.wait(lambda: not opened.driver.find_elements(By.CSS_SELECTOR, ".near"))
-
-
-def test_a_click_on_the_icicle_opens_the_list_at_the_node(opened: Reader) -> None:
-    links = opened.driver.find_elements(By.CSS_SELECTOR, ".icicle a")
-    number = len(links) - 1
-    opened.script("arguments[0].dispatchEvent(new MouseEvent('click', {bubbles: true, view: window}))", links[number])
-    item = opened.driver.find_element(By.CSS_SELECTOR, ".tree li:target")
-    opened.wait(item.is_displayed)
-    title = opened.script("return arguments[0].querySelector('title').textContent", links[number])
-    assert item.text.startswith(" ".join(str(title).split()))
 
 
 def test_arrow_keys_go_from_point_to_point(opened: Reader, frontier: Frontier) -> None:

@@ -7,16 +7,22 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from msgspec.structs import replace as replaced
 
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.hand import HandShape
 from thenar.compiler.placement.id3 import grow_id3
-from thenar.compiler.report.content import ReportContent
+from thenar.compiler.report.content import ReportContent, hand_picture
 from thenar.compiler.report.frontier import frontier_view
-from thenar.compiler.report.hand import hand_picture
-from thenar.compiler.report.results import confusion_view
-from thenar.compiler.report.sections import kept_table, no_tree, placement_sentences, scan_table
-from thenar.compiler.report.tree import MOST_NODES, tree_view
+from thenar.compiler.report.sections import (
+    MOST_LINES,
+    confusion_view,
+    kept_table,
+    placement_sentences,
+    scan_table,
+    term_table,
+    tree_text,
+)
 from thenar.compiler.text import DASH
 
 
@@ -38,34 +44,26 @@ def test_the_commonest_mistakes_are_named_first_and_hits_never(counts: np.ndarra
     assert [int(sentence.split(": ")[1].split()[0]) for sentence in said] == wrong[:5]
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.integers(1, 400))
-def test_the_list_of_a_tree_closes_what_it_opens(seed: int, inputs: int, rows: int) -> None:
-    random = np.random.default_rng(seed)
-    tree = grow_id3(random.random((rows, inputs)) < 0.5, random.integers(0, 3, rows))
-    names, grasps = tuple(f"x{number}" for number in range(inputs)), ("a", "b", "c")
-    view = tree_view(tree, names, grasps)
-    depth = 0
-    for node in view.nodes:
-        assert depth == tree.depths[node.number]
-        depth += 1 if node.opens else -node.closes
-    assert depth == 0
-    assert [node.line for node in view.nodes] == list(range(len(view.nodes)))
-    for node in view.nodes:
-        inside = [other for other in view.nodes[node.line + 1 :] if other.line < node.line + node.lines]
-        assert len(inside) == node.lines - 1
-        assert all(other.depth > node.depth for other in inside)
-        after = view.nodes[node.line + node.lines :]
-        assert not after or after[0].depth <= node.depth
-    assert len(view.nodes) + sum(node.below for node in view.nodes) == len(tree.nodes)
-
-
-def test_a_large_tree_is_cut_and_says_so() -> None:
+def test_the_tree_has_a_line_for_each_node_and_a_large_one_is_cut(bare: ReportContent) -> None:
+    assert bare.tree is not None
+    lines, said = tree_text(bare.tree, bare.manifest)
+    assert len(lines.split("\n")) == len(bare.tree.nodes)
+    assert all(name in lines for name in bare.switch_names)
+    assert "shown" not in said
     random = np.random.default_rng(3)
-    tree = grow_id3(random.random((3000, 30)) < 0.5, random.integers(0, 5, 3000))
-    view = tree_view(tree, tuple(f"x{number}" for number in range(30)), tuple("abcde"))
-    assert MOST_NODES / 3 < len(view.nodes) <= MOST_NODES < len(tree.nodes)
-    assert "thenar place --draw draws all of it" in view.sentence
-    assert len(view.nodes) + sum(node.below for node in view.nodes) == len(tree.nodes)
+    tree = grow_id3(random.random((6000, 30)) < 0.5, random.integers(0, 4, 6000))
+    names = tuple(replaced(bare.manifest.switches[0], name=f"x{number}") for number in range(len(tree.inputs)))
+    lines, said = tree_text(tree, replaced(bare.manifest, switches=names))
+    assert len(lines.split("\n")) == MOST_LINES < len(tree.nodes)
+    assert "thenar place --draw draws all of them" in said
+
+
+def test_the_terms_are_told_the_weightiest_first(bare: ReportContent) -> None:
+    table = term_table(bare)
+    assert table is not None
+    spans = [float(row[2]) for row in table.rows]
+    assert spans == sorted(spans, reverse=True)
+    assert {row[0] for row in table.rows} <= {*bare.switch_names, *(joint.name for joint in bare.manifest.joints)}
 
 
 def test_switches_stand_on_the_picture_where_they_lie_on_the_hand(hand: HandShape) -> None:
@@ -95,7 +93,7 @@ def test_a_placement_without_a_tree_names_its_method_and_shows_no_shares(bare: R
     chosen = msgspec.structs.replace(bare.manifest.options, **options)
     content = replace(bare, manifest=msgspec.structs.replace(bare.manifest, options=chosen), tree=None)
     assert "Together" not in kept_table(content).columns
-    assert no_tree(content.manifest) == "No tree: the switches were chosen by elimination."
+    assert tree_text(content.tree, content.manifest) == ("", "No tree: the switches were chosen by elimination.")
     how, bits = placement_sentences(content)
     assert how.endswith("(--method elimination).")
     assert "together" not in bits
@@ -122,7 +120,7 @@ def test_the_section_names_its_machine_and_labels_guesses(frontier: Frontier) ->
     view = frontier_view(frontier, frontier.fingerprint, None)
     assert any(f"times on {frontier.machine}." in note for note in view.notes)
     assert "guess" not in repr(view)
-    guess, replaced = frontier.points[0].frame, msgspec.structs.replace
+    guess = frontier.points[0].frame
     points = [replaced(point, frame=replaced(guess, us=point.frame.us, how="guess")) for point in frontier.points]
     view = frontier_view(replaced(frontier, points=tuple(points)), frontier.fingerprint, None)
     assert {"Frame, µs (guess)", "Latency, µs (guess)", "99th pct., µs (guess)"} <= {*view.points.columns}

@@ -24,7 +24,7 @@ from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.export import to_csv
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own
-from thenar.compiler.tryout import writing
+from thenar.compiler.report import tryout
 from thenar.runtime import Build
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import PAIRED, PLAIN, SLOPED
@@ -445,8 +445,8 @@ PARTS = ("codeOf", "parseCsv")
 @pytest.fixture(scope="module")
 def parts(trier: Trier, tmp_path_factory: pytest.TempPathFactory) -> Trier:
     """Return a browser in which `parts` holds functions of the page's modules."""
-    modules = [Path(writing.__file__).with_name("page") / name for name in ("tables.js", "rows.js")]
-    script = "".join(writing.scoped(module.read_text()) for module in modules)
+    modules = [Path(tryout.__file__).with_name("templates") / name for name in ("tables.js", "rows.js")]
+    script = "".join(tryout.scoped(module.read_text()) for module in modules)
     page = tmp_path_factory.mktemp("parts") / "parts.html"
     page.write_text(f"<script type=module>{script}globalThis.parts = {{ {', '.join(PARTS)} }};</script>")
     trier.open(page)

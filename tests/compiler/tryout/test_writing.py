@@ -14,8 +14,8 @@ from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.pages import embedded
 from thenar.compiler.pictures import PALETTE
-from thenar.compiler.tryout import writing
-from thenar.compiler.tryout.writing import MOST_BYTES, sample, scoped
+from thenar.compiler.report import tryout
+from thenar.compiler.report.tryout import MOST_BYTES, sample, scoped
 
 Make = Callable[..., GraspSet]
 
@@ -66,10 +66,10 @@ def test_large_pages_hold_fewer_rows_or_are_omitted(
     make_set: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     size = len((_compiled(make_set, tmp_path / "whole") / "try.html").read_bytes())
-    monkeypatch.setattr(writing, "MOST_BYTES", size - 500)
+    monkeypatch.setattr(tryout, "MOST_BYTES", size - 500)
     page = (_compiled(make_set, tmp_path / "less") / "try.html").read_bytes()
     assert size - 700 < len(page) <= size - 500
-    monkeypatch.setattr(writing, "MOST_BYTES", 20_000)
+    monkeypatch.setattr(tryout, "MOST_BYTES", 20_000)
     bare = _compiled(make_set, tmp_path / "none")
     assert not (bare / "try.html").exists()
     assert "try.html" not in (bare / "report.html").read_text()
@@ -103,7 +103,7 @@ def test_a_module_becomes_a_scope_that_gives_its_exports() -> None:
 
 
 def test_the_hand_has_the_colours_of_the_report() -> None:
-    css = (Path(writing.__file__).parents[1].parent / "runtime" / "web" / "pages" / "hand.css").read_text()
+    css = (Path(tryout.__file__).parents[1].parent / "runtime" / "web" / "pages" / "hand.css").read_text()
     light, dark = css.split("@media", maxsplit=1)
     named = dict(re.findall(r"--([\w-]+): (#\w{6});", light))
     shaded = dict(re.findall(r"--([\w-]+): (#\w{6});", dark))

@@ -6,8 +6,8 @@ import pytest
 
 from thenar.compiler.firmware.simavr import missing
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.frontier.price import steps_of
-from thenar.compiler.frontier.timing.classify_times import ClassifyModel, fitting, random_tables
+from thenar.compiler.frontier.price import ClassifyModel, count_steps, fitting, random_tables
+from thenar.runtime.model.integers import tables_to_bytes
 
 PYTHON = (2.0, 0.03, 0.15, 0.03, 0.0002, 0.0009, 10.0)
 TABLES = [random_tables(33, 16, 14), random_tables(20, 0, 14), random_tables(8, 0, 5)]
@@ -28,7 +28,7 @@ def test_cycles_of_an_avr_are_foretold_within_ten_percent() -> None:
         fit = fitting(tables, part)
         assert fit is not None
         assert fit.cost is not None
-        assert fit.cost.cycles == pytest.approx(steps_of(fit), rel=0.1)
+        assert fit.cost.cycles == pytest.approx(count_steps(tables_to_bytes(tables), ClassifyModel("avr328p")), rel=0.1)
 
 
 def test_a_target_without_tools_names_what_is_missing(

@@ -3,7 +3,7 @@ import pytest
 from thenar.compiler.firmware.choose import fit_for
 from thenar.compiler.firmware.targets import TARGETS, timed
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.frontier.timing.classify_times import ClassifyModel, classify_us, fit_here, random_tables
+from thenar.compiler.frontier.price import ClassifyModel, classify_us, fit_here, random_tables
 from thenar.compiler.workers import in_workers
 from thenar.runtime.model.integers import tables_to_bytes
 

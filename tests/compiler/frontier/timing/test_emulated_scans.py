@@ -15,7 +15,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.frontier.timing.wirings import BOARD, wirings
+from thenar.compiler.frontier.wirings import BOARD, wirings
 from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c, WireCounters
 from thenar.drivers.errors import DeviceError
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead, Scan

@@ -3,13 +3,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.frontier.points import PointTime
-from thenar.compiler.frontier.timing.scan_times import (
+from thenar.compiler.frontier.wirings import (
+    BOARD,
     ReadingCost,
     ScanTimes,
+    WiringOption,
     records_of,
     scan_times,
 )
-from thenar.compiler.frontier.timing.wirings import BOARD, WiringOption
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, CLOCKS_HZ, WiringOption, wirings
+from thenar.compiler.frontier.wirings import AS_WIRED, BOARD, CLOCKS_HZ, WiringOption, wirings
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError

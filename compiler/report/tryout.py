@@ -1,4 +1,4 @@
-"""`try_html`: the page of a build, with its tables, its hand and some of its rows in one file."""
+"""`try_html`: a build to try out in a browser, its tables, its hand and some of its rows in one file."""
 
 import base64
 import re
@@ -146,11 +146,11 @@ def _rendered(manifest: Manifest, data: Json) -> bytes:
 
 @lru_cache(maxsize=1)
 def _environment() -> Environment:
-    return templates(__package__, "page")
+    return templates(__package__, "templates")
 
 
 def _own(name: str) -> str:
-    return files(__package__).joinpath("page", name).read_text(encoding="utf-8")
+    return files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
 
 
 def _shared(name: str) -> str:

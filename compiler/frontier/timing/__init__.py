@@ -1,1 +1,0 @@
-"""Times of reading and classifying: predicted, simulated, measured, and compared with each other."""
