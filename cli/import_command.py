@@ -123,7 +123,7 @@ def _write(text: str, path: Path, asked: bool) -> Path:
 
 
 def _print_proposal(proposal: "ColumnProposal") -> None:
-    from thenar.compiler.recordings.inputs import listed
+    from thenar.compiler.recordings.propose import listed
 
     for remark in proposal.remarks:
         echo(remark)

@@ -31,8 +31,8 @@ def command(grasps: Path, plot: Path | None) -> None:
         thenar info set.grasps
         thenar info set.grasps --plot set.png
     """
+    from thenar.compiler.recordings.export import draw
     from thenar.compiler.recordings.graspset import GraspSet
-    from thenar.compiler.recordings.picture import draw
     from thenar.compiler.recordings.summary import summarise
 
     keep_apart(grasps, plot)

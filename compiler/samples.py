@@ -9,8 +9,8 @@ from thenar.drivers.errors import ThenarError
 from thenar.runtime.recipe import Inputs
 
 from .limits import check_types
+from .recordings.arrays import groups
 from .recordings.graspset import GraspSet
-from .recordings.trials import groups
 
 Columns = tuple[int, ...]
 

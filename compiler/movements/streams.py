@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from thenar.drivers.errors import ThenarError
 
 from ..placement.elements import above, elements_of
+from ..recordings.arrays import groups
 from ..recordings.graspset import GraspSet
-from ..recordings.trials import groups
 from ..samples import Samples
 
 Rows = NDArray[np.intp]

@@ -27,8 +27,8 @@ from thenar.runtime.files import open_file
 from thenar.runtime.names import list_names, shortened
 
 from .arrays import AnyArray
+from .cells import preface
 from .errors import COLUMNS, LARGEST, ROWS, TableError
-from .headers import preface
 
 # Bytes of memory that reading may take in addition to the libraries: a constant, and a factor per byte of the file.
 MEMORY, MEMORY_EACH = 600_000_000, 20

@@ -28,10 +28,9 @@ from thenar.runtime.nesting import check_json
 from thenar.runtime.sealed import seal, unseal
 
 from ..text import counted, trials_of_frames
-from .arrays import AnyArray, pack, unpack
+from .arrays import AnyArray, groups, pack, unpack
 from .errors import LARGEST, RecordingError, check_names, check_room
 from .taxonomy import Taxonomy
-from .trials import groups
 
 CODES = 65536
 # Far enough from the limits of doubles that spans and margins of values stay finite, and steps keep all their bits.

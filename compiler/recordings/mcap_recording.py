@@ -30,11 +30,10 @@ from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.taxels import TaxelLine, Taxels
 
-from .coding import CodingCost, code_joint
 from .columns import CalibrationPoints, JointColumns
 from .errors import ColumnsError, TableError, list_rows
 from .graspset import CODES, GraspSet, Joint
-from .importer import ImportReport, import_file, report_of
+from .importer import CodingCost, ImportReport, code_joint, import_file, report_of
 from .summary import Oddity, find_oddities
 from .taxonomy import Taxonomy
 from .trial_files import Report

@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 
 from thenar.runtime.names import SHOWN, list_names, shortened
 
+from .cells import Column, is_numeric, natural_key
 from .columns import PLAIN, TextFormat
 from .errors import LARGEST, ROWS, FileRows, TableError, check_room
-from .sniff import sniff
-from .table import SUFFIXES, Column, Table, is_numeric, is_text, read_table, read_tables
+from .table import SUFFIXES, Table, is_text, read_table, read_tables, sniff
 from .taxonomy import plain, published_for
-from .trials import natural_key
 
 # The most files of a set.
 FILES = 100_000

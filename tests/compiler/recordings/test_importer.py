@@ -1,5 +1,5 @@
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -10,7 +10,10 @@ from thenar.compiler.recordings.errors import ColumnsError, TableError
 from thenar.compiler.recordings.export import export
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_file, import_table
-from thenar.compiler.recordings.table import Column, Table
+from thenar.compiler.recordings.table import Table
+
+if TYPE_CHECKING:
+    from thenar.compiler.recordings.cells import Column
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "columns"
 JOINTS = (JointColumns(("j",)),)
