@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.recipe import Inputs
 
+from .arrays import groups
 from .limits import check_types
-from .recordings.arrays import groups
 from .recordings.graspset import GraspSet
 
 Columns = tuple[int, ...]

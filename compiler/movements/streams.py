@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from thenar.drivers.errors import ThenarError
 
+from ..arrays import groups
 from ..placement.elements import above, elements_of
-from ..recordings.arrays import groups
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from thenar.runtime.names import fault, shortened
 
+from ..arrays import AnyArray
 from ..text import text_of
-from .arrays import AnyArray
-from .errors import COLUMNS, TableError, check_names, check_room
+from . import COLUMNS, TableError, check_names, check_room
 
 # Text as read, or an array of numbers or of str.
 Column = Sequence[str] | AnyArray
@@ -109,7 +109,7 @@ def names(column: Column, cells: bool = False, size: int = 0) -> Parsed[np.str_]
     """
     if is_numeric(column):
         values = _floats(column)
-        texts = list(map(_name_of_number, values.tolist()))
+        texts = list(map(name_of_number, values.tolist()))
         faulty = {"inf", "-inf"}
     else:
         texts = [text_of(cell.strip()) if cells else cell.strip() for piece in pieces(column) for cell in piece]
@@ -122,7 +122,8 @@ def names(column: Column, cells: bool = False, size: int = 0) -> Parsed[np.str_]
     return Parsed(np.array(texts, np.str_), missing, wrong)
 
 
-def _name_of_number(number: float) -> str:
+def name_of_number(number: float) -> str:
+    """Return a number without an exponent, and an integer without decimals; "" for NaN."""
     if math.isnan(number):
         return ""
     # Adding zero turns -0.0 into 0.0.
@@ -157,15 +158,11 @@ def _floats(column: AnyArray) -> NDArray[np.float64]:
 
 
 def _numbers(cells: list[str], words: dict[str, float]) -> NDArray[np.float64]:
-    try:
-        # Convert all at once, which is several times faster; float() would read 1_000 as a thousand.
-        values = np.array(cells, dtype=np.float64)
-        return values if not any("_" in cell for cell in cells) else _one_by_one(cells, words)
-    except ValueError:
-        return _one_by_one(cells, words)
-
-
-def _one_by_one(cells: list[str], words: dict[str, float]) -> NDArray[np.float64]:
+    # float() would read 1_000 as a thousand.
+    if not any("_" in cell for cell in cells):
+        with suppress(ValueError):
+            # Convert all at once, which is several times faster.
+            return np.array(cells, dtype=np.float64)
     values = np.full(len(cells), np.nan)
     for row, cell in enumerate(cells):
         word = cell.strip().casefold()

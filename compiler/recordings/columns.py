@@ -22,7 +22,7 @@ from thenar.runtime.names import LONGEST_NAME, nearest, shortened
 from thenar.runtime.toml_source import read_source
 from thenar.runtime.toml_struct import convert
 
-from .errors import ColumnsError
+from . import ColumnsError
 from .graspset import CODES, LARGEST_VALUE
 
 DEFAULT_GRID = 0.5

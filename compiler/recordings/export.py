@@ -23,9 +23,9 @@ from thenar.runtime.toml_struct import convert
 
 from ..pictures import painting, rendered
 from ..text import cell, cells
+from . import ColumnsError, RecordingError, TableError, check_names
 from .cells import Column, unlisted
 from .columns import KEYS, CalibrationPoints, ColumnRoles, JointColumns, TaxelColumns, read_columns
-from .errors import ColumnsError, RecordingError, TableError, check_names
 from .graspset import GraspSet, Joint
 from .importer import import_table
 from .inputs import POSSIBLE_CLOCKS

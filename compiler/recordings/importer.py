@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from thenar.runtime.names import list_names, nearest, shortened
 from thenar.runtime.published import NONE
 
-from .arrays import groups
+from ..arrays import groups
+from . import TYPES, ColumnsError, RecordingError, TableError, check_names, check_room, list_rows
 from .columns import ColumnRoles, JointColumns, TaxelColumns, read_columns, select, sound_grid
-from .errors import TYPES, ColumnsError, RecordingError, TableError, check_names, check_room, list_rows
 from .graspset import CODES, GraspSet, Joint
 from .inputs import WORDS, Course, possible_clocks, words_of
 from .readings import Readings, nothing_held, read_cells
@@ -145,15 +145,15 @@ def _trials_by_name(grasp_set: GraspSet, columns: ColumnRoles) -> tuple[GraspSet
     return replace(grasp_set, independent=True), [Oddity("alike trials", len(grasp_set), message)]
 
 
-def _renamed(table: Table, names: dict[str, str]) -> Table:
-    """Return `table` with other `names` for some columns. Raises ColumnsError, or RecordingError for a name twice."""
-    there = list(table.columns)
-    if unknown := [name for name in names if name not in table.columns]:
-        missing = shortened(repr(unknown[0]))
-        raise ColumnsError(f"rename: the table has no column {missing}{nearest(unknown[0], there)}")
-    renamed = [names.get(name, name) for name in there]
-    check_names("rename: column", renamed)
-    return replace(table, columns=dict(zip(renamed, table.columns.values(), strict=True)))
+def _renamed(table: Table, rename: dict[str, str]) -> Table:
+    """Return `table` with other names for some columns. Raises ColumnsError, or RecordingError for a name twice."""
+    names = list(table.columns)
+    for name in rename:
+        if name not in table.columns:
+            raise ColumnsError(f"rename: the table has no column {shortened(repr(name))}{nearest(name, names)}")
+    names = list((dict(zip(names, names, strict=True)) | rename).values())
+    check_names("rename: column", names)
+    return replace(table, columns=dict(zip(names, table.columns.values(), strict=True)))
 
 
 def _course(readings: Readings, columns: ColumnRoles) -> Course:
@@ -161,14 +161,14 @@ def _course(readings: Readings, columns: ColumnRoles) -> Course:
     owner = groups(readings.subjects, readings.sessions)
     group = groups(owner, readings.labels, readings.objects)
     time = None if columns.time is None or not np.isfinite(readings.time).all() else readings.time
-    trial = np.arange(len(owner)) if columns.frames == "independent" else groups(group, readings.trials)
-    return Course(owner, group, trial, time, columns.time or "")
+    trial_ids = np.arange(len(owner)) if columns.frames == "independent" else groups(group, readings.trials)
+    return Course(owner, group, trial_ids, time, columns.time or "")
 
 
 def report_of(
     what: str,
     grasp_set: GraspSet,
-    coding: tuple[CodingCost, ...],
+    costs: tuple[CodingCost, ...],
     warnings: Iterable[Oddity],
     notes: Iterable[str] = (),
 ) -> ImportReport:
@@ -185,7 +185,7 @@ def report_of(
         switches=len(grasp_set.switch_names),
         taxels=len(grasp_set.taxel_columns),
         joints=len(grasp_set.joints),
-        coding=coding,
+        coding=costs,
         notes=tuple(notes),
         warnings=tuple(warnings),
     )
@@ -193,28 +193,29 @@ def report_of(
 
 def _labels(table: Table, columns: ColumnRoles, readings: Readings) -> tuple[NDArray[np.str_], Taxonomy, list[Oddity]]:
     """Return each row's grasp type, the taxonomy, and a finding about unused aliases."""
-    found, where = np.unique(readings.labels, return_inverse=True)
-    if len(found) > TYPES:
+    labels, where = np.unique(readings.labels, return_inverse=True)
+    if len(labels) > TYPES:
         raise TableError(
-            f"{table.what}: column {shortened(repr(columns.label))} holds {len(found)} different labels, "
+            f"{table.what}: column {shortened(repr(columns.label))} holds {len(labels)} different labels, "
             f"more than {TYPES}: is it the label?"
         )
-    aliased = [columns.labels.get(label, label) for label in found.tolist()]
-    none = nothing_held(columns, found).tolist()
+    none = nothing_held(columns, labels).tolist()
+    aliases = dict(zip(labels.tolist(), labels.tolist(), strict=True)) | columns.labels
+    aliased = [aliases[label] for label in labels.tolist()]
     taxonomy = _taxonomy(columns, [label for label, nothing in zip(aliased, none, strict=True) if not nothing])
     find = taxonomy.finder()
     types = [NONE if nothing else find(label) for label, nothing in zip(aliased, none, strict=True)]
     unknown = np.array([name is None for name in types])[where]
     if unknown.any():
-        strange = [label for label, name in zip(aliased, types, strict=True) if name is None]
+        names = [label for label, name in zip(aliased, types, strict=True) if name is None]
         raise TableError(
-            f"{table.what}: {len(strange)} labels in {shortened(repr(columns.label))} are not grasp types of "
-            f"{taxonomy.name}: {_unknown(strange, taxonomy)}; {unknown.sum()} rows have them, "
+            f"{table.what}: {len(names)} labels in {shortened(repr(columns.label))} are not grasp types of "
+            f"{taxonomy.name}: {_unknown(names, taxonomy)}; {unknown.sum()} rows have them, "
             f"{list_rows(readings.rows[unknown])}; [labels] can translate them"
         )
-    unused = sorted(columns.labels.keys() - set(found.tolist()))
-    there = {*map(plain, (*found.tolist(), *aliased))}
-    unused += [label for label in columns.parts("none") if plain(label) not in there]
+    unused = sorted(columns.labels.keys() - {*labels.tolist()})
+    meanings = {*map(plain, (*labels.tolist(), *aliased))}
+    unused += [label for label in columns.parts("none") if plain(label) not in meanings]
     message = f"{len(unused)} entries of [labels] and `none` occur in no row: {list_names(unused)}"
     check_room(len(where), max(map(len, filter(None, types))), table.size)
     return (

@@ -90,7 +90,7 @@ class Course:
         Equal for rows of one subject and session.
     group : (n,) array of intp
         Equal for rows of one owner, label and object.
-    trial : (n,) array of intp
+    trial_ids : (n,) array of intp
         Equal for rows of one trial.
     time : (n,) array of float, optional
         A recognised clock, and its name.
@@ -101,11 +101,11 @@ class Course:
         self,
         owner: NDArray[np.intp],
         group: NDArray[np.intp],
-        trial: NDArray[np.intp],
+        trial_ids: NDArray[np.intp],
         time: Values | None = None,
         time_name: str = "",
     ) -> None:
-        begins = np.diff(trial, prepend=-1) != 0
+        begins = np.diff(trial_ids, prepend=-1) != 0
         if time is not None:
             begins[1:] |= np.diff(time) < 0
         self.first = np.flatnonzero(begins)
@@ -289,8 +289,6 @@ _LISTS = {
 WORDS = {role: words_of(words) for role, words in _LISTS.items()}
 # An unknown analog column is a pad if this share of its cells is at rest, in the lowest tenth of its range.
 _AT_REST, _REST = 0.5, 0.1
-# Resolutions in bits of existing converters.
-_CONVERTERS = (8, 10, 12, 14, 16)
 _PADS = ': a placement chooses their levels (threshold = 0.4, or "otsu", makes switches of them)'
 _RESTS = "at rest in most rows, as a pad is"
 _CODES, _MOST_JOINTS = "whole numbers, taken as codes", 24

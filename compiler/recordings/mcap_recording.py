@@ -30,8 +30,8 @@ from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.taxels import TaxelLine, Taxels
 
+from . import ColumnsError, TableError, list_rows
 from .columns import CalibrationPoints, JointColumns
-from .errors import ColumnsError, TableError, list_rows
 from .graspset import CODES, GraspSet, Joint
 from .importer import CodingCost, ImportReport, code_joint, import_file, report_of
 from .summary import Oddity, find_oddities

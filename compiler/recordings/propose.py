@@ -1,5 +1,6 @@
 """Propose a columns.toml for a table: the role of each column, from its name and values, with reasons."""
 
+import dataclasses
 import re
 from collections.abc import Iterable, Sequence
 from functools import cached_property
@@ -14,15 +15,15 @@ from numpy.typing import NDArray
 from thenar.runtime.names import list_names, printable, shortened
 from thenar.runtime.published import NONE
 
-from .arrays import groups
+from ..arrays import groups
+from . import FileRows, TableError, list_rows
 from .cells import names, numbers, skipped, times, unit_of_time
 from .columns import KEYS, PLAIN, ColumnRoles, JointColumns, TaxelColumns, TextFormat, globs_of
-from .errors import FileRows, TableError, list_rows
 from .inputs import ON_GRID, WORDS, Course, Facts, Role, facts_of, inputs_of, is_time, numbers_trials
 from .readings import in_runs, restarts
 from .table import Table, is_text, read_table, sniff
 from .taxonomy import plain, published_for
-from .trial_files import Report, emptied, find_files, is_pattern, read_files
+from .trial_files import Report, find_files, is_pattern, read_files
 
 # The share of a stream's label changes that lead to or from the label for nothing held.
 _BETWEEN = 0.9
@@ -74,8 +75,9 @@ def propose_file(path: Path, progress: Report = lambda _done, _total: None) -> t
     # What a path says is no input, and only a field that is called so has a role.
     fields = {*files[0].fields} - {*KEYS} if files else set()
     paths = [*sorted(fields), *([table.rows.column] if isinstance(table.rows, FileRows) else [])]
+    emptied = dict.fromkeys(paths, np.full(len(table.rows), ""))
     try:
-        proposal = propose(emptied(table, paths), text, remarks)
+        proposal = propose(dataclasses.replace(table, columns={**table.columns, **emptied}), text, remarks)
     except TableError as reason:
         raise TableError(f"{reason}; {odd}" if (odd := _first_oddity(table)) else str(reason)) from reason
     if others:

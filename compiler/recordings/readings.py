@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from heapq import nsmallest
 from operator import itemgetter
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -13,10 +14,10 @@ from numpy.typing import NDArray
 from thenar.runtime.names import SHOWN, list_names, shortened
 from thenar.runtime.published import NONE
 
-from .arrays import groups, otsu
+from ..arrays import groups, otsu
+from . import ColumnsError, RecordingError, TableError, check_room, list_rows
 from .cells import Parsed, Value, bits, codes, integers, names, natural_key, numbers, times, unit_of_time
 from .columns import KEYS, ColumnRoles, Selection
-from .errors import ColumnsError, RecordingError, TableError, check_room, list_rows
 from .summary import Oddity
 from .table import Table
 from .taxonomy import plain
@@ -39,9 +40,9 @@ class Readings:
     switches: NDArray[np.bool_]
     joints: NDArray[np.float64]
 
-    def kept(self, pick: NDArray[np.bool_] | NDArray[np.intp]) -> "Readings":
-        """Return the rows selected by `pick`, a mask or indices; two-dimensional arrays are overwritten."""
-        return Readings(**{name: _kept(getattr(self, name), pick) for name in self.__slots__})
+    def kept(self, keep: NDArray[np.bool_] | NDArray[np.intp]) -> "Readings":
+        """Return the rows selected by `keep`, a mask or indices; two-dimensional arrays are overwritten."""
+        return Readings(**{name: _kept(getattr(self, name), keep) for name in self.__slots__})
 
     def trial_ids(self) -> NDArray[np.intp]:
         """Return the trial number (n,) of each row."""
@@ -120,7 +121,8 @@ def nothing_held(columns: ColumnRoles, labels: NDArray[np.str_]) -> NDArray[np.b
     types = next(iter(columns.taxonomy.values())) if isinstance(columns.taxonomy, dict) else columns.taxonomy
     meant = {*map(plain, columns.parts("none")), *((NONE,) if isinstance(types, str) or NONE not in types else ())}
     found, where = np.unique(labels, return_inverse=True)
-    none = [not meant.isdisjoint(map(plain, (label, columns.labels.get(label, label)))) for label in found.tolist()]
+    aliases = dict(zip(found.tolist(), found.tolist(), strict=True)) | columns.labels
+    none = [not meant.isdisjoint(map(plain, (label, aliases[label]))) for label in found.tolist()]
     return np.array(none, np.bool_)[where]
 
 
@@ -154,7 +156,7 @@ def _runs(readings: Readings, none: NDArray[np.bool_], timeless: bool) -> NDArra
     leads = none[last] & ~none[last + 1] & (clock[last] == clock[last + 1])
     for column in (readings.subjects, readings.sessions):
         leads &= column[last] == column[last + 1]
-    return np.unique(number + np.append(leads, False)[number - 1], return_inverse=True)[1] + 1
+    return np.unique(number + np.pad(leads, (0, 1))[number - 1], return_inverse=True)[1] + 1
 
 
 def _switches(reader: "_Reader", selection: Selection, notes: list[str]) -> NDArray[np.bool_]:
@@ -194,16 +196,16 @@ def _require_trial_column(what: str, trial_ids: NDArray[np.intp]) -> None:
         )
 
 
-def _kept(array: NDArray[Value], pick: NDArray[np.bool_] | NDArray[np.intp]) -> NDArray[Value]:
-    """Return the rows of a 1-D or 2-D `array` selected by `pick`; the array itself if a mask selects all."""
-    if pick.dtype == np.bool_ and pick.all():
-        return array
-    if array.ndim == 1:
-        return array[pick]
-    count = int(pick.sum()) if pick.dtype == np.bool_ else len(pick)
-    for column in array.T:
-        column[:count] = column[pick]
-    return array[:count]
+def _kept(values: NDArray[Value], keep: NDArray[np.bool_] | NDArray[np.intp]) -> NDArray[Value]:
+    """Return the rows of 1-D or 2-D `values` selected by `keep`; the array itself if a mask selects all."""
+    if keep.dtype == np.bool_ and keep.all():
+        return values
+    if values.ndim == 1:
+        return values[keep]
+    count = int(keep.sum()) if keep.dtype == np.bool_ else len(keep)
+    for column in values.T:
+        column[:count] = column[keep]
+    return values[:count]
 
 
 def _dropped(readings: Readings, keep: NDArray[np.bool_], missing: dict[str, NDArray[np.bool_]]) -> list[Oddity]:
@@ -213,12 +215,12 @@ def _dropped(readings: Readings, keep: NDArray[np.bool_], missing: dict[str, NDA
         return []
     trial_ids = readings.trial_ids()
     lost = len(np.unique(trial_ids)) - len(np.unique(trial_ids[keep]))
-    types = sorted(set(readings.labels[~keep & (readings.labels != "")].tolist()) - set(readings.labels[keep].tolist()))
+    labels = sorted({*readings.labels[~keep].tolist()} - {*readings.labels[keep].tolist(), ""})
     lack = list_names([name for name, mask in missing.items() if mask[~keep].any()])
     message = f"{rows.size} rows with missing values were left out: {list_rows(rows)} (columns {lack})"
-    cost = [f"{lost} of {len(np.unique(trial_ids))} trials"] * bool(lost)
-    cost += [f"grasp type{'s' if len(types) > 1 else ''} {list_names(types)}"] * bool(types)
-    message += f"; so {' and '.join(cost)} are lost" if cost else ""
+    shown = [f"{lost} of {len(np.unique(trial_ids))} trials"] * bool(lost)
+    shown += [f"grasp type{'s' if len(labels) > 1 else ''} {list_names(labels)}"] * bool(labels)
+    message += f"; so {' and '.join(shown)} are lost" if shown else ""
     return [Oddity("dropped rows", int(rows.size), message, tuple(rows[:SHOWN].tolist()), tuple(missing))]
 
 
@@ -231,15 +233,15 @@ def _filled(
 ) -> list[Oddity]:
     """Fill the cells of inputs that are `missing`, in place, and return a finding about them."""
     inputs = [*selection.switches, *(name for name, _ in selection.taxels)]
-    arrays: dict[str, NDArray[np.bool_] | NDArray[np.float64]] = dict(zip(inputs, readings.switches.T, strict=True))
-    arrays |= zip((name for name, _ in selection.coded), readings.joints.T, strict=True)
-    masks = {name: mask for name, mask in missing.items() if name in arrays and mask.any()}
+    values: dict[str, NDArray[np.bool_] | NDArray[np.float64]] = dict(zip(inputs, readings.switches.T, strict=True))
+    values |= zip((name for name, _ in selection.coded), readings.joints.T, strict=True)
+    masks = {name: mask for name, mask in missing.items() if name in values and mask.any()}
     if not masks:
         return []
     if empty := [name for name, mask in masks.items() if mask.all()]:
         raise TableError(f"{what}: column {shortened(repr(empty[0]))} has no values: leave it out")
     cells = sum(int(mask.sum()) for mask in masks.values())
-    strange = sum(fill(arrays[name], mask, trial_ids) for name, mask in masks.items())
+    strange = sum(fill(values[name], mask, trial_ids) for name, mask in masks.items())
     rows = readings.rows[np.logical_or.reduce([*masks.values()])]
     message = (
         f"{cells} missing cells in {rows.size} rows were filled: {cells - strange} from the nearest frame of their "
@@ -252,22 +254,23 @@ def _reduced(readings: Readings, how: str, trial_ids: NDArray[np.intp], notes: l
     """Return one row per trial, computed from its frames; all rows if `how` is "none"."""
     if how == "none":
         return readings
-    middle = frame_of_each(trial_ids)
-    reduced = replace(readings, switches=readings.switches[:, :0], joints=readings.joints[:, :0]).kept(middle)
-    switches = _each(readings.switches, trial_ids, middle, how, how == "any")
-    joints = _each(readings.joints, trial_ids, middle, how)
-    notes.append(f"{len(trial_ids)} frames of {len(middle)} trials were reduced to one row a trial ({how})")
+    rows = frame_of_each(trial_ids)
+    reduced = replace(readings, switches=readings.switches[:, :0], joints=readings.joints[:, :0]).kept(rows)
+    notes.append(f"{len(trial_ids)} frames of {len(rows)} trials were reduced to one row a trial ({how})")
+    switches, joints = (_of_trials(values, trial_ids, rows, how) for values in (readings.switches, readings.joints))
     return replace(reduced, switches=switches, joints=joints)
 
 
-def _each(
-    array: NDArray[Value], trial_ids: NDArray[np.intp], middle: NDArray[np.intp], how: str, largest: bool = False
-) -> NDArray[Value]:
+def _of_trials(
+    values: NDArray[np.generic], trial_ids: NDArray[np.intp], rows: NDArray[np.intp], how: str
+) -> NDArray[Any]:
+    """Return the values (m, d) of m trials: of their middle `rows` (m,), or column by column by `how`."""
     if how == "middle":
-        return array[middle]
-    made = np.empty((len(middle), array.shape[1]), array.dtype, order="F")
-    for number, column in enumerate(array.T):
-        made[:, number] = column[frame_of_each(trial_ids, column, largest)]
+        return values[rows]
+    made = np.empty((len(rows), values.shape[1]), values.dtype, order="F")
+    for number in range(values.shape[1]):
+        frames = frame_of_each(trial_ids, values[:, number], how == "any" and values.dtype == np.bool_)
+        made[:, number] = values[frames, number]
     return made
 
 
@@ -411,46 +414,46 @@ def restarts(ids: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.int
     return np.cumsum(begins).astype(np.int64)
 
 
-def in_time(trials: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.intp]:
+def in_time(trial_ids: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the rows (n,) ordered such that each trial keeps its places, with its frames in the order of `time`."""
-    order = np.empty(len(trials), np.intp)
-    order[np.argsort(trials, kind="stable")] = np.lexsort((time, trials))
+    order = np.empty(len(trial_ids), np.intp)
+    order[np.argsort(trial_ids, kind="stable")] = np.lexsort((time, trial_ids))
     return order
 
 
-def fill(values: NDArray[np.generic], missing: NDArray[np.bool_], trials: NDArray[np.intp]) -> int:
+def fill(values: NDArray[np.generic], missing: NDArray[np.bool_], trial_ids: NDArray[np.intp]) -> int:
     """Fill the `missing` (n,) of `values` (n,) in place from the nearest frame of the same trial, the earlier of two.
 
     If the trial has none, use the lower median of all known values. Return the number of cells filled that way. Labels
     are not used.
     """
-    order = np.argsort(trials, kind="stable")
-    there, trial, place = ~missing[order], trials[order], np.arange(len(order))
-    before = np.maximum.accumulate(np.where(there, place, -1))
-    after = np.minimum.accumulate(np.where(there, place, len(order))[::-1])[::-1]
-    has_before = (before >= 0) & (trial[before] == trial)
-    has_after = (after < len(order)) & (trial[np.minimum(after, len(order) - 1)] == trial)
-    nearest = np.where(has_before & (~has_after | (place - before <= after - place)), before, after)
-    known = has_before | has_after
+    order = np.argsort(trial_ids, kind="stable")
+    trial, known, gaps = trial_ids[order], np.flatnonzero(~missing[order]), np.flatnonzero(missing[order])
+    following = np.searchsorted(known, gaps)
+    before, after = known[following - 1], known[following % len(known)]
+    beyond = len(order)
+    back = np.where((following > 0) & (trial[before] == trial[gaps]), gaps - before, beyond)
+    ahead = np.where((following < len(known)) & (trial[after] == trial[gaps]), after - gaps, beyond)
+    alone = (back == beyond) & (ahead == beyond)
     present = np.sort(values[~missing])
-    filled = np.full(len(order), present[(len(present) - 1) // 2])
-    filled[known] = values[order][nearest[known]]
-    values[order[~there]] = filled[~there]
-    return int((~there & ~known).sum())
+    filled = values[order[np.where(back <= ahead, before, after)]]
+    filled[alone] = present[(len(present) - 1) // 2]
+    values[order[gaps]] = filled
+    return int(alone.sum())
 
 
 def frame_of_each(
-    trials: NDArray[np.intp], values: NDArray[np.generic] | None = None, largest: bool = False
+    trial_ids: NDArray[np.intp], values: NDArray[np.generic] | None = None, largest: bool = False
 ) -> NDArray[np.intp]:
-    """Return a row of each of the `trials` (n,), in the order of their middle frames.
+    """Return a row of each of the trials `trial_ids` (n,), in the order of their middle frames.
 
     It is the middle frame; with `values` (n,) a frame with the lower median of them, for switches the majority, or with
     the largest.
     """
-    order = np.argsort(trials, kind="stable")
-    starts = np.flatnonzero(np.diff(trials[order], prepend=-1))
-    sizes = np.diff(starts, append=len(trials))
+    order = np.argsort(trial_ids, kind="stable")
+    starts = np.flatnonzero(np.diff(trial_ids[order], prepend=-1))
+    sizes = np.diff(starts, append=len(trial_ids))
     middles = starts + (sizes - 1) // 2
-    by_value = order if values is None else np.lexsort((values, trials))
+    by_value = order if values is None else np.lexsort((values, trial_ids))
     chosen: NDArray[np.intp] = by_value[starts + sizes - 1 if largest else middles]
     return chosen[np.argsort(order[middles])]

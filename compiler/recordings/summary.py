@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.names import SHOWN, list_names
 
-from .arrays import groups, otsu
-from .errors import list_rows
+from ..arrays import groups, otsu
+from . import list_rows
 from .graspset import GraspSet, Joint
 
 
@@ -45,8 +45,9 @@ def find_oddities(grasp_set: GraspSet, rows: NDArray[np.int64]) -> tuple[Oddity,
 
     Rows in which nothing is held are naturally alike, and so not compared.
     """
-    held = grasp_set.without_none()
-    return (*_odd_columns(grasp_set), *_odd_frames(held, rows[~grasp_set.is_none]), *_gaps(held))
+    columns = tuple(_odd_columns(grasp_set))
+    rows, grasp_set = rows[~grasp_set.is_none], grasp_set.without_none()
+    return (*columns, *_odd_frames(grasp_set, rows), *_gaps(grasp_set))
 
 
 def constant_columns(columns: NDArray[np.generic], names: Sequence[str]) -> tuple[str, ...]:
@@ -310,14 +311,14 @@ def _are_apart(grasp_set: GraspSet) -> bool:
     """Return whether steps from one trial to the next are larger than steps between the rows of a trial."""
     group = groups(grasp_set.labels, grasp_set.subjects, grasp_set.objects, grasp_set.sessions)
     order = np.argsort(group, kind="stable")
-    before, after = order[:-1], order[1:]
-    alike = group[before] == group[after]
-    before, after = before[alike], after[alike]
-    inside = grasp_set.trial_ids[before] == grasp_set.trial_ids[after]
+    rows, others = order[:-1], order[1:]
+    alike = group[rows] == group[others]
+    rows, others = rows[alike], others[alike]
+    inside = grasp_set.trial_ids[rows] == grasp_set.trial_ids[others]
     count = int(np.count_nonzero(~inside))
     if not count or not inside.any():
         return False
-    (steps,) = _distances(grasp_set, before, [after])
+    (steps,) = _distances(grasp_set, rows, [others])
     larger = float(np.mean(steps[~inside] > np.median(steps[inside])))
     return larger >= _APART and larger - 0.5 >= _ERRORS * (0.25 / count) ** 0.5
 
@@ -328,7 +329,7 @@ def _units(grasp_set: GraspSet) -> tuple[Rows, Rows]:
     order = np.argsort(group, kind="stable")
     trial = grasp_set.trial_ids[order]
     first = np.flatnonzero(np.diff(trial, prepend=-1) != 0)
-    middle = (first + np.append(first[1:], len(order))) // 2
+    middle = first + np.diff(first, append=len(order)) // 2
     return order[middle], group[order[middle]]
 
 

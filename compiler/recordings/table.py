@@ -29,9 +29,9 @@ from thenar.runtime.files import open_file
 from thenar.runtime.names import shortened
 
 from ..text import text_of
+from . import COLUMNS, LARGEST, LINES, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
 from .cells import NUMBER, Column, has_names, preface, skipped, unlisted
 from .columns import PLAIN, TextFormat
-from .errors import COLUMNS, LARGEST, LINES, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
 from .foreign import READERS, read_foreign
 
 if TYPE_CHECKING:

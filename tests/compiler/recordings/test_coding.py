@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.compiler.recordings import RecordingError, TableError
 from thenar.compiler.recordings.columns import CalibrationPoints, JointColumns, sound_grid
-from thenar.compiler.recordings.errors import RecordingError, TableError
 from thenar.compiler.recordings.importer import code_joint
 
 ANGLES = st.lists(st.floats(-400, 400), min_size=1, max_size=20)

@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
+from thenar.compiler.recordings import ColumnsError
 from thenar.compiler.recordings.columns import CalibrationPoints, ColumnRoles, JointColumns, read_columns, select
-from thenar.compiler.recordings.errors import ColumnsError
 
 NAMES = ["grasp", "who", "what", "s1", "s2", "s10", "j1", "j2"]
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from thenar.compiler.recordings import ColumnsError, TableError
 from thenar.compiler.recordings.columns import CalibrationPoints, ColumnRoles, JointColumns, TaxelColumns
-from thenar.compiler.recordings.errors import ColumnsError, TableError
 from thenar.compiler.recordings.export import export
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_file, import_table

@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import pytest
 
+from thenar.compiler.recordings import RecordingError
 from thenar.compiler.recordings import export as module
-from thenar.compiler.recordings.errors import RecordingError
 from thenar.compiler.recordings.export import draw
 from thenar.compiler.recordings.graspset import GraspSet
 
