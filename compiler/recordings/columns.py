@@ -210,17 +210,14 @@ def _is_encoding(name: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The columns of one table by role; taxels and joints with the entry that says how to read them."""
+    """The inputs in one table, by name, with the entries that say how to read them.
 
-    switches: tuple[str, ...]
-    taxels: tuple[tuple[str, TaxelColumns], ...]
-    joints: tuple[tuple[str, JointColumns], ...]
-    learnt: tuple[tuple[str, TaxelColumns], ...] = ()
+    switches  the switches, without an entry, then the taxels with a threshold
+    coded     the columns that become codes: the joints, then the analog taxels
+    """
 
-    @property
-    def coded(self) -> tuple[tuple[str, JointColumns], ...]:
-        """The columns that become codes: the joints, then the analog taxels."""
-        return (*self.joints, *self.learnt)
+    switches: tuple[tuple[str, TaxelColumns | None], ...]
+    coded: tuple[tuple[str, JointColumns], ...]
 
 
 def read_columns(path: Path) -> ColumnRoles:
@@ -263,13 +260,13 @@ def select(columns: ColumnRoles, names: Sequence[str]) -> Selection:
     if not found:
         raise ColumnsError("no column is an input: name some under `switches`, `[[taxels]]` or `[[joints]]`")
     taxels = [(name, entry) for name, entry in found if isinstance(entry, TaxelColumns)]
+    joints = [(name, entry) for name, entry in found if entry is not None and not isinstance(entry, TaxelColumns)]
     return Selection(
-        switches=tuple(name for name, entry in found if entry is None),
-        taxels=tuple((name, entry) for name, entry in taxels if entry.threshold != "learnt"),
-        joints=tuple(
-            (name, entry) for name, entry in found if entry is not None and not isinstance(entry, TaxelColumns)
+        switches=(
+            *((name, None) for name, entry in found if entry is None),
+            *((name, entry) for name, entry in taxels if entry.threshold != "learnt"),
         ),
-        learnt=tuple((name, entry) for name, entry in taxels if entry.threshold == "learnt"),
+        coded=(*joints, *((name, entry) for name, entry in taxels if entry.threshold == "learnt")),
     )
 
 

@@ -140,13 +140,6 @@ class GraspSet:
     ----------
     labels : (n,) array of intp
         The index of each grasp in `taxonomy.types`, and the number of types if nothing is held.
-    is_none : (n,) array of bool
-        Where nothing is held.
-    trial_ids : (n,) array of intp
-        The trial of each row, numbered from 0 in the order of first appearance.
-    movement_ids : (n,) array of intp
-        The movement of each row: its trial, with the rows before and after it in which nothing is held. No fold splits
-        the rows of a movement.
 
     Raises
     ------
@@ -299,7 +292,7 @@ class GraspSet:
     def movement_ids(self) -> NDArray[np.intp]:
         """The movement of each row: a trial, and the rows of its number, subject, object and session without a grasp.
 
-        Such rows belong to the trial before them, or to the first.
+        Such rows belong to the trial before them, or to the first. No fold splits the rows of a movement.
         """
         trials, none = self.trial_ids, self.is_none
         if not none.any() or self.independent:

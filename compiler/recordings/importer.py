@@ -90,14 +90,15 @@ def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportRe
     ]
     costs = tuple(cost for _, _, cost in coded)
     inputs = zip((name for name, _ in selection.coded), readings.joints.T, strict=True)
-    joints, taxels = coded[: len(selection.joints)], coded[len(selection.joints) :]
+    count = sum(not isinstance(entry, TaxelColumns) for _, entry in selection.coded)
+    joints, taxels = coded[:count], coded[count:]
     empty = np.zeros((len(grasps), 0), np.uint16)
     # Read-only, so that the set uses them without copies.
     for name in readings.__slots__:
         getattr(readings, name).setflags(write=False)
     grasp_set = GraspSet(
         switches=readings.switches,
-        switch_names=(*selection.switches, *(name for name, _ in selection.taxels)),
+        switch_names=tuple(name for name, _ in selection.switches),
         codes=np.stack([codes for codes, _, _ in joints], axis=1) if joints else empty,
         joints=tuple(joint for _, joint, _ in joints),
         taxels=np.stack([codes for codes, _, _ in taxels], axis=1) if taxels else empty,

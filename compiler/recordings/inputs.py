@@ -365,8 +365,9 @@ def inputs_of(columns: Sequence[Facts], held: NDArray[np.bool_], out: dict[str, 
         if reason := out.get(column.name) or _no_input(column):
             found.setdefault(("left out", reason), []).append(column.name)
         else:
-            families.setdefault("bits" if column.bits else _family(column), []).append(column)
-    # Columns whose names differ only in a finger or a number have the same role, whatever the range of each.
+            # Columns whose names differ only in a finger, or without words in a number, have the same role.
+            family = column.words - WORDS["finger"] if column.words else stem_of(column.name)
+            families.setdefault("bits" if column.bits else family, []).append(column)
     judged: dict[str, tuple[str, str]] = {}
     for several in sorted(families.values(), key=len, reverse=True):
         role = _input(several, held)
@@ -381,11 +382,6 @@ def inputs_of(columns: Sequence[Facts], held: NDArray[np.bool_], out: dict[str, 
         )
     order = ["switches", "taxels", "joints", "left out"]
     return [Role(tuple(alike), *key) for key, alike in sorted(found.items(), key=lambda item: order.index(item[0][0]))]
-
-
-def _family(column: Facts) -> object:
-    """Return the words of the name except fingers, or a name without words up to its number: siblings share them."""
-    return column.words - WORDS["finger"] if column.words else stem_of(column.name)
 
 
 def _as_on_finger(

@@ -161,12 +161,12 @@ def _runs(readings: Readings, none: NDArray[np.bool_], timeless: bool) -> NDArra
 
 def _switches(reader: "_Reader", selection: Selection, notes: list[str]) -> NDArray[np.bool_]:
     """Return the switches, with those made by thresholds last."""
-    names = [*selection.switches, *selection.taxels]
-    switches = np.empty((len(reader.table.rows), len(names)), np.bool_, order="F")
-    for number, name in enumerate(selection.switches):
-        switches[:, number] = reader.read(name, bits, "0 or 1")
+    switches = np.empty((len(reader.table.rows), len(selection.switches)), np.bool_, order="F")
     shown = []
-    for number, (name, taxel) in enumerate(selection.taxels, start=len(selection.switches)):
+    for number, (name, taxel) in enumerate(selection.switches):
+        if taxel is None:
+            switches[:, number] = reader.read(name, bits, "0 or 1")
+            continue
         values = reader.read(name, numbers, "finite numbers")
         threshold = otsu(values) if isinstance(taxel.threshold, str) else taxel.threshold
         switches[:, number] = values > threshold
@@ -232,9 +232,8 @@ def _filled(
     trial_ids: NDArray[np.intp],
 ) -> list[Oddity]:
     """Fill the cells of inputs that are `missing`, in place, and return a finding about them."""
-    inputs = [*selection.switches, *(name for name, _ in selection.taxels)]
-    values: dict[str, NDArray[np.bool_] | NDArray[np.float64]] = dict(zip(inputs, readings.switches.T, strict=True))
-    values |= zip((name for name, _ in selection.coded), readings.joints.T, strict=True)
+    inputs = [name for name, _ in (*selection.switches, *selection.coded)]
+    values = dict(zip(inputs, (*readings.switches.T, *readings.joints.T), strict=True))
     masks = {name: mask for name, mask in missing.items() if name in values and mask.any()}
     if not masks:
         return []
