@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from thenar.runtime.errors import SealError
 
 AnyArray = NDArray[np.generic]
+
 _HEADER = "header"
 # The header of an array as numpy writes it, after the length of the header. All quantifiers are possessive, so the time
 # is linear.

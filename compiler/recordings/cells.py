@@ -38,8 +38,10 @@ def pieces(column: Column) -> Iterator[list[str]]:
 
 
 MISSING_NAMES = frozenset({"", "?"})
+
 _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?")
 _BITS = {"true": 1.0, "false": 0.0}
+
 Value = TypeVar("Value", bound=np.generic)
 
 
@@ -271,6 +273,7 @@ def _list_of(cell: str) -> list[float] | None:
 NUMBER = re.compile(r"[+-]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:[eE][+-]?\d++)?")
 # Cells in place of numbers, without regard to case.
 MISSING_NUMBERS = frozenset({"", "?", "na", "n/a", "#n/a", "nan", "null", "none"})
+
 _Rows = Sequence[Sequence[str]]
 
 

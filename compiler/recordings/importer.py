@@ -311,8 +311,6 @@ def _joint(name: str, entry: JointColumns, least: float) -> Joint:
     return Joint(name, entry.unit, 0, origin, _FAR, origin + _FAR * entry.step)
 
 
-# The most codes for values that share a decimal place; the fewest between the 1st and 99th percentiles of others.
-_OWN_STEPS, _STEPS = 20_000, 1000
 # Joints with more values than the first number and fewer codes than the second have lost information.
 _MANY, _FEW = 20, 10
 

@@ -24,6 +24,7 @@ from .table import Table
 
 Values = NDArray[np.float64]
 Bits = NDArray[np.bool_]
+
 # The kind of the finding about inputs that may be clocks.
 POSSIBLE_CLOCKS = "possible clocks"
 # Clocks seldom fall: the largest share of falling steps from trial to trial, of one that is certain or suspicious, and
@@ -287,6 +288,7 @@ _LISTS = {
     "joint": "flex bend joint angle glove cyberglove enc encoder mcp pip dip cmc abduction winkel biegung",
 }
 WORDS = {role: words_of(words) for role, words in _LISTS.items()}
+
 # An unknown analog column is a pad if this share of its cells is at rest, in the lowest tenth of its range.
 _AT_REST, _REST = 0.5, 0.1
 _PADS = ': a placement chooses their levels (threshold = 0.4, or "otsu", makes switches of them)'

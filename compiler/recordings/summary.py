@@ -227,6 +227,7 @@ def _ranges(joints: Sequence[Joint], columns: NDArray[np.uint16]) -> tuple[Joint
 
 
 Rows = NDArray[np.intp]
+
 # A frame's distance to the next is below this share of its distance to a row further away. For repetitions this is
 # rare, even if they come in blocks of one hand or one action.
 _ALIKE = 0.25
@@ -237,6 +238,7 @@ _ERRORS = 3.0
 # Trials are separate if this share of the steps from one to the next exceeds the median step within them.
 _APART = 0.75
 _SEED = 1
+
 _NUMBER = 'name the column that numbers {} (trial = "..." in columns.toml) and import again'
 _STATE = '; or, if each row is a separate trial, state that in place of `trial` (frames = "independent")'
 

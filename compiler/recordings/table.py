@@ -88,10 +88,6 @@ def _lines(what: str, text: io.TextIOWrapper) -> Iterator[str]:
         yield line
 
 
-# Cells kept as str at a time, while a table is filled or a column is read.
-_CELLS, _READ = 1 << 15, 1 << 14
-
-
 # Cells that are kept as str at a time, while a table is filled.
 _CELLS = 1 << 15
 
@@ -245,6 +241,7 @@ _VALUE = re.compile(rf"""{_QUOTED}|['"].*+|[^\s,{{}}'"%]++""")
 _CLOSED = re.compile(_QUOTED)
 _ATTRIBUTE = re.compile(rf"@attribute\s++({_VALUE.pattern})\s++(.+)", re.IGNORECASE)
 _NUMERIC = ("numeric", "real", "integer")
+
 # The possible values of an attribute; None for numbers.
 _Kinds = dict[str, frozenset[str] | None]
 
