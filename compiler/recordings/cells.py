@@ -186,9 +186,10 @@ def natural_key(text: str) -> tuple[list[tuple[int, str]], str]:
     return [(len(part.lstrip("0")), part.lstrip("0")) if odd % 2 else (-1, part) for odd, part in parts], text
 
 
+TimeUnit = Literal["s", "ms", "us", "ns"]
 # Units of time by the words that name them, and the smallest step between two frames for each: frames come 2 to 2000
 # times a second.
-UNITS = {
+UNITS: dict[TimeUnit, tuple[set[str], float, float]] = {
     "s": ({"s", "sec", "secs", "second", "seconds", "sekunde", "sekunden"}, 0.0005, 0.5),
     "ms": ({"ms", "msec", "milli", "millis", "millisecond", "milliseconds"}, 2.0, 500.0),
     "us": ({"us", "usec", "µs", "μs", "micro", "micros", "microsecond", "microseconds"}, 500.0, 5e5),
@@ -196,7 +197,7 @@ UNITS = {
 }
 
 
-def unit_of_time(name: str, time: NDArray[np.float64]) -> Literal["s", "ms", "us", "ns"] | None:
+def unit_of_time(name: str, time: NDArray[np.float64]) -> TimeUnit | None:
     """Return the unit of times (n,) in a column called `name`, by its name or by the distance between frames.
 
     Return None if neither is conclusive, as for numbered frames.
@@ -208,7 +209,7 @@ def unit_of_time(name: str, time: NDArray[np.float64]) -> Literal["s", "ms", "us
     # Numbers of frames have no unit, however far apart they are.
     numbered = words & {"frame", "frames", "bild"}
     found = named or [unit for unit, (_, least, most) in UNITS.items() if least <= step < most and not numbered]
-    return found[0] if len(found) == 1 else None  # type: ignore[return-value]
+    return found[0] if len(found) == 1 else None
 
 
 # A list as pandas and numpy write it, with commas or blanks, and a number of numpy in it.

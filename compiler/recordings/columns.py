@@ -23,6 +23,7 @@ from thenar.runtime.toml_source import read_source
 from thenar.runtime.toml_struct import convert
 
 from . import ColumnsError
+from .cells import TimeUnit
 from .graspset import CODES, LARGEST_VALUE
 
 DEFAULT_GRID = 0.5
@@ -108,9 +109,6 @@ class TaxelColumns(JointColumns, frozen=True, forbid_unknown_fields=True, omit_d
     def is_coded(self) -> bool:
         """Whether the coding of the columns is given."""
         return self.is_counts or not (self.grid is None and self.origin is None and self.calibration is None)
-
-
-TimeUnit = Literal["s", "ms", "us", "ns"]
 
 
 class TextFormat(NamedTuple):
