@@ -8,6 +8,7 @@ one trial to the next, or takes the same course in all of them.
 import re
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from operator import itemgetter
 from typing import NamedTuple
 
 import msgspec
@@ -75,11 +76,8 @@ def is_count(words: frozenset[str]) -> bool:
     return bool(words & _COUNTERS) or (bool(words & _COUNTS) and words <= _COUNTS | _BESIDE)
 
 
-class Sign(NamedTuple):
-    """Why a column may be a clock, a counter or a trial number, and whether that is certain."""
-
-    reason: str
-    certain: bool
+# Why a column may be a clock, a counter or a trial number, and whether that is certain.
+Sign = tuple[str, bool]
 
 
 class Course:
@@ -136,8 +134,7 @@ class Course:
         # Sensors fall as often as they rise, nearly all of them: the rest is for what hardly falls within trials.
         if np.count_nonzero(inside < 0) <= _FALLS * len(inside):
             signs += [self._over_trials(values, steps), self._along(values), self._few(steps)]
-        found = [sign for sign in signs if sign is not None]
-        return next((sign for sign in found if sign.certain), found[0] if found else None)
+        return max(filter(None, signs), key=itemgetter(1), default=None)
 
     def _equal_steps(self, values: Values, steps: Values) -> Sign | None:
         """Judge by steps that are all equal: over the file, or within trials that start with one value."""
@@ -146,9 +143,9 @@ class Course:
         # Nothing but a row number has steps of one in a table of few rows.
         enough = len(steps) >= _MANY_ROWS or (usual == 1 and bool(equal.all()))
         if usual > 0 and enough and np.mean(equal) >= _EQUAL:
-            return Sign("it counts the rows", True)
+            return "it counts the rows", True
         if usual > 0 and enough and self.within.any() and equal[self.within].all() and self._same_start(values, usual):
-            return Sign("it counts the frames of each trial", True)
+            return "it counts the frames of each trial", True
         return None
 
     def _same_start(self, values: Values, step: float) -> bool:
@@ -166,10 +163,10 @@ class Course:
             seldom = down <= _FALLS * len(rise) and 2 * up >= len(rise)
             if seldom and (excess or (order < 2 and len(rise) >= _TRIALS - 1)):
                 if order == 2 or not self.sorted or self._one_rate(steps):
-                    return Sign("it rises from trial to trial, as a clock or a counter does", True)
-                found = Sign("it rises from trial to trial", False)
+                    return "it rises from trial to trial, as a clock or a counter does", True
+                found = ("it rises from trial to trial", False)
             elif excess and down <= _SUSPICIOUS_FALLS * len(rise) and 2 * np.count_nonzero(inside > 0) > len(inside):
-                found = found or Sign("it rises within trials and from most of them to the next", False)
+                found = found or ("it rises within trials and from most of them to the next", False)
         return found
 
     def _one_rate(self, steps: Values) -> bool:
@@ -190,14 +187,14 @@ class Course:
         place = np.arange(len(values), dtype=np.float64)
         inside = place - place[self.first][self.run]
         if self.time is not None and _on_line(self.time - self.time.mean(), values - values.mean(), self.time):
-            return Sign(f"it runs with {self.time_name}", True)
+            return f"it runs with {self.time_name}", True
         if len(values) < _FRAMES * len(self.first):
             return None
         for what, name in ((self.time, self.time_name), (inside, "the frames of a trial")):
             if what is None or not (step := _on_line(self._centred(what), self._centred(values), what)):
                 continue
             certain = len(self.first) >= _TRIALS and self._same_start(values, step)
-            return Sign(f"it runs with {name} in all trials", certain)
+            return f"it runs with {name} in all trials", certain
         return None
 
     def _centred(self, values: Values) -> Values:
@@ -209,7 +206,7 @@ class Course:
         up, down = np.count_nonzero(steps > 0), np.count_nonzero(steps < 0)
         if len(self.first) >= _TRIALS or up < _RISES or down > _FALLS * up:
             return None
-        return Sign("it rises over the whole table", self._one_rate(steps))
+        return "it rises over the whole table", self._one_rate(steps)
 
 
 def _successors(first: NDArray[np.intp], of: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -251,7 +248,7 @@ def possible_clocks(columns: Iterable[tuple[str, Values]], course: Course) -> li
         if is_time(words) or is_count(words):
             found[name] = "its name is that of a clock or a counter"
         elif sign := course.sign(values):
-            found[name] = sign.reason
+            found[name] = sign[0]
     if not found:
         return []
     listed = list_names([f"{name} ({reason})" for name, reason in found.items()])

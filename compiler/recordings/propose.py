@@ -401,8 +401,9 @@ class _Search:
         for column in self.free:
             if column.values is None or column.bits or column.distinct < 2:
                 continue
-            if (sign := course.sign(column.over_rows)) and sign.certain:
-                signs[column.name] = sign.reason
+            reason, certain = course.sign(column.over_rows) or ("", False)
+            if certain:
+                signs[column.name] = reason
         return signs
 
 
