@@ -20,7 +20,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from thenar.compiler.recordings.errors import check_names
+from thenar.compiler.recordings import check_names
 from thenar.compiler.recordings.taxonomy import MOVEMENTS, Taxonomy
 from thenar.drivers.closing import Closing
 from thenar.drivers.errors import DeviceError, SettingError

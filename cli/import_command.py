@@ -84,7 +84,7 @@ def _pattern(folder: Path) -> Path:
 
 def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport]":
     """Import the table in `path` with the detected columns, if the user agrees."""
-    from thenar.compiler.recordings.errors import ColumnsError
+    from thenar.compiler.recordings import ColumnsError
     from thenar.compiler.recordings.importer import import_table
     from thenar.compiler.recordings.propose import propose_file
 
@@ -111,7 +111,7 @@ def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport
 
 def _write(text: str, path: Path, asked: bool) -> Path:
     """Write the detected columns to `path`; replace others there only if the user agrees. Return the path."""
-    from thenar.compiler.recordings.errors import ColumnsError
+    from thenar.compiler.recordings import ColumnsError
     from thenar.runtime.files import write_atomically
 
     kept = os.path.lexists(path) and not (path.is_file() and path.read_bytes() == text.encode())
@@ -123,7 +123,7 @@ def _write(text: str, path: Path, asked: bool) -> Path:
 
 
 def _print_proposal(proposal: "ColumnProposal") -> None:
-    from thenar.compiler.recordings.inputs import listed
+    from thenar.compiler.recordings.propose import listed
 
     for remark in proposal.remarks:
         echo(remark)

@@ -32,7 +32,6 @@ def command(grasps: Path, plot: Path | None) -> None:
         thenar info set.grasps --plot set.png
     """
     from thenar.compiler.recordings.graspset import GraspSet
-    from thenar.compiler.recordings.picture import draw
     from thenar.compiler.recordings.summary import summarise
 
     keep_apart(grasps, plot)
@@ -40,6 +39,8 @@ def command(grasps: Path, plot: Path | None) -> None:
     with progress(f"comparing the rows of {grasps.name}"):
         summary = summarise(grasp_set)
     if plot is not None:
+        from thenar.compiler.recordings.export import draw
+
         write_picture(plot, partial(draw, grasp_set))
     show(summary, _print, grasps)
 

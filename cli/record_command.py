@@ -65,7 +65,7 @@ def command(
         thenar record --glove glove.toml --subject A --objects objects.toml -o anna.grasps
         thenar record --glove glove.toml --subject A -o anna.grasps --web
     """
-    from thenar.compiler.recordings.errors import check_names
+    from thenar.compiler.recordings import check_names
     from thenar.compiler.recordings.taxonomy import collected
     from thenar.runtime.harness.loading import load_harness
     from thenar.runtime.recording.guide import planned, read_journal

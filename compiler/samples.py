@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.recipe import Inputs
 
+from .arrays import groups
 from .limits import check_types
 from .recordings.graspset import GraspSet
-from .recordings.trials import groups
 
 Columns = tuple[int, ...]
 

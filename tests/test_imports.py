@@ -19,6 +19,7 @@ ALLOWED = {
     "runtime.errors": ("drivers.errors",),
     "compiler": ("runtime", "drivers.errors", "compiler"),
     "compiler.frontier": ("runtime", "drivers", "compiler"),
+    "compiler.arrays": ("runtime.errors",),
     "compiler.pictures": ("runtime.errors",),
     "compiler.elementary": (),
     "compiler.text": (),
@@ -30,12 +31,13 @@ ALLOWED = {
     "compiler.recordings": (
         "runtime",
         "drivers.errors",
+        "compiler.arrays",
         "compiler.recordings",
         "compiler.pictures",
         "compiler.publication",
         "compiler.text",
     ),
-    "compiler.samples": ("runtime", "drivers.errors", "compiler.limits", "compiler.recordings"),
+    "compiler.samples": ("runtime", "drivers.errors", "compiler.arrays", "compiler.limits", "compiler.recordings"),
     "compiler.placement": (
         "runtime",
         "drivers.cyberglove_protocol",

@@ -34,8 +34,8 @@ from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts, ports_of_whole_glove
 from ..publication import check_folder, publish_folder, sweep
 from ..recogniser import Recogniser, predicted_classes
-from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet, Joint
+from ..recordings.summary import check_trials
 from ..samples import Samples
 from ..trainers.base import SHARED, TRAINERS, Training
 from . import CompileError

@@ -1,6 +1,6 @@
 """`ensemble.bin`: the model that a build was collapsed from, kept for verification.
 
-A sealed npz (recordings/arrays.py) in one of five formats.
+A sealed npz (compiler/arrays.py) in one of five formats.
 
 Format 1, LogitBoost: columns (M, K) int32, thresholds (M, K) float64 and values (M, K, 3) float64, with a JSON header
 {"n_inputs", "shrinkage"}.
@@ -29,9 +29,9 @@ from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Line
 from thenar.runtime.sealed import seal, unseal
 
+from ..arrays import AnyArray, pack, unpack
 from ..boosting.stumps import Stumps
 from ..model.collapse import Model, collapse
-from ..recordings.arrays import AnyArray, pack, unpack
 
 KIND = b"THNRENSM"
 STUMPS, TABLES, LINES, PAIRS, OTHERS = 1, 2, 3, 4, 5  # formats

@@ -29,8 +29,8 @@ from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import InputSelection, information_alone
 from ..placement.selectors import SwitchSelector
 from ..recogniser import Recogniser, Scores
-from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
+from ..recordings.summary import check_trials
 from ..samples import Columns, Samples
 from . import CompileError
 from .compile import BuildAssembly, Wired, check_target

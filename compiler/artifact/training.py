@@ -20,8 +20,8 @@ from ..movements.streams import TICK_US, MovementError, streams_of
 from ..placement.constraints import Limits
 from ..placement.ports import PortCosts
 from ..recogniser import Classes, Groups, Recogniser, Scores
-from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
+from ..recordings.summary import check_trials
 from ..samples import Samples
 from ..trainers.base import Report, Training
 from ..workers import in_workers, little

@@ -14,8 +14,8 @@ from ..placement.constraints import Limits
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import Placer
 from ..placement.ports import PortCosts
-from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
+from ..recordings.summary import check_trials
 from ..samples import Samples
 from ..text import counted
 from ..trainers.base import Training

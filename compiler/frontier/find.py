@@ -24,8 +24,8 @@ from ..limits import check_inputs, check_memory, check_types
 from ..placement.methods.base import METHODS, usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
-from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
+from ..recordings.summary import check_trials
 from ..samples import Samples
 from ..text import INDEPENDENT, sentence
 from .cache import Cache, Report, Store

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from thenar.drivers.errors import ThenarError
 
+from ..arrays import groups
 from ..placement.elements import above, elements_of
 from ..recordings.graspset import GraspSet
-from ..recordings.trials import groups
 from ..samples import Samples
 
 Rows = NDArray[np.intp]

@@ -4,8 +4,9 @@ import codecs
 import glob
 import math
 import re
+from bisect import bisect_left
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fnmatch import translate
 from itertools import islice
@@ -13,13 +14,17 @@ from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
 import msgspec
+import numpy as np
 import tomli_w
+from numpy.typing import NDArray
 
 from thenar.runtime.names import LONGEST_NAME, nearest, shortened
 from thenar.runtime.toml_source import read_source
 from thenar.runtime.toml_struct import convert
 
-from .errors import ColumnsError
+from . import ColumnsError
+from .cells import TimeUnit
+from .graspset import CODES, LARGEST_VALUE
 
 DEFAULT_GRID = 0.5
 # Codecs of Python that are not text encodings.
@@ -104,9 +109,6 @@ class TaxelColumns(JointColumns, frozen=True, forbid_unknown_fields=True, omit_d
     def is_coded(self) -> bool:
         """Whether the coding of the columns is given."""
         return self.is_counts or not (self.grid is None and self.origin is None and self.calibration is None)
-
-
-TimeUnit = Literal["s", "ms", "us", "ns"]
 
 
 class TextFormat(NamedTuple):
@@ -206,17 +208,14 @@ def _is_encoding(name: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The columns of one table by role; taxels and joints with the entry that says how to read them."""
+    """The inputs in one table, by name, with the entries that say how to read them.
 
-    switches: tuple[str, ...]
-    taxels: tuple[tuple[str, TaxelColumns], ...]
-    joints: tuple[tuple[str, JointColumns], ...]
-    learnt: tuple[tuple[str, TaxelColumns], ...] = ()
+    switches  the switches, without an entry, then the taxels with a threshold
+    coded     the columns that become codes: the joints, then the analog taxels
+    """
 
-    @property
-    def coded(self) -> tuple[tuple[str, JointColumns], ...]:
-        """The columns that become codes: the joints, then the analog taxels."""
-        return (*self.joints, *self.learnt)
+    switches: tuple[tuple[str, TaxelColumns | None], ...]
+    coded: tuple[tuple[str, JointColumns], ...]
 
 
 def read_columns(path: Path) -> ColumnRoles:
@@ -259,13 +258,13 @@ def select(columns: ColumnRoles, names: Sequence[str]) -> Selection:
     if not found:
         raise ColumnsError("no column is an input: name some under `switches`, `[[taxels]]` or `[[joints]]`")
     taxels = [(name, entry) for name, entry in found if isinstance(entry, TaxelColumns)]
+    joints = [(name, entry) for name, entry in found if entry is not None and not isinstance(entry, TaxelColumns)]
     return Selection(
-        switches=tuple(name for name, entry in found if entry is None),
-        taxels=tuple((name, entry) for name, entry in taxels if entry.threshold != "learnt"),
-        joints=tuple(
-            (name, entry) for name, entry in found if entry is not None and not isinstance(entry, TaxelColumns)
+        switches=(
+            *((name, None) for name, entry in found if entry is None),
+            *((name, entry) for name, entry in taxels if entry.threshold != "learnt"),
         ),
-        learnt=tuple((name, entry) for name, entry in taxels if entry.threshold == "learnt"),
+        coded=(*joints, *((name, entry) for name, entry in taxels if entry.threshold == "learnt")),
     )
 
 
@@ -294,3 +293,59 @@ def _matches(what: str, pattern: str, names: Sequence[str], there: set[str]) -> 
 
 def _is_wild(pattern: str) -> bool:
     return any(letter in pattern for letter in "*?[")
+
+
+def stem_of(name: str) -> str:
+    """Return a name without its number."""
+    return name.rstrip("0123456789")
+
+
+def globs_of(names: Iterable[str], columns: Iterable[str]) -> tuple[str, ...]:
+    """Return globs that match exactly `names` among all `columns`: a star if a stem has no others."""
+    ordered = sorted(columns)
+    stems: dict[str, list[str]] = {}
+    for name in names:
+        stems.setdefault(stem_of(name), []).append(name)
+    made: list[str] = []
+    for stem, alike in stems.items():
+        others = bisect_left(ordered, stem + "\U0010ffff") - bisect_left(ordered, stem) - len(alike)
+        made += [f"{glob.escape(stem)}*"] if stem and len(alike) > 2 and not others else map(glob.escape, alike)
+    return tuple(made)
+
+
+# The most codes for values that share a decimal place; the fewest between the 1st and 99th percentiles of others.
+_OWN_STEPS, _STEPS = 20_000, 1000
+
+
+def sound_grid(values: NDArray[np.float64]) -> float:
+    """Return a grid for finite `values`.
+
+    It is the last decimal place of the values, if that takes at most 20,000 codes; otherwise 1, 2 or 5 times a power of
+    ten: the widest with a thousand steps between the 1st and 99th percentiles, unless the other values would then have
+    no codes.
+    """
+    least, largest = float(values.min()), float(values.max())
+    span, far = largest - least, max(abs(least), abs(largest))
+    if not 0 < span <= LARGEST_VALUE:
+        return 1.0
+    finest = _round_up(max(span / (CODES - 2), far * 1e-8, 1 / LARGEST_VALUE))
+    for exponent in range(
+        min(0, math.floor(math.log10(span))), math.ceil(math.log10(max(span / _OWN_STEPS, finest)) - 1e-9) - 1, -1
+    ):
+        steps = values / float(f"1e{exponent}")
+        if np.allclose(steps, np.rint(steps), 0, 1e-6):
+            return float(f"1e{exponent}")
+    low, high = np.percentile(values, [1, 99]).tolist()
+    return max(_round_down(max((high - low) / _STEPS, finest)), finest)
+
+
+def _round_down(number: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is not above `number`."""
+    exponent = math.floor(math.log10(number) + 1e-9)
+    return next(step for factor in (5, 2, 1, 0.5) if (step := float(f"{factor}e{exponent}")) <= number * (1 + 1e-9))
+
+
+def _round_up(number: float) -> float:
+    """Return the smallest of 1, 2 and 5 times a power of ten that is not below `number`."""
+    exponent = math.floor(math.log10(number) + 1e-9)
+    return next(step for factor in (1, 2, 5, 10) if (step := float(f"{factor}e{exponent}")) >= number * (1 - 1e-9))

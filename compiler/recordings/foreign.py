@@ -26,9 +26,9 @@ from thenar.drivers.extras import missing
 from thenar.runtime.files import open_file
 from thenar.runtime.names import list_names, shortened
 
-from .arrays import AnyArray
-from .errors import COLUMNS, LARGEST, ROWS, TableError
-from .headers import preface
+from ..arrays import AnyArray
+from . import COLUMNS, LARGEST, ROWS, TableError
+from .cells import preface
 
 # Bytes of memory that reading may take in addition to the libraries: a constant, and a factor per byte of the file.
 MEMORY, MEMORY_EACH = 600_000_000, 20
@@ -222,37 +222,24 @@ def _npz(path: Path) -> Columns:
             elif array.dtype.kind == "U":
                 array = array.astype(array.dtype.newbyteorder("="))
                 array.astype(StringDType())  # raises TypeError for characters that do not exist
+            # A single row is one, too.
             parts = {f"{name}.{place}": part for place, part in enumerate(array.T)} if array.ndim > 1 else {name: array}
             for column, part in parts.items():
                 _add(found, column, part)
     return _even(found)
 
 
-def _even(found: Mapping[str, AnyArray]) -> Columns:
+def _even(arrays: Mapping[str, AnyArray]) -> Columns:
     """Return the arrays as columns; those with one element are left out if others have more."""
     columns: Columns = {}
-    for name, array in found.items():
-        columns |= _columns(name, array)
+    for name, array in arrays.items():
+        _add(columns, name, array)
     lengths = Counter(len(column) for column in columns.values())
     if len(lengths) > 1:
         del lengths[1]
     if len(lengths) > 1:
         raise TableError(f"its arrays have unequal lengths, {list_names(list(map(str, sorted(lengths))))}")
-    rows = next(iter(lengths), 0)
-    made: Columns = {}
-    for name, column in columns.items():
-        if len(column) == rows:
-            _add(made, name, column)
-    return made
-
-
-def _columns(name: str, array: AnyArray) -> Columns:
-    """Return an array as columns called by its name, or by its name and a number."""
-    if array.ndim > 2:
-        return {}
-    if array.ndim == 1 or 1 in array.shape:
-        return {name: array.reshape(-1)}
-    return {f"{name}.{number}": array[:, number] for number in range(array.shape[1])}
+    return {name: column for name, column in columns.items() if len(column) in lengths}
 
 
 def _array(cells: list[Any]) -> AnyArray:
@@ -271,11 +258,17 @@ def _text(cell: Any) -> str:
 
 
 def _add(columns: Columns, name: str, array: AnyArray) -> None:
-    for each, column in _columns(name, array).items():
-        if each in columns:
-            raise TableError(f"two columns are called {shortened(repr(each))}: rename one")
-        columns[each] = column
-    _check(len(array), len(columns))
+    """Add an array by its name, or its columns by its name and a number; nothing if it has more dimensions."""
+    if array.ndim > 2:
+        return
+    parts = {name: array.reshape(-1)}
+    if array.ndim == 2 and 1 not in array.shape:
+        parts = {f"{name}.{number}": column for number, column in enumerate(array.T)}
+    for part, column in parts.items():
+        if part in columns:
+            raise TableError(f"two columns are called {shortened(repr(part))}: rename one")
+        columns[part] = column
+        _check(len(column), len(columns))
 
 
 def _check(rows: int, columns: int) -> None:

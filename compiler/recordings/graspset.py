@@ -1,6 +1,6 @@
 """`GraspSet`: labelled grasps, the input of the rest of the compiler, and their `.grasps` file.
 
-The file is a sealed npz (arrays.py) of a JSON header and these arrays:
+The file is a sealed npz (compiler/arrays.py) of a JSON header and these arrays:
 
 switches  (n, ceil(s / 8)) uint8    eight switches to the byte, the first in the highest bit
 codes     (n, j) uint16
@@ -15,7 +15,6 @@ times     (n,) int64                microseconds; only where they are known, and
 import hashlib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Self, TypeVar
 
 import msgspec
 import numpy as np
@@ -27,11 +26,10 @@ from thenar.runtime.names import LONGEST_NAME, fault, shortened
 from thenar.runtime.nesting import check_json
 from thenar.runtime.sealed import seal, unseal
 
+from ..arrays import AnyArray, groups, pack, unpack
 from ..text import counted, trials_of_frames
-from .arrays import AnyArray, pack, unpack
-from .errors import LARGEST, RecordingError, check_names, check_room
+from . import LARGEST, RecordingError, check_names, check_room
 from .taxonomy import Taxonomy
-from .trials import groups
 
 CODES = 65536
 # Far enough from the limits of doubles that spans and margins of values stay finite, and steps keep all their bits.
@@ -142,13 +140,6 @@ class GraspSet:
     ----------
     labels : (n,) array of intp
         The index of each grasp in `taxonomy.types`, and the number of types if nothing is held.
-    is_none : (n,) array of bool
-        Where nothing is held.
-    trial_ids : (n,) array of intp
-        The trial of each row, numbered from 0 in the order of first appearance.
-    movement_ids : (n,) array of intp
-        The movement of each row: its trial, with the rows before and after it in which nothing is held. No fold splits
-        the rows of a movement.
 
     Raises
     ------
@@ -301,7 +292,7 @@ class GraspSet:
     def movement_ids(self) -> NDArray[np.intp]:
         """The movement of each row: a trial, and the rows of its number, subject, object and session without a grasp.
 
-        Such rows belong to the trial before them, or to the first.
+        Such rows belong to the trial before them, or to the first. No fold splits the rows of a movement.
         """
         trials, none = self.trial_ids, self.is_none
         if not none.any() or self.independent:
@@ -356,15 +347,15 @@ class GraspSet:
         several = (self.sessions != "1").any() or self.times_us.size > 0 or self.is_none.any()
         return 1 + bool(self.independent or self.taxel_columns or several)
 
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
+    @staticmethod
+    def load(path: str | Path) -> "GraspSet":
         """Read a `.grasps` file; raises SealError with the reason if it is foreign, truncated, altered, newer or
         invalid.
         """
         name = Path(path).name
         _, payload = unseal(read_file(Path(path), LARGEST, SealError), KIND, VERSION, name)
         try:
-            return _unpack(cls, len(payload), *unpack(payload, name))
+            return _unpack(len(payload), *unpack(payload, name))
         except (RecordingError, msgspec.DecodeError, ValueError) as reason:
             raise SealError(f"{name} is inconsistent: {reason}") from reason
 
@@ -385,8 +376,6 @@ MOST = 10_000_000
 _DTYPES = {"switches": "u1", "codes": "<u2", "taxels": "<u2", "trials": "<i8", "times": "<i8"}
 _TEXTS = ("subjects", "objects", "sessions")
 _DTYPES |= dict.fromkeys(("grasps", *_TEXTS), "<u4")
-
-AnyGraspSet = TypeVar("AnyGraspSet", bound=GraspSet)
 
 
 class _Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -436,7 +425,7 @@ def _pack(grasp_set: GraspSet) -> bytes:
     return pack(msgspec.json.encode(header), {name: array.astype(_DTYPES[name]) for name, array in arrays.items()})
 
 
-def _unpack(cls: type[AnyGraspSet], size: int, header_bytes: bytes, arrays: dict[str, AnyArray]) -> AnyGraspSet:
+def _unpack(size: int, header_bytes: bytes, arrays: dict[str, AnyArray]) -> GraspSet:
     check_json(header_bytes)
     header = msgspec.json.decode(header_bytes, type=_Header)
     _check_arrays(header, arrays)
@@ -445,7 +434,7 @@ def _unpack(cls: type[AnyGraspSet], size: int, header_bytes: bytes, arrays: dict
         np.bool_
     )
     switches.setflags(write=False)
-    return cls(
+    return GraspSet(
         switches=switches,
         switch_names=header.switches,
         codes=arrays["codes"].astype(np.uint16),

@@ -1,381 +1,45 @@
 """Import a table and its columns.toml as a `GraspSet`, with a report on the content and on coding losses."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from functools import partial
-from heapq import nsmallest
-from operator import itemgetter
+import math
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
-from thenar.runtime.names import SHOWN, list_names, nearest, shortened
+from thenar.runtime.names import list_names, nearest, shortened
 from thenar.runtime.published import NONE
 
-from .cells import Parsed, Value, bits, codes, integers, names, numbers, times
-from .clocks import Course, possible_clocks, words_of
-from .coding import CodingCost, coarse, code_joint
-from .columns import KEYS, ColumnRoles, Selection, read_columns, select
-from .errors import TYPES, ColumnsError, RecordingError, TableError, check_names, check_room, list_rows
-from .frames import check_trials, looks_like_frames
-from .graspset import GraspSet
-from .inputs import WORDS
-from .summary import Oddity, find_oddities
+from ..arrays import groups
+from . import TYPES, ColumnsError, RecordingError, TableError, check_names, check_room, list_rows
+from .columns import ColumnRoles, JointColumns, TaxelColumns, read_columns, select, sound_grid
+from .graspset import CODES, GraspSet, Joint
+from .inputs import WORDS, Course, possible_clocks, words_of
+from .readings import Readings, nothing_held, read_cells
+from .summary import Oddity, check_trials, find_oddities, looks_like_frames
 from .table import Table, read_table
 from .taxonomy import Taxonomy, own, plain, published
 from .trial_files import Report, find_files, is_pattern, read_files
-from .trials import fill, frame_of_each, groups, in_runs, in_time, numbered, otsu, restarts, unit_of_time
 
 
-@dataclass(frozen=True, slots=True)
-class Readings:
-    """The content of a table: n rows with the numbers that the user sees; values or codes (n, j) of the joints.
+class CodingCost(msgspec.Struct, frozen=True):
+    """The loss from coding one joint: errors in `unit`, distinct values before and after."""
 
-    `time` is in the table's unit, 0 throughout if there is none.
-    """
+    joint: str
+    unit: str
+    step: float
+    largest_error: float
+    rms_error: float
+    distinct_before: int
+    distinct_after: int
 
-    rows: NDArray[np.int64]
-    labels: NDArray[np.str_]
-    subjects: NDArray[np.str_]
-    objects: NDArray[np.str_]
-    sessions: NDArray[np.str_]
-    trials: NDArray[np.int64]
-    time: NDArray[np.float64]
-    switches: NDArray[np.bool_]
-    joints: NDArray[np.float64]
-
-    def kept(self, pick: NDArray[np.bool_] | NDArray[np.intp]) -> "Readings":
-        """Return the rows selected by `pick`, a mask or indices; two-dimensional arrays are overwritten."""
-        return Readings(**{name: _kept(getattr(self, name), pick) for name in self.__slots__})
-
-    def trial_ids(self) -> NDArray[np.intp]:
-        """Return the trial number (n,) of each row."""
-        return groups(self.labels, self.subjects, self.objects, self.sessions, self.trials)
-
-
-def read_cells(
-    table: Table, columns: ColumnRoles, selection: Selection
-) -> tuple[Readings, NDArray[np.int64], list[Oddity], list[str]]:
-    """Return the content of `table`, its times in microseconds (none if unknown), oddities, and notes on conversions.
-
-    Columns that are not named are "1" throughout. Raises TableError naming the first wrong or missing cells and their
-    number.
-    """
-    reader = _Reader(table, columns)
-    notes: list[str] = []
-    labels = reader.names(columns.parts("label"))
-    readings = Readings(
-        rows=table.rows,
-        labels=labels,
-        subjects=reader.names(columns.parts("subject")),
-        objects=reader.names(columns.parts("object")),
-        sessions=reader.names(columns.parts("session")),
-        trials=reader.trials(columns.parts("trial"), notes),
-        time=reader.time(columns.time),
-        switches=_switches(reader, selection, notes),
-        joints=_joints(reader, selection),
-    )
-    none = nothing_held(columns, labels)
-    _fill_from_next_grasp(readings, none, columns, reader)
-    keep = reader.complete(columns.missing)
-    warnings = _dropped(readings, keep, reader.missing)
-    missing = {name: _kept(mask, keep) for name, mask in reader.missing.items()}
-    readings, none = readings.kept(keep), none[keep]
-    untold = columns.frames is None and not columns.parts("trial")
-    if untold and none.any() and in_runs(readings.labels, readings.subjects, readings.objects, readings.sessions):
-        notes.append('a run of rows of one label was taken for a trial: frames = "restart" says so')
-        untold, columns = False, msgspec.structs.replace(columns, frames="restart")
-    if columns.frames == "restart":
-        readings = replace(readings, trials=_runs(readings, none, columns.time is None))
-    independent = columns.frames == "independent"
-    trial_ids = np.arange(len(readings.rows)) if independent else readings.trial_ids()
-    if untold:
-        _require_trial_column(table.what, trial_ids)
-    if columns.time is not None:
-        order = in_time(trial_ids, readings.time)
-        readings = readings.kept(order)
-        missing = {name: mask[order] for name, mask in missing.items()}
-    warnings += _filled(table.what, readings, selection, missing, trial_ids)
-    micros = _micros(table.what, columns, readings.time, notes)
-    readings = _reduced(readings, columns.reduce, trial_ids, notes)
-    times_us = np.rint(readings.time * micros).astype(np.int64) if micros else np.empty(0, np.int64)
-    return readings, times_us, warnings, notes
-
-
-def _micros(what: str, columns: ColumnRoles, time: NDArray[np.float64], notes: list[str]) -> float:
-    """Return the number of microseconds in the unit of `time`, 0.0 if there is no time or its unit is unknown.
-
-    Raises TableError if a time is too large.
-    """
-    if columns.time is None:
-        return 0.0
-    unit = columns.time_unit or unit_of_time(columns.time, time)
-    if unit is None or not np.isfinite(time).all():
-        why = "its unit is not known (`time_unit`)" if unit is None else "some of its cells are missing"
-        notes.append(f"{shortened(columns.time)} orders frames, but does not say when they were recorded: {why}")
-        return 0.0
-    micros = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}[unit]
-    if np.abs(time).max(initial=0) * micros > 2**62:
-        raise TableError(f"{what}: column {shortened(repr(columns.time))} holds times of more than 100,000 years")
-    return micros
-
-
-def nothing_held(columns: ColumnRoles, labels: NDArray[np.str_]) -> NDArray[np.bool_]:
-    """Return which rows (n,) have a label that means, in general or by `columns`, that nothing is held."""
-    types = next(iter(columns.taxonomy.values())) if isinstance(columns.taxonomy, dict) else columns.taxonomy
-    meant = {*map(plain, columns.parts("none")), *((NONE,) if isinstance(types, str) or NONE not in types else ())}
-    found, where = np.unique(labels, return_inverse=True)
-    none = [not meant.isdisjoint(map(plain, (label, columns.labels.get(label, label)))) for label in found.tolist()]
-    return np.array(none, np.bool_)[where]
-
-
-def _fill_from_next_grasp(readings: Readings, none: NDArray[np.bool_], columns: ColumnRoles, reader: "_Reader") -> None:
-    """Allow cells to be empty in rows in which nothing is held.
-
-    This applies to the label, if an empty one means none, and to object, session and trial, which are taken from the
-    next row in which something is held, or the last.
-    """
-    if "" in columns.parts("none"):
-        reader.excuse(columns.parts("label"), none)
-    held = np.flatnonzero(~none)
-    if not held.size:
-        return
-    nearest = held[np.minimum(np.searchsorted(held, np.arange(len(none))), len(held) - 1)]
-    for key in ("object", "session", "trial"):
-        if (lacking := reader.excuse(columns.parts(key), none)).any():
-            column = getattr(readings, f"{key}s")
-            column[lacking] = column[nearest[lacking]]
-
-
-def _runs(readings: Readings, none: NDArray[np.bool_], timeless: bool) -> NDArray[np.int64]:
-    """Return the trial number (n,) of each row; a trial starts where the clock starts again or anything else changes.
-
-    Rows in which nothing is held have the number of the trial that follows.
-    """
-    time = np.arange(len(none), dtype=np.float64) if timeless else readings.time
-    number = restarts(readings.trial_ids(), time)
-    last = np.flatnonzero(np.diff(number))
-    clock = restarts(np.zeros(len(none), np.intp), time)
-    leads = none[last] & ~none[last + 1] & (clock[last] == clock[last + 1])
-    for column in (readings.subjects, readings.sessions):
-        leads &= column[last] == column[last + 1]
-    return np.unique(number + np.append(leads, False)[number - 1], return_inverse=True)[1] + 1
-
-
-# Read directly into the result, and by columns, so that a large table is in memory only once.
-
-
-def _switches(reader: "_Reader", selection: Selection, notes: list[str]) -> NDArray[np.bool_]:
-    """Return the switches, with those made by thresholds last."""
-    names = [*selection.switches, *selection.taxels]
-    switches = np.empty((len(reader.table.rows), len(names)), np.bool_, order="F")
-    for number, name in enumerate(selection.switches):
-        switches[:, number] = reader.read(name, bits, "0 or 1")
-    shown = []
-    for number, (name, taxel) in enumerate(selection.taxels, start=len(selection.switches)):
-        values = reader.read(name, numbers, "finite numbers")
-        threshold = otsu(values) if isinstance(taxel.threshold, str) else taxel.threshold
-        switches[:, number] = values > threshold
-        shown.append(f"{shortened(name)} above {threshold:g}")
-    if shown:
-        notes.append(f"{len(shown)} analog columns became switches, closed {list_names(shown)}")
-    return switches
-
-
-def _joints(reader: "_Reader", selection: Selection) -> NDArray[np.float64]:
-    """Return the columns that become codes: the joints, then the analog taxels."""
-    joints = np.empty((len(reader.table.rows), len(selection.coded)), order="F")
-    for number, (name, entry) in enumerate(selection.coded):
-        parse, expected = (codes, "codes 0..65535") if entry.is_counts else (numbers, "finite numbers")
-        joints[:, number] = reader.read(name, parse, expected)
-    return joints
-
-
-def _require_trial_column(what: str, trial_ids: NDArray[np.intp]) -> None:
-    """Raise ColumnsError if rows may be frames of one trial, and nothing says whether they are."""
-    shared = np.bincount(trial_ids)[trial_ids] > 1
-    if shared.any():
-        raise ColumnsError(
-            f"{what}: {int(shared.sum())} rows share subject, grasp type, object and session with others, and nothing "
-            "says which of them are frames of one trial: name the column that does (`trial = ...`, or a list of them), "
-            'or state that each row is a separate trial (`frames = "independent"`)'
-        )
-
-
-def _kept(array: NDArray[Value], pick: NDArray[np.bool_] | NDArray[np.intp]) -> NDArray[Value]:
-    """Return the rows of a 1-D or 2-D `array` selected by `pick`; the array itself if a mask selects all."""
-    if pick.dtype == np.bool_ and pick.all():
-        return array
-    if array.ndim == 1:
-        return array[pick]
-    count = int(pick.sum()) if pick.dtype == np.bool_ else len(pick)
-    for column in array.T:
-        column[:count] = column[pick]
-    return array[:count]
-
-
-def _dropped(readings: Readings, keep: NDArray[np.bool_], missing: dict[str, NDArray[np.bool_]]) -> list[Oddity]:
-    """Return the findings about leaving out all rows except those to `keep`."""
-    rows = readings.rows[~keep]
-    if not rows.size:
-        return []
-    trial_ids = readings.trial_ids()
-    lost = len(np.unique(trial_ids)) - len(np.unique(trial_ids[keep]))
-    types = sorted(set(readings.labels[~keep & (readings.labels != "")].tolist()) - set(readings.labels[keep].tolist()))
-    lack = list_names([name for name, mask in missing.items() if mask[~keep].any()])
-    message = f"{rows.size} rows with missing values were left out: {list_rows(rows)} (columns {lack})"
-    cost = [f"{lost} of {len(np.unique(trial_ids))} trials"] * bool(lost)
-    cost += [f"grasp type{'s' if len(types) > 1 else ''} {list_names(types)}"] * bool(types)
-    message += f"; so {' and '.join(cost)} are lost" if cost else ""
-    return [Oddity("dropped rows", int(rows.size), message, tuple(rows[:SHOWN].tolist()), tuple(missing))]
-
-
-def _filled(
-    what: str,
-    readings: Readings,
-    selection: Selection,
-    missing: dict[str, NDArray[np.bool_]],
-    trial_ids: NDArray[np.intp],
-) -> list[Oddity]:
-    """Fill the cells of inputs that are `missing`, in place, and return a finding about them."""
-    inputs = [*selection.switches, *(name for name, _ in selection.taxels)]
-    arrays: dict[str, NDArray[np.bool_] | NDArray[np.float64]] = dict(zip(inputs, readings.switches.T, strict=True))
-    arrays |= zip((name for name, _ in selection.coded), readings.joints.T, strict=True)
-    masks = {name: mask for name, mask in missing.items() if name in arrays and mask.any()}
-    if not masks:
-        return []
-    if empty := [name for name, mask in masks.items() if mask.all()]:
-        raise TableError(f"{what}: column {shortened(repr(empty[0]))} has no values: leave it out")
-    cells = sum(int(mask.sum()) for mask in masks.values())
-    strange = sum(fill(arrays[name], mask, trial_ids) for name, mask in masks.items())
-    rows = readings.rows[np.logical_or.reduce([*masks.values()])]
-    message = (
-        f"{cells} missing cells in {rows.size} rows were filled: {cells - strange} from the nearest frame of their "
-        f"trial, {strange} with their column's median ({list_rows(rows)}; columns {list_names([*masks])})"
-    )
-    return [Oddity("filled cells", cells, message, tuple(rows[:SHOWN].tolist()), tuple(masks))]
-
-
-def _reduced(readings: Readings, how: str, trial_ids: NDArray[np.intp], notes: list[str]) -> Readings:
-    """Return one row per trial, computed from its frames; all rows if `how` is "none"."""
-    if how == "none":
-        return readings
-    middle = frame_of_each(trial_ids)
-    reduced = replace(readings, switches=readings.switches[:, :0], joints=readings.joints[:, :0]).kept(middle)
-    switches = _each(readings.switches, trial_ids, middle, how, how == "any")
-    joints = _each(readings.joints, trial_ids, middle, how)
-    notes.append(f"{len(trial_ids)} frames of {len(middle)} trials were reduced to one row a trial ({how})")
-    return replace(reduced, switches=switches, joints=joints)
-
-
-def _each(
-    array: NDArray[Value], trial_ids: NDArray[np.intp], middle: NDArray[np.intp], how: str, largest: bool = False
-) -> NDArray[Value]:
-    if how == "middle":
-        return array[middle]
-    made = np.empty((len(middle), array.shape[1]), array.dtype, order="F")
-    for number, column in enumerate(array.T):
-        made[:, number] = column[frame_of_each(trial_ids, column, largest)]
-    return made
-
-
-_MISSING = 'missing (missing = "keep" fills them, "drop" leaves their rows out)'
-
-
-class _Reader:
-    """Reads columns of one table and records which cells are missing or wrong."""
-
-    def __init__(self, table: Table, columns: ColumnRoles) -> None:
-        self.table = table
-        # Columns that a row must have: there is no substitute for their cells.
-        self.needed = {name for key in KEYS if key != "time" for name in columns.parts(key)}
-        self.missing: dict[str, NDArray[np.bool_]] = {}
-        self.wrong: dict[str, dict[str, NDArray[np.bool_]]] = {}
-
-    def read(self, name: str, parse: "Callable[..., Parsed[Value]]", expected: str) -> NDArray[Value]:
-        return self._noted(name, parse(self.table.columns[name], self.table.decimal), expected)
-
-    def _noted(self, name: str, parsed: Parsed[Value], expected: str) -> NDArray[Value]:
-        if parsed.missing.any():
-            self.missing[name] = parsed.missing
-        if parsed.wrong.any():
-            self.wrong.setdefault(expected, {})[name] = parsed.wrong
-        return parsed.values
-
-    def names(self, columns: tuple[str, ...]) -> NDArray[np.str_]:
-        """Return the text of `columns`, joined with blanks; "1" if there are none."""
-        parts = [self._names(column) for column in columns] or [np.full(len(self.table.rows), "1")]
-        joined = parts[0]
-        for part in parts[1:]:
-            check_room(len(joined), (joined.itemsize + part.itemsize) // 4 + 1, self.table.size)
-            joined = np.char.add(np.char.add(joined, " "), part)
-        return joined
-
-    def _names(self, column: str) -> NDArray[np.str_]:
-        parse = partial(names, cells=self.table.cells, size=self.table.size)
-        try:
-            return self._noted(column, parse(self.table.columns[column]), "names that can be printed")
-        except RecordingError as reason:
-            raise TableError(f"{self.table.what}: column {shortened(repr(column))}: {reason}") from reason
-
-    def time(self, column: str | None) -> NDArray[np.float64]:
-        """Return the values of `column`, 0 throughout without one."""
-        if column is None:
-            return np.zeros(len(self.table.rows))
-        return self.read(column, times, "finite numbers, or dates with times")
-
-    def trials(self, columns: tuple[str, ...], notes: list[str]) -> NDArray[np.int64]:
-        """Return the trial number of each row: one column of integers as it is, otherwise counted from 1."""
-        if not columns:
-            return np.ones(len(self.table.rows), np.int64)
-        if (
-            len(columns) == 1
-            and not (parsed := integers(self.table.columns[columns[0]], self.table.decimal)).wrong.any()
-        ):
-            return self._noted(columns[0], parsed, "whole numbers").astype(np.int64)
-        trials, texts = numbered([self._names(column) for column in columns])
-        shown = [f"{shortened(repr(text))} is {number}" for number, text in enumerate(texts[:SHOWN], start=1)]
-        what = " and ".join(map(shortened, columns))
-        notes.append(f"the texts of {what} were numbered as trials in natural order: {list_names(shown, len(texts))}")
-        return trials
-
-    def excuse(self, columns: tuple[str, ...], rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Do not count cells of `columns` in `rows` (n,) as missing; return in which rows (n,) some were."""
-        lacking = np.zeros(len(rows), np.bool_)
-        for name in columns:
-            if name in self.missing:
-                lacking |= self.missing[name] & rows
-                self.missing[name] &= ~rows
-                if not self.missing[name].any():
-                    del self.missing[name]
-        return lacking
-
-    def complete(self, missing: str) -> NDArray[np.bool_]:
-        """Return which rows stay; raises TableError for wrong cells, and for missing ones if they are not allowed."""
-        faults = [f"not {expected}: {self._list(columns)}" for expected, columns in self.wrong.items()]
-        if self.missing and missing == "refuse":
-            faults.append(f"{_MISSING}: {self._list(self.missing)}")
-        if faults:
-            raise TableError(f"{self.table.what}: {'; '.join(faults)}")
-        keep = np.ones(len(self.table.rows), np.bool_)
-        for name, mask in self.missing.items():
-            if missing == "drop" or name in self.needed:
-                keep &= ~mask
-        if not keep.any():
-            raise TableError(f"{self.table.what}: every row misses a value: {self._list(self.missing)}")
-        return keep
-
-    def _list(self, columns: dict[str, NDArray[np.bool_]]) -> str:
-        """Return "3 cells, ...": how many cells, and the first of them in the order of rows, then of columns."""
-        count = sum(int(faulty.sum()) for faulty in columns.values())
-        each = ((row, name) for name, faulty in columns.items() for row in np.flatnonzero(faulty)[:SHOWN].tolist())
-        first = nsmallest(SHOWN, each, key=itemgetter(0))
-        cells = [(row, name, shortened(repr(str(self.table.columns[name][row])))) for row, name in first]
-        rows = self.table.rows
-        shown = [f"{list_rows(rows[[row]])} {shortened(repr(name))} ({cell})" for row, name, cell in cells]
-        return f"{count} cell{'s' if count > 1 else ''}, {list_names(shown, count)}"
+    @property
+    def rounds(self) -> bool:
+        """Whether coding changes values by more than the arithmetic does, or makes some equal."""
+        return self.largest_error > 1e-6 * self.step or self.distinct_after < self.distinct_before
 
 
 class ImportReport(msgspec.Struct, frozen=True):
@@ -426,14 +90,15 @@ def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportRe
     ]
     costs = tuple(cost for _, _, cost in coded)
     inputs = zip((name for name, _ in selection.coded), readings.joints.T, strict=True)
-    joints, taxels = coded[: len(selection.joints)], coded[len(selection.joints) :]
+    count = sum(not isinstance(entry, TaxelColumns) for _, entry in selection.coded)
+    joints, taxels = coded[:count], coded[count:]
     empty = np.zeros((len(grasps), 0), np.uint16)
     # Read-only, so that the set uses them without copies.
     for name in readings.__slots__:
         getattr(readings, name).setflags(write=False)
     grasp_set = GraspSet(
         switches=readings.switches,
-        switch_names=(*selection.switches, *(name for name, _ in selection.taxels)),
+        switch_names=tuple(name for name, _ in selection.switches),
         codes=np.stack([codes for codes, _, _ in joints], axis=1) if joints else empty,
         joints=tuple(joint for _, joint, _ in joints),
         taxels=np.stack([codes for codes, _, _ in taxels], axis=1) if taxels else empty,
@@ -481,15 +146,15 @@ def _trials_by_name(grasp_set: GraspSet, columns: ColumnRoles) -> tuple[GraspSet
     return replace(grasp_set, independent=True), [Oddity("alike trials", len(grasp_set), message)]
 
 
-def _renamed(table: Table, names: dict[str, str]) -> Table:
-    """Return `table` with other `names` for some columns. Raises ColumnsError, or RecordingError for a name twice."""
-    there = list(table.columns)
-    if unknown := [name for name in names if name not in table.columns]:
-        missing = shortened(repr(unknown[0]))
-        raise ColumnsError(f"rename: the table has no column {missing}{nearest(unknown[0], there)}")
-    renamed = [names.get(name, name) for name in there]
-    check_names("rename: column", renamed)
-    return replace(table, columns=dict(zip(renamed, table.columns.values(), strict=True)))
+def _renamed(table: Table, rename: dict[str, str]) -> Table:
+    """Return `table` with other names for some columns. Raises ColumnsError, or RecordingError for a name twice."""
+    names = list(table.columns)
+    for name in rename:
+        if name not in table.columns:
+            raise ColumnsError(f"rename: the table has no column {shortened(repr(name))}{nearest(name, names)}")
+    names = list((dict(zip(names, names, strict=True)) | rename).values())
+    check_names("rename: column", names)
+    return replace(table, columns=dict(zip(names, table.columns.values(), strict=True)))
 
 
 def _course(readings: Readings, columns: ColumnRoles) -> Course:
@@ -497,14 +162,14 @@ def _course(readings: Readings, columns: ColumnRoles) -> Course:
     owner = groups(readings.subjects, readings.sessions)
     group = groups(owner, readings.labels, readings.objects)
     time = None if columns.time is None or not np.isfinite(readings.time).all() else readings.time
-    trial = np.arange(len(owner)) if columns.frames == "independent" else groups(group, readings.trials)
-    return Course(owner, group, trial, time, columns.time or "")
+    trial_ids = np.arange(len(owner)) if columns.frames == "independent" else groups(group, readings.trials)
+    return Course(owner, group, trial_ids, time, columns.time or "")
 
 
 def report_of(
     what: str,
     grasp_set: GraspSet,
-    coding: tuple[CodingCost, ...],
+    costs: tuple[CodingCost, ...],
     warnings: Iterable[Oddity],
     notes: Iterable[str] = (),
 ) -> ImportReport:
@@ -521,7 +186,7 @@ def report_of(
         switches=len(grasp_set.switch_names),
         taxels=len(grasp_set.taxel_columns),
         joints=len(grasp_set.joints),
-        coding=coding,
+        coding=costs,
         notes=tuple(notes),
         warnings=tuple(warnings),
     )
@@ -529,28 +194,29 @@ def report_of(
 
 def _labels(table: Table, columns: ColumnRoles, readings: Readings) -> tuple[NDArray[np.str_], Taxonomy, list[Oddity]]:
     """Return each row's grasp type, the taxonomy, and a finding about unused aliases."""
-    found, where = np.unique(readings.labels, return_inverse=True)
-    if len(found) > TYPES:
+    labels, where = np.unique(readings.labels, return_inverse=True)
+    if len(labels) > TYPES:
         raise TableError(
-            f"{table.what}: column {shortened(repr(columns.label))} holds {len(found)} different labels, "
+            f"{table.what}: column {shortened(repr(columns.label))} holds {len(labels)} different labels, "
             f"more than {TYPES}: is it the label?"
         )
-    aliased = [columns.labels.get(label, label) for label in found.tolist()]
-    none = nothing_held(columns, found).tolist()
+    none = nothing_held(columns, labels).tolist()
+    aliases = dict(zip(labels.tolist(), labels.tolist(), strict=True)) | columns.labels
+    aliased = [aliases[label] for label in labels.tolist()]
     taxonomy = _taxonomy(columns, [label for label, nothing in zip(aliased, none, strict=True) if not nothing])
     find = taxonomy.finder()
     types = [NONE if nothing else find(label) for label, nothing in zip(aliased, none, strict=True)]
     unknown = np.array([name is None for name in types])[where]
     if unknown.any():
-        strange = [label for label, name in zip(aliased, types, strict=True) if name is None]
+        names = [label for label, name in zip(aliased, types, strict=True) if name is None]
         raise TableError(
-            f"{table.what}: {len(strange)} labels in {shortened(repr(columns.label))} are not grasp types of "
-            f"{taxonomy.name}: {_unknown(strange, taxonomy)}; {unknown.sum()} rows have them, "
+            f"{table.what}: {len(names)} labels in {shortened(repr(columns.label))} are not grasp types of "
+            f"{taxonomy.name}: {_unknown(names, taxonomy)}; {unknown.sum()} rows have them, "
             f"{list_rows(readings.rows[unknown])}; [labels] can translate them"
         )
-    unused = sorted(columns.labels.keys() - set(found.tolist()))
-    there = {*map(plain, (*found.tolist(), *aliased))}
-    unused += [label for label in columns.parts("none") if plain(label) not in there]
+    unused = sorted(columns.labels.keys() - {*labels.tolist()})
+    meanings = {*map(plain, (*labels.tolist(), *aliased))}
+    unused += [label for label in columns.parts("none") if plain(label) not in meanings]
     message = f"{len(unused)} entries of [labels] and `none` occur in no row: {list_names(unused)}"
     check_room(len(where), max(map(len, filter(None, types))), table.size)
     return (
@@ -588,3 +254,79 @@ def _taxonomy(columns: ColumnRoles, labels: list[str]) -> Taxonomy:
         return own(sorted(set(labels))) if columns.taxonomy == "own" else published(columns.taxonomy)
     except RecordingError as reason:
         raise ColumnsError(f"taxonomy: {reason}") from reason
+
+
+# The second point of a grid's straight line: so far out that its step equals the grid within a bit or two.
+_FAR = 1000
+
+
+def code_joint(
+    name: str, entry: JointColumns, values: NDArray[np.float64], rows: NDArray[np.int64]
+) -> tuple[NDArray[np.uint16], Joint, CodingCost]:
+    """Return the codes (n,) of one column of finite `values` (n,), their calibration, and their cost.
+
+    Raises TableError naming the first of `rows` whose code lies outside 0..65535; RecordingError if the calibration is
+    not a straight line.
+    """
+    if isinstance(entry, TaxelColumns) and not entry.is_coded:
+        whole = bool((values == np.rint(values)).all()) and values.min() >= 0 and values.max() < CODES
+        entry = structs.replace(entry, codes=True) if whole else structs.replace(entry, grid=sound_grid(values))
+    joint = _joint(name, entry, float(values.min()))
+    if isinstance(entry, TaxelColumns) and entry.bits is not None:
+        # Calibrated at the ends of the converter's range.
+        least, most = joint.value([0, top := 2**entry.bits - 1]).tolist()
+        joint = Joint(joint.name, joint.unit, 0, least, top, most)
+        if (beyond := values > joint.code_b).any():
+            raise TableError(f"taxel {name!r}: {list_rows(rows[beyond])} exceed {entry.bits} bits: say how many it has")
+    codes = values if entry.is_counts else joint.code(values)
+    outside = (codes < 0) | (codes >= CODES)
+    if outside.any():
+        cause = "check origin and calibration" if (codes < 0).any() else "take a coarser grid"
+        raise TableError(f"joint {name!r}: {list_rows(rows[outside])} would get codes outside 0..{CODES - 1}: {cause}")
+    errors = np.zeros(1) if entry.is_counts else np.abs(joint.value(codes) - values)
+    step = abs(joint.step)
+    cost = CodingCost(
+        joint=name,
+        unit=joint.unit,
+        step=step,
+        largest_error=float(errors.max()),
+        # In steps, whose squares are neither too large nor too small for a double.
+        rms_error=math.sqrt(float(np.mean((errors / step) ** 2))) * step,
+        distinct_before=len(np.unique(values)),
+        distinct_after=len(np.unique(codes)),
+    )
+    return codes.astype(np.uint16), joint, cost
+
+
+def _joint(name: str, entry: JointColumns, least: float) -> Joint:
+    if entry.calibration is not None:
+        points = entry.calibration
+        return Joint(name, entry.unit, points.code_a, points.value_a, points.code_b, points.value_b)
+    if entry.is_counts:
+        return Joint(name, entry.unit, 0, 0.0, 1, 1.0)
+    steps = least / entry.step
+    # If the grid is too fine to count, a Joint cannot have it either.
+    floor = math.floor(steps) * entry.step if math.isfinite(steps) else least
+    origin = floor if entry.origin is None else entry.origin
+    return Joint(name, entry.unit, 0, origin, _FAR, origin + _FAR * entry.step)
+
+
+# Joints with more values than the first number and fewer codes than the second have lost information.
+_MANY, _FEW = 20, 10
+
+
+def coarse(coded: Iterable[tuple[CodingCost, NDArray[np.float64]]]) -> list[Oddity]:
+    """Return a finding about the joints that lost most of their distinct values, given costs and values."""
+    lost = [
+        (cost, sound_grid(values))
+        for cost, values in coded
+        if cost.distinct_before >= _MANY and cost.distinct_after < _FEW
+    ]
+    if not lost:
+        return []
+    shown = [
+        f"{cost.joint} {cost.distinct_after} of {cost.distinct_before} (grid = {grid:g} keeps them)"
+        for cost, grid in lost
+    ]
+    message = f"{len(lost)} joints keep few of their values on their grid: {list_names(shown)}"
+    return [Oddity("coarse grids", len(lost), message, columns=tuple(cost.joint for cost, _ in lost))]

@@ -30,11 +30,10 @@ from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.taxels import TaxelLine, Taxels
 
-from .coding import CodingCost, code_joint
+from . import ColumnsError, TableError, list_rows
 from .columns import CalibrationPoints, JointColumns
-from .errors import ColumnsError, TableError, list_rows
 from .graspset import CODES, GraspSet, Joint
-from .importer import ImportReport, import_file, report_of
+from .importer import CodingCost, ImportReport, code_joint, import_file, report_of
 from .summary import Oddity, find_oddities
 from .taxonomy import Taxonomy
 from .trial_files import Report
@@ -66,10 +65,9 @@ class _Grasp:
 
 @dataclass(slots=True)
 class _Attempt:
-    """A captured trial: its start, the row of its capture, the time of its judgement, its rows, and the judgement."""
+    """A captured trial: its start, the time of its judgement, its rows, the last at its capture, and the judgement."""
 
     begun_us: int
-    captured: _Grasp
     judged_us: int
     rows: tuple[_Grasp, ...]
     accepted: bool = False
@@ -224,13 +222,13 @@ class _Watch:
             begun_us = self._begun_us
             if begun_us is None:
                 begun_us = self.attempts[-1].judged_us if self.attempts else label.time_us
-            self.attempts.append(_Attempt(begun_us, row, label.time_us, (*rows, row)))
+            self.attempts.append(_Attempt(begun_us, label.time_us, (*rows, row)))
             self._begun_us = None
         elif before is not None and before.event == "captured":
             accepted = label.event == "accepted" and label.trial == before.trial
             self.attempts[-1].accepted, self.attempts[-1].judged_us = accepted, label.time_us
         elif label.event == "undone":
-            same = [each for each in self.attempts if each.accepted and each.captured.label.trial == label.trial]
+            same = [each for each in self.attempts if each.accepted and each.rows[-1].label.trial == label.trial]
             if same:
                 same[-1].accepted = False
             else:
@@ -274,15 +272,15 @@ def _streamed(watch: _Watch, collection: Collection) -> tuple[_Grasp, ...]:
     if not places:
         codes = np.array([[count or 0 for count in tick.counts] for tick in ticks])
     codes = codes.astype(np.int32).reshape(len(ticks), -1)
-    empty = {number for number, attempt in enumerate(attempts) if attempt.captured.label.grasp == NONE}
+    empty = {number for number, attempt in enumerate(attempts) if attempt.rows[-1].label.grasp == NONE}
     empty = empty if NONE not in collection.types else set()
     trial, held = np.full(len(ticks), -1), np.zeros(len(ticks), np.bool_)
-    ends = [int(np.searchsorted(time, each.captured.time_us, "right")) for each in attempts]
+    ends = [int(np.searchsorted(time, each.rows[-1].time_us, "right")) for each in attempts]
     # A damaged recording may have captures in the wrong order.
     captures = np.maximum.accumulate([0, *ends, len(ticks)]).tolist()
     records_none = NONE in {task.grasp for task in collection.tasks}
     for number, attempt in enumerate(attempts):
-        end_us = attempt.captured.time_us if number in empty else attempt.judged_us
+        end_us = attempt.rows[-1].time_us if number in empty else attempt.judged_us
         if attempt.accepted and records_none:
             first, beyond = np.searchsorted(time, [attempt.begun_us, end_us]).tolist()
             trial[first:beyond] = np.where(held[first:beyond], trial[first:beyond], number)
@@ -292,7 +290,7 @@ def _streamed(watch: _Watch, collection: Collection) -> tuple[_Grasp, ...]:
         if attempt.accepted and number not in empty and before < here:
             first, beyond = _held(closed[before:after], codes[before:after], time[before:after], here - 1 - before)
             trial[before + first : before + beyond], held[before + first : before + beyond] = number, True
-    labels = [(structs.replace(each.captured.label, grasp=NONE), each.captured.label) for each in attempts]
+    labels = [(structs.replace(each.rows[-1].label, grasp=NONE), each.rows[-1].label) for each in attempts]
     rows = np.flatnonzero(trial >= 0).tolist()
     return tuple(replace(ticks[row], label=labels[trial[row]][int(held[row])]) for row in rows)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thenar.runtime.names import list_names, shortened
 
 from ..publication import entries, publish_folder
-from .errors import RecordingError
+from . import RecordingError
 from .graspset import CODES, GraspSet, Joint
 from .taxonomy import Taxonomy, is_published
 

@@ -1,7 +1,8 @@
-"""Read tables of labelled grasps: delimited text and Weka's ARFF; foreign.py reads those of other programs.
+"""Read tables of labelled grasps: delimited text, in a format that is detected, and Weka's ARFF.
 
-ARFF has numeric and nominal attributes, quoted names and values, and `?` for a missing value. It is read here because
-the reader of scipy loses quotes in nominal values, reports no rows, and is not installed on a board.
+foreign.py reads the tables of other programs. ARFF has numeric and nominal attributes, quoted names and values, and `?`
+for a missing value. It is read here because the reader of scipy loses quotes in nominal values, reports no rows, and is
+not installed on a board.
 """
 
 import codecs
@@ -17,21 +18,21 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, TypeGuard
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 from numpy.dtypes import StringDType
 from numpy.typing import NDArray
 
+from thenar.drivers.extras import optional
 from thenar.runtime.files import open_file
 from thenar.runtime.names import shortened
 
 from ..text import text_of
-from .arrays import AnyArray
+from . import COLUMNS, LARGEST, LINES, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
+from .cells import NUMBER, Column, has_names, preface, skipped, unlisted
 from .columns import PLAIN, TextFormat
-from .errors import COLUMNS, LARGEST, LINES, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
 from .foreign import READERS, read_foreign
-from .headers import MISSING_NUMBERS
 
 if TYPE_CHECKING:
     from _csv import Reader
@@ -87,30 +88,15 @@ def _lines(what: str, text: io.TextIOWrapper) -> Iterator[str]:
         yield line
 
 
-# Cells kept as str at a time, while a table is filled or a column is read.
-_CELLS, _READ = 1 << 15, 1 << 14
-
-# Text as read, or an array of numbers or of str.
-Column = Sequence[str] | AnyArray
-
-
-def is_numeric(column: Column) -> TypeGuard[AnyArray]:
-    """Return whether a column holds numbers, not text."""
-    return isinstance(column, np.ndarray) and column.dtype.kind not in "UT"
-
-
-def pieces(column: Column) -> Iterator[list[str]]:
-    """Yield the cells of a text column in lists of some thousands, so that few are kept as str."""
-    for start in range(0, len(column), _READ):
-        piece = column[start : start + _READ]
-        yield piece.tolist() if isinstance(piece, np.ndarray) else list(piece)
+# Cells that are kept as str at a time, while a table is filled.
+_CELLS = 1 << 15
 
 
 def _columns(what: str, names: Collection[str], rows: Iterator[list[str]]) -> dict[str, Column]:
     """Return the cells of `rows` as columns of text, each cell in the memory that it needs. Raises TableError."""
     check_names("column", names)
     step = _CELLS // max(len(names), 1) + 1
-    blocks: list[AnyArray] = [np.zeros((0, len(names)), StringDType())]
+    blocks: list[NDArray[np.generic]] = [np.zeros((0, len(names)), StringDType())]
     while block := list(islice(rows, step)):
         blocks.append(np.array(block, StringDType()))
         if sum(map(len, blocks)) > ROWS:
@@ -335,62 +321,84 @@ def _unquote(where: str, value: str) -> str:
     return re.sub(r"\\(.)", r"\1", value[1:-1])
 
 
-# Columns whose cells hold lists of numbers become several columns, as those of Parquet files do.
+# Lines examined, and cells of them.
+_LINES, _SEEN_CELLS = 200, 200_000
+# Lines, and characters of each, given to clevercsv, whose run time is quadratic.
+_SEEN_LINES, _SEEN = 60, 400
+# The bytes that Windows-1252 does not define: searching for them is many times faster than decoding.
+_NOT_WESTERN = b"\x81\x8d\x8f\x90\x9d"
+_DELIMITERS = (",", ";", "\t", "|", " ")
+_SPOKEN = {",": "a comma", ";": "a semicolon", "\t": "a tab", "|": "a bar", " ": "blanks"}
 
-# A list as pandas and numpy write it, with commas or blanks, and a number of numpy in it.
-_LIST = re.compile(r"[\[(](.*)[\])]", re.DOTALL)
-_SCALAR = re.compile(r"np\.\w+\(([^()]*)\)")
 
+def sniff(path: Path) -> tuple[TextFormat, list[str]]:
+    """Return the format of the text table in `path`, and the reasons as sentences.
 
-def unlisted(what: str, columns: Mapping[str, Column], rows: NDArray[np.int64]) -> dict[str, Column]:
-    """Return `columns` with lists such as "[0.56, 0.83]" in the cells of `data` as columns data.0, data.1, ...
-
-    what  the table in messages
-    rows  (n,) the numbers of its rows in messages
-
-    Raises TableError if a column holds lists that are unequally long, or lists and other cells; RecordingError if two
-    columns get one name.
+    Raises TableError where the file cannot be read as text.
     """
-    made: list[tuple[str, Column]] = []
-    for name, column in columns.items():
-        first = "" if is_numeric(column) else next((cell for cell in column if cell), "")
-        if not _list_of(str(first)):
-            made.append((name, column))
-            continue
-        values = _of_lists(f"{what}: column {shortened(repr(name))}", column, rows)
-        many = values.shape[1] > 1
-        made += [(f"{name}.{place}" if many else name, part) for place, part in enumerate(values.T)]
-    if len(made) != len(columns):
-        check_names("column", [name for name, _ in made])
-        if len(made) > COLUMNS:
-            raise TableError(f"{what} has more than {COLUMNS} columns, the most that are read of a table")
-    return dict(made)
+    encoding, why = _encoding(path)
+    with open_lines(path, encoding) as lines:
+        sample = list(islice(lines, _LINES))
+    # The second half is free of lines before the header.
+    rows, starts = _rows(sample, *_dialect(sample[len(sample) // 2 :]))
+    skip = starts[preface(rows)] if rows else 0
+    delimiter, quote = _dialect(sample[skip:])
+    rows, _ = _rows(sample[skip:], delimiter, quote)
+    decimal = "," if delimiter != "," or quote else "."
+    numbers = [cell for row in rows for cell in row if NUMBER.fullmatch(cell)]
+    if not any("," in number for number in numbers) or any("." in number for number in numbers):
+        decimal = "."
+    header, reason = has_names(rows)
+    sentences = [
+        f"encoding {encoding}: {why}",
+        *([skipped(skip)] if skip else []),
+        f"delimiter: {_SPOKEN[delimiter] if delimiter else 'none, one column'} (clevercsv)",
+        f"decimal sign: {'a comma' if decimal == ',' else 'a point'}",
+        f"header: {reason}",
+    ]
+    return TextFormat(delimiter or None, decimal, encoding, quote or '"', header, skip), sentences
 
 
-def _of_lists(where: str, column: Column, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the numbers (n, k) of lists of k, NaN for missing ones. Raises TableError."""
-    first, width = next((row, len(cells)) for row, cell in enumerate(column) if (cells := _list_of(str(cell))))
-    numbers = np.full((len(column), width), np.nan)
-    for row, cell in enumerate(map(str, column)):
-        cells = _list_of(cell) if cell.strip() else []
-        if cells is None:
-            shown = f"but row {rows[row]} has {shortened(repr(cell))}: write each list whole"
-            raise TableError(f"{where} holds lists of numbers, {shown}")
-        if len(cells) not in (0, width):
-            shown = f"{width} in row {rows[first]} and {len(cells)} in row {rows[row]}"
-            raise TableError(f"{where} holds lists of unequal lengths, {shown}: write lists of one length")
-        if cells:
-            numbers[row] = cells
-    return numbers
-
-
-def _list_of(cell: str) -> list[float] | None:
-    """Return the numbers of a list, or None if `cell` is no list of numbers."""
-    inner = _LIST.fullmatch(cell.strip())
-    if inner is None:
-        return None
-    parts = _SCALAR.sub(r"\1", inner[1]).replace(",", " ").split()
+def _encoding(path: Path) -> tuple[str, str]:
+    with open_bytes(path) as file:
+        content = file.read()
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16", "its byte order mark says so"
     try:
-        return [np.nan if part.casefold() in MISSING_NUMBERS else float(part) for part in parts]
-    except ValueError:
-        return None
+        content.decode()
+    except UnicodeDecodeError:
+        if any(byte in content for byte in _NOT_WESTERN):
+            return "latin-1", "it is neither UTF-8 nor Windows-1252"
+        return "cp1252", "it is not UTF-8; Windows-1252 is Latin-1 with more signs"
+    return "utf-8", "its byte order mark says so" if content.startswith(codecs.BOM_UTF8) else "all of it decodes so"
+
+
+def _dialect(lines: Iterable[str]) -> tuple[str, str]:
+    """Return the delimiter, "" for none, and the quote."""
+    with optional(TableError, "finding how a table is written (a columns.toml says it, too)"):
+        from clevercsv import Detector, Error
+    # Runs of blanks are one delimiter; of other delimiters they are no part.
+    sample = "".join(re.sub(" +", " ", line[:_SEEN].strip(" \r\n")) + "\n" for line in islice(lines, _SEEN_LINES))
+    try:
+        found = Detector().detect(sample.replace("\0", ""), delimiters=list(_DELIMITERS))
+    except Error:
+        found = None
+    return ("", "") if found is None else (found.delimiter or "", found.quotechar or "")
+
+
+def _rows(lines: Sequence[str], delimiter: str, quote: str) -> tuple[list[list[str]], list[int]]:
+    """Return the rows in `lines` that are not empty, and how many lines precede each."""
+    reader = csv_rows(lines, delimiter or "\0", quote or '"', strict=False)
+    rows: list[list[str]] = []
+    starts: list[int] = []
+    row: list[str] | None = []
+    while row is not None and sum(map(len, rows)) <= _SEEN_CELLS:
+        start = reader.line_num
+        try:
+            row = next(reader, None)
+        except csv.Error:
+            continue
+        if row:
+            rows.append(named_by_comment([cell.strip() for cell in row], delimiter))
+            starts.append(start)
+    return rows, starts

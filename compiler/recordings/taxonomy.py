@@ -22,7 +22,7 @@ from thenar.runtime.published import NONE
 from thenar.runtime.recording.session import CollectionTask
 from thenar.runtime.toml_source import TomlText, read_source
 
-from .errors import ColumnsError, RecordingError, check_names
+from . import ColumnsError, RecordingError, check_names
 
 # Kamakura et al. 1980, Patterns of static prehension in normal hands, Am. J. Occup. Ther. 34(7):437-445, with the usual
 # abbreviations.

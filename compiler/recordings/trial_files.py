@@ -8,7 +8,6 @@ import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,12 +16,11 @@ from numpy.typing import NDArray
 
 from thenar.runtime.names import SHOWN, list_names, shortened
 
+from . import LARGEST, ROWS, FileRows, TableError, check_room
+from .cells import Column, is_numeric, name_of_number, natural_key
 from .columns import PLAIN, TextFormat
-from .errors import LARGEST, ROWS, FileRows, TableError, check_room
-from .sniff import sniff
-from .table import SUFFIXES, Column, Table, is_numeric, is_text, read_table, read_tables
+from .table import SUFFIXES, Table, is_text, read_table, read_tables, sniff
 from .taxonomy import plain, published_for
-from .trials import natural_key
 
 # The most files of a set.
 FILES = 100_000
@@ -158,12 +156,6 @@ def read_files(files: Sequence[TrialFile], text: TextFormat, report: Report) -> 
     )
 
 
-def emptied(table: Table, names: Sequence[str]) -> Table:
-    """Return `table` with the columns `names` empty, which are therefore no inputs."""
-    empty = np.full(len(table.rows), "")
-    return replace(table, columns={**table.columns, **dict.fromkeys(names, empty)})
-
-
 def _check_alike(first: str, table: Table, other: str, its: Table) -> None:
     """Raise TableError if two tables have other columns, in whatever order."""
     if table.columns.keys() == its.columns.keys():
@@ -179,12 +171,8 @@ def _joined(parts: Sequence[Column]) -> Column:
     arrays = [np.asarray(part) for part in parts]
     if len({*map(is_numeric, arrays)}) == 1:
         return np.concatenate(arrays)
-    return np.concatenate([_written(array) if is_numeric(array) else array for array in arrays])
-
-
-def _written(numbers: NDArray[np.generic]) -> NDArray[np.str_]:
-    cells = numbers.astype(np.float64).tolist()
-    return np.array(["" if cell != cell else np.format_float_positional(cell, trim="-") for cell in cells], np.str_)
+    texts = [list(map(name_of_number, array.tolist())) if is_numeric(array) else array for array in arrays]
+    return np.concatenate([np.asarray(text, np.str_) for text in texts])
 
 
 def _repeated(values: Sequence[str], counts: Sequence[int], size: int) -> NDArray[np.str_]:

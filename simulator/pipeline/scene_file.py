@@ -10,7 +10,7 @@ from typing import Annotated, get_args
 
 import msgspec
 
-from thenar.compiler.recordings.errors import RecordingError
+from thenar.compiler.recordings import RecordingError
 from thenar.compiler.recordings.taxonomy import Taxonomy, published
 from thenar.runtime.names import fault, list_names, nearest
 from thenar.runtime.toml_source import Place, TomlText, read_source

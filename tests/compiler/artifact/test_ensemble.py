@@ -3,9 +3,9 @@ import sys
 import numpy as np
 import pytest
 
+from thenar.compiler.arrays import pack, unpack
 from thenar.compiler.artifact.ensemble import KIND, LINES, PAIRS, TABLES, ensemble_from_bytes, ensemble_to_bytes
 from thenar.compiler.boosting.stumps import Stumps
-from thenar.compiler.recordings.arrays import pack, unpack
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid

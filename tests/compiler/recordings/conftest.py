@@ -4,7 +4,7 @@ import hypothesis.strategies as st
 import numpy as np
 import pytest
 
-from thenar.compiler.recordings.errors import RecordingError, check_names
+from thenar.compiler.recordings import RecordingError, check_names
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import CUTKOSKY_16, FEIX_33, KAMAKURA_14, Taxonomy, own
 

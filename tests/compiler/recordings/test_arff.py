@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings import TableError
 from thenar.compiler.recordings.table import Table, read_arff, read_table
 
 HEADER = """% a comment

@@ -4,7 +4,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from thenar.compiler.recordings.arrays import pack, unpack
+from thenar.compiler.arrays import pack, unpack
 from thenar.runtime.errors import SealError
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.recordings.errors import TableError, unpacked
+from thenar.compiler.recordings import TableError, unpacked
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.table import read_table
 from thenar.compiler.recordings.taxonomy import FEIX_33

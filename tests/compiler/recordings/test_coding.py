@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.recordings.coding import code_joint, sound_grid
-from thenar.compiler.recordings.columns import CalibrationPoints, JointColumns
-from thenar.compiler.recordings.errors import RecordingError, TableError
+from thenar.compiler.recordings import RecordingError, TableError
+from thenar.compiler.recordings.columns import CalibrationPoints, JointColumns, sound_grid
+from thenar.compiler.recordings.importer import code_joint
 
 ANGLES = st.lists(st.floats(-400, 400), min_size=1, max_size=20)
 

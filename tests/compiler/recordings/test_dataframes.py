@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 
 from thenar.compiler import ColumnRoles, GraspSet, Joint, from_dataframe, to_dataframe
+from thenar.compiler.recordings import ColumnsError, RecordingError, TableError
 from thenar.compiler.recordings.columns import JointColumns
-from thenar.compiler.recordings.errors import ColumnsError, RecordingError, TableError
 
 
 @pytest.mark.filterwarnings("ignore:.*may be clocks:UserWarning")  # a joint may be called T

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings import TableError
 from thenar.compiler.recordings.export import SUFFIXES, export, to_arff, to_csv
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from thenar.compiler.recordings.arrays import pack, unpack
+from thenar.compiler.arrays import pack, unpack
 from thenar.compiler.recordings.graspset import KIND, VERSION, GraspSet
 from thenar.runtime.errors import SealError
 from thenar.runtime.sealed import seal, unseal

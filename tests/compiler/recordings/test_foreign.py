@@ -13,8 +13,7 @@ import pandas as pd
 import pytest
 from scipy.io import savemat
 
-from thenar.compiler.recordings import foreign
-from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings import TableError, foreign
 from thenar.compiler.recordings.table import read_table
 
 GRASPS = ["Größe", "hook", "pin"]

@@ -8,9 +8,9 @@ import pytest
 
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.recordings.frames import check_trials, looks_like_frames
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.importer import import_file
+from thenar.compiler.recordings.summary import check_trials, looks_like_frames
 from thenar.compiler.recordings.taxonomy import own
 
 Measure = Callable[[Callable[[], object]], int]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 from thenar.compiler import GraspSet
-from thenar.compiler.recordings.errors import RecordingError
+from thenar.compiler.recordings import RecordingError
 from thenar.compiler.recordings.graspset import Joint
 
 PAD, PADS = Joint("pad", "N", 0, 0.0, 4095, 20.0), np.array([[0], [4095], [65535], [1], [2], [3]], np.uint16)

@@ -1,16 +1,19 @@
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from thenar.compiler.recordings import ColumnsError, TableError
 from thenar.compiler.recordings.columns import CalibrationPoints, ColumnRoles, JointColumns, TaxelColumns
-from thenar.compiler.recordings.errors import ColumnsError, TableError
 from thenar.compiler.recordings.export import export
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_file, import_table
-from thenar.compiler.recordings.table import Column, Table
+from thenar.compiler.recordings.table import Table
+
+if TYPE_CHECKING:
+    from thenar.compiler.recordings.cells import Column
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "columns"
 JOINTS = (JointColumns(("j",)),)

@@ -7,7 +7,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings import TableError
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.mcap_recording import _Grasp, _Part, _taxel, import_recordings
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from thenar.compiler import merge, split
-from thenar.compiler.recordings.errors import RecordingError
+from thenar.compiler.recordings import RecordingError
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.merging import By, split_into
 from thenar.compiler.recordings.taxonomy import FEIX_33, own

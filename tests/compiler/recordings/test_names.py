@@ -1,6 +1,6 @@
 import pytest
 
-from thenar.compiler.recordings.errors import RecordingError, check_names
+from thenar.compiler.recordings import RecordingError, check_names
 
 
 @pytest.mark.parametrize(

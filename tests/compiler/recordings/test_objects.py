@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.recordings.errors import ColumnsError, RecordingError
+from thenar.compiler.recordings import ColumnsError, RecordingError
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14, collected
 from thenar.runtime.recording.session import CollectionTask
 

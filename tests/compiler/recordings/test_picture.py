@@ -2,10 +2,10 @@ from dataclasses import replace
 
 import pytest
 
-from thenar.compiler.recordings import picture as module
-from thenar.compiler.recordings.errors import RecordingError
+from thenar.compiler.recordings import RecordingError
+from thenar.compiler.recordings import export as module
+from thenar.compiler.recordings.export import draw
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.recordings.picture import draw
 
 
 def parts(grasp_set: GraspSet, switches: int, joints: int) -> GraspSet:

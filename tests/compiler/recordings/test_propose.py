@@ -12,13 +12,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.compiler.recordings import TableError
+from thenar.compiler.recordings.cells import Column
 from thenar.compiler.recordings.columns import ColumnRoles, TextFormat, read_columns
-from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
-from thenar.compiler.recordings.inputs import listed
-from thenar.compiler.recordings.propose import ColumnProposal, propose, propose_file
-from thenar.compiler.recordings.table import Column, Table
+from thenar.compiler.recordings.propose import ColumnProposal, listed, propose, propose_file
+from thenar.compiler.recordings.table import Table
 from thenar.drivers.errors import ThenarError
 
 

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
+from thenar.compiler.recordings import TableError
+from thenar.compiler.recordings.cells import Column
 from thenar.compiler.recordings.columns import ColumnRoles, JointColumns, select
-from thenar.compiler.recordings.errors import TableError
-from thenar.compiler.recordings.importer import read_cells
-from thenar.compiler.recordings.table import Column, Table
+from thenar.compiler.recordings.readings import read_cells
+from thenar.compiler.recordings.table import Table
 
 GOOD = {
     "g": ["a", "b", "c"],

@@ -6,10 +6,9 @@ from random import Random
 
 import pytest
 
+from thenar.compiler.recordings import TableError
 from thenar.compiler.recordings.columns import TextFormat
-from thenar.compiler.recordings.errors import TableError
-from thenar.compiler.recordings.sniff import sniff
-from thenar.compiler.recordings.table import read_table
+from thenar.compiler.recordings.table import read_table, sniff
 
 ROWS = [["Griff", "Person", "Daumen"], ["Größe", "Jörg", "1,5"], ["Haken", "Käthe", "12,25"], ["Haken", "Anna", "3"]]
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from thenar.compiler.movements.streams import frames_are_dense, movements_of
+from thenar.compiler.recordings import ColumnsError, TableError
+from thenar.compiler.recordings.cells import Column, unit_of_time
 from thenar.compiler.recordings.columns import ColumnRoles, JointColumns
-from thenar.compiler.recordings.errors import ColumnsError, TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
 from thenar.compiler.recordings.propose import ColumnProposal, propose, propose_file
-from thenar.compiler.recordings.table import Column, Table
-from thenar.compiler.recordings.trials import unit_of_time
+from thenar.compiler.recordings.table import Table
 
 JOINTS = 18
 

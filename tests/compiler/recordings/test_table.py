@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from thenar.compiler.recordings import TableError
 from thenar.compiler.recordings.cells import numbers
 from thenar.compiler.recordings.columns import TextFormat
-from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.table import Table, read_table
 
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.recordings.errors import RecordingError
+from thenar.compiler.recordings import RecordingError
 from thenar.compiler.recordings.taxonomy import (
     CUTKOSKY_16,
     FEIX_33,

@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from thenar.compiler.recordings.trials import fill, groups, numbered, otsu, restarts
+from thenar.compiler.arrays import groups, otsu
+from thenar.compiler.recordings.readings import fill, numbered, restarts
 
 IDS = hnp.arrays(np.intp, st.integers(1, 30), elements=st.integers(0, 4))
 

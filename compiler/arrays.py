@@ -1,7 +1,7 @@
-"""Sealed npz files: a JSON header and arrays, as the payload of our own files.
+"""Arrays: numbers of equal rows, a threshold between values, and sealed npz files, the payload of our own files.
 
-It is an uncompressed zip of .npy members, the header among them as bytes. It is uncompressed so that the same content
-gives the same bytes with every version of zlib, and so that no file can claim more memory than its length.
+A payload is an uncompressed zip of .npy members, a JSON header among them as bytes. It is uncompressed so that the same
+content gives the same bytes with every version of zlib, and so that no file can claim more memory than its length.
 """
 
 import io
@@ -88,3 +88,31 @@ def _array(name: str, data: bytes) -> AnyArray:
         raise SealError(f"array {name} is not plain numbers of its shape {shape}")
     flat: AnyArray = np.frombuffer(data, dtype, offset=start)
     return flat.reshape(shape)
+
+
+def groups(*columns: NDArray[np.generic]) -> NDArray[np.intp]:
+    """Return a number (n,) for each row from 0 in the order of first appearance, equal where all `columns` (n,) are."""
+    ids = np.zeros(len(columns[0]), np.intp)
+    for column in columns:
+        _, part = np.unique(column, return_inverse=True)
+        # Renumber densely at once: the product of all counts may overflow.
+        ids = np.unique(ids * (part.max(initial=0) + 1) + part, return_inverse=True)[1]
+    _, first, ids = np.unique(ids, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[ids]
+
+
+def otsu(values: NDArray[np.float64]) -> float:
+    """Return the threshold that splits `values` into two classes with the least variance within (Otsu 1979).
+
+    It lies half-way between two neighbours among the finite `values`; if there is only one value, it is that.
+    """
+    found, counts = np.unique(values[np.isfinite(values)], return_counts=True)
+    if len(found) < 2:
+        return float(found[0]) if len(found) else 0.0
+    # In units of the range, from its minimum, so that squares stay finite.
+    scaled = (found / 2 - found[0] / 2) / (found[-1] / 2 - found[0] / 2)
+    below, total = np.cumsum(counts)[:-1], counts.sum()
+    sums = np.cumsum(scaled * counts)
+    between = (sums[-1] * below - sums[:-1] * total) ** 2 / (below * (total - below))
+    best = int(np.argmax(between))
+    return float(found[best] / 2 + found[best + 1] / 2)
