@@ -193,20 +193,18 @@ def fault_table(content: ReportContent) -> PlainTable | None:
     return PlainTable(caption, ("Input", "Lost", "Points less", "Stuck", "At"), tuple(rows), words=(0, 4))
 
 
-def term_table(content: ReportContent) -> PlainTable | None:
-    """Return the terms of the model, the weightiest first: what each reads, and by how much it can move a score; None
-    without any.
+def term_bars(content: ReportContent) -> tuple[tuple[str, float], ...]:
+    """Return each term of the model, the weightiest first: what it reads and by how much it can move a score, as a text
+    and as a share of the largest.
     """
     joints = [joint.name for joint in content.manifest.joints]
     rows = []
     for term in content.tables.core_terms:
         names = content.switch_names if isinstance(term, Bit) else joints
         span = int(np.subtract(*term.ends, dtype=np.int64).max())
-        rows.append((span, " and ".join(names[one] for one in term.inputs), term.name))
-    rows = sorted((row for row in rows if row[0]), key=lambda row: (-row[0], *row[1:]))
-    texts = tuple((reads, kind, f"{span / content.tables.scale:.2f}") for span, reads, kind in rows)
-    caption = "Terms of the model, the weightiest first, and by how much each can move the score of a grasp type"
-    return PlainTable(caption, ("Reads", "Kind", "Moves a score by"), texts, words=(0, 1)) if rows else None
+        rows.append((span, f"{' and '.join(names[one] for one in term.inputs)}, {term.name}"))
+    rows = sorted((row for row in rows if row[0]), key=lambda row: (-row[0], row[1]))
+    return tuple((f"{text} {span / content.tables.scale:.2f}", span / rows[0][0]) for span, text in rows)
 
 
 def _share(count: int, total: int) -> str:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import msgspec
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -20,7 +21,7 @@ from thenar.compiler.report.sections import (
     kept_table,
     placement_sentences,
     scan_table,
-    term_table,
+    term_bars,
     tree_text,
 )
 from thenar.compiler.text import DASH
@@ -58,12 +59,13 @@ def test_the_tree_has_a_line_for_each_node_and_a_large_one_is_cut(bare: ReportCo
     assert "thenar place --draw draws all of them" in said
 
 
-def test_the_terms_are_told_the_weightiest_first(bare: ReportContent) -> None:
-    table = term_table(bare)
-    assert table is not None
-    spans = [float(row[2]) for row in table.rows]
+def test_the_terms_are_drawn_the_weightiest_first(bare: ReportContent) -> None:
+    bars = term_bars(bare)
+    spans = [float(text.rpartition(" ")[2]) for text, _ in bars]
     assert spans == sorted(spans, reverse=True)
-    assert {row[0] for row in table.rows} <= {*bare.switch_names, *(joint.name for joint in bare.manifest.joints)}
+    assert [share for _, share in bars] == pytest.approx([span / spans[0] for span in spans], abs=0.01)
+    names = {text.partition(",")[0] for text, _ in bars}
+    assert names <= {*bare.switch_names, *(joint.name for joint in bare.manifest.joints)}
 
 
 def test_switches_stand_on_the_picture_where_they_lie_on_the_hand(hand: HandShape) -> None:
