@@ -110,7 +110,7 @@ def switches(frontier: Frontier, number: int) -> list[str]:
 
 def test_the_report_opens_with_all_its_charts_and_the_picked_point(opened: Reader, frontier: Frontier) -> None:
     drawn = opened.driver.find_elements(By.CSS_SELECTOR, "figure:has(.scroll > svg)")
-    charts = ["by-frontier", "by-switches", "by-latency"]
+    charts = ["terms", "by-frontier", "by-switches", "by-latency"]
     assert [chart.get_attribute("id") for chart in drawn] == charts
     assert all(chart.find_element(By.TAG_NAME, "svg").size["height"] > 100 for chart in drawn)
     assert frontier.picked is not None
