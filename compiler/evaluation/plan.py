@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,47 +11,42 @@ from numpy.typing import NDArray
 from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import AUTO, Recipe, changed
 
+from ..placement.constraints import Limits
 from ..placement.elements import Elements, bits_of, elements_of
 from ..placement.joints import joint_order
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.methods.filters import random_placement
-from ..placement.placement import Placer
-from ..recordings.graspset import GraspSet
+from ..placement.placement import InputSelection, select
+from ..placement.ports import PortCosts
 from ..samples import Columns, Samples
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
 from .choosing import choose_training
-from .folds import Fold, Rows
-from .populations import Population, Protocol, Scheme, groups_of
+from .folds import Fold, Population, Protocol, Rows
 
 Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
-# For each trainer, the candidates among which each fit chooses.
-Ways = Mapping[str, tuple[Training, ...]]
+_T = TypeVar("_T")
+# For each learner of a fit, the trainings among which each fit chooses.
+Candidates = Mapping[str, tuple[Training, ...]]
 # Classifiers of scikit-learn with its own settings, neighbours weighted by distance: to compare the trainers with.
 CLASSIFIERS = ("logistic-regression", "5-nearest-neighbours")
+REFERENCE = "logitboost"  # the trainer with which the others are compared
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Data:
-    """All rows from which fits take elements and joints, with their labels (n,) in the taxonomy.
-
-    groups (n,) are what each row is left out with, None: its trial.
+def learners() -> tuple[str, ...]:
+    """Return the methods in the table of trainers: REFERENCE, the other trainers that can be chosen automatically, and
+    CLASSIFIERS.
     """
+    return tuple(dict.fromkeys([REFERENCE, *(name for name in TRAINERS if TRAINERS[name].tried), *CLASSIFIERS]))
 
-    samples: Samples
-    labels: Labels
-    groups: NDArray[np.str_] | None
 
-    @classmethod
-    def of(cls, grasp_set: GraspSet, scheme: Scheme = "trial") -> "Data":
-        """Return the rows of a set."""
-        return cls(Samples.of(grasp_set), grasp_set.labels, groups_of(grasp_set, scheme))
-
-    @property
-    def trials(self) -> Rows:
-        """The trial (n,) of each row."""
-        return self.samples.trials
+def candidates_of(recipe: Recipe) -> Candidates:
+    """Return the candidates of each learner: requested settings apply to the trainers that have them."""
+    trainers = dict.fromkeys([*learners(), recipe.trainer])
+    recipes = {name: recipe if name == recipe.trainer else Recipe(trainer=name) for name in trainers}
+    compared = {name: Training.candidates(recipes[name]) for name in trainers if name not in CLASSIFIERS}
+    return {"": (Training.of(recipe),), **compared}
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,29 +63,34 @@ class FoldFit:
     grasps: tuple[int, ...]
     learner: str = ""
 
-    def read(self, data: Data) -> Samples:
-        """Return all rows with only these inputs."""
-        return bits_of(data.samples.with_joints(self.joints), self.elements)
+    def read(self, samples: Samples, rows: Rows) -> Samples:
+        """Return some rows of a set with only these inputs."""
+        return InputSelection.of(self.elements, self.joints).read(samples.rows(rows))
+
+    def is_blind(self, samples: Samples) -> bool:
+        """Return whether none of the inputs varies among the training rows."""
+        return not self.read(samples, self.fold.train).varies
 
 
-def predictions(data: Data, fit: FoldFit, training: Training, ways: Ways | None = None) -> Labels:
-    """Return the labels predicted for the fold's test rows, by `training` or the fit's learner among `ways`.
+def predictions(
+    samples: Samples, fit: FoldFit, candidates: Candidates, groups: NDArray[np.str_] | None = None
+) -> Labels:
+    """Return the labels predicted for the fold's test rows, by the best of the learner's candidates.
 
-    A blind fit predicts the most frequent label of the training rows (the lowest of several), which is the accuracy to
-    beat.
+    A blind fit predicts the most frequent label of the training rows, which is the accuracy to beat. `groups` (n,) are
+    what each row is left out with, None: its trial.
     """
     grasps, rows = np.array(fit.grasps, dtype=np.intp), fit.fold.train
-    trained = np.searchsorted(grasps, data.labels[rows])
-    if is_blind(data, fit):
-        return np.full(len(fit.fold.test), grasps[np.bincount(trained).argmax()])
-    read = fit.read(data)
-    learning = replace(read.rows(rows), labels=trained, grasps=tuple(map(str, fit.grasps)))
-    test = read.rows(fit.fold.test)
+    read, test = fit.read(samples, rows), fit.read(samples, fit.fold.test)
+    if not read.varies:
+        return np.full(len(fit.fold.test), read.most_frequent)
+    learning = replace(read, labels=np.searchsorted(grasps, read.labels), grasps=tuple(map(str, fit.grasps)))
     if fit.learner in CLASSIFIERS:
         return grasps[_classified(fit.learner, learning, test.inputs)]
+    (training,) = candidates[""]
     if fit.learner:
-        groups = None if data.groups is None else data.groups[rows]
-        fitting = choose_training(learning, (ways or {})[fit.learner], groups=groups)
+        inner = None if groups is None else groups[rows]
+        fitting = choose_training(learning, candidates[fit.learner], groups=inner)
         training = Training.chosen(fitting, masked=training.masked)
     return grasps[winners(training.train(learning).scores(test.switches, test.codes))]
 
@@ -111,19 +111,14 @@ def _classified(name: str, learning: Samples, X: NDArray[np.generic]) -> Labels:
     return np.asarray(made.predict(X.astype(np.float64)), dtype=np.intp)
 
 
-def is_blind(data: Data, fit: FoldFit) -> bool:
-    """Return whether none of a fit's inputs varies among its training rows."""
-    inputs = fit.read(data).inputs[fit.fold.train]
-    return not (inputs != inputs[0]).any()
-
-
 def run_fits(
-    data: Data,
+    samples: Samples,
     fits: Iterable[FoldFit],
-    training: Training,
+    candidates: Candidates,
+    groups: NDArray[np.str_] | None = None,
+    *,
     jobs: int = -1,
     progress: Progress | None = None,
-    ways: Ways | None = None,
 ) -> dict[FoldFit, Labels]:
     """Return the predictions of every fit. Equal fits are run once; `progress(done, total)` is called after each.
 
@@ -132,17 +127,16 @@ def run_fits(
     """
     todo = list(dict.fromkeys(fits))
     results: dict[FoldFit, Labels] = {}
-    tasks = ((number, data, fit, training, ways) for number, fit in enumerate(todo))
-    for number, found in in_workers(_numbered, tasks, jobs):
-        results[todo[number]] = found
+    tasks = ((number, (samples, fit, candidates, groups)) for number, fit in enumerate(todo))
+    for number, labels in in_workers(_numbered, tasks, jobs):
+        results[todo[number]] = labels
         if progress is not None:
             progress(len(results), len(todo))
     return results
 
 
-def _numbered(task: tuple[int, Data, FoldFit, Training, Ways | None]) -> tuple[int, Labels]:
-    number, data, fit, training, ways = task
-    return number, predictions(data, fit, training, ways)
+def _numbered(task: tuple[int, tuple[Any, ...]]) -> tuple[int, Labels]:
+    return task[0], predictions(*task[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +158,10 @@ class Composition:
     def has_switches(self) -> bool:
         """Whether it uses any switches."""
         return self.selected or self.others
+
+    def __str__(self) -> str:
+        """Return "II Angle + Sel-Co"."""
+        return f"{self.name} {self.what}"
 
     def elements(self, placement: Elements, every: Elements) -> Elements:
         """Return the elements that it uses, ascending, given the selected and the available ones."""
@@ -192,23 +190,8 @@ TableName = Literal["compositions", "generality", "pruning", "baselines", "train
 Select = Callable[[Population, Fold], Elements]
 
 BASELINES = ("cmim", "mutual-information")
-REFERENCE = "logitboost"  # the trainer with which the others are compared
 JOINTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18)  # numbers of kept joints, without switches
 DRAWS = 5  # random placements to compare with
-
-
-def learners() -> tuple[str, ...]:
-    """Return the methods in the table of trainers: REFERENCE, the other trainers that can be chosen automatically, and
-    CLASSIFIERS.
-    """
-    return tuple(dict.fromkeys([REFERENCE, *(name for name in TRAINERS if TRAINERS[name].tried), *CLASSIFIERS]))
-
-
-def ways_of(recipe: Recipe) -> Ways:
-    """Return the candidates of each trainer, and of AUTO: requested settings apply to the trainers that have them."""
-    trainers = [name for name in learners() if name not in CLASSIFIERS]
-    own = {name: recipe if name == recipe.trainer else Recipe(trainer=name) for name in (*trainers, recipe.trainer)}
-    return {name: Training.candidates(each) for name, each in own.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,24 +220,19 @@ class RowPlan:
 class Planner:
     """Plans the tables for populations of one set.
 
-    samples  of all rows; placer: chooses elements from the training rows, and its recipe says how many joints
-             classifiers get, chosen from the training rows, given the switches; baselines: methods to compare with.
-             A placement is chosen once from the same rows.
+    samples  of all rows; recipe: how elements are chosen from training rows, and how many joints classifiers get,
+             chosen from the training rows, given the switches; ports, limits: costs and constraints, as for `select`;
+             baselines: methods to compare with; known: what was chosen, once by the same recipe from the same rows.
     """
 
     parts: tuple[Population, ...]
     samples: Samples
-    placer: Placer
+    recipe: Recipe
+    ports: PortCosts | None = None
+    limits: Limits | None = None
     prune_list: tuple[int, ...] = ()
     baselines: tuple[str, ...] = BASELINES
-    _chosen: dict[tuple[str, int | None, int, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
-    _elements: dict[bytes, Elements] = field(default_factory=dict, init=False, repr=False)
-    _joint_orders: dict[tuple[Elements, bytes], Columns] = field(default_factory=dict, init=False, repr=False)
-
-    @property
-    def recipe(self) -> Recipe:
-        """The recipe of the classifiers."""
-        return self.placer.recipe
+    known: dict[tuple[object, ...], Any] = field(default_factory=dict, repr=False, compare=False)
 
     def table(self, name: TableName, protocol: Protocol) -> list[RowPlan]:
         """Return the rows of a table under a protocol."""
@@ -343,33 +321,33 @@ class Planner:
         """Return the recipe's placement for a fold, chosen from the population's own rows as the protocol allows."""
         return self.chosen(protocol.may_choose(part, fold))
 
+    def _once(self, key: tuple[object, ...], rows: Rows, choose: Callable[[Samples], tuple[_T, ...]]) -> tuple[_T, ...]:
+        """Return what `choose` returns for these rows, called once for the same key and rows."""
+        key = *key, rows.tobytes()
+        if key not in self.known:
+            self.known[key] = choose(self.samples.rows(rows))
+        known: tuple[_T, ...] = self.known[key]
+        return known
+
     def elements(self, rows: Rows) -> Elements:
         """Return the elements available in these rows."""
-        key = rows.tobytes()
-        if key not in self._elements:
-            self._elements[key] = elements_of(self.samples.rows(rows), self.recipe.levels)
-        return self._elements[key]
+        return self._once((), rows, lambda samples: elements_of(samples, self.recipe.levels))
 
     def chosen(self, rows: Rows, **changes: Any) -> Elements:
         """Return the elements that the recipe, with other choices `changes`, keeps from these rows, in any order."""
-        recipe = changed(self.recipe, changes)
-        method = METHODS.named(recipe.placement)
-        if not self._n_switches or (method.by_number and recipe.keep is None):
+        recipe = changed(self.recipe, {"keep_joints": None, **changes})
+        if not self._n_switches or (METHODS.named(recipe.placement).by_number and recipe.keep is None):
             return ()
-        rows = np.sort(rows)
-        key = method.name, recipe.keep, recipe.prune, rows.tobytes()
-        if key not in self._chosen:
-            self._chosen[key] = self.placer.elements(self.samples.rows(rows), **changes)
-        return self._chosen[key]
+        return self._once(
+            (recipe,), np.sort(rows), lambda samples: select(samples, recipe, self.ports, self.limits).kept
+        )
 
     def joints(self, rows: Rows, elements: Elements, most: int | None) -> Columns:
         """Return the best joints, ascending, at most `most`, given these elements and rows; None: all."""
         if most is None or most >= self.n_joints:
             return tuple(range(self.n_joints))
-        key = elements, rows.tobytes()
-        if key not in self._joint_orders:
-            self._joint_orders[key] = joint_order(bits_of(self.samples.rows(rows), elements))
-        return tuple(sorted(self._joint_orders[key][:most]))
+        order = self._once((elements,), rows, lambda samples: joint_order(bits_of(samples, elements)))
+        return tuple(sorted(order[:most]))
 
     def _row(
         self, name: str, what: str, kind: Composition, select: Select, learner: str = "", most: int | None = None

@@ -1,40 +1,52 @@
-"""An evaluation: the paper's tables for the user's own recordings, with each distinct fit run once."""
+"""An evaluation: the paper's tables for the user's recordings, with each distinct fit run once; learning curves; and a
+permutation test.
+"""
 
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
-from thenar.runtime.manifest import fit_name
+from thenar.runtime.manifest import Of, Unit, fit_name
 from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Recipe, changed
 
 from ..limits import check_memory, check_types
+from ..pictures import painting
 from ..placement.constraints import Limits
 from ..placement.methods.base import METHODS, PAPERS
-from ..placement.placement import Placer
 from ..placement.ports import PortCosts
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..text import counted
 from ..trainers.base import Training
-from .folds import EvaluationError
+from ..workers import in_workers
+from .folds import (
+    NESTED,
+    OF,
+    PROTOCOLS,
+    EvaluationError,
+    Population,
+    ProtocolName,
+    Scheme,
+    concerns,
+    groups_of,
+    populations,
+)
 from .learning import Learning, plan_learning
-from .permutation import Permuted, permuted
 from .plan import (
     BASELINES,
-    Data,
     Planner,
     Progress,
     TableName,
-    is_blind,
+    candidates_of,
+    predictions,
     run_fits,
-    ways_of,
 )
-from .populations import NESTED, OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, populations
 from .rates import RecipeWords, placement_words
-from .tables import RateReader, RateTable
+from .tables import RateReader, RateTable, draw_confusions
 
 TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines", "trainers")
 _NESTED: tuple[TableName, ...] = ("trainers", "joints")
@@ -43,6 +55,7 @@ _NESTED: tuple[TableName, ...] = ("trainers", "joints")
 _OF_ALL_SWITCHES: tuple[TableName, ...] = ("compositions", "pruning")
 _FEWEST_FOLDS = 2
 PAPERS_RECIPE = Recipe(trainer=PAPERS_TRAINER)
+LEARNING_NAME = "learning-curve.svg"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +106,39 @@ class LeftOut:
 
     name: TableName
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Permuted:
+    """The accuracy of one composition under the nested protocol, one repeat, compared with shuffled labels.
+
+    Labels are shuffled among the trials of each subject, keeping frames of a trial together; then folds are cut,
+    placements chosen and classifiers trained as with the true labels.
+
+    composition   its name and inputs             of, unit  what the accuracy is of
+    rate          with the true labels            chance    mean accuracy of the permutations
+    permutations  their number, m                 highest   their highest accuracy
+    p             (b + 1) / (m + 1), where b permutations reach the accuracy: the probability of it by chance
+    """
+
+    composition: str
+    recipe: RecipeWords
+    of: Of
+    unit: Unit
+    rate: float
+    permutations: int
+    chance: float
+    highest: float
+    p: float
+
+    def __str__(self) -> str:
+        """Return accuracy, chance level and p-value in a sentence."""
+        return (
+            f"Permutation test of {self.composition}, {self.of}, {self.unit}, nested ({self.recipe}): "
+            f"{100 * self.rate:.1f} %; chance "
+            f"{100 * self.chance:.1f} % (mean of {self.permutations} shuffles of labels within subjects, highest "
+            f"{100 * self.highest:.1f} %); p = {self.p:.2g}"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +234,8 @@ def evaluate(
     reasons = {name: _why_not(name, chosen, parts, design) for name in design.tables}
     if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
         _check_all_switches(chosen, parts)
-    planner = Planner(parts, Samples.of(chosen), Placer(recipe, ports, limits), design.prune_list, design.baselines)
+    samples = Samples.of(chosen)
+    planner = Planner(parts, samples, recipe, ports, limits, design.prune_list, design.baselines)
     plans = {
         (name, each.name): planner.table(name, each)
         for name, reason in reasons.items()
@@ -196,36 +243,31 @@ def evaluate(
         for each in PROTOCOLS
         if each.name in design.protocols and (each is NESTED or name not in _NESTED)
     }
-    data, curves = Data.of(chosen, scheme), None
-    if design.learning:
-        curves = plan_learning(data, chosen.subjects, planner, scheme, recipe.folds, design.repeats)
+    curves = plan_learning(planner, chosen.subjects, scheme, design.repeats) if design.learning else None
     cells = [cell for rows in plans.values() for row in rows for cell in row.cells]
-    fits = [fit for cell in (*cells, *(curves.every if curves else ())) for fit in cell.fits]
+    cells += [cell for row in curves.cells.values() for cell in row] if curves else []
+    fits = dict.fromkeys(fit for cell in cells for fit in cell.fits)
 
-    def report(done: int, total: int, before: int = 0, after: int = 0) -> None:
+    def report(before: int, done: int, _: int) -> None:
         if progress is not None:
-            progress(before + done, before + total + after)
+            progress(before + done, len(fits) + design.permute)
 
-    after = partial(report, after=design.permute)
-    predictions = run_fits(data, fits, Training.of(recipe), jobs, after, ways_of(recipe))
-    test = None
+    groups, candidates = groups_of(chosen, scheme), candidates_of(recipe)
+    predicted = run_fits(samples, fits, candidates, groups, jobs=jobs, progress=partial(report, 0))
+    test, learning = None, None
     if design.permute:
-        words, before = _recipe_of("compositions", recipe), partial(report, before=len(predictions))
-        test = permuted(chosen, parts, scheme, planner.placer, words, design.permute, jobs, before)
-    grasps = tuple(np.unique(chosen.labels).tolist())
-    blind = frozenset(fit for fit in predictions if is_blind(data, fit))
-    reader = RateReader(chosen.labels, data.trials, grasps, predictions, blind, OF[scheme], data.groups)
-    learning = None
+        words = _recipe_of("compositions", recipe)
+        test = _permuted(chosen, planner, scheme, words, design.permute, jobs, partial(report, len(fits)))
+    reader = RateReader(samples, predicted, OF[scheme], groups)
     if curves is not None:
-        words = _recipe_of("trainers", recipe)
-        learning = curves.read(replace(reader, of=curves.of), data.groups, recipe.seed, words)
+        learning = curves.read(reader, recipe.seed, _recipe_of("trainers", recipe))
     empty = grasp_set.is_none & np.isin(grasp_set.subjects, np.unique(chosen.subjects))
     return Study(
         fingerprint=grasp_set.fingerprint(),
         rows=len(chosen),
-        trials=int(data.trials.max()) + 1,
+        trials=int(samples.trials.max()) + 1,
         options=design,
-        grasps=tuple(chosen.taxonomy.types[label] for label in grasps),
+        grasps=samples.grasps,
         warnings=concerns(chosen, parts, scheme, recipe.folds),
         left_out=tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None),
         tables=tuple(reader.table(*which, rows, _recipe_of(which[0], recipe)) for which, rows in plans.items()),
@@ -233,6 +275,84 @@ def evaluate(
         learning=learning,
         rests=len(np.unique(grasp_set.trial_ids[empty])),
     )
+
+
+def draw(study: Study, folder: Path) -> list[Path]:
+    """Write a picture for each composition and protocol, subjects side by side, and one of learning curves, if present.
+
+    Return the files: `confusion-PROTOCOL-COMPOSITION.png` and LEARNING_NAME in `folder`, which is created if necessary.
+    Raises OSError from the system.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    compositions = [table for table in study.tables if table.name == "compositions"]
+    with painting(font_size=10):
+        curves = [] if study.learning is None else [study.learning.draw(folder / LEARNING_NAME)]
+        return curves + [
+            draw_confusions(study.grasps, table, row, folder) for table in compositions for row in table.rows
+        ]
+
+
+def _permuted(
+    grasp_set: GraspSet,
+    planner: Planner,
+    scheme: Scheme,
+    words: RecipeWords,
+    m: int,
+    jobs: int,
+    progress: Progress,
+) -> Permuted:
+    """Return the test of an evaluation, of m > 0 permutations, with selected switches and joints as far as the set has
+    them; `planner` is that of the true labels.
+    """
+    # Without what it chose for the true labels: it goes to the workers.
+    tasks = [(grasp_set, replace(planner, known={}), scheme, number) for number in range(m + 1)]
+    correct, total = _recognised(tasks[0])
+    shuffled: list[int] = []
+    for count, _ in in_workers(_recognised, tasks[1:], jobs):
+        shuffled.append(count)
+        progress(len(shuffled), m)
+    return Permuted(
+        composition=str(planner.kinds[0]),
+        recipe=words,
+        of=OF[scheme],
+        unit="trials",
+        rate=correct / total,
+        permutations=m,
+        chance=sum(shuffled) / m / total,
+        highest=max(shuffled) / total,
+        p=(sum(count >= correct for count in shuffled) + 1) / (m + 1),
+    )
+
+
+def _recognised(task: tuple[GraspSet, Planner, Scheme, int]) -> tuple[int, int]:
+    """Return the number of trials that a permutation (0: the true labels) predicts correctly, and the total."""
+    grasp_set, planner, scheme, number = task
+    recipe = planner.recipe
+    if number:
+        grasp_set = shuffled_labels(grasp_set, (recipe.seed, number))
+    samples, parts = Samples.of(grasp_set), planner.parts
+    if scheme == "trial":
+        parts = populations(grasp_set, scheme, recipe.folds, 1, recipe.seed)
+    planner = replace(planner, parts=parts, samples=samples, known={})
+    cells = [planner.cell(part, planner.kinds[0], partial(planner.own, NESTED)) for part in parts]
+    cells = [replace(cell, runs=cell.runs[:1]) for cell in cells]
+    candidates = candidates_of(recipe)
+    predicted = {fit: predictions(samples, fit, candidates) for cell in cells for fit in cell.fits}
+    rate, _ = RateReader(samples, predicted, OF[scheme], groups_of(grasp_set, scheme)).rates(cells)
+    return rate.correct[0], rate.total
+
+
+def shuffled_labels(grasp_set: GraspSet, seed: tuple[int, ...]) -> GraspSet:
+    """Return the set with its grasp types shuffled among the trials of each subject; trials stay whole."""
+    random = np.random.default_rng(seed)
+    trial = grasp_set.trial_ids
+    _, first = np.unique(trial, return_index=True)
+    subjects, grasps = grasp_set.subjects[first], grasp_set.grasps[first]
+    for subject in np.unique(subjects):
+        mine = np.flatnonzero(subjects == subject)
+        grasps[mine] = grasps[random.permutation(mine)]
+    # The trial number keeps two trials apart that get the same label.
+    return replace(grasp_set, grasps=grasps[trial], trials=trial)
 
 
 def recipe_words(recipe: Recipe) -> RecipeWords:

@@ -10,8 +10,7 @@ from msgspec.structs import replace as changed_to
 
 from thenar.runtime.recipe import Recipe
 
-from ..evaluation.luck import Draws
-from ..evaluation.rates import Rate
+from ..evaluation.rates import Draws, Rate
 from ..trainers.base import TRAINERS, Training
 from .finalists import EvaluatedFinalist
 from .latency import POLICIES

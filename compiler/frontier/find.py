@@ -113,7 +113,7 @@ def find_frontier(
     Returns
     -------
     Frontier
-        A point's rate is corrected for the selection of the best of many; see `thenar.compiler.evaluation.luck`.
+        A point's rate is corrected for the selection of the best of many; see `thenar.compiler.evaluation.rates.Draws`.
 
     Raises
     ------

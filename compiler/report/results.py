@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..evaluation.populations import PROTOCOLS
+from ..evaluation.folds import PROTOCOLS
 from ..evaluation.study import Study
 from ..evaluation.tables import RateTable, both
 from ..movements.transitions import Transitions

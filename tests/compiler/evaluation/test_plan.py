@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler import grow_id3
+from thenar.compiler.evaluation.folds import NESTED, PAPER, Protocol, populations
 from thenar.compiler.evaluation.plan import (
     COMPOSITIONS,
     DRAWS,
@@ -13,10 +14,8 @@ from thenar.compiler.evaluation.plan import (
     RowPlan,
     available,
 )
-from thenar.compiler.evaluation.populations import NESTED, PAPER, Protocol, populations
 from thenar.compiler.placement.elements import Element, columns_of
 from thenar.compiler.placement.methods.base import METHODS
-from thenar.compiler.placement.placement import Placer
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.runtime.recipe import Recipe
@@ -54,7 +53,7 @@ both_protocols = pytest.mark.parametrize("protocol", [PAPER, NESTED], ids=lambda
 
 def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
     parts = populations(grasps, "trial", 4, repeats, 1)
-    return Planner(parts, Samples.of(grasps), Placer(Recipe(prune=prune)), (0, 30))
+    return Planner(parts, Samples.of(grasps), Recipe(prune=prune), prune_list=(0, 30))
 
 
 @pytest.fixture(scope="module")

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, compile_build, evaluate
-from thenar.compiler.evaluation.plan import Data, FoldFit, predictions
-from thenar.compiler.evaluation.populations import populations
+from thenar.compiler.evaluation.folds import populations
+from thenar.compiler.evaluation.plan import FoldFit, predictions
 from thenar.compiler.placement.elements import Element, Elements, bits_of, elements_of, names_of
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import Training
 
 Make = Callable[..., GraspSet]
-TRAINING = Training("logitboost", {"rounds": 6})
+TRAINING = {"": (Training("logitboost", {"rounds": 6}),)}
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +47,8 @@ def test_a_fold_is_predicted_by_the_levels_of_its_training_rows(padded: GraspSet
         assert len(every) > 9
         elements = tuple(element for element in every if element.column in columns)
         same = tuple(map(Element, range(len(elements))))
-        found = predictions(Data.of(padded), FoldFit(fold, elements, (0,), part.grasps), TRAINING)
-        plain = Data.of(plain_by(padded, elements))
+        found = predictions(Samples.of(padded), FoldFit(fold, elements, (0,), part.grasps), TRAINING)
+        plain = Samples.of(plain_by(padded, elements))
         assert np.array_equal(found, predictions(plain, FoldFit(fold, same, (0,), part.grasps), TRAINING))
 
 
