@@ -12,11 +12,10 @@ from thenar.runtime.recipe import Recipe
 
 from ..evaluation.rates import Draws, Rate
 from ..trainers.base import TRAINERS, Training
-from .finalists import EvaluatedFinalist
+from .finalists import EvaluatedFinalist, Screened
 from .latency import POLICIES
 from .points import DecisionKind, FrontierPoint, Latency, PointSetting, PointTime, front
 from .price import PricedTables
-from .screen import Screened
 from .search import placement_of
 from .survey import Cuts, Survey, TrialAccuracy
 from .timing.classify_times import Classified

@@ -1,23 +1,28 @@
-"""Finalists: select the placements worth full evaluation, and evaluate all their rounds and tables in all folds."""
+"""From choices to finalists: screen every placement, select those worth full evaluation, and evaluate all their rounds
+and tables in all folds.
+"""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from math import log
 
+import numpy as np
 from msgspec.structs import replace as changed_to
 
 from thenar.runtime.recipe import Inputs, Recipe
 
 from ..evaluation.folds import Fold
 from ..evaluation.rates import Rate
-from ..placement.methods.base import BEST, PAPERS
-from .points import STEP, By, ReferencePoint, front
+from ..placement.elements import Elements
+from ..placement.methods.base import BEST, METHODS, PAPERS
+from .points import STEP, By, Curve, ReferencePoint, front
 from .price import PricedTables
-from .screen import Screened
-from .search import SHAPES, Search, placed, tabled
+from .search import CURVE_SIZES, JOINTS, SHAPES, Search, placed, tabled
 from .survey import Cuts, FoldHits, Survey, TrialAccuracy
 
+# Screening: the frame time hardly depends on the numbers of rounds and rows, so tables of few suffice.
+_ROUNDS, _FEW_ROWS = 12, 1000
 # The paper's S.
 _PAPERS = 62
 
@@ -27,6 +32,21 @@ _USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
 _FEWEST = 0.002
 # The share of the rows that more rounds than the paper's must win in the first repeat.
 _DEEPER = 0.002
+
+
+@dataclass(frozen=True, slots=True)
+class Screened:
+    """A choice after screening: its elements when chosen from all rows, its rate, its frame time (us)."""
+
+    choice: Recipe
+    elements: Elements
+    judged: TrialAccuracy
+    frame_us: float
+
+    @property
+    def mean(self) -> float:
+        """The rate."""
+        return self.judged.rate.mean
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +62,87 @@ class EvaluatedFinalist:
     frames: dict[Recipe, Rate]
     other: dict[Recipe, Rate]
     priced: tuple[PricedTables, ...]
+
+
+def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
+    """Train every placement once, on the folds of one repeat, and price it in the fastest of its wirings.
+
+    Return the accuracy and frame time of every choice that can be built, with the first trainer; and the curves of all
+    methods, including the baselines.
+    """
+    search, cuts, sizes = survey.search, survey.cuts, {most: survey.size(most) for most in survey.levels}
+    trainer, most = search.trainers[0], survey.levels[-1]
+    inputs: tuple[Inputs, ...] = ("both", "switches") if survey.n_joints else ("switches",)
+    choices = [
+        placed(name, number, trainer, kind, levels)
+        for kind in (inputs if sizes[most] else ())
+        for levels, size in sizes.items()
+        for name in search.methods
+        for number in METHODS[name].ladder(size)
+    ]
+    baselines = [
+        placed(name, size, trainer, "switches", most)
+        for name in search.baselines
+        for size in CURVE_SIZES
+        if size <= sizes[most]
+    ]
+    survey.choose(choices, (cuts.everything, *cuts.screening))
+    survey.choose(baselines, cuts.screening)
+    # Drop placements that keep nothing. Joints alone need no placement.
+    choices = [choice for choice in choices if survey.elements(choice)]
+    choices += [Recipe(trainer=trainer, inputs="joints")] if survey.n_joints else []
+    rates = _rates(survey, choices, baselines)
+    names = dict.fromkeys([*search.methods, *search.baselines]) if sizes[most] else ()
+    return _screened(survey, choices, rates), tuple(_curve(survey, name, rates) for name in names)
+
+
+def screen_fewer(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
+    """Return those `worth` it, screened with fewer joints, if joints take time."""
+    sizes = [size for size in JOINTS if size < survey.n_joints] if survey.equipment.records.each_us else []
+    choices = [changed_to(one.choice, keep_joints=size) for one in worth for size in sizes]
+    survey.choose_joints(choices, (survey.cuts.everything, *survey.cuts.screening))
+    return _screened(survey, choices, _rates(survey, choices))
+
+
+def screen_others(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
+    """Return those `worth` it, screened with each of the other trainers."""
+    choices = [changed_to(one.choice, trainer=name) for name in survey.search.trainers[1:] for one in worth]
+    return _screened(survey, choices, _rates(survey, choices))
+
+
+def _rates(survey: Survey, choices: Sequence[Recipe], baselines: Sequence[Recipe] = ()) -> dict[Recipe, TrialAccuracy]:
+    """Return the rates of choices and baselines; baselines choose within the folds only and tune nothing."""
+    cuts, several = survey.cuts, [*choices, *baselines]
+    survey.tune(choices, (cuts.everything, *cuts.screening))
+    rounds = {name: survey.search.alone(name).screened for name in survey.search.trainers}
+    fits = survey.fit(several, cuts.screening, lambda choice: ((rounds[choice.trainer],), ()))
+    return {
+        choice: cuts.judged(cuts.by, {fold: fits[choice, fold].stages[-1] for fold in cuts.screening})
+        for choice in several
+    }
+
+
+def _screened(survey: Survey, choices: Sequence[Recipe], rates: Mapping[Recipe, TrialAccuracy]) -> tuple[Screened, ...]:
+    """Return the choices that can be built."""
+    rows = len(survey.samples.labels)
+    few = np.linspace(0, rows - 1, min(_FEW_ROWS, rows)).astype(np.intp)
+    prices = survey.prices({choice: (tabled(choice, _ROUNDS),) for choice in choices}, few)
+    found = []
+    for choice, (priced,) in prices.items():
+        us = priced.fastest_us(survey.transfer(choice).us)
+        if us is not None and (priced.scans or choice.inputs == "joints"):
+            found.append(Screened(choice, survey.elements(choice), rates[choice], us))
+    return tuple(found)
+
+
+def _curve(survey: Survey, name: str, rates: Mapping[Recipe, TrialAccuracy]) -> Curve:
+    """Return a method's rates by the mean number of switches that it kept in the folds, switches alone."""
+    folds, points = survey.cuts.screening, {}
+    for choice, judged in rates.items():
+        if (choice.placement, choice.inputs, choice.levels) == (name, "switches", survey.levels[-1]):
+            points[sum(len(survey.elements(choice, fold)) for fold in folds) / len(folds)] = judged.rate
+    sizes = tuple(sorted(points))
+    return Curve(name, METHODS[name].help, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))
 
 
 def finalists(screened: Sequence[Screened], wanted: Collection[Recipe], most: int) -> tuple[Screened, ...]:
@@ -115,26 +216,25 @@ def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[Eval
     """
     cuts, choices = survey.cuts, [one.choice for one in chosen]
     searches = {choice: survey.search.alone(choice.trainer) for choice in choices}
-    typical = survey.typical(choices)
     survey.choose(choices, cuts.others)
     survey.choose_joints(choices, cuts.others)
-    survey.tune(typical, cuts.others)
-    fits = survey.fit(choices, cuts.screening, lambda one: (searches[one].stages, searches[one].tabled))
-    rows = len(cuts.trials)
-    depths = {one: depth_of(searches[one], [fits[one, fold] for fold in cuts.screening], rows) for one in choices}
-    fits |= survey.fit(choices, cuts.others, lambda one: (depths[one].stages, depths[one].tabled))
+    survey.tune(choices, cuts.others)
+    fits = survey.fit(choices, cuts.screening, lambda choice: (searches[choice].stages, searches[choice].tabled))
+    depths = {
+        choice: depth_of(search, [fits[choice, fold] for fold in cuts.screening], len(cuts.trials))
+        for choice, search in searches.items()
+    }
+    fits |= survey.fit(choices, cuts.others, lambda choice: (depths[choice].stages, depths[choice].tabled))
     judged = {
         choice: _judged(cuts, choice, depth, {fold: fits[choice, fold] for fold in (*cuts.screening, *cuts.others)})
         for choice, depth in depths.items()
     }
-    worth = [
-        (choice, tuple(dict.fromkeys([*worthwhile(judged[choice][1]), papers_tables(choice, searches[choice])])))
-        for choice in choices
-    ]
+    worth = {
+        choice: tuple(dict.fromkeys([*worthwhile(judged[choice][1]), papers_tables(choice, search)]))
+        for choice, search in searches.items()
+    }
     prices = survey.prices(worth, cuts.everything.train, lost=True)
-    return tuple(
-        EvaluatedFinalist(one, *judged[one.choice], priced) for one, priced in zip(chosen, prices, strict=True)
-    )
+    return tuple(EvaluatedFinalist(one, *judged[one.choice], prices[one.choice]) for one in chosen)
 
 
 def choices_to_mark(n_elements: int, n_joints: int, trainer: str, levels: int | None = None) -> dict[Recipe, str]:
@@ -215,8 +315,8 @@ def _judged(
 
     def tables(by: By) -> dict[Recipe, TrialAccuracy]:
         return {
-            each: cuts.judged(by, {fold: fit.tables[row][column] for fold, fit in fits.items()})
-            for each, (row, column) in places.items()
+            recipe: cuts.judged(by, {fold: fit.tables[row][column] for fold, fit in fits.items()})
+            for recipe, (row, column) in places.items()
         }
 
     stages = {
@@ -224,8 +324,8 @@ def _judged(
         for number, stage in enumerate(search.stages)
     }
     frames = {
-        each: cuts.frames({fold: fit.frames[row][column] for fold, fit in fits.items()})
-        for each, (row, column) in (places.items() if len(cuts.people) < len(cuts.trials) else ())
+        recipe: cuts.judged(cuts.by, {fold: fit.frames[row][column] for fold, fit in fits.items()}, "frames").rate
+        for recipe, (row, column) in (places.items() if len(cuts.people) < len(cuts.trials) else ())
     }
-    other = {} if cuts.other is None else {each: judged.rate for each, judged in tables(cuts.other).items()}
+    other = {} if cuts.other is None else {recipe: judged.rate for recipe, judged in tables(cuts.other).items()}
     return stages, tables(cuts.by), frames, other

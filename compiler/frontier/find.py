@@ -30,13 +30,22 @@ from ..samples import Samples
 from ..text import INDEPENDENT, sentence
 from .cache import Cache, Report, Store
 from .designs import Design, Latencies, best_designs, designs, lucks, points_of
-from .finalists import EvaluatedFinalist, choices_to_mark, evaluate_finalists, finalists, marks_of
+from .finalists import (
+    EvaluatedFinalist,
+    Screened,
+    choices_to_mark,
+    evaluate_finalists,
+    finalists,
+    marks_of,
+    screen,
+    screen_fewer,
+    screen_others,
+)
 from .latency import POLICIES, latencies, movements_of
 from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, FrontierPoint, ReferencePoint, Tried, frontier_to_bytes
 from .price import Equipment, equipment_for, measured
 from .replay import Replay, replay_of
-from .screen import Screened, screen, screen_fewer, screen_others
 from .search import TAXEL_LEVELS, Search, placement_of
 from .survey import Cuts, Survey
 from .timing.scan_times import records_of

@@ -30,27 +30,21 @@ class Picked:
     def options(self) -> dict[str, object]:
         """The options of `compile_build` that the point determines."""
         setting = self.point.setting
-        settled: dict[str, object] = {
+        names = ("max_bins", "keep_joints", "levels", "rounds")
+        chosen = {name: value for name in names if (value := getattr(setting, name)) is not None}
+        if setting.inputs != "joints":
+            parameter = "keep" if METHODS[setting.placement.method].by_number else "prune"
+            chosen |= {"placement": setting.placement.method, parameter: int(setting.placement.parameter)}
+        return {
             "inputs": setting.inputs,
             "width": setting.width,
             "table_bits": setting.table_bits,
             "trainer": setting.trainer,
             # Settings that are not written are defaults, and none is left to choose.
-            **{own.name: own.default for own in TRAINERS[setting.trainer].settings},
+            **{option.name: option.default for option in TRAINERS[setting.trainer].settings},
             **setting.settings,
+            **chosen,
         }
-        if setting.max_bins is not None:
-            settled["max_bins"] = setting.max_bins
-        if setting.keep_joints is not None:
-            settled["keep_joints"] = setting.keep_joints
-        if setting.levels is not None:
-            settled["levels"] = setting.levels
-        if setting.rounds is not None:
-            settled["rounds"] = setting.rounds
-        if setting.inputs == "joints":
-            return settled
-        parameter = "keep" if METHODS[setting.placement.method].by_number else "prune"
-        return {**settled, "placement": setting.placement.method, parameter: int(setting.placement.parameter)}
 
     def wired(self, given: Harness | None) -> Harness | Callable[[Sequence[str]], Harness] | None:
         """Return the wiring for `compile_build`: the given one if the point is wired so, else a function that makes a

@@ -4,7 +4,7 @@ A candidate is a `Recipe`: its placement with its number, its inputs, and its tr
 its tables.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -135,11 +135,9 @@ class Search:
     def candidates(self) -> tuple[Training, ...]:
         """All trainings that the settings leave open; trainers with stages are not varied by rounds."""
         usual = {"rounds": self.training.settings["rounds"]} if self.staged else {}
-        every = Training.candidates(self._asked(self.trainers[0]))
-        found = {
-            tuple(one.settings.items()): one for one in (Training(e.trainer, {**e.settings, **usual}) for e in every)
-        }
-        return tuple(found.values())
+        open_ones = Training.candidates(self._asked(self.trainers[0]))
+        found = [Training(one.trainer, {**one.settings, **usual}) for one in open_ones]
+        return tuple(one for number, one in enumerate(found) if one not in found[:number])
 
     def _asked(self, trainer: str) -> Recipe:
         return changed(Recipe(), {"trainer": trainer, **self.settings})
@@ -166,15 +164,3 @@ class Search:
 
     def _up_to_last(self, rounds: tuple[int, ...]) -> tuple[int, ...]:
         return (*(each for each in rounds if each < self.rounds), self.rounds) if self.staged else (1,)
-
-
-def candidates(method: str, n_elements: int, trainer: str, inputs: Inputs, levels: int | None) -> Iterator[Recipe]:
-    """Yield the candidates that a frontier tries with a method among `n_elements` elements."""
-    return (placed(method, size, trainer, inputs, levels) for size in METHODS[method].ladder(n_elements))
-
-
-def available_inputs(n_elements: int, n_joints: int) -> tuple[Inputs, ...]:
-    """Return which inputs a set has; joints alone need no placement."""
-    if not n_elements:
-        return ("joints",) if n_joints else ()
-    return ("both", "switches", "joints") if n_joints else ("switches",)

@@ -176,7 +176,7 @@ def test_a_trial_is_recognised_as_most_of_its_frames_are(make_set: Callable[...,
     judged = cuts.judged("new subject", {fold: fit.stages[0] for fold, fit in fits.items()})
     assert (judged.rate.correct, judged.rate.total, judged.rate.over) == ((right_trials,), len(cuts.people), 3)
     assert (judged.hits.sum(), judged.repeats, judged.rate.what) == (right_trials, 1, "new subject, trials")
-    frames = cuts.frames({fold: fit.frames[0][0] for fold, fit in fits.items()})
+    frames = cuts.judged("new subject", {fold: fit.frames[0][0] for fold, fit in fits.items()}, "frames").rate
     assert (frames.correct, frames.total, frames.what) == ((right_rows,), 288, "new subject, frames")
 
 
