@@ -46,12 +46,12 @@ def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None 
     groups  (n,) the subject, object or session of each row, if those are left out
     """
     n_trials = len(np.unique(samples.movements))
-    number = next((folds for most, folds in _FOLDS if n_trials < most), 2)
+    n_folds = next((folds for most, folds in _FOLDS if n_trials < most), 2)
     if groups is not None and len(np.unique(groups)) >= _LEAST_GROUPS:
-        return leave_groups_out(groups, "group", number)
+        return leave_groups_out(groups, "group", n_folds)
     if n_trials < 2:
         return []
-    return trial_folds(samples.labels, samples.movements, min(number, n_trials), seed)
+    return trial_folds(samples.labels, samples.movements, min(n_folds, n_trials), seed)
 
 
 def choose_training(
@@ -189,12 +189,13 @@ def _table_rows(tables: ScoreTables) -> int:
     return sum(term.n_rows for term in tables.core_terms if term.largest > 0)
 
 
-def _error(gains: NDArray[np.intp], clusters: Rows) -> float:
+def _error(gains: NDArray[np.intp], clusters: NDArray[np.generic]) -> float:
     """Return the standard error of the mean of integers (T,) in clusters, robust to correlation within them."""
-    sizes, own, total = np.bincount(clusters), np.zeros(clusters.max() + 1, np.int64), int(gains.sum())
-    np.add.at(own, clusters, gains)
-    squares = int(((len(gains) * own - sizes * total) ** 2).sum())
-    return sqrt(squares * len(sizes) / max(1, len(sizes) - 1)) / len(gains) ** 2
+    _, number, sizes = np.unique(clusters, return_inverse=True, return_counts=True)
+    sums = np.zeros(len(sizes), np.int64)
+    np.add.at(sums, number, gains)
+    squares = int(((len(gains) * sums - sizes * int(gains.sum())) ** 2).sum())
+    return round(sqrt(squares * len(sizes) / max(1, len(sizes) - 1)) / len(gains) ** 2, 6)
 
 
 def _fitting(
@@ -206,33 +207,34 @@ def _fitting(
     n_folds: int,
 ) -> Fitting:
     # All candidates are tested on the same trials.
-    cluster = np.unique(clusters[scores[0].first], return_inverse=True)[1]
+    clusters = clusters[scores[0].first]
     best = min(range(len(scores)), key=lambda one: (-int(scores[one].hits.sum()), scores[one].loss))
-    found = []
-    for candidate, score in zip(candidates, scores, strict=True):
-        lost = scores[best].hits.astype(np.intp) - score.hits
-        found.append(
+    compared = []
+    for training, score in zip(candidates, scores, strict=True):
+        gains = scores[best].hits.astype(np.intp) - score.hits
+        compared.append(
             Compared(
-                candidate.trainer,
-                _values(candidate),
+                training.trainer,
+                _values(training),
                 correct=int(score.hits.sum()),
                 total=len(score.hits),
-                error=round(_error(score.hits.astype(np.intp), cluster), 6),
+                error=_error(score.hits.astype(np.intp), clusters),
                 loss=score.loss,
-                behind=round(int(lost.sum()) / len(lost), 6),
-                behind_error=round(_error(lost, cluster), 6),
+                behind=round(int(gains.sum()) / len(gains), 6),
+                behind_error=_error(gains, clusters),
                 rows=score.rows,
             )
         )
-    near = [one for one, each in enumerate(found) if each.behind <= each.behind_error]
-    small = max(_SMALL / n_classes, _LARGER * min(found[one].rows for one in near))
-    chosen = min((one for one in near if found[one].rows <= small), key=lambda one: (found[one].loss, one))
+    near = [number for number, other in enumerate(compared) if other.behind <= other.behind_error]
+    small = max(_SMALL / n_classes, _LARGER * min(compared[number].rows for number in near))
+    chosen = min(
+        (number for number in near if compared[number].rows <= small),
+        key=lambda number: (compared[number].loss, number),
+    )
+    # Of each trainer, the most accurate.
     shown = {
-        min(
-            (one for one, each in enumerate(found) if each.trainer == name),
-            key=lambda one: (-found[one].correct, found[one].loss, one),
-        )
-        for name in {each.trainer for each in found}
+        other.trainer: number
+        for number, other in sorted(enumerate(compared), key=lambda pair: (pair[1].correct, -pair[1].loss, -pair[0]))
     }
     return Fitting(
         candidates[chosen].trainer,
@@ -240,14 +242,14 @@ def _fitting(
         of=of,
         folds=n_folds,
         tried=len(candidates),
-        compared=tuple(found[one] for one in sorted(shown | {chosen})),
-        why=_why(found, best, chosen),
+        compared=tuple(compared[number] for number in sorted({*shown.values(), chosen})),
+        why=_why(compared, best, chosen),
     )
 
 
-def _why(found: list[Compared], best: int, chosen: int) -> str:
-    one, top = found[chosen], found[best]
-    rate = f"{100 * one.rate:.1f} % of {one.total} trials in inner folds"
+def _why(compared: list[Compared], best: int, chosen: int) -> str:
+    top = compared[best]
+    rate = f"{100 * compared[chosen].rate:.1f} % of {top.total} trials in inner folds"
     if chosen == best:
         return f"it has the highest accuracy, {rate}"
     return (

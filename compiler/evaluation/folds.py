@@ -50,11 +50,11 @@ class JavaRandom:
             if drawn - remainder + bound <= 1 << 31:
                 return remainder
 
-    def shuffle(self, items: list[int]) -> None:
-        """Shuffle `items` in place: for i from the end down to 1, swap items i and nextInt(i + 1)."""
-        for i in range(len(items) - 1, 0, -1):
+    def shuffle(self, order: list[int]) -> None:
+        """Shuffle a list in place: for i from the end down to 1, swap items i and nextInt(i + 1)."""
+        for i in range(len(order) - 1, 0, -1):
             j = self.next_int(i + 1)
-            items[i], items[j] = items[j], items[i]
+            order[i], order[j] = order[j], order[i]
 
 
 Rows = NDArray[np.intp]
@@ -97,8 +97,8 @@ def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed:
     grasp, since rows without one have the highest label. Raises EvaluationError as `weka_folds` does.
     """
     _, first, number = np.unique(trials, return_index=True, return_inverse=True)
-    least = np.asarray(labels)[first]
-    np.minimum.at(least, number, labels)
+    values = np.asarray(labels)[first]
+    np.minimum.at(values, number, labels)
     order = np.argsort(first)
     number = np.argsort(order)[number]
     rows, starts = np.argsort(number, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(number))])
@@ -107,7 +107,7 @@ def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed:
     def expanded(chosen: Rows) -> Rows:
         return np.concatenate([rows[starts[trial] : starts[trial + 1]] for trial in chosen.tolist()])
 
-    folds = weka_folds(least[order], n_folds, seed)
+    folds = weka_folds(values[order], n_folds, seed)
     return [Fold(expanded(fold.train), expanded(fold.test), fold.name) for fold in folds]
 
 
@@ -143,9 +143,9 @@ def _cut(order: list[int], n_folds: int, fold: int, random: JavaRandom) -> Fold:
     size, larger = divmod(len(order), n_folds)
     start = fold * size + min(fold, larger)
     stop = start + size + (fold < larger)
-    train = order[:start] + order[stop:]
-    random.shuffle(train)
-    return Fold(np.array(train, dtype=np.intp), np.array(order[start:stop], dtype=np.intp), str(fold + 1))
+    test, order = order[start:stop], order[:start] + order[stop:]
+    random.shuffle(order)
+    return Fold(np.array(order, dtype=np.intp), np.array(test, dtype=np.intp), str(fold + 1))
 
 
 def leave_one_out(groups: NDArray[np.str_], what: str) -> list[Fold]:
@@ -165,11 +165,11 @@ def leave_one_out(groups: NDArray[np.str_], what: str) -> list[Fold]:
 _MOST_GROUPS = 10
 
 
-def leave_groups_out(names: NDArray[np.generic], what: str, most: int = _MOST_GROUPS) -> list[Fold]:
-    """Return the folds of `leave_one_out`; for more than `most` names in names (n,), `most` folds of several names."""
-    found, number = np.unique(names, return_inverse=True)
-    parts = names if len(found) <= most else number % most
-    return leave_one_out(parts.astype(np.str_), what)
+def leave_groups_out(names: NDArray[np.generic], what: str, n_folds: int = _MOST_GROUPS) -> list[Fold]:
+    """Return the folds of `leave_one_out`; for more than `n_folds` names in names (n,), that many of several names."""
+    several, number = np.unique(names, return_inverse=True)
+    groups = names if len(several) <= n_folds else number % n_folds
+    return leave_one_out(groups.astype(np.str_), what)
 
 
 def block_folds(trials: NDArray[np.int64], n_folds: int) -> list[Fold]:
@@ -230,7 +230,9 @@ class Population:
         return [fold for folds in self.repeats for fold in folds]
 
 
-def populations(grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int, seed: int) -> tuple[Population, ...]:
+def populations_of(
+    grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int, seed: int
+) -> tuple[Population, ...]:
     """Return one population per subject.
 
     trial, block, object, session: only the subject's own rows are trained on, and all are tested once per repeat.
@@ -255,21 +257,23 @@ def populations(grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int,
 
     if scheme == "subject":
         return tuple(population(fold.name, everyone, [[fold]]) for fold in leave_one_out(subjects, "subject"))
-    found = []
+    several = []
     for name in np.unique(subjects).tolist():
         rows = np.flatnonzero(subjects == name)
         try:
-            found.append(population(name, rows, cut(rows)))
+            several.append(population(name, rows, cut(rows)))
         except EvaluationError as reason:
             raise EvaluationError(f"subject {name}: {reason}") from reason
-    return tuple(found)
+    return tuple(several)
 
 
 def groups_of(grasp_set: GraspSet, scheme: Scheme) -> NDArray[np.str_] | None:
     """Return the group (n,) that each row is left out with, None if that is its trial; sessions are per subject."""
     if scheme == "session":
         return np.char.add(np.char.add(grasp_set.subjects, "\n"), grasp_set.sessions)
-    return {"subject": grasp_set.subjects, "object": grasp_set.objects}.get(scheme)
+    if scheme == "object":
+        return grasp_set.objects
+    return grasp_set.subjects if scheme == "subject" else None
 
 
 ProtocolName = Literal["paper", "nested"]
@@ -282,9 +286,9 @@ class Protocol:
     name: ProtocolName
     meaning: str
 
-    def may_choose(self, part: Population, fold: Fold) -> Rows:
+    def may_choose(self, population: Population, fold: Fold) -> Rows:
         """Return the rows from which the placement for this fold may be chosen."""
-        return part.rows if self.name == "paper" else fold.train
+        return population.rows if self.name == "paper" else fold.train
 
     def may_choose_pooled(self, everyone: Rows, fold: Fold) -> Rows:
         """Return the rows from which a placement common to all subjects may be chosen for this fold."""
@@ -302,7 +306,7 @@ NESTED = Protocol(
 PROTOCOLS = (PAPER, NESTED)
 
 
-def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme, n_folds: int) -> tuple[str, ...]:
+def concerns(grasp_set: GraspSet, populations: tuple[Population, ...], scheme: Scheme, n_folds: int) -> tuple[str, ...]:
     """Return warnings: that grasps are simulated, that rows are stated to be independent, and about grasp types that
     are the only one, too rare for the folds, or tested but never trained.
     """
@@ -310,34 +314,34 @@ def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme,
     found = [f"these grasps are simulated ({origin}): the rates are not those of recorded ones"] if origin else []
     found += [INDEPENDENT] if grasp_set.independent else []
     found += [
-        f"subject {part.name}: every row is of {samples.grasps[part.grasps[0]]}, the only type"
-        for part in parts
-        if len(part.grasps) == 1
+        f"subject {population.name}: every row is of {samples.grasps[population.grasps[0]]}, the only type"
+        for population in populations
+        if len(population.grasps) == 1
     ]
     if scheme == "trial":
-        found += [text for part in parts for text in _rare(samples, part, n_folds)]
-    return (*found, *(text for part in parts for text in _untrained(samples, part)))
+        found += [text for population in populations for text in _rare(samples, population, n_folds)]
+    return (*found, *(text for population in populations for text in _untrained(samples, population)))
 
 
-def _rare(samples: Samples, part: Population, n_folds: int) -> list[str]:
-    first = np.unique(samples.trials[part.rows], return_index=True)[1]
-    counts = np.bincount(samples.labels[part.rows][first], minlength=samples.n_classes)
+def _rare(samples: Samples, population: Population, n_folds: int) -> list[str]:
+    first = np.unique(samples.trials[population.rows], return_index=True)[1]
+    counts = np.bincount(samples.labels[population.rows][first], minlength=samples.n_classes)
     return [
-        f"subject {part.name} has {counts[label]} trial(s) of {samples.grasps[label]}: "
+        f"subject {population.name} has {counts[label]} trial(s) of {samples.grasps[label]}: "
         f"fewer than the {n_folds} folds, so some folds do not test it"
-        for label in part.grasps
+        for label in population.grasps
         if counts[label] < n_folds
     ]
 
 
-def _untrained(samples: Samples, part: Population) -> list[str]:
+def _untrained(samples: Samples, population: Population) -> list[str]:
     """Name the grasp types that some fold tests without training on them, with the number of rows lost."""
     lost = np.zeros(samples.n_classes, np.intp)
-    for fold in part.repeats[0]:
+    for fold in population.repeats[0]:
         unknown = ~np.isin(samples.labels[fold.test], samples.labels[fold.train])
         np.add.at(lost, samples.labels[fold.test][unknown], 1)
     return [
-        f"{lost[label]} row(s) of {samples.grasps[label]} of subject {part.name} are tested by a fold that trains "
-        "no such row: they cannot be recognised"
+        f"{lost[label]} row(s) of {samples.grasps[label]} of subject {population.name} are tested by a fold that "
+        "trains no such row: they cannot be recognised"
         for label in np.flatnonzero(lost)
     ]

@@ -179,8 +179,10 @@ def plan_learning(planner: Planner, subjects: NDArray[np.str_], scheme: Scheme, 
     populations = [
         Population("all", everyone, grasps, tuple(map(tuple, folds))) for folds in (*map(limited, sizes), runs)
     ]
-    kind, chosen = planner.kinds[0], partial(planner.own, NESTED)
-    cells = {name: tuple(planner.cell(part, kind, chosen, name) for part in populations) for name in learners()}
+    kind, chosen = planner.kinds[0], partial(planner.placement, NESTED)
+    cells = {
+        name: tuple(planner.cell(population, kind, chosen, name) for population in populations) for name in learners()
+    }
     several = len(np.unique(subjects)) > 1
     of: Of = "new subject" if scheme == "subject" else "pooled" if several else "within subject"
     return LearningPlan(str(kind), of, (*sizes, most), cells)

@@ -86,17 +86,16 @@ def predictions(
         return np.full(len(fit.fold.test), read.most_frequent)
     learning = replace(read, labels=np.searchsorted(grasps, read.labels), grasps=tuple(map(str, fit.grasps)))
     if fit.learner in CLASSIFIERS:
-        return grasps[_classified(fit.learner, learning, test.inputs)]
+        return grasps[_classified(fit.learner, learning, test)]
     (training,) = candidates[""]
     if fit.learner:
-        inner = None if groups is None else groups[rows]
-        fitting = choose_training(learning, candidates[fit.learner], groups=inner)
+        fitting = choose_training(learning, candidates[fit.learner], groups=None if groups is None else groups[rows])
         training = Training.chosen(fitting, masked=training.masked)
     return grasps[winners(training.train(learning).scores(test.switches, test.codes))]
 
 
-def _classified(name: str, learning: Samples, X: NDArray[np.generic]) -> Labels:
-    """Return the class numbers that one of CLASSIFIERS, on standardised inputs, predicts for rows X (n, d)."""
+def _classified(name: str, learning: Samples, test: Samples) -> Labels:
+    """Return the class numbers that one of CLASSIFIERS, on standardised inputs, predicts for test rows (n,)."""
     from sklearn.linear_model import LogisticRegression
     from sklearn.neighbors import KNeighborsClassifier
     from sklearn.pipeline import make_pipeline
@@ -104,11 +103,11 @@ def _classified(name: str, learning: Samples, X: NDArray[np.generic]) -> Labels:
 
     # scikit-learn's classifiers cannot be fitted to a single class.
     if (learning.labels == learning.labels[0]).all():
-        return np.full(len(X), learning.labels[0])
+        return np.full(len(test.labels), learning.labels[0])
     logistic = name == "logistic-regression"
     classifier = LogisticRegression(max_iter=10_000) if logistic else KNeighborsClassifier(5, weights="distance")
-    made = make_pipeline(StandardScaler(), classifier).fit(learning.inputs.astype(np.float64), learning.labels)
-    return np.asarray(made.predict(X.astype(np.float64)), dtype=np.intp)
+    pipeline = make_pipeline(StandardScaler(), classifier).fit(learning.inputs.astype(np.float64), learning.labels)
+    return np.asarray(pipeline.predict(test.inputs.astype(np.float64)), dtype=np.intp)
 
 
 def run_fits(
@@ -149,24 +148,15 @@ class Composition:
     selected: bool
     others: bool
 
-    @property
-    def needs_placement(self) -> bool:
-        """Whether its columns depend on the selected switches."""
-        return self.selected != self.others
-
-    @property
-    def has_switches(self) -> bool:
-        """Whether it uses any switches."""
-        return self.selected or self.others
-
     def __str__(self) -> str:
         """Return "II Angle + Sel-Co"."""
         return f"{self.name} {self.what}"
 
-    def elements(self, placement: Elements, every: Elements) -> Elements:
+    def elements(self, placement: Elements, known: Elements) -> Elements:
         """Return the elements that it uses, ascending, given the selected and the available ones."""
         kept = set(placement)
-        return tuple(sorted([*kept] * self.selected + [one for one in every if one not in kept] * self.others))
+        others = [element for element in known if element not in kept]
+        return tuple(sorted([*kept] * self.selected + others * self.others))
 
 
 COMPOSITIONS = (
@@ -183,7 +173,7 @@ ANGLE_SELECTED, ANGLE, ALL_SWITCHES, SELECTED = COMPOSITIONS[1], COMPOSITIONS[3]
 
 def available(n_switches: int, n_joints: int) -> tuple[Composition, ...]:
     """Return the compositions that a set has inputs for: without switches only IV, without joints V, VI and VII."""
-    return tuple(c for c in COMPOSITIONS if (n_joints or not c.angle) and (n_switches or not c.has_switches))
+    return tuple(c for c in COMPOSITIONS if (n_joints or not c.angle) and (n_switches or not (c.selected or c.others)))
 
 
 TableName = Literal["compositions", "generality", "pruning", "baselines", "trainers", "joints"]
@@ -198,7 +188,7 @@ DRAWS = 5  # random placements to compare with
 class CellPlan:
     """The fits of one cell: `runs` of folds, one per repeat; a cell of random draws has all repeats of each draw."""
 
-    part: Population
+    population: Population
     runs: tuple[tuple[FoldFit, ...], ...]
 
     @property
@@ -225,7 +215,7 @@ class Planner:
              baselines: methods to compare with; known: what was chosen, once by the same recipe from the same rows.
     """
 
-    parts: tuple[Population, ...]
+    populations: tuple[Population, ...]
     samples: Samples
     recipe: Recipe
     ports: PortCosts | None = None
@@ -247,55 +237,56 @@ class Planner:
         return rows[name](protocol)
 
     def _compositions(self, protocol: Protocol) -> list[RowPlan]:
-        chosen = partial(self.own, protocol)
+        chosen = partial(self.placement, protocol)
         kinds = available(self._n_switches, self.n_joints)
         return [self._row(kind.name, kind.what, kind, chosen) for kind in kinds]
 
     def _generality(self, protocol: Protocol) -> list[RowPlan]:
-        def chosen_by(giver: Population, part: Population, fold: Fold) -> Elements:
+        def chosen_by(giver: Population, population: Population, fold: Fold) -> Elements:
             # Another subject's placement has never seen this subject's rows: both protocols allow it.
-            own = part is giver
-            return self.own(protocol, part, fold) if own else self.chosen(giver.rows)
+            return self.chosen(protocol.may_choose(population, fold) if population is giver else giver.rows)
 
         return [
             self._row(giver.name, f"placement of subject {giver.name}", SELECTED, partial(chosen_by, giver))
-            for giver in self.parts
+            for giver in self.populations
         ]
 
     def _pruning(self, protocol: Protocol) -> list[RowPlan]:
-        everyone = np.unique(np.concatenate([part.rows for part in self.parts]))
+        everyone = np.unique(np.concatenate([population.rows for population in self.populations]))
 
-        def pooled(least: int, part: Population, fold: Fold) -> Elements:
+        def pooled(least: int, population: Population, fold: Fold) -> Elements:
             return self.chosen(protocol.may_choose_pooled(everyone, fold), prune=least)
 
-        everything = self._row("all", "all switches", ALL_SWITCHES, lambda part, fold: ())
+        everything = self._row("all", "all switches", ALL_SWITCHES, lambda population, fold: ())
         pruned = [self._row(str(s), f"S = {s}", SELECTED, partial(pooled, s)) for s in self.prune_list]
         return [everything, *pruned]
 
     def _baselines(self, protocol: Protocol) -> list[RowPlan]:
-        def baseline(name: str, part: Population, fold: Fold) -> Elements:
-            number = len(self.own(protocol, part, fold))
-            return self.chosen(protocol.may_choose(part, fold), placement=name, keep=number or None, prune=0)
+        def baseline(name: str, population: Population, fold: Fold) -> Elements:
+            number = len(self.placement(protocol, population, fold))
+            return self.chosen(protocol.may_choose(population, fold), placement=name, keep=number or None, prune=0)
 
-        def drawn(draw: int, part: Population, fold: Fold) -> Elements:
-            every = self.elements(fold.train)
-            places = random_placement(len(every), len(self.own(protocol, part, fold)), self.recipe.seed + draw)
-            return tuple(every[place] for place in places)
+        def drawn(draw: int, population: Population, fold: Fold) -> Elements:
+            elements, number = self.elements(fold.train), len(self.placement(protocol, population, fold))
+            return tuple(elements[place] for place in random_placement(len(elements), number, self.recipe.seed + draw))
 
         recipe = METHODS.named(self.recipe.placement)
         what = "the paper's placement" if recipe.name == PAPERS else recipe.help
         baselines = [METHODS.named(name) for name in self.baselines if name != recipe.name]
         draws = [self._row("random", f"mean of {DRAWS} draws", SELECTED, partial(drawn, draw)) for draw in range(DRAWS)]
         return [
-            self._row(recipe.title, what, SELECTED, partial(self.own, protocol)),
-            *(self._row(each.title, each.help, SELECTED, partial(baseline, each.name)) for each in baselines),
+            self._row(recipe.title, what, SELECTED, partial(self.placement, protocol)),
+            *(self._row(other.title, other.help, SELECTED, partial(baseline, other.name)) for other in baselines),
             replace(draws[0], cells=tuple(map(_joined, zip(*(draw.cells for draw in draws), strict=True)))),
         ]
 
     def _trainers(self, protocol: Protocol) -> list[RowPlan]:
-        chosen = partial(self.own, protocol)
+        chosen = partial(self.placement, protocol)
         # Choosing settings takes as long as many fits: a single repeat is run.
-        once = replace(self, parts=tuple(replace(part, repeats=part.repeats[:1]) for part in self.parts))
+        once = replace(
+            self,
+            populations=tuple(replace(population, repeats=population.repeats[:1]) for population in self.populations),
+        )
         return [once._row(name, kind.what, kind, chosen, name) for kind in self.kinds for name in learners()]
 
     def _best_joints(self) -> list[RowPlan]:
@@ -317,9 +308,9 @@ class Planner:
     def _n_switches(self) -> int:
         return self.samples.n_switches + int(self.samples.taxels.shape[1])
 
-    def own(self, protocol: Protocol, part: Population, fold: Fold) -> Elements:
-        """Return the recipe's placement for a fold, chosen from the population's own rows as the protocol allows."""
-        return self.chosen(protocol.may_choose(part, fold))
+    def placement(self, protocol: Protocol, population: Population, fold: Fold) -> Elements:
+        """Return the recipe's placement for a fold, chosen from the population's rows as the protocol allows."""
+        return self.chosen(protocol.may_choose(population, fold))
 
     def _once(self, key: tuple[object, ...], rows: Rows, choose: Callable[[Samples], tuple[_T, ...]]) -> tuple[_T, ...]:
         """Return what `choose` returns for these rows, called once for the same key and rows."""
@@ -352,26 +343,29 @@ class Planner:
     def _row(
         self, name: str, what: str, kind: Composition, select: Select, learner: str = "", most: int | None = None
     ) -> RowPlan:
-        return RowPlan(name, what, tuple(self.cell(part, kind, select, learner, most) for part in self.parts))
+        return RowPlan(
+            name, what, tuple(self.cell(population, kind, select, learner, most) for population in self.populations)
+        )
 
     def cell(
-        self, part: Population, kind: Composition, select: Select, learner: str = "", most: int | None = None
+        self, population: Population, kind: Composition, select: Select, learner: str = "", most: int | None = None
     ) -> CellPlan:
-        """Return the fits of composition `kind` on every fold of `part`.
+        """Return the fits of composition `kind` on every fold of a population.
 
         `select` returns the placement for a fold, and `most` is the number of joints kept, None: the recipe's.
         """
         learner = learner or (AUTO if self.recipe.trainer == AUTO else "")
 
         def fit(fold: Fold) -> FoldFit:
-            placement = select(part, fold) if kind.needs_placement else ()
+            # All switches depend on no placement.
+            placement = select(population, fold) if kind.selected != kind.others else ()
             elements = kind.elements(placement, self.elements(fold.train) if kind.others else ())
             joints = self.joints(fold.train, elements, most or self.recipe.keep_joints) if kind.angle else ()
-            return FoldFit(fold, elements, joints, part.grasps, learner)
+            return FoldFit(fold, elements, joints, population.grasps, learner)
 
-        return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
+        return CellPlan(population, tuple(tuple(map(fit, folds)) for folds in population.repeats))
 
 
 def _joined(cells: tuple[CellPlan, ...]) -> CellPlan:
     """Return one cell that holds the runs of all."""
-    return CellPlan(cells[0].part, tuple(run for cell in cells for run in cell.runs))
+    return CellPlan(cells[0].population, tuple(run for cell in cells for run in cell.runs))

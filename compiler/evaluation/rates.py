@@ -120,22 +120,26 @@ class Rate:
         ValueError
             If there are no rows, or the shapes do not match.
         """
-        given, truth = np.atleast_2d(np.asarray(predicted)), np.asarray(labels)
+        guesses, truth = np.atleast_2d(np.asarray(predicted)), np.asarray(labels)
         _, first, trial = np.unique(np.asarray(trials), return_index=True, return_inverse=True)
-        if not truth.size or given.shape[1:] != truth.shape or trial.shape != truth.shape:
-            shapes = f"predictions {given.shape} of {truth.size} rows with {trial.size} trials"
+        if not truth.size or guesses.shape[1:] != truth.shape or trial.shape != truth.shape:
+            shapes = f"predictions {guesses.shape} of {truth.size} rows with {trial.size} trials"
             raise ValueError(f"{shapes} do not give a rate")
         clusters: Rows = trial
         alike: Unit = "frames"
-        if groups is not None and len(found := np.unique(np.asarray(groups), return_inverse=True)[1]) and found.max():
-            clusters, alike = found, "trials"
+        if groups is not None and (number := np.unique(np.asarray(groups), return_inverse=True)[1]).any():
+            clusters, alike = number, "trials"
         if unit == "trials":
-            given, truth, clusters = decided(given, trial), truth[first], clusters[first]
-        hits = given == truth
-        correct, sizes = tuple(hits.sum(axis=1).tolist()), np.bincount(clusters)
+            guesses, truth, clusters = decided(guesses, trial), truth[first], clusters[first]
+        hits = guesses == truth
+        correct, sizes = hits.sum(axis=1), np.bincount(clusters)
         recognised = np.bincount(clusters, weights=hits.sum(axis=0)).astype(np.intp)
-        bounds = clustered(recognised.tolist(), sizes.tolist(), alike, len(hits))
-        return cls._held(of, unit, correct, len(clusters), len(sizes), bounds, repeats_a_draw)
+        mean = int(correct.sum()) / hits.size
+        ends = [mean, *clustered(recognised.tolist(), sizes.tolist(), alike, len(hits))]
+        if len(correct) > repeats_a_draw:
+            ends += student([fmean(draw) / len(truth) for draw in correct.reshape(-1, repeats_a_draw).tolist()])
+        low, high = max(0.0, min(ends)), min(1.0, max(ends))
+        return cls(of, unit, tuple(correct.tolist()), len(truth), len(sizes), mean, low, high)
 
     @classmethod
     def counted(cls, correct: tuple[int, ...], total: int, *, of: Of, repeats_a_draw: int = 1) -> Self:
@@ -145,27 +149,9 @@ class Rate:
         """
         if not correct or total < 1 or not all(0 <= count <= total for count in correct):
             raise ValueError(f"{correct} correct of {total} trials do not give a rate")
-        wilson = _wilson(sum(correct) / (len(correct) * total), total, _Z)
-        return cls._held(of, "trials", correct, total, total, wilson, repeats_a_draw)
-
-    @classmethod
-    def _held(
-        cls,
-        of: Of,
-        unit: Unit,
-        correct: tuple[int, ...],
-        total: int,
-        over: int,
-        bounds: tuple[float, float],
-        repeats_a_draw: int,
-    ) -> Self:
-        """Return the rate whose interval contains `bounds`, Student's interval over the draws, and the mean."""
-        mean = sum(correct) / (len(correct) * total)
-        ends = [mean, *bounds]
-        starts = range(0, len(correct), repeats_a_draw)
-        if len(starts) > 1:
-            ends += student([fmean(correct[i : i + repeats_a_draw]) / total for i in starts])
-        return cls(of, unit, correct, total, over, mean, max(0.0, min(ends)), min(1.0, max(ends)))
+        trials = np.arange(total)
+        hits = trials < np.array(correct)[:, np.newaxis]
+        return cls.predicted(hits, np.ones_like(trials), trials, of=of, repeats_a_draw=repeats_a_draw)
 
     @property
     def what(self) -> str:

@@ -33,7 +33,7 @@ from .folds import (
     Scheme,
     concerns,
     groups_of,
-    populations,
+    populations_of,
 )
 from .learning import Learning, plan_learning
 from .plan import (
@@ -230,18 +230,18 @@ def evaluate(
     design = (design or StudyDesign()).changed(**changes)
     recipe, scheme = design.recipe, design.scheme
     chosen = _of_subjects(grasp_set.without_none(), design.subjects)
-    parts = populations(chosen, scheme, recipe.folds, design.repeats, recipe.seed)
-    reasons = {name: _why_not(name, chosen, parts, design) for name in design.tables}
+    populations = populations_of(chosen, scheme, recipe.folds, design.repeats, recipe.seed)
+    reasons = {name: _why_not(name, chosen, populations, design) for name in design.tables}
     if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
-        _check_all_switches(chosen, parts)
+        _check_all_switches(chosen, populations)
     samples = Samples.of(chosen)
-    planner = Planner(parts, samples, recipe, ports, limits, design.prune_list, design.baselines)
+    planner = Planner(populations, samples, recipe, ports, limits, design.prune_list, design.baselines)
     plans = {
-        (name, each.name): planner.table(name, each)
+        (name, protocol.name): planner.table(name, protocol)
         for name, reason in reasons.items()
         if reason is None
-        for each in PROTOCOLS
-        if each.name in design.protocols and (each is NESTED or name not in _NESTED)
+        for protocol in PROTOCOLS
+        if protocol.name in design.protocols and (protocol is NESTED or name not in _NESTED)
     }
     curves = plan_learning(planner, chosen.subjects, scheme, design.repeats) if design.learning else None
     cells = [cell for rows in plans.values() for row in rows for cell in row.cells]
@@ -268,9 +268,11 @@ def evaluate(
         trials=int(samples.trials.max()) + 1,
         options=design,
         grasps=samples.grasps,
-        warnings=concerns(chosen, parts, scheme, recipe.folds),
+        warnings=concerns(chosen, populations, scheme, recipe.folds),
         left_out=tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None),
-        tables=tuple(reader.table(*which, rows, _recipe_of(which[0], recipe)) for which, rows in plans.items()),
+        tables=tuple(
+            reader.table(name, protocol, rows, _recipe_of(name, recipe)) for (name, protocol), rows in plans.items()
+        ),
         permuted=test,
         learning=learning,
         rests=len(np.unique(grasp_set.trial_ids[empty])),
@@ -308,8 +310,8 @@ def _permuted(
     tasks = [(grasp_set, replace(planner, known={}), scheme, number) for number in range(m + 1)]
     correct, total = _recognised(tasks[0])
     shuffled: list[int] = []
-    for count, _ in in_workers(_recognised, tasks[1:], jobs):
-        shuffled.append(count)
+    for recognised, _ in in_workers(_recognised, tasks[1:], jobs):
+        shuffled += [recognised]
         progress(len(shuffled), m)
     return Permuted(
         composition=str(planner.kinds[0]),
@@ -330,15 +332,17 @@ def _recognised(task: tuple[GraspSet, Planner, Scheme, int]) -> tuple[int, int]:
     recipe = planner.recipe
     if number:
         grasp_set = shuffled_labels(grasp_set, (recipe.seed, number))
-    samples, parts = Samples.of(grasp_set), planner.parts
+    samples, populations = Samples.of(grasp_set), planner.populations
     if scheme == "trial":
-        parts = populations(grasp_set, scheme, recipe.folds, 1, recipe.seed)
-    planner = replace(planner, parts=parts, samples=samples, known={})
-    cells = [planner.cell(part, planner.kinds[0], partial(planner.own, NESTED)) for part in parts]
-    cells = [replace(cell, runs=cell.runs[:1]) for cell in cells]
+        populations = populations_of(grasp_set, scheme, recipe.folds, 1, recipe.seed)
+    planner = replace(planner, populations=populations, samples=samples, known={})
+    plans = [
+        planner.cell(population, planner.kinds[0], partial(planner.placement, NESTED)) for population in populations
+    ]
+    plans = [replace(plan, runs=plan.runs[:1]) for plan in plans]
     candidates = candidates_of(recipe)
-    predicted = {fit: predictions(samples, fit, candidates) for cell in cells for fit in cell.fits}
-    rate, _ = RateReader(samples, predicted, OF[scheme], groups_of(grasp_set, scheme)).rates(cells)
+    predicted = {fit: predictions(samples, fit, candidates) for plan in plans for fit in plan.fits}
+    rate, _ = RateReader(samples, predicted, OF[scheme], groups_of(grasp_set, scheme)).rates(plans)
     return rate.correct[0], rate.total
 
 
@@ -349,8 +353,8 @@ def shuffled_labels(grasp_set: GraspSet, seed: tuple[int, ...]) -> GraspSet:
     _, first = np.unique(trial, return_index=True)
     subjects, grasps = grasp_set.subjects[first], grasp_set.grasps[first]
     for subject in np.unique(subjects):
-        mine = np.flatnonzero(subjects == subject)
-        grasps[mine] = grasps[random.permutation(mine)]
+        rows = np.flatnonzero(subjects == subject)
+        grasps[rows] = grasps[random.permutation(rows)]
     # The trial number keeps two trials apart that get the same label.
     return replace(grasp_set, grasps=grasps[trial], trials=trial)
 
@@ -390,16 +394,17 @@ def _of_subjects(grasp_set: GraspSet, subjects: tuple[str, ...]) -> GraspSet:
     return chosen
 
 
-def _check_all_switches(grasp_set: GraspSet, parts: tuple[Population, ...]) -> None:
+def _check_all_switches(grasp_set: GraspSet, populations: tuple[Population, ...]) -> None:
     """Raise EvaluationError if training on all switches does not fit in memory, before placements are chosen."""
-    switches = grasp_set.switches
-    varying = int(np.count_nonzero(switches.any(axis=0) & ~switches.all(axis=0))) + len(grasp_set.taxel_columns)
-    for part in parts:
-        rows = max((len(fold.train) for fold in part.folds), default=0)
-        check_memory(rows, len(part.grasps), EvaluationError, varying)
+    varying = grasp_set.switches.any(axis=0) & ~grasp_set.switches.all(axis=0)
+    for population in populations:
+        rows = max((len(fold.train) for fold in population.folds), default=0)
+        check_memory(rows, len(population.grasps), EvaluationError, int(varying.sum()) + len(grasp_set.taxel_columns))
 
 
-def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...], design: StudyDesign) -> str | None:
+def _why_not(
+    name: TableName, grasp_set: GraspSet, populations: tuple[Population, ...], design: StudyDesign
+) -> str | None:
     """Return why a table has no meaning for the set and the design, or None."""
     if name == "joints" and not grasp_set.joints:
         return "the set has no joints"
@@ -407,7 +412,7 @@ def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...]
         return None if "nested" in design.protocols else f"{name} are compared under the nested protocol only"
     if name != "compositions" and not grasp_set.element_names:
         return "a placement needs switches, and the set has none"
-    if name == "generality" and len(parts) < 2:
+    if name == "generality" and len(populations) < 2:
         return "another's placement needs a second subject"
     if name == "pruning" and design.recipe.placement != PAPERS:
         return f"S prunes the tree of {PAPERS}, and the recipe has another method"

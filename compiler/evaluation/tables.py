@@ -140,7 +140,7 @@ class RateReader:
         self, name: TableName, protocol: ProtocolName, plans: Sequence[RowPlan], recipe: RecipeWords
     ) -> RateTable:
         """Return the table for these rows, which were fitted by this recipe."""
-        columns = tuple(cell.part.name for cell in plans[0].cells)
+        columns = tuple(cell.population.name for cell in plans[0].cells)
         rows = [self._row(plan, confusing=name == "compositions") for plan in plans]
         if name == "trainers":
             hits = [self.hits(plan.cells) for plan in plans]
@@ -161,7 +161,7 @@ class RateReader:
     def cell(self, plan: CellPlan, *, confusing: bool) -> Cell:
         """Return the cell of a plan, with its confusion matrix if `confusing`."""
         rate, frames = self.rates((plan,))
-        repeats, draws = len(plan.part.repeats), None
+        repeats, draws = len(plan.population.repeats), None
         if len(plan.runs) > repeats:
             draws = Spread.of((np.reshape(rate.correct, (-1, repeats)).mean(axis=1) / rate.total).tolist())
         counts = [len(fit.elements) for fit in plan.fits]
@@ -172,7 +172,7 @@ class RateReader:
         """Return the rates by trials and by frames of some cells together; their runs correspond."""
         rows, predicted = self._predicted(plans)
         groups = None if self.groups is None else self.groups[rows]
-        repeats = len(plans[0].part.repeats)
+        repeats = len(plans[0].population.repeats)
         return rated(
             predicted,
             self.samples.labels[rows],

@@ -21,6 +21,8 @@ from .price import PricedTables
 from .search import CURVE_SIZES, JOINTS, SHAPES, Search, placed, tabled
 from .survey import Cuts, FoldHits, Survey, TrialAccuracy
 
+# The inputs that need a placement; without joints, only the second.
+ALL_INPUTS: tuple[Inputs, ...] = ("both", "switches")
 # Screening: the frame time hardly depends on the numbers of rounds and rows, so tables of few suffice.
 _ROUNDS, _FEW_ROWS = 12, 1000
 # The paper's S.
@@ -70,21 +72,21 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     Return the accuracy and frame time of every choice that can be built, with the first trainer; and the curves of all
     methods, including the baselines.
     """
-    search, cuts, sizes = survey.search, survey.cuts, {most: survey.size(most) for most in survey.levels}
-    trainer, most = search.trainers[0], survey.levels[-1]
-    inputs: tuple[Inputs, ...] = ("both", "switches") if survey.n_joints else ("switches",)
+    search, cuts, trainer = survey.search, survey.cuts, survey.search.trainers[0]
+    sizes = {levels: survey.size(levels) for levels in survey.levels}
+    n_elements, kinds = sizes[survey.levels[-1]], ALL_INPUTS if survey.n_joints else ALL_INPUTS[1:]
     choices = [
-        placed(name, number, trainer, kind, levels)
-        for kind in (inputs if sizes[most] else ())
+        placed(method, number, trainer, inputs, levels)
+        for inputs in (kinds if n_elements else ())
         for levels, size in sizes.items()
-        for name in search.methods
-        for number in METHODS[name].ladder(size)
+        for method in search.methods
+        for number in METHODS[method].ladder(size)
     ]
     baselines = [
-        placed(name, size, trainer, "switches", most)
-        for name in search.baselines
-        for size in CURVE_SIZES
-        if size <= sizes[most]
+        placed(method, number, trainer, "switches", survey.levels[-1])
+        for method in search.baselines
+        for number in CURVE_SIZES
+        if number <= n_elements
     ]
     survey.choose(choices, (cuts.everything, *cuts.screening))
     survey.choose(baselines, cuts.screening)
@@ -92,21 +94,21 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     choices = [choice for choice in choices if survey.elements(choice)]
     choices += [Recipe(trainer=trainer, inputs="joints")] if survey.n_joints else []
     rates = _rates(survey, choices, baselines)
-    names = dict.fromkeys([*search.methods, *search.baselines]) if sizes[most] else ()
-    return _screened(survey, choices, rates), tuple(_curve(survey, name, rates) for name in names)
+    methods = dict.fromkeys([*search.methods, *search.baselines]) if n_elements else ()
+    return _screened(survey, choices, rates), tuple(_curve(survey, method, rates) for method in methods)
 
 
-def screen_fewer(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
-    """Return those `worth` it, screened with fewer joints, if joints take time."""
-    sizes = [size for size in JOINTS if size < survey.n_joints] if survey.equipment.records.each_us else []
-    choices = [changed_to(one.choice, keep_joints=size) for one in worth for size in sizes]
+def screen_fewer(survey: Survey, screened: Sequence[Screened]) -> tuple[Screened, ...]:
+    """Return the same choices, screened with fewer joints, if joints take time."""
+    numbers = [number for number in JOINTS if number < survey.n_joints] if survey.equipment.records.each_us else []
+    choices = [changed_to(one.choice, keep_joints=number) for one in screened for number in numbers]
     survey.choose_joints(choices, (survey.cuts.everything, *survey.cuts.screening))
     return _screened(survey, choices, _rates(survey, choices))
 
 
-def screen_others(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
-    """Return those `worth` it, screened with each of the other trainers."""
-    choices = [changed_to(one.choice, trainer=name) for name in survey.search.trainers[1:] for one in worth]
+def screen_others(survey: Survey, screened: Sequence[Screened]) -> tuple[Screened, ...]:
+    """Return the same choices, screened with each of the other trainers."""
+    choices = [changed_to(one.choice, trainer=name) for name in survey.search.trainers[1:] for one in screened]
     return _screened(survey, choices, _rates(survey, choices))
 
 
@@ -124,29 +126,29 @@ def _rates(survey: Survey, choices: Sequence[Recipe], baselines: Sequence[Recipe
 
 def _screened(survey: Survey, choices: Sequence[Recipe], rates: Mapping[Recipe, TrialAccuracy]) -> tuple[Screened, ...]:
     """Return the choices that can be built."""
-    rows = len(survey.samples.labels)
-    few = np.linspace(0, rows - 1, min(_FEW_ROWS, rows)).astype(np.intp)
-    prices = survey.prices({choice: (tabled(choice, _ROUNDS),) for choice in choices}, few)
-    found = []
+    most = len(survey.samples.labels)
+    rows = np.linspace(0, most - 1, min(_FEW_ROWS, most)).astype(np.intp)
+    prices = survey.prices({choice: (tabled(choice, _ROUNDS),) for choice in choices}, rows)
+    screened = []
     for choice, (priced,) in prices.items():
         us = priced.fastest_us(survey.transfer(choice).us)
         if us is not None and (priced.scans or choice.inputs == "joints"):
-            found.append(Screened(choice, survey.elements(choice), rates[choice], us))
-    return tuple(found)
+            screened.append(Screened(choice, survey.elements(choice), rates[choice], us))
+    return tuple(screened)
 
 
-def _curve(survey: Survey, name: str, rates: Mapping[Recipe, TrialAccuracy]) -> Curve:
+def _curve(survey: Survey, method: str, rates: Mapping[Recipe, TrialAccuracy]) -> Curve:
     """Return a method's rates by the mean number of switches that it kept in the folds, switches alone."""
     folds, points = survey.cuts.screening, {}
     for choice, judged in rates.items():
-        if (choice.placement, choice.inputs, choice.levels) == (name, "switches", survey.levels[-1]):
+        if (choice.placement, choice.inputs, choice.levels) == (method, "switches", survey.levels[-1]):
             points[sum(len(survey.elements(choice, fold)) for fold in folds) / len(folds)] = judged.rate
     sizes = tuple(sorted(points))
-    return Curve(name, METHODS[name].help, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))
+    return Curve(method, METHODS[method].help, METHODS[method].ours, sizes, tuple(points[size] for size in sizes))
 
 
-def finalists(screened: Sequence[Screened], wanted: Collection[Recipe], most: int) -> tuple[Screened, ...]:
-    """Return at most `most` of `screened`, in their order, plus the `wanted` ones.
+def finalists(screened: Sequence[Screened], choices: Collection[Recipe], number: int) -> tuple[Screened, ...]:
+    """Return at most `number` of `screened`, in their order, plus those of certain choices.
 
     They are on a front of accuracy against frame time or, among the same inputs, against the number of switches, and
     are distributed evenly among the kinds of inputs. Of each kind, take the best, then the smallest that ties with it,
@@ -154,11 +156,10 @@ def finalists(screened: Sequence[Screened], wanted: Collection[Recipe], most: in
     and switches count once; those with less than three quarters of the best accuracy are dropped.
     """
     enough = _USEFUL * max((one.mean for one in screened), default=0.0)
-    useful = [one for one in _different(screened) if one.mean >= enough]
-    pool = _fronts(useful)
+    pool = _fronts([one for one in _different(screened) if one.mean >= enough])
     queues = [_spread([one for one in pool if one.choice.inputs == kind]) for kind in _kinds(pool)]
     turns = [one for turn in zip_longest(*queues) for one in turn if one is not None]
-    chosen = {id(one) for one in turns[:most]} | {id(one) for one in screened if one.choice in wanted}
+    chosen = {id(one) for one in turns[:number]} | {id(one) for one in screened if one.choice in choices}
     return tuple(one for one in screened if id(one) in chosen)
 
 
@@ -168,22 +169,20 @@ def _kinds(screened: Sequence[Screened]) -> list[Inputs]:
 
 def _fronts(screened: Sequence[Screened]) -> list[Screened]:
     """Return the choices on a front, in its order."""
-    found = front(screened, lambda one: one.frame_us, lambda one: one.mean, _STEP)
+    best = front(screened, lambda one: one.frame_us, lambda one: one.mean, _STEP)
     for kind in _kinds(screened):
-        mine = [one for one in screened if one.choice.inputs == kind]
-        found += front(mine, lambda one: len(one.elements), lambda one: one.mean, _STEP)
-    known = {id(one) for one in found}
+        pool = [one for one in screened if one.choice.inputs == kind]
+        best += front(pool, lambda one: len(one.elements), lambda one: one.mean, _STEP)
+    known = {id(one) for one in best}
     return [one for one in screened if id(one) in known]
 
 
-def _spread(mine: list[Screened]) -> list[Screened]:
-    """Return all of `mine`, in the order in which they merit full evaluation."""
-    if not mine:
-        return []
-    best = max(mine, key=lambda one: one.mean)
-    level = [one for one in mine if one.mean >= best.mean - _LEVEL]
+def _spread(pool: list[Screened]) -> list[Screened]:
+    """Return the one or more of a pool in the order in which they merit full evaluation."""
+    best = max(pool, key=lambda one: one.mean)
+    level = [one for one in pool if one.mean >= best.mean - _LEVEL]
     order = list(dict.fromkeys([best, min(level, key=lambda one: len(one.elements))]))
-    left = [one for one in mine if one not in order]
+    left = [one for one in pool if one not in order]
     while left:
         order.append(max(left, key=lambda one: min(_distance(one, known) for known in order)))
         left.remove(order[-1])
@@ -226,14 +225,14 @@ def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[Eval
     }
     fits |= survey.fit(choices, cuts.others, lambda choice: (depths[choice].stages, depths[choice].tabled))
     judged = {
-        choice: _judged(cuts, choice, depth, {fold: fits[choice, fold] for fold in (*cuts.screening, *cuts.others)})
-        for choice, depth in depths.items()
+        choice: _judged(cuts, choice, search, {fold: fits[choice, fold] for fold in (*cuts.screening, *cuts.others)})
+        for choice, search in depths.items()
     }
-    worth = {
+    recipes = {
         choice: tuple(dict.fromkeys([*worthwhile(judged[choice][1]), papers_tables(choice, search)]))
         for choice, search in searches.items()
     }
-    prices = survey.prices(worth, cuts.everything.train, lost=True)
+    prices = survey.prices(recipes, cuts.everything.train, lost=True)
     return tuple(EvaluatedFinalist(one, *judged[one.choice], prices[one.choice]) for one in chosen)
 
 
@@ -253,19 +252,19 @@ def choices_to_mark(n_elements: int, n_joints: int, trainer: str, levels: int | 
 
 
 def marks_of(
-    named: Mapping[Recipe, str], closes: Sequence[EvaluatedFinalist], survey: Survey
+    choices: Mapping[Recipe, str], closes: Sequence[EvaluatedFinalist], survey: Survey
 ) -> tuple[ReferencePoint, ...]:
     """Return the marks of those choices that were fully evaluated, with the paper's rounds."""
-    found = []
+    marks = []
     for close in closes:
         choice, size = close.screened.choice, len(close.screened.elements)
-        if choice in named:
+        if choice in choices:
             recipe = papers_tables(choice, survey.search)
             priced = next(tables for tables in close.priced if tables.recipe == recipe)
             us = priced.fastest_us(survey.transfer(choice).us)
             if us is not None:
-                found.append(ReferencePoint(named[choice], size, close.tables[recipe].rate, us))
-    return tuple(found)
+                marks.append(ReferencePoint(choices[choice], size, close.tables[recipe].rate, us))
+    return tuple(marks)
 
 
 def papers_tables(choice: Recipe, search: Search) -> Recipe:
@@ -293,12 +292,12 @@ def worthwhile(tables: Mapping[Recipe, TrialAccuracy]) -> tuple[Recipe, ...]:
     alike: dict[Recipe, list[Recipe]] = {}
     for recipe in tables:
         alike.setdefault(changed_to(recipe, rounds=None), []).append(recipe)
-    found = []
-    for mine in alike.values():
-        best = max(tables[recipe].rate.mean for recipe in mine)
-        level = [recipe for recipe in mine if tables[recipe].rate.mean >= best - STEP]
-        found.append(min(level, key=lambda recipe: recipe.rounds or 1))
-    return tuple(found)
+    fewest = []
+    for recipes in alike.values():
+        best = max(tables[recipe].rate.mean for recipe in recipes)
+        level = [recipe for recipe in recipes if tables[recipe].rate.mean >= best - STEP]
+        fewest.append(min(level, key=lambda recipe: recipe.rounds or 1))
+    return tuple(fewest)
 
 
 def _judged(

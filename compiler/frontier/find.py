@@ -139,8 +139,8 @@ def find_frontier(
     """
     samples = _samples(grasp_set.without_none())
     # Levels of one taxel share its conversion.
-    costs = harness is not None or bool(grasp_set.taxel_columns)
-    search, lacking = _installed(search or Search(methods=usual(ours=True, wired=costs)))
+    wired = harness is not None or bool(grasp_set.taxel_columns)
+    search, lacking = _installed(search or Search(methods=usual(ours=True, wired=wired)))
     cuts = Cuts.of(samples, search)
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
@@ -157,15 +157,15 @@ def find_frontier(
             options = wirings(harness, target, switches=switches or not taxels, taxels=taxels)
             equipment = equipment_for(target, options, cache, records)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
-            played = _replay(survey, stream)
-            own = () if build is None else (own_build(build, grasp_set, equipment),)
+            replay = _replay(survey, stream)
+            marks = () if build is None else (own_build(build, grasp_set, equipment),)
         untimed = (_UNTIMED.format(list_names(grasp_set.joint_names)),) if records.how == "unknown" else ()
-        found = _found(survey, played, (budget_us, rate), own, (*untimed, *lacking))
+        frontier = _found(survey, replay, (budget_us, rate), marks, (*untimed, *lacking))
         if output is not None:
             # The store moves into the new folder as the same file, and stays locked meanwhile.
             store.finish()
-            publish_folder(_documents(found), output, kept_entries, FrontierError)
-    return found
+            publish_folder(_documents(frontier), output, kept_entries, FrontierError)
+    return frontier
 
 
 @contextmanager
@@ -223,9 +223,9 @@ def kept_entries(folder: Path) -> list[str]:
     return [path for path in there if path not in _DOCUMENTS]
 
 
-def _documents(found: Frontier) -> dict[str, bytes]:
-    drawn = {f"{name}.svg": data for name, data in pictures(found, "svg").items()}
-    return {FRONTIER_NAME: frontier_to_bytes(found), TABLE_NAME: csv_bytes(found), **drawn}
+def _documents(frontier: Frontier) -> dict[str, bytes]:
+    drawn = {f"{name}.svg": data for name, data in pictures(frontier, "svg").items()}
+    return {FRONTIER_NAME: frontier_to_bytes(frontier), TABLE_NAME: csv_bytes(frontier), **drawn}
 
 
 def _replay(survey: Survey, given: GraspSet | None) -> Replay:
@@ -285,29 +285,29 @@ def _found(
     survey: Survey,
     replay: Replay,
     goal: tuple[float | None, float | None],
-    own: tuple[ReferencePoint, ...],
+    marks: tuple[ReferencePoint, ...],
     lacking: tuple[str, ...],
 ) -> Frontier:
-    search, equipment, most = survey.search, survey.equipment, survey.levels[-1]
-    n_switches, n_elements = survey.samples.n_switches, survey.size(most)
+    search, equipment, levels = survey.search, survey.equipment, survey.levels[-1]
+    n_switches, n_elements = survey.samples.n_switches, survey.size(levels)
     screened, curves = screen(survey)
     if not screened:
         raise FrontierError(
             f"no placement that was tried can be built for {equipment.model.target}: name other ``methods`` or "
             "another ``target``"
         )
-    several = finalists(screened, (), _WIDER * search.finalists)
-    with_joints = [one for one in screened if one.choice.inputs != "switches"]
-    screened += screen_fewer(survey, finalists(with_joints, (), _FEWER))
-    screened += screen_others(survey, several)
-    named = choices_to_mark(n_elements, survey.n_joints, search.trainers[0], most)
-    closes = evaluate_finalists(survey, finalists(screened, named, search.finalists))
-    every = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
-    by_time, by_switches = best_designs(every)
+    wider = finalists(screened, (), _WIDER * search.finalists)
+    pool = [one for one in screened if one.choice.inputs != "switches"]
+    screened += screen_fewer(survey, finalists(pool, (), _FEWER))
+    screened += screen_others(survey, wider)
+    choices = choices_to_mark(n_elements, survey.n_joints, search.trainers[0], levels)
+    closes = evaluate_finalists(survey, finalists(screened, choices, search.finalists))
+    several = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
+    by_time, by_switches = best_designs(several)
     best = list(dict.fromkeys([*by_time, *by_switches]))
     times = measured([design.tables.content for design in best], equipment.model, survey.cache)
     kept = [replace(design, measured=times.get(design.tables.content)) for design in best]
-    luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
+    luck = lucks((by_time, by_switches), several, screened, survey.cuts, search.seed)
     points = points_of(kept, _latencies(survey, replay, kept), luck, survey)
     tried = _tried(screened, closes, search)
     claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
@@ -331,11 +331,11 @@ def _found(
         machine=model.machine,
         folds=search.folds,
         repeats=len(survey.cuts.repeats),
-        combinations=len(POLICIES) * len(every) + len(tried),
+        combinations=len(POLICIES) * len(several) + len(tried),
         points=points,
         tried=tried,
         curves=curves,
-        marks=(*marks_of(named, closes, survey), *own),
+        marks=(*marks_of(choices, closes, survey), *marks),
         skipped=(*lacking, *claimed, *notes, replay.what),
         picked=_picked(points, *goal),
         wanted=_in_words(*goal),

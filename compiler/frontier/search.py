@@ -34,10 +34,10 @@ TABLED = (10, 30, 100)
 Choosing = tuple[str, bool, int | None]
 
 
-def placed(method: str, parameter: int, trainer: str, inputs: Inputs, levels: int | None = None) -> Recipe:
+def placed(method: str, number: int, trainer: str, inputs: Inputs, levels: int | None = None) -> Recipe:
     """Return the candidate whose elements a method chooses, given its number, and the levels of a taxel."""
-    named = {"keep" if METHODS[method].by_number else "prune": parameter}
-    return changed(Recipe(placement=method, trainer=trainer, inputs=inputs, levels=levels), named)
+    changes = {"keep" if METHODS[method].by_number else "prune": number}
+    return changed(Recipe(placement=method, trainer=trainer, inputs=inputs, levels=levels), changes)
 
 
 def placement_of(recipe: Recipe) -> PlacementChoice:
