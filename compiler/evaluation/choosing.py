@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Compared, Fitting, Of
-from thenar.runtime.model.tables import ScoreTables
 
 from ..elementary import softmax_and_loss
 from ..model.collapse import Model, collapse
@@ -170,7 +169,8 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
                 (predicted == test.labels[first])[held],
                 len(first),
                 loss,
-                _table_rows(collapse(model, samples.n_switches)),
+                # The scores of the inputs in use: of each switch, bin, cell of a grid, and line.
+                sum(term.n_rows for term in collapse(model, samples.n_switches).core_terms if term.largest > 0),
             )
         )
     return fold.name, batch, found
@@ -182,11 +182,6 @@ def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
     else:
         rounds = [int(each.settings["rounds"] or 0) for each in trainings]
         yield from trainings[int(np.argmax(rounds))].stages(samples, rounds)
-
-
-def _table_rows(tables: ScoreTables) -> int:
-    """Return the number of rows of scores for the inputs in use: of each switch, bin, cell of a grid, and line."""
-    return sum(term.n_rows for term in tables.core_terms if term.largest > 0)
 
 
 def _error(gains: NDArray[np.intp], clusters: NDArray[np.generic]) -> float:

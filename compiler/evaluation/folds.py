@@ -85,7 +85,8 @@ def weka_folds(labels: ArrayLike, n_folds: int, seed: int) -> list[Fold]:
     random = JavaRandom(seed)
     order = list(range(len(values)))
     random.shuffle(order)
-    order = _dealt(_grouped(order, values), n_folds)
+    grouped = _grouped(order, values)
+    order = [row for start in range(n_folds) for row in grouped[start::n_folds]]
     return [_cut(order, n_folds, fold, random) for fold in range(n_folds)]
 
 
@@ -123,7 +124,6 @@ def check_cut(n_parts: int, n_folds: int, what: str) -> None:
 
 def _grouped(order: list[int], labels: Sequence[object]) -> list[int]:
     """Bring rows of one class together by Weka's swaps, classes by first appearance. Not stable: swaps move others."""
-    order = list(order)
     placed = 1
     while placed < len(order):
         label = labels[order[placed - 1]]
@@ -133,10 +133,6 @@ def _grouped(order: list[int], labels: Sequence[object]) -> list[int]:
                 placed += 1
         placed += 1
     return order
-
-
-def _dealt(order: list[int], n_folds: int) -> list[int]:
-    return [row for start in range(n_folds) for row in order[start::n_folds]]
 
 
 def _cut(order: list[int], n_folds: int, fold: int, random: JavaRandom) -> Fold:

@@ -227,19 +227,18 @@ class Planner:
     def table(self, name: TableName, protocol: Protocol) -> list[RowPlan]:
         """Return the rows of a table under a protocol."""
         rows: dict[TableName, Callable[[Protocol], list[RowPlan]]] = {
-            "compositions": self._compositions,
             "generality": self._generality,
             "pruning": self._pruning,
             "baselines": self._baselines,
             "trainers": self._trainers,
-            "joints": lambda _: self._best_joints(),
         }
-        return rows[name](protocol)
-
-    def _compositions(self, protocol: Protocol) -> list[RowPlan]:
-        chosen = partial(self.placement, protocol)
+        if name in rows:
+            return rows[name](protocol)
+        if name == "joints":
+            sizes = [*(size for size in JOINTS if size < self.n_joints), self.n_joints]
+            return [self._row(str(n), f"the best {n} joints", ANGLE, lambda *_: (), most=n) for n in sizes]
         kinds = available(self._n_switches, self.n_joints)
-        return [self._row(kind.name, kind.what, kind, chosen) for kind in kinds]
+        return [self._row(kind.name, kind.what, kind, partial(self.placement, protocol)) for kind in kinds]
 
     def _generality(self, protocol: Protocol) -> list[RowPlan]:
         def chosen_by(giver: Population, population: Population, fold: Fold) -> Elements:
@@ -270,14 +269,17 @@ class Planner:
             elements, number = self.elements(fold.train), len(self.placement(protocol, population, fold))
             return tuple(elements[place] for place in random_placement(len(elements), number, self.recipe.seed + draw))
 
+        def random(population: Population) -> CellPlan:
+            cells = (self.cell(population, SELECTED, partial(drawn, draw)) for draw in range(DRAWS))
+            return CellPlan(population, tuple(run for cell in cells for run in cell.runs))
+
         recipe = METHODS.named(self.recipe.placement)
         what = "the paper's placement" if recipe.name == PAPERS else recipe.help
         baselines = [METHODS.named(name) for name in self.baselines if name != recipe.name]
-        draws = [self._row("random", f"mean of {DRAWS} draws", SELECTED, partial(drawn, draw)) for draw in range(DRAWS)]
         return [
             self._row(recipe.title, what, SELECTED, partial(self.placement, protocol)),
             *(self._row(other.title, other.help, SELECTED, partial(baseline, other.name)) for other in baselines),
-            replace(draws[0], cells=tuple(map(_joined, zip(*(draw.cells for draw in draws), strict=True)))),
+            RowPlan("random", f"mean of {DRAWS} draws", tuple(map(random, self.populations))),
         ]
 
     def _trainers(self, protocol: Protocol) -> list[RowPlan]:
@@ -288,10 +290,6 @@ class Planner:
             populations=tuple(replace(population, repeats=population.repeats[:1]) for population in self.populations),
         )
         return [once._row(name, kind.what, kind, chosen, name) for kind in self.kinds for name in learners()]
-
-    def _best_joints(self) -> list[RowPlan]:
-        sizes = [*(size for size in JOINTS if size < self.n_joints), self.n_joints]
-        return [self._row(str(n), f"the best {n} joints", ANGLE, lambda *_: (), most=n) for n in sizes]
 
     @property
     def kinds(self) -> tuple[Composition, ...]:
@@ -364,8 +362,3 @@ class Planner:
             return FoldFit(fold, elements, joints, population.grasps, learner)
 
         return CellPlan(population, tuple(tuple(map(fit, folds)) for folds in population.repeats))
-
-
-def _joined(cells: tuple[CellPlan, ...]) -> CellPlan:
-    """Return one cell that holds the runs of all."""
-    return CellPlan(cells[0].population, tuple(run for cell in cells for run in cell.runs))

@@ -11,12 +11,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thenar.runtime.manifest import Of, Unit
+from thenar.runtime.manifest import Of, Unit, fit_name
 from thenar.runtime.names import list_names
-from thenar.runtime.recipe import Recipe
+from thenar.runtime.recipe import AUTO, Recipe
 
 from ..samples import decided
 from ..text import counted, interval
+from ..trainers.base import Training
 
 UNITS: tuple[Unit, ...] = ("trials", "frames")
 
@@ -45,6 +46,14 @@ class RecipeWords:
 
     method: str
     trainer: str
+
+    @classmethod
+    def of(cls, recipe: Recipe) -> Self:
+        """Return the words for classifiers that all have the same placement and trainer."""
+        training, trainer = Training.of(recipe), "chosen from the training rows"
+        if recipe.trainer != AUTO:
+            trainer = fit_name(training.trainer, training.settings)
+        return cls(placement_words(recipe), trainer)
 
     def __str__(self) -> str:
         """Return "placement: id3, S = 0; trainer: logit, penalty 1"."""
@@ -248,10 +257,10 @@ def design_effect(recognised: list[int], sizes: list[int], unit: Unit, repeats: 
     if not hits or not misses:
         return prior
     # Integers up to the final quotient: exact on every machine.
-    squares = sum((own * total - size * hits) ** 2 for own, size in zip(recognised, sizes, strict=True))
-    found = max(1.0, n_clusters * squares / ((n_clusters - 1) * total * hits * misses))
-    weight = min(hits, misses) / (repeats * found)
-    return (weight * found + WEIGHT * max(prior, found)) / (weight + WEIGHT)
+    squares = sum((correct * total - size * hits) ** 2 for correct, size in zip(recognised, sizes, strict=True))
+    effect = max(1.0, n_clusters * squares / ((n_clusters - 1) * total * hits * misses))
+    weight = min(hits, misses) / (repeats * effect)
+    return (weight * effect + WEIGHT * max(prior, effect)) / (weight + WEIGHT)
 
 
 def _wilson(p: float, n: float, z: float) -> tuple[float, float]:
@@ -292,33 +301,30 @@ class Draws:
         """Return the draws for `hits` (c, m), the correct predictions for each of m trials; `units` (m,) are drawn."""
         units = np.unique(units, return_inverse=True)[1]
         sizes = np.bincount(units)
-        counts = _counts(len(sizes), seed)
+        n = len(sizes)
+        if n <= _FEW:
+            chosen = np.indices((n,) * n).reshape(n, -1).T
+        else:
+            chosen = np.random.default_rng(seed).integers(n, size=(DRAWS, n))
+        # How often each unit is drawn, (b, n).
+        counts = np.array([np.bincount(draw, minlength=n) for draw in chosen], np.int32)
         sums = np.zeros((2, len(counts), len(hits)))
-        own = np.array([np.bincount(units, each) for each in hits]).T
-        for start in range(0, len(sizes), _BLOCK):
+        correct = np.array([np.bincount(units, row) for row in hits]).T
+        for start in range(0, n, _BLOCK):
             block = slice(start, start + _BLOCK)
             # Integers below 2^53: the sums are exact in any order.
-            sums[0] += counts[:, block].astype(np.float64) @ own[block]
-            sums[1] += (counts[:, block] == 0).astype(np.float64) @ own[block]
+            sums[0] += counts[:, block].astype(np.float64) @ correct[block]
+            sums[1] += (counts[:, block] == 0).astype(np.float64) @ correct[block]
         drawn, left = counts @ sizes, (counts == 0) @ sizes
         judged = left > 0
-        return cls(sums[0, judged] / drawn[judged, None], sums[1, judged] / left[judged, None], own.sum(axis=0))
+        return cls(sums[0, judged] / drawn[judged, None], sums[1, judged] / left[judged, None], correct.sum(axis=0))
 
     def luck(self, costs: Floats, limits: Sequence[float]) -> list[float]:
         """Return, for each limit, the luck of the best contender (c,) with a lower cost; ties go to the cheapest."""
         order = np.argsort(costs, kind="stable")
         drawn, left, every = self.drawn[:, order], self.left[:, order], self.every[order]
-        found = []
+        lucks = []
         for size in np.searchsorted(costs[order], limits).tolist():
             best, draws = every[:size].argmax(), np.arange(len(drawn))
-            found.append(max(float((left[:, best] - left[draws, drawn[:, :size].argmax(axis=1)]).mean()), 0.0))
-        return found
-
-
-def _counts(units: int, seed: int) -> NDArray[np.int32]:
-    """Return how often each unit (u,) is drawn, (b, u)."""
-    if units <= _FEW:
-        drawn = np.indices((units,) * units).reshape(units, -1).T
-    else:
-        drawn = np.random.default_rng(seed).integers(units, size=(DRAWS, units))
-    return np.array([np.bincount(each, minlength=units) for each in drawn], np.int32)
+            lucks.append(max(float((left[:, best] - left[draws, drawn[:, :size].argmax(axis=1)]).mean()), 0.0))
+        return lucks

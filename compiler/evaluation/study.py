@@ -9,8 +9,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from thenar.runtime.manifest import Of, Unit, fit_name
-from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Recipe, changed
+from thenar.runtime.manifest import Of, Unit
+from thenar.runtime.recipe import PAPERS_TRAINER, Recipe, changed
 
 from ..limits import check_memory, check_types
 from ..pictures import painting
@@ -21,7 +21,6 @@ from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..text import counted
-from ..trainers.base import Training
 from ..workers import in_workers
 from .folds import (
     NESTED,
@@ -45,7 +44,7 @@ from .plan import (
     predictions,
     run_fits,
 )
-from .rates import RecipeWords, placement_words
+from .rates import RecipeWords
 from .tables import RateReader, RateTable, draw_confusions
 
 TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines", "trainers")
@@ -359,17 +358,9 @@ def shuffled_labels(grasp_set: GraspSet, seed: tuple[int, ...]) -> GraspSet:
     return replace(grasp_set, grasps=grasps[trial], trials=trial)
 
 
-def recipe_words(recipe: Recipe) -> RecipeWords:
-    """Return the words for classifiers that all have the same placement and trainer."""
-    training, trainer = Training.of(recipe), "chosen from the training rows"
-    if recipe.trainer != AUTO:
-        trainer = fit_name(training.trainer, training.settings)
-    return RecipeWords(placement_words(recipe), trainer)
-
-
 def _recipe_of(name: TableName, recipe: Recipe) -> RecipeWords:
     """Return the words for the recipe of a table."""
-    same = recipe_words(recipe)
+    same = RecipeWords.of(recipe)
     methods: dict[TableName, str] = {
         "pruning": f"{PAPERS}, S of the row, all subjects pooled",
         "baselines": f"that of the row, as many elements as {same.method}",

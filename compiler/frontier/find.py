@@ -145,7 +145,7 @@ def find_frontier(
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
-        cache = Cache(store, report or _no_progress, _ROUNDS, jobs=jobs)
+        cache = Cache(store, report or (lambda _done, _total: None), _ROUNDS, jobs=jobs)
         with _remove_created_on_error(made, store):
             records = records_of(
                 grasp_set.joint_names,
@@ -164,7 +164,9 @@ def find_frontier(
         if output is not None:
             # The store moves into the new folder as the same file, and stays locked meanwhile.
             store.finish()
-            publish_folder(_documents(frontier), output, kept_entries, FrontierError)
+            drawn = {f"{name}.svg": data for name, data in pictures(frontier, "svg").items()}
+            documents = {FRONTIER_NAME: frontier_to_bytes(frontier), TABLE_NAME: csv_bytes(frontier), **drawn}
+            publish_folder(documents, output, kept_entries, FrontierError)
     return frontier
 
 
@@ -221,11 +223,6 @@ def kept_entries(folder: Path) -> list[str]:
     if there and not {FRONTIER_NAME, STORE_NAME} & set(there):
         raise FrontierError(f"{folder} is not empty and holds no frontier: name another folder")
     return [path for path in there if path not in _DOCUMENTS]
-
-
-def _documents(frontier: Frontier) -> dict[str, bytes]:
-    drawn = {f"{name}.svg": data for name, data in pictures(frontier, "svg").items()}
-    return {FRONTIER_NAME: frontier_to_bytes(frontier), TABLE_NAME: csv_bytes(frontier), **drawn}
 
 
 def _replay(survey: Survey, given: GraspSet | None) -> Replay:
@@ -411,7 +408,3 @@ def _tried(screened: Sequence[Screened], closes: Sequence[EvaluatedFinalist], se
         )
         for one, rounds, rate in (*first, *then)
     )
-
-
-def _no_progress(_done: int, _total: int) -> None:
-    pass
