@@ -1,4 +1,4 @@
-"""Model selection inside the training rows: the trainer and its settings are chosen on inner folds.
+"""What is chosen inside the training rows: elements and joints, and by inner folds the trainer and its settings.
 
 Inner folds split no movement; if the fit is to generalise to new subjects (objects, sessions), they also leave subjects
 out. Each candidate is scored by its accuracy on trials, ties by log-loss. Candidates within one standard error of the
@@ -7,24 +7,34 @@ lowest log-loss among them is taken. Rows in which nothing is held count only in
 frames, a subset of the frames suffices for the comparison.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import groupby
 from math import fsum, sqrt
+from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Compared, Fitting, Of
+from thenar.runtime.recipe import Inputs, Recipe
 
 from ..elementary import softmax_and_loss
 from ..model.collapse import Model, collapse
-from ..samples import Samples, decided
+from ..placement.constraints import Limits
+from ..placement.elements import Elements, bits_of, elements_of, ports_of
+from ..placement.joints import joint_order
+from ..placement.methods.base import METHODS
+from ..placement.placement import select
+from ..placement.ports import PortCosts
+from ..samples import Columns, Samples, decided
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
-from .folds import Fold, leave_groups_out, trial_folds
+from .folds import Fold, Rows, leave_groups_out, trial_folds
 
-Rows = NDArray[np.intp]
+# Returns the results of a function for several tuples of arguments.
+Ask = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], list[Any]]
 
 # Training sets with fewer trials than this are cut into this many inner folds, larger ones into two.
 _FOLDS = ((1500, 4), (20_000, 3))
@@ -35,6 +45,113 @@ _SMALL, _LARGER = 8192, 1.25
 # Frames of a trial resemble their neighbours: of more rows than this, evenly spaced ones suffice to compare fits, at
 # least this many per trial.
 _COMPARED, _FRAMES = 2048, 8
+
+
+def choose_path(
+    samples: Samples,
+    rows: Rows,
+    recipe: Recipe,
+    numbers: tuple[float, ...],
+    ports: PortCosts | None = None,
+    limits: Limits | None = None,
+) -> tuple[Elements, ...]:
+    """Return the elements that a recipe keeps by some rows, for each of several numbers that its method takes."""
+    learning, method = samples.rows(rows), METHODS.named(recipe.placement)
+    learning = learning if recipe.inputs == "both" else learning.with_joints(())
+    if recipe.robust or limits is not None:
+        name = "keep" if method.by_number else "prune"
+        recipes = [replace(recipe, **{name: int(number)}) for number in numbers]
+        return tuple(select(learning, each, ports, limits).kept for each in recipes)
+    elements = elements_of(learning, recipe.levels)
+    choose = method.chooser(bits_of(learning, elements), None if ports is None else ports_of(ports, elements))
+    return tuple(tuple(elements[column] for column in choose(number)) for number in numbers)
+
+
+def rank_joints(samples: Samples, rows: Rows, elements: Elements) -> Columns:
+    """Return the joints in the order of their value in addition to these elements, in some rows."""
+    return joint_order(bits_of(samples.rows(rows), elements))
+
+
+def _here(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
+    return [function(*args) for args in calls]
+
+
+@dataclass(frozen=True, eq=False)
+class InputChoices:
+    """The elements and joints that recipes choose from rows of samples, such as a fold's training rows: once from each.
+
+    ports, limits  costs and constraints, as for `select`
+    ask            calls functions: in this process, or in workers, with a store
+    """
+
+    samples: Samples
+    ports: PortCosts | None = None
+    limits: Limits | None = None
+    ask: Ask = _here
+    _available: dict[tuple[int | None, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
+    _elements: dict[tuple[Recipe, float, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
+    _orders: dict[tuple[Elements, bytes], Columns] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def n_joints(self) -> int:
+        """The number of joints."""
+        return int(self.samples.codes.shape[1])
+
+    def available(self, rows: Rows, levels: int | None) -> Elements:
+        """Return the elements that there are to choose from in some rows."""
+        place = levels, rows.tobytes()
+        if place not in self._available:
+            self._available[place] = elements_of(self.samples.rows(rows), levels)
+        return self._available[place]
+
+    def choose(self, recipes: Iterable[Recipe], several: Sequence[Rows]) -> None:
+        """Choose the elements of recipes from several rows; what differs in the method's number alone, together."""
+        numbers: dict[Recipe, dict[float, None]] = {}
+        for recipe in recipes:
+            if recipe.inputs != "joints":
+                same, number = _placement(recipe)
+                numbers.setdefault(same, {})[number] = None
+        # Costs that a method does not use are no reason to ask it again.
+        used = {same for same in numbers if METHODS[same.placement].uses_ports or self.limits is not None}
+        ports = {same: self.ports if same in used else None for same in numbers}
+        places = [(same, rows) for same in numbers for rows in several]
+        calls = [(self.samples, rows, same, tuple(numbers[same]), ports[same], self.limits) for same, rows in places]
+        for (same, rows), path in zip(places, self.ask(choose_path, calls), strict=True):
+            for number, elements in zip(numbers[same], path, strict=True):
+                self._elements[same, number, rows.tobytes()] = elements
+
+    def elements(self, recipe: Recipe, rows: Rows) -> Elements:
+        """Return the elements that a recipe keeps by some rows."""
+        if recipe.inputs == "joints":
+            return ()
+        place = *_placement(recipe), rows.tobytes()
+        if place not in self._elements:
+            self.choose([recipe], [rows])
+        return self._elements[place]
+
+    def rank(self, places: Sequence[tuple[Elements, Rows]]) -> None:
+        """Rank the joints, given elements, by rows."""
+        calls = [(self.samples, rows, elements) for elements, rows in places]
+        for (elements, rows), order in zip(places, self.ask(rank_joints, calls), strict=True):
+            self._orders[elements, rows.tobytes()] = order
+
+    def joints(self, elements: Elements, rows: Rows, most: int | None) -> Columns:
+        """Return the best joints, ascending, at most `most`, given these elements and rows; None: all."""
+        if most is None or most >= self.n_joints:
+            return tuple(range(self.n_joints))
+        place = elements, rows.tobytes()
+        if place not in self._orders:
+            self.rank([(elements, rows)])
+        return tuple(sorted(self._orders[place][:most]))
+
+
+def _placement(recipe: Recipe) -> tuple[Recipe, float]:
+    """Return all on which the choice of a recipe's elements depends, but for the number of its method; and that."""
+    method = METHODS.named(recipe.placement)
+    joints = recipe.inputs == "both" and (method.uses_joints or recipe.robust)
+    inputs: Inputs = "both" if joints else "switches"
+    same = Recipe(placement=recipe.placement, inputs=inputs, levels=recipe.levels, robust=recipe.robust)
+    return same, float(recipe.keep or 0 if method.by_number else recipe.prune)
 
 
 def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:

@@ -1,9 +1,9 @@
 """Plan the fits for each table (inputs, placement, folds), and run each distinct fit once."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,22 +11,18 @@ from numpy.typing import NDArray
 from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import AUTO, Recipe, changed
 
-from ..placement.constraints import Limits
-from ..placement.elements import Elements, bits_of, elements_of
-from ..placement.joints import joint_order
+from ..placement.elements import Elements
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.methods.filters import random_placement
-from ..placement.placement import InputSelection, select
-from ..placement.ports import PortCosts
+from ..placement.placement import InputSelection
 from ..samples import Columns, Samples
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
-from .choosing import choose_training
+from .choosing import InputChoices, choose_training
 from .folds import Fold, Population, Protocol, Rows
 
 Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
-_T = TypeVar("_T")
 # For each learner of a fit, the trainings among which each fit chooses.
 Candidates = Mapping[str, tuple[Training, ...]]
 # Classifiers of scikit-learn with its own settings, neighbours weighted by distance: to compare the trainers with.
@@ -210,19 +206,20 @@ class RowPlan:
 class Planner:
     """Plans the tables for populations of one set.
 
-    samples  of all rows; recipe: how elements are chosen from training rows, and how many joints classifiers get,
-             chosen from the training rows, given the switches; ports, limits: costs and constraints, as for `select`;
-             baselines: methods to compare with; known: what was chosen, once by the same recipe from the same rows.
+    choices  of elements and joints, from training rows; recipe: how they are chosen, and how many joints classifiers
+             get, given the switches; baselines: methods to compare with.
     """
 
     populations: tuple[Population, ...]
-    samples: Samples
+    choices: InputChoices
     recipe: Recipe
-    ports: PortCosts | None = None
-    limits: Limits | None = None
     prune_list: tuple[int, ...] = ()
     baselines: tuple[str, ...] = BASELINES
-    known: dict[tuple[object, ...], Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def samples(self) -> Samples:
+        """All rows."""
+        return self.choices.samples
 
     def table(self, name: TableName, protocol: Protocol) -> list[RowPlan]:
         """Return the rows of a table under a protocol."""
@@ -235,9 +232,9 @@ class Planner:
         if name in rows:
             return rows[name](protocol)
         if name == "joints":
-            sizes = [*(size for size in JOINTS if size < self.n_joints), self.n_joints]
+            sizes = [*(size for size in JOINTS if size < self.choices.n_joints), self.choices.n_joints]
             return [self._row(str(n), f"the best {n} joints", ANGLE, lambda *_: (), most=n) for n in sizes]
-        kinds = available(self._n_switches, self.n_joints)
+        kinds = available(self._n_switches, self.choices.n_joints)
         return [self._row(kind.name, kind.what, kind, partial(self.placement, protocol)) for kind in kinds]
 
     def _generality(self, protocol: Protocol) -> list[RowPlan]:
@@ -294,13 +291,8 @@ class Planner:
     @property
     def kinds(self) -> tuple[Composition, ...]:
         """The inputs for comparing trainers: selected switches and joints, as far as available, and each alone."""
-        there = available(self._n_switches, self.n_joints)
+        there = available(self._n_switches, self.choices.n_joints)
         return tuple(kind for kind in (ANGLE_SELECTED, ANGLE, SELECTED) if kind in there)
-
-    @property
-    def n_joints(self) -> int:
-        """The number of joints."""
-        return int(self.samples.codes.shape[1])
 
     @property
     def _n_switches(self) -> int:
@@ -310,33 +302,16 @@ class Planner:
         """Return the recipe's placement for a fold, chosen from the population's rows as the protocol allows."""
         return self.chosen(protocol.may_choose(population, fold))
 
-    def _once(self, key: tuple[object, ...], rows: Rows, choose: Callable[[Samples], tuple[_T, ...]]) -> tuple[_T, ...]:
-        """Return what `choose` returns for these rows, called once for the same key and rows."""
-        key = *key, rows.tobytes()
-        if key not in self.known:
-            self.known[key] = choose(self.samples.rows(rows))
-        known: tuple[_T, ...] = self.known[key]
-        return known
-
     def elements(self, rows: Rows) -> Elements:
         """Return the elements available in these rows."""
-        return self._once((), rows, lambda samples: elements_of(samples, self.recipe.levels))
+        return self.choices.available(rows, self.recipe.levels)
 
     def chosen(self, rows: Rows, **changes: Any) -> Elements:
         """Return the elements that the recipe, with other choices `changes`, keeps from these rows, in any order."""
-        recipe = changed(self.recipe, {"keep_joints": None, **changes})
+        recipe = changed(self.recipe, changes)
         if not self._n_switches or (METHODS.named(recipe.placement).by_number and recipe.keep is None):
             return ()
-        return self._once(
-            (recipe,), np.sort(rows), lambda samples: select(samples, recipe, self.ports, self.limits).kept
-        )
-
-    def joints(self, rows: Rows, elements: Elements, most: int | None) -> Columns:
-        """Return the best joints, ascending, at most `most`, given these elements and rows; None: all."""
-        if most is None or most >= self.n_joints:
-            return tuple(range(self.n_joints))
-        order = self._once((elements,), rows, lambda samples: joint_order(bits_of(samples, elements)))
-        return tuple(sorted(order[:most]))
+        return self.choices.elements(recipe, np.sort(rows))
 
     def _row(
         self, name: str, what: str, kind: Composition, select: Select, learner: str = "", most: int | None = None
@@ -358,7 +333,8 @@ class Planner:
             # All switches depend on no placement.
             placement = select(population, fold) if kind.selected != kind.others else ()
             elements = kind.elements(placement, self.elements(fold.train) if kind.others else ())
-            joints = self.joints(fold.train, elements, most or self.recipe.keep_joints) if kind.angle else ()
+            most_joints = most or self.recipe.keep_joints
+            joints = self.choices.joints(elements, fold.train, most_joints) if kind.angle else ()
             return FoldFit(fold, elements, joints, population.grasps, learner)
 
         return CellPlan(population, tuple(tuple(map(fit, folds)) for folds in population.repeats))

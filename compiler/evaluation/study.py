@@ -22,6 +22,7 @@ from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..text import counted
 from ..workers import in_workers
+from .choosing import InputChoices
 from .folds import (
     NESTED,
     OF,
@@ -234,7 +235,7 @@ def evaluate(
     if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
         _check_all_switches(chosen, populations)
     samples = Samples.of(chosen)
-    planner = Planner(populations, samples, recipe, ports, limits, design.prune_list, design.baselines)
+    planner = Planner(populations, InputChoices(samples, ports, limits), recipe, design.prune_list, design.baselines)
     plans = {
         (name, protocol.name): planner.table(name, protocol)
         for name, reason in reasons.items()
@@ -306,7 +307,8 @@ def _permuted(
     them; `planner` is that of the true labels.
     """
     # Without what it chose for the true labels: it goes to the workers.
-    tasks = [(grasp_set, replace(planner, known={}), scheme, number) for number in range(m + 1)]
+    fresh = replace(planner, choices=replace(planner.choices))
+    tasks = [(grasp_set, fresh, scheme, number) for number in range(m + 1)]
     correct, total = _recognised(tasks[0])
     shuffled: list[int] = []
     for recognised, _ in in_workers(_recognised, tasks[1:], jobs):
@@ -334,7 +336,7 @@ def _recognised(task: tuple[GraspSet, Planner, Scheme, int]) -> tuple[int, int]:
     samples, populations = Samples.of(grasp_set), planner.populations
     if scheme == "trial":
         populations = populations_of(grasp_set, scheme, recipe.folds, 1, recipe.seed)
-    planner = replace(planner, populations=populations, samples=samples, known={})
+    planner = replace(planner, populations=populations, choices=replace(planner.choices, samples=samples))
     plans = [
         planner.cell(population, planner.kinds[0], partial(planner.placement, NESTED)) for population in populations
     ]

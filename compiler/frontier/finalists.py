@@ -74,7 +74,7 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     """
     search, cuts, trainer = survey.search, survey.cuts, survey.search.trainers[0]
     sizes = {levels: survey.size(levels) for levels in survey.levels}
-    n_elements, kinds = sizes[survey.levels[-1]], ALL_INPUTS if survey.n_joints else ALL_INPUTS[1:]
+    n_elements, kinds = sizes[survey.levels[-1]], ALL_INPUTS if survey.inputs.n_joints else ALL_INPUTS[1:]
     choices = [
         placed(method, number, trainer, inputs, levels)
         for inputs in (kinds if n_elements else ())
@@ -92,7 +92,7 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     survey.choose(baselines, cuts.screening)
     # Drop placements that keep nothing. Joints alone need no placement.
     choices = [choice for choice in choices if survey.elements(choice)]
-    choices += [Recipe(trainer=trainer, inputs="joints")] if survey.n_joints else []
+    choices += [Recipe(trainer=trainer, inputs="joints")] if survey.inputs.n_joints else []
     rates = _rates(survey, choices, baselines)
     methods = dict.fromkeys([*search.methods, *search.baselines]) if n_elements else ()
     return _screened(survey, choices, rates), tuple(_curve(survey, method, rates) for method in methods)
@@ -100,7 +100,9 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
 
 def screen_fewer(survey: Survey, screened: Sequence[Screened]) -> tuple[Screened, ...]:
     """Return the same choices, screened with fewer joints, if joints take time."""
-    numbers = [number for number in JOINTS if number < survey.n_joints] if survey.equipment.records.each_us else []
+    numbers = (
+        [number for number in JOINTS if number < survey.inputs.n_joints] if survey.equipment.records.each_us else []
+    )
     choices = [changed_to(one.choice, keep_joints=number) for one in screened for number in numbers]
     survey.choose_joints(choices, (survey.cuts.everything, *survey.cuts.screening))
     return _screened(survey, choices, _rates(survey, choices))

@@ -297,7 +297,7 @@ def _found(
     pool = [one for one in screened if one.choice.inputs != "switches"]
     screened += screen_fewer(survey, finalists(pool, (), _FEWER))
     screened += screen_others(survey, wider)
-    choices = choices_to_mark(n_elements, survey.n_joints, search.trainers[0], levels)
+    choices = choices_to_mark(n_elements, survey.inputs.n_joints, search.trainers[0], levels)
     closes = evaluate_finalists(survey, finalists(screened, choices, search.finalists))
     several = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
     by_time, by_switches = best_designs(several)
@@ -322,7 +322,7 @@ def _found(
         n_switches=n_switches,
         n_taxels=len(survey.grasp_set.taxel_columns),
         n_levels=n_elements - n_switches,
-        n_joints=survey.n_joints,
+        n_joints=survey.inputs.n_joints,
         grasps=survey.samples.grasps,
         target=model.target,
         machine=model.machine,

@@ -30,10 +30,6 @@ JOINTS = (2, 3, 4, 5, 6, 7, 8, 10, 12, 16)
 TABLED = (10, 30, 100)
 
 
-# A method, whether it uses the joints, and how many levels of a taxel it chooses from.
-Choosing = tuple[str, bool, int | None]
-
-
 def placed(method: str, number: int, trainer: str, inputs: Inputs, levels: int | None = None) -> Recipe:
     """Return the candidate whose elements a method chooses, given its number, and the levels of a taxel."""
     changes = {"keep" if METHODS[method].by_number else "prune": number}
@@ -46,12 +42,6 @@ def placement_of(recipe: Recipe) -> PlacementChoice:
         return PlacementChoice("none", 0.0)
     by_number = METHODS[recipe.placement].by_number
     return PlacementChoice(recipe.placement, float(recipe.keep or 0 if by_number else recipe.prune))
-
-
-def chosen_by(recipe: Recipe) -> Choosing:
-    """Return all on which the choice of a candidate's elements depends, but for its number."""
-    joints = recipe.inputs == "both" and METHODS[recipe.placement].uses_joints
-    return placement_of(recipe).method, joints, recipe.levels
 
 
 def tabled(recipe: Recipe, rounds: int, shape: Recipe = SHAPES[0]) -> Recipe:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -13,12 +14,10 @@ from thenar.runtime.manifest import Fitting, Unit
 from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Inputs, Recipe
 
-from ..evaluation.choosing import choose_training
+from ..evaluation.choosing import InputChoices, choose_path, choose_training, rank_joints
 from ..evaluation.folds import EvaluationError, Fold, Rows, leave_groups_out, trial_folds
 from ..evaluation.rates import Rate
-from ..placement.elements import Elements, bits_of, elements_of, names_of, ports_of
-from ..placement.joints import joint_order
-from ..placement.methods.base import METHODS
+from ..placement.elements import Elements, names_of
 from ..placement.placement import InputSelection
 from ..placement.ports import PortCosts
 from ..recogniser import Recogniser, predicted_classes
@@ -28,7 +27,7 @@ from ..trainers.base import Training
 from .cache import Cache, stored
 from .points import By, PointTime
 from .price import Equipment, PricedTables, price
-from .search import SHAPES, TAXEL_LEVELS, Choosing, Search, chosen_by, placement_of
+from .search import SHAPES, TAXEL_LEVELS, Search
 
 # Settings are selected on the placement whose number of switches is nearest to the paper's.
 _TYPICAL = 33
@@ -151,9 +150,12 @@ class Survey:
     cuts: Cuts
     equipment: Equipment
     cache: Cache
-    _elements: dict[tuple[Choosing, float, Fold], Elements] = field(default_factory=dict, init=False)
-    _joints: dict[tuple[Elements, Fold], Columns] = field(default_factory=dict, init=False)
     _trainings: dict[tuple[str, Inputs, Fold], Training] = field(default_factory=dict, init=False)
+
+    @cached_property
+    def inputs(self) -> InputChoices:
+        """The elements and joints that choices keep."""
+        return InputChoices(self.samples, self.ports, ask=self.cache.ask)
 
     @property
     def levels(self) -> tuple[int | None, ...]:
@@ -162,22 +164,18 @@ class Survey:
 
     def size(self, levels: int | None) -> int:
         """Return how many elements there are to choose from in all rows."""
-        return len(elements_of(self.samples, levels))
+        return len(self.inputs.available(self.cuts.everything.train, levels))
 
     def elements(self, choice: Recipe, fold: Fold | None = None) -> Elements:
-        """Return the elements that a choice keeps by the training rows of `fold`, or by all rows, once chosen."""
-        if choice.inputs == "joints":
-            return ()
-        return self._elements[chosen_by(choice), placement_of(choice).parameter, fold or self.cuts.everything]
+        """Return the elements that a choice keeps by the training rows of `fold`, or by all rows."""
+        return self.inputs.elements(choice, (fold or self.cuts.everything).train)
 
     def joints(self, choice: Recipe, fold: Fold | None = None) -> Columns:
-        """Return the joints of a choice, ascending, once ranked on the training rows of `fold`, or on all rows."""
+        """Return the joints of a choice, ascending, by the training rows of `fold`, or by all rows."""
         if choice.inputs == "switches":
             return ()
-        if choice.keep_joints is None:
-            return tuple(range(self.n_joints))
-        order = self._joints[self.elements(choice, fold), fold or self.cuts.everything]
-        return tuple(sorted(order[: choice.keep_joints]))
+        rows = (fold or self.cuts.everything).train
+        return self.inputs.joints(self.elements(choice, fold), rows, choice.keep_joints)
 
     def selection(self, choice: Recipe, fold: Fold | None = None) -> InputSelection:
         """Return the inputs that a choice keeps by the training rows of `fold`, or by all rows."""
@@ -186,11 +184,6 @@ class Survey:
     def names(self, choice: Recipe) -> tuple[str, ...]:
         """Return the names of the elements that a choice keeps by all rows."""
         return names_of(self.grasp_set, self.elements(choice))
-
-    @property
-    def n_joints(self) -> int:
-        """How many joints a frame has."""
-        return int(self.samples.codes.shape[1])
 
     def transfer(self, choice: Recipe) -> PointTime:
         """Return the time of reading the joints of a choice."""
@@ -208,25 +201,13 @@ class Survey:
 
     def choose(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
         """Choose the switches and levels of all choices from the training rows of these folds."""
-        numbers: dict[Choosing, dict[float, None]] = {}
-        for choice in choices:
-            if choice.inputs != "joints":
-                numbers.setdefault(chosen_by(choice), {})[placement_of(choice).parameter] = None
-        ports = {key: self.ports if METHODS[key[0]].uses_ports else None for key in numbers}
-        calls = {
-            (key, fold): (self.samples, fold.train, *key, tuple(numbers[key]), ports[key])
-            for key in numbers
-            for fold in folds
-        }
-        for (key, fold), path in self._ask(choose_path, calls).items():
-            for number, elements in zip(numbers[key], path, strict=True):
-                self._elements[key, number, fold] = elements
+        self.inputs.choose(choices, [fold.train for fold in folds])
 
     def choose_joints(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
         """Rank the joints, given the switches, for choices that keep only some, by the training rows of these folds."""
-        kept = [(self.elements(choice, fold), fold) for choice in choices if choice.keep_joints for fold in folds]
-        calls = {(elements, fold): (self.samples, fold.train, elements) for elements, fold in kept}
-        self._joints.update(self._ask(rank_joints, calls))
+        some = [choice for choice in choices if choice.keep_joints is not None]
+        places = dict.fromkeys((self.elements(choice, fold), fold) for choice in some for fold in folds)
+        self.inputs.rank([(elements, fold.train) for elements, fold in places])
 
     def tune(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
         """Select the open settings of each trainer and kind of inputs on the training rows of these folds, as `compile`
@@ -297,30 +278,8 @@ class Survey:
         return dict(zip(calls, self.cache.ask(function, list(calls.values())), strict=True))
 
 
-@stored(3)
-def choose_path(
-    samples: Samples,
-    rows: Rows,
-    method: str,
-    joints: bool,
-    levels: int | None,
-    numbers: tuple[float, ...],
-    ports: PortCosts | None,
-) -> tuple[Elements, ...]:
-    """Choose from these levels of the taxels, and the switches, in some rows by one method, for each of its numbers;
-    given the joints, or not.
-    """
-    learning = samples.rows(rows)
-    elements = elements_of(learning, levels)
-    bits = bits_of(learning if joints else learning.with_joints(()), elements)
-    choose = METHODS[method].chooser(bits, None if ports is None else ports_of(ports, elements))
-    return tuple(tuple(elements[column] for column in choose(number)) for number in numbers)
-
-
-@stored(2)
-def rank_joints(samples: Samples, rows: Rows, elements: Elements) -> Columns:
-    """Return the joints in the order of their value in addition to these elements, in some rows."""
-    return joint_order(bits_of(samples.rows(rows), elements))
+stored(4)(choose_path)
+stored(3)(rank_joints)
 
 
 @stored(3)

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
+from thenar.compiler.evaluation.choosing import InputChoices
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.learning import LEAST, expected, plan_learning, power_law
 from thenar.compiler.evaluation.plan import Planner, learners
@@ -23,7 +24,7 @@ QUICK = StudyDesign(Recipe(trainer="logitboost", rounds=3), repeats=1, tables=()
 
 
 def planned(grasps: GraspSet) -> Planner:
-    return Planner((), Samples.of(grasps), Recipe(seed=3))
+    return Planner((), InputChoices(Samples.of(grasps)), Recipe(seed=3))
 
 
 @given(st.floats(0, 0.5), st.floats(0, 0.5), st.integers(1, 60))

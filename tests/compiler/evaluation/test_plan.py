@@ -1,10 +1,12 @@
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from thenar.compiler import grow_id3
+from thenar.compiler.evaluation.choosing import InputChoices
 from thenar.compiler.evaluation.folds import NESTED, PAPER, Protocol, populations_of
 from thenar.compiler.evaluation.plan import (
     COMPOSITIONS,
@@ -53,7 +55,7 @@ both_protocols = pytest.mark.parametrize("protocol", [PAPER, NESTED], ids=lambda
 
 def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
     populations = populations_of(grasps, "trial", 4, repeats, 1)
-    return Planner(populations, Samples.of(grasps), Recipe(prune=prune), prune_list=(0, 30))
+    return Planner(populations, InputChoices(Samples.of(grasps)), Recipe(prune=prune), (0, 30))
 
 
 @pytest.fixture(scope="module")
@@ -153,3 +155,20 @@ def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps:
 def test_any_method_can_be_a_baseline(make_grasps: Make) -> None:
     table = replace(planner_of(make_grasps()), baselines=("mrmr",)).table("baselines", NESTED)
     assert [line.name for line in table] == ["ID3", "mrmr", "random"]
+
+
+def test_what_differs_in_its_number_alone_is_chosen_together_and_once(make_grasps: Make) -> None:
+    asked: list[tuple[float, ...]] = []
+
+    def ask(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
+        asked.extend(call[3] for call in calls)
+        return [function(*call) for call in calls]
+
+    samples, rows = Samples.of(make_grasps(noise=0.3)), np.arange(5, 40)
+    recipes = [Recipe(placement=name, keep=keep) for name in ("cmim", "mutual-information") for keep in (2, 5)]
+    choices = InputChoices(samples, ask=ask)
+    choices.choose(recipes, [rows])
+    assert asked == [(2.0, 5.0), (2.0, 5.0)]
+    for recipe in recipes:
+        assert choices.elements(recipe, rows) == InputChoices(samples).elements(recipe, rows)
+    assert len(asked) == 2
