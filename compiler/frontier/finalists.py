@@ -100,9 +100,9 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
 
 def screen_fewer(survey: Survey, screened: Sequence[Screened]) -> tuple[Screened, ...]:
     """Return the same choices, screened with fewer joints, if joints take time."""
-    numbers = (
-        [number for number in JOINTS if number < survey.inputs.n_joints] if survey.equipment.records.each_us else []
-    )
+    # Joints that take no time are all read.
+    most = survey.inputs.n_joints if survey.equipment.records.each_us else 0
+    numbers = [number for number in JOINTS if number < most]
     choices = [changed_to(one.choice, keep_joints=number) for one in screened for number in numbers]
     survey.choose_joints(choices, (survey.cuts.everything, *survey.cuts.screening))
     return _screened(survey, choices, _rates(survey, choices))

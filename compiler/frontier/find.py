@@ -164,9 +164,7 @@ def find_frontier(
         if output is not None:
             # The store moves into the new folder as the same file, and stays locked meanwhile.
             store.finish()
-            drawn = {f"{name}.svg": data for name, data in pictures(frontier, "svg").items()}
-            documents = {FRONTIER_NAME: frontier_to_bytes(frontier), TABLE_NAME: csv_bytes(frontier), **drawn}
-            publish_folder(documents, output, kept_entries, FrontierError)
+            publish_folder(_documents(frontier), output, kept_entries, FrontierError)
     return frontier
 
 
@@ -223,6 +221,11 @@ def kept_entries(folder: Path) -> list[str]:
     if there and not {FRONTIER_NAME, STORE_NAME} & set(there):
         raise FrontierError(f"{folder} is not empty and holds no frontier: name another folder")
     return [path for path in there if path not in _DOCUMENTS]
+
+
+def _documents(frontier: Frontier) -> dict[str, bytes]:
+    drawn = {f"{name}.svg": data for name, data in pictures(frontier, "svg").items()}
+    return {FRONTIER_NAME: frontier_to_bytes(frontier), TABLE_NAME: csv_bytes(frontier), **drawn}
 
 
 def _replay(survey: Survey, given: GraspSet | None) -> Replay:
@@ -293,10 +296,10 @@ def _found(
             f"no placement that was tried can be built for {equipment.model.target}: name other ``methods`` or "
             "another ``target``"
         )
-    wider = finalists(screened, (), _WIDER * search.finalists)
     pool = [one for one in screened if one.choice.inputs != "switches"]
-    screened += screen_fewer(survey, finalists(pool, (), _FEWER))
-    screened += screen_others(survey, wider)
+    fewer = screen_fewer(survey, finalists(pool, (), _FEWER))
+    others = screen_others(survey, finalists(screened, (), _WIDER * search.finalists))
+    screened += (*fewer, *others)
     choices = choices_to_mark(n_elements, survey.inputs.n_joints, search.trainers[0], levels)
     closes = evaluate_finalists(survey, finalists(screened, choices, search.finalists))
     several = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
