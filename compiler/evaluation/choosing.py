@@ -61,7 +61,7 @@ def choose_path(
     if recipe.robust or limits is not None:
         name = "keep" if method.by_number else "prune"
         recipes = [replace(recipe, **{name: int(number)}) for number in numbers]
-        return tuple(select(learning, each, ports, limits).kept for each in recipes)
+        return tuple(select(learning, numbered, ports, limits).kept for numbered in recipes)
     elements = elements_of(learning, recipe.levels)
     choose = method.chooser(bits_of(learning, elements), None if ports is None else ports_of(ports, elements))
     return tuple(tuple(elements[column] for column in choose(number)) for number in numbers)
@@ -211,11 +211,11 @@ def choose_training(
         return Fitting(candidates[0].trainer, _values(candidates[0]))
     grouped = groups is not None and len(np.unique(groups)) >= _LEAST_GROUPS
     clusters = groups if grouped and groups is not None else samples.movements
-    together = [list(each) for _, each in groupby(range(len(candidates)), lambda one: _alike(candidates[one]))]
+    together = [list(batch) for _, batch in groupby(range(len(candidates)), lambda one: _alike(candidates[one]))]
     tasks = [(samples, fold, [candidates[one] for one in batch], batch) for fold in folds for batch in together]
     tests: dict[tuple[int, str], _Test] = {}
-    for done, (name, batch, found) in enumerate(in_workers(_tested, tasks, jobs), 1):
-        tests |= {(one, name): test for one, test in zip(batch, found, strict=True)}
+    for done, (name, batch, several) in enumerate(in_workers(_tested, tasks, jobs), 1):
+        tests |= {(one, name): test for one, test in zip(batch, several, strict=True)}
         if report is not None:
             report(done, len(tasks) + 1)
     scores = [_joined([tests[one, fold.name] for fold in folds]) for one in range(len(candidates))]
@@ -275,12 +275,12 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
     learning, test = samples.rows(fold.train), samples.rows(fold.test)
     _, first, trial = np.unique(test.trials, return_index=True, return_inverse=True)
     weights, held = 1.0 / np.bincount(trial)[trial], ~test.is_none[first]
-    found = []
+    tests = []
     for model in _models(trainings, learning):
         scores = model.scores(test.switches, test.codes)
         predicted = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
         loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
-        found.append(
+        tests.append(
             _Test(
                 fold.test[first[held]],
                 (predicted == test.labels[first])[held],
@@ -290,14 +290,14 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
                 sum(term.n_rows for term in collapse(model, samples.n_switches).core_terms if term.largest > 0),
             )
         )
-    return fold.name, batch, found
+    return fold.name, batch, tests
 
 
 def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
     if len(trainings) == 1:
         yield trainings[0].train(samples)
     else:
-        rounds = [int(each.settings["rounds"] or 0) for each in trainings]
+        rounds = [int(training.settings["rounds"] or 0) for training in trainings]
         yield from trainings[int(np.argmax(rounds))].stages(samples, rounds)
 
 

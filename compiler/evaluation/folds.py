@@ -307,16 +307,16 @@ def concerns(grasp_set: GraspSet, populations: tuple[Population, ...], scheme: S
     are the only one, too rare for the folds, or tested but never trained.
     """
     origin, samples = grasp_set.simulated, Samples.of(grasp_set)
-    found = [f"these grasps are simulated ({origin}): the rates are not those of recorded ones"] if origin else []
-    found += [INDEPENDENT] if grasp_set.independent else []
-    found += [
+    texts = [f"these grasps are simulated ({origin}): the rates are not those of recorded ones"] if origin else []
+    texts += [INDEPENDENT] if grasp_set.independent else []
+    texts += [
         f"subject {population.name}: every row is of {samples.grasps[population.grasps[0]]}, the only type"
         for population in populations
         if len(population.grasps) == 1
     ]
     if scheme == "trial":
-        found += [text for population in populations for text in _rare(samples, population, n_folds)]
-    return (*found, *(text for population in populations for text in _untrained(samples, population)))
+        texts += [text for population in populations for text in _rare(samples, population, n_folds)]
+    return (*texts, *(text for population in populations for text in _untrained(samples, population)))
 
 
 def _rare(samples: Samples, population: Population, n_folds: int) -> list[str]:

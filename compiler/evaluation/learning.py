@@ -76,7 +76,7 @@ class Learning:
     @property
     def further(self) -> tuple[int, ...]:
         """The numbers of repetitions for which the accuracy is extrapolated."""
-        return tuple(each.repetitions for each in self.curves[0].expected)
+        return tuple(ahead.repetitions for ahead in self.curves[0].expected)
 
     def draw(self, path: Path) -> Path:
         """Write the curves as a picture."""
@@ -96,8 +96,8 @@ class Learning:
             if curve.expected:
                 shown: list[Rate | ExpectedAccuracy] = [curve.rates[-1], *curve.expected]
                 ahead = [self.repetitions[-1], *self.further]
-                lows, highs = [100 * each.low for each in shown], [100 * each.high for each in shown]
-                axes.plot(ahead, [100 * each.mean for each in shown], color=colour, lw=1.5, ls=(0, (2, 2)))
+                lows, highs = [100 * rate.low for rate in shown], [100 * rate.high for rate in shown]
+                axes.plot(ahead, [100 * rate.mean for rate in shown], color=colour, lw=1.5, ls=(0, (2, 2)))
                 axes.fill_between(ahead, lows, highs, color=colour, alpha=0.08, lw=0)
         if self.further:
             axes.plot([], [], color=on_paper("soft"), ls=(0, (2, 2)), label="expected, 95 % shaded")
@@ -211,33 +211,32 @@ def expected(
     hits (sizes, repeats, m). It is at least as wide as that of the last accuracy, and contains that accuracy.
     """
     sizes, repeats, _ = hits.shape
-    wanted = np.array([times * repetitions[-1] for times in FURTHER], np.float64)
+    further = np.array([times * repetitions[-1] for times in FURTHER], np.float64)
     n = np.array(repetitions, np.float64)
     errors = np.array([1 - rate.mean for rate in rates])
     weights = rates[0].total / (errors * (1 - errors) + 1 / rates[0].total)
     drawn = Draws.of(hits.reshape(sizes * repeats, -1).astype(np.intp), units, seed).drawn
-    taken = np.random.default_rng(seed).integers(repeats, size=(len(drawn), repeats))
-    every = drawn.reshape(len(drawn), sizes, repeats)
-    several = np.take_along_axis(every, taken[:, np.newaxis, :], axis=2).mean(axis=2)
-    (means,) = 1 - power_law(n, errors[np.newaxis], weights, wanted)
-    laws = 1 - power_law(n, 1 - several, weights, wanted)
+    numbers = np.random.default_rng(seed).integers(repeats, size=(len(drawn), 1, repeats))
+    several = np.take_along_axis(drawn.reshape(len(drawn), sizes, repeats), numbers, axis=2).mean(axis=2)
+    (means,) = 1 - power_law(n, errors[np.newaxis], weights, further)
+    laws = 1 - power_law(n, 1 - several, weights, further)
     lows, highs = np.quantile(laws, (0.025, 0.975), axis=0)
-    last, found = rates[-1], []
+    last, ahead = rates[-1], []
     for times, mean, low, high in zip(FURTHER, means.tolist(), lows.tolist(), highs.tolist(), strict=True):
         ends = (low, mean - last.mean + last.low, last.mean), (high, mean - last.mean + last.high, last.mean)
-        found.append(ExpectedAccuracy(times * repetitions[-1], mean, max(0.0, min(ends[0])), min(1.0, max(ends[1]))))
-    return tuple(found)
+        ahead.append(ExpectedAccuracy(times * repetitions[-1], mean, max(0.0, min(ends[0])), min(1.0, max(ends[1]))))
+    return tuple(ahead)
 
 
-def power_law(n: Floats, errors: Floats, weights: Floats, wanted: Floats) -> Floats:
-    """Return a + b w^-c for each of `wanted` (w,), as (r, w).
+def power_law(n: Floats, errors: Floats, weights: Floats, further: Floats) -> Floats:
+    """Return a + b w^-c for each of the numbers `further` (w,), as (r, w).
 
     The law minimises the sum of weights (s,) times squared residuals over errors (r, s) at n (s,).
     """
-    best, found = np.full(len(errors), np.inf), np.zeros((len(errors), len(wanted)))
+    best, laws = np.full(len(errors), np.inf), np.zeros((len(errors), len(further)))
     total = weights.sum()
     for exponent in _EXPONENTS:
-        x, at = (n / n[0]) ** -exponent, (wanted / n[0]) ** -exponent
+        x, at = (n / n[0]) ** -exponent, (further / n[0]) ** -exponent
         centre, mean = (weights @ x) / total, errors @ weights / total
         b = np.maximum((errors - mean[:, None]) @ (weights * (x - centre)) / (weights @ (x - centre) ** 2), 0.0)
         a = mean - b * centre
@@ -246,5 +245,5 @@ def power_law(n: Floats, errors: Floats, weights: Floats, wanted: Floats) -> Flo
         squares = (errors - a[:, None] - b[:, None] * x) ** 2 @ weights
         better = squares < best
         best[better] = squares[better]
-        found[better] = (a[:, None] + b[:, None] * at)[better]
-    return found
+        laws[better] = (a[:, None] + b[:, None] * at)[better]
+    return laws

@@ -95,7 +95,7 @@ class StudyDesign:
 
     def changed(self, **changes: Any) -> Self:
         """Return a design with other values, by name: fields, choices of the recipe, or settings of its trainer."""
-        names = {each.name for each in fields(self)}
+        names = {choice.name for choice in fields(self)}
         recipe = changed(self.recipe, {name: value for name, value in changes.items() if name not in names})
         return replace(self, **{"recipe": recipe, **{name: changes[name] for name in changes if name in names}})
 

@@ -144,10 +144,10 @@ class RateReader:
         rows = [self._row(plan, confusing=name == "compositions") for plan in plans]
         if name == "trainers":
             hits = [self.hits(plan.cells) for plan in plans]
-            first = {plan.what: own for plan, own in zip(plans, hits, strict=True) if plan.name == REFERENCE}
+            first = {plan.what: correct for plan, correct in zip(plans, hits, strict=True) if plan.name == REFERENCE}
             rows = [
-                row if row.name == REFERENCE else replace(row, paired=Paired.of(own, first[row.what], REFERENCE))
-                for row, own in zip(rows, hits, strict=True)
+                row if row.name == REFERENCE else replace(row, paired=Paired.of(correct, first[row.what], REFERENCE))
+                for row, correct in zip(rows, hits, strict=True)
             ]
         return RateTable(name, protocol, recipe, columns, tuple(rows))
 
@@ -239,7 +239,7 @@ def draw_matrix(axes: "Axes", grasps: tuple[str, ...], confusion: "Confusion") -
     axes.set_xticks(range(len(grasps)), grasps, rotation=90, fontsize=8)
     axes.set_yticks(range(len(grasps)), grasps, fontsize=8)
     axes.set_xlabel("recognised as")
-    for true, found in np.argwhere(shares >= 0.01):
-        share = shares[true, found]
+    for true, predicted in np.argwhere(shares >= 0.01):
+        share = shares[true, predicted]
         colour = "white" if share > 0.6 else "black"
-        axes.text(found, true, f"{100 * share:.0f}", ha="center", va="center", fontsize=7, color=colour)
+        axes.text(predicted, true, f"{100 * share:.0f}", ha="center", va="center", fontsize=7, color=colour)

@@ -143,10 +143,10 @@ def find_frontier(
     search, lacking = _installed(search or Search(methods=usual(ours=True, wired=wired)))
     cuts = Cuts.of(samples, search)
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
-    made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
+    created = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
         cache = Cache(store, report or (lambda _done, _total: None), _ROUNDS, jobs=jobs)
-        with _remove_created_on_error(made, store):
+        with _remove_created_on_error(created, store):
             records = records_of(
                 grasp_set.joint_names,
                 joint_us,
@@ -169,14 +169,14 @@ def find_frontier(
 
 
 @contextmanager
-def _remove_created_on_error(made: Sequence[Path], store: Store) -> Iterator[None]:
+def _remove_created_on_error(created: Sequence[Path], store: Store) -> Iterator[None]:
     """Remove files and folders that a run made if its request is refused; files added by others meanwhile stay."""
     try:
         yield
     except (FrontierError, BuildError, HarnessError):
         store.finish()
         with suppress(OSError):
-            for path in made:
+            for path in created:
                 (path.rmdir if path.is_dir() else path.unlink)()
         raise
 
@@ -228,27 +228,27 @@ def _documents(frontier: Frontier) -> dict[str, bytes]:
     return {FRONTIER_NAME: frontier_to_bytes(frontier), TABLE_NAME: csv_bytes(frontier), **drawn}
 
 
-def _replay(survey: Survey, given: GraspSet | None) -> Replay:
+def _replay(survey: Survey, stream: GraspSet | None) -> Replay:
     """Return the test rows of the first fold as a replay, or the recordings given for it."""
     grasp_set, seed = survey.grasp_set, survey.search.seed
     number = {grasp: label for label, grasp in enumerate(survey.samples.grasps)} | {NONE: -1}
-    if given is None:
+    if stream is None:
         labels = np.array([number[grasp] for grasp in grasp_set.grasps.tolist()], np.intp)
         # The test rows, and the rows of their movements in which nothing is held.
         movements, test = grasp_set.movement_ids, np.flatnonzero(~grasp_set.is_none)[survey.cuts.screening[0].test]
         return replay_of(grasp_set, labels, np.flatnonzero(np.isin(movements, movements[test])), seed=seed)
-    if given.fingerprint() == grasp_set.fingerprint():
+    if stream.fingerprint() == grasp_set.fingerprint():
         raise FrontierError(
             f"the stream equals the training set, {survey.source}: name other recordings with ``stream``, or leave it "
             "out to use held-out rows"
         )
-    if (given.element_names, given.joints) != (grasp_set.element_names, grasp_set.joints):
+    if (stream.element_names, stream.joints) != (grasp_set.element_names, grasp_set.joints):
         raise FrontierError(f"the stream has other switches, taxels or joints than {survey.source}")
-    strange = sorted({str(grasp) for grasp in given.grasps} - set(number))
+    strange = sorted({str(grasp) for grasp in stream.grasps} - set(number))
     if strange:
         raise FrontierError(f"the stream holds {strange[0]!r}, which {survey.source} does not")
-    labels = np.array([number[str(grasp)] for grasp in given.grasps], dtype=np.intp)
-    return replay_of(given, labels, seed=seed)
+    labels = np.array([number[str(grasp)] for grasp in stream.grasps], dtype=np.intp)
+    return replay_of(stream, labels, seed=seed)
 
 
 def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> ReferencePoint:
@@ -376,17 +376,17 @@ def _latencies(survey: Survey, replay: Replay, kept: Sequence[Design]) -> Latenc
             fold.train,
             survey.selection(choice, fold),
             replay,
-            tuple((design.tables.recipe, design.frame.us) for design in mine),
+            tuple((design.tables.recipe, design.frame.us) for design in alike),
             survey.training(choice, fold),
             movements,
             seed,
         )
-        for choice, mine in grouped.items()
+        for choice, alike in grouped.items()
     ]
     return {
         (design, kind): latency
-        for mine, found in zip(grouped.values(), survey.cache.ask(latencies, calls), strict=True)
-        for design, several in zip(mine, found, strict=True)
+        for alike, timed in zip(grouped.values(), survey.cache.ask(latencies, calls), strict=True)
+        for design, several in zip(alike, timed, strict=True)
         for kind, latency in zip(POLICIES, several, strict=True)
     }
 

@@ -46,16 +46,16 @@ class Picked:
             **chosen,
         }
 
-    def wired(self, given: Harness | None) -> Harness | Callable[[Sequence[str]], Harness] | None:
-        """Return the wiring for `compile_build`: the given one if the point is wired so, else a function that makes a
+    def wired(self, harness: Harness | None) -> Harness | Callable[[Sequence[str]], Harness] | None:
+        """Return the wiring for `compile_build`: this harness if the point is wired so, else a function that makes a
         new one of its kind for the kept switches.
 
         Raises FrontierError if the point needs the wiring of a glove that is not given.
         """
         setting = self.point.setting
         if not setting.wiring:
-            return given
-        if setting.wiring == AS_WIRED and given is None:
+            return harness
+        if setting.wiring == AS_WIRED and harness is None:
             raise FrontierError(
                 f"point {self.point.number} is read as the glove was wired: name its glove.toml with ``glove``"
             )
@@ -66,8 +66,8 @@ class Picked:
                     f"point {self.point.number} lists {len(self.point.switches)} switches, but its placement keeps "
                     f"{len(kept)}, not the same ones: run thenar frontier again"
                 )
-            if given is not None and setting.wiring == AS_WIRED:
-                return given
+            if harness is not None and setting.wiring == AS_WIRED:
+                return harness
             joints = () if setting.inputs == "switches" else self.point.joints or self.joints
             return WiringOption(setting.wiring, setting.clock_hz).harness_of(kept, joints)
 
@@ -98,17 +98,17 @@ def picked(path: Path, number: int | None, grasp_set: GraspSet) -> Picked:
     ...     grasp_set, Path("build"), **chosen.options, harness=chosen.wired(None)
     ... )  # doctest: +SKIP
     """
-    found = frontier_from_bytes(read_file(path, MAX_BYTES, FrontierError), str(path))
-    wanted = found.picked if number is None else number
-    if wanted is None:
-        raise FrontierError(f"{path} has points 1 to {len(found.points)}: say with ``point`` which to build")
-    if found.fingerprint != grasp_set.fingerprint():
+    frontier = frontier_from_bytes(read_file(path, MAX_BYTES, FrontierError), str(path))
+    number = frontier.picked if number is None else number
+    if number is None:
+        raise FrontierError(f"{path} has points 1 to {len(frontier.points)}: say with ``point`` which to build")
+    if frontier.fingerprint != grasp_set.fingerprint():
         raise FrontierError(
-            f"{path} was found for other recordings ({found.source}): run thenar frontier on these, or compile those"
+            f"{path} was found for other recordings ({frontier.source}): run thenar frontier on these, or compile those"
         )
-    point = found.point(wanted)
+    point = frontier.point(number)
     _check(point, grasp_set, f"{path}: point {point.number}")
-    return Picked(found, point, tuple(joint.name for joint in grasp_set.joints))
+    return Picked(frontier, point, tuple(joint.name for joint in grasp_set.joints))
 
 
 def _check(point: FrontierPoint, grasp_set: GraspSet, what: str) -> None:

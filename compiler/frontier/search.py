@@ -109,7 +109,7 @@ class Search:
         """The trainers, the paper's first; the other properties describe the first: see `alone`."""
         if self.trainer != AUTO:
             return (self.trainer,)
-        names = dict.fromkeys(each.trainer for each in Training.candidates(self._asked(AUTO)))
+        names = dict.fromkeys(training.trainer for training in Training.candidates(self._recipe(AUTO)))
         return tuple(sorted(names, key=lambda name: name != PAPERS_TRAINER))
 
     def alone(self, trainer: str) -> "Search":
@@ -119,17 +119,17 @@ class Search:
     @property
     def training(self) -> Training:
         """The trainer, and values for all its settings: those given, and defaults."""
-        return Training.of(self._asked(self.trainers[0]))
+        return Training.of(self._recipe(self.trainers[0]))
 
     @property
     def candidates(self) -> tuple[Training, ...]:
         """All trainings that the settings leave open; trainers with stages are not varied by rounds."""
         usual = {"rounds": self.training.settings["rounds"]} if self.staged else {}
-        open_ones = Training.candidates(self._asked(self.trainers[0]))
-        found = [Training(one.trainer, {**one.settings, **usual}) for one in open_ones]
-        return tuple(one for number, one in enumerate(found) if one not in found[:number])
+        several = Training.candidates(self._recipe(self.trainers[0]))
+        several = tuple(Training(one.trainer, {**one.settings, **usual}) for one in several)
+        return tuple(one for number, one in enumerate(several) if one not in several[:number])
 
-    def _asked(self, trainer: str) -> Recipe:
+    def _recipe(self, trainer: str) -> Recipe:
         return changed(Recipe(), {"trainer": trainer, **self.settings})
 
     @property
@@ -153,4 +153,4 @@ class Search:
         return self._up_to_last(TABLED)
 
     def _up_to_last(self, rounds: tuple[int, ...]) -> tuple[int, ...]:
-        return (*(each for each in rounds if each < self.rounds), self.rounds) if self.staged else (1,)
+        return (*(number for number in rounds if number < self.rounds), self.rounds) if self.staged else (1,)

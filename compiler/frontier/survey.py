@@ -313,19 +313,26 @@ def fit_stages(
     train, test = (selection.read(samples.rows(rows)) for rows in (fold.train, fold.test))
     if not train.varies:
         trials, frames = _packed(np.full(len(test.labels), train.most_frequent), test)
-        return FoldHits((trials,) * len(stages), *(((each,) * len(shapes),) * len(tabled) for each in (trials, frames)))
-    rounds = (*stages, *tabled)
-    made = dict(zip(rounds, Recogniser.stages(samples, Recipe(), fold.train, selection, training, rounds), strict=True))
-    predictions = (winners(made[stage].model.scores(test.switches, test.codes)) for stage in stages)
-    by_stage = tuple(_packed(predicted, test)[0] for predicted in predictions)
-    found = [
-        [
-            _packed(predicted_classes(tables, None, test.switches, test.codes), test)
-            for tables in (replace(made[stage], recipe=shape).integers for shape in shapes)
+        by_table = [[(trials, frames)] * len(shapes)] * len(tabled)
+        by_stage = (trials,) * len(stages)
+    else:
+        rounds = (*stages, *tabled)
+        recognisers = Recogniser.stages(samples, Recipe(), fold.train, selection, training, rounds)
+        trained = dict(zip(rounds, recognisers, strict=True))
+        predictions = (winners(trained[stage].model.scores(test.switches, test.codes)) for stage in stages)
+        by_stage = tuple(_packed(predicted, test)[0] for predicted in predictions)
+        by_table = [
+            [
+                _packed(predicted_classes(tables, None, test.switches, test.codes), test)
+                for tables in (replace(trained[stage], recipe=shape).integers for shape in shapes)
+            ]
+            for stage in tabled
         ]
-        for stage in tabled
-    ]
-    return FoldHits(by_stage, *(tuple(tuple(each[which] for each in row) for row in found) for which in (0, 1)))
+    return FoldHits(
+        by_stage,
+        tables=tuple(tuple(trials for trials, _ in row) for row in by_table),
+        frames=tuple(tuple(frames for _, frames in row) for row in by_table),
+    )
 
 
 def _packed(predictions: Rows, test: Samples) -> tuple[bytes, bytes]:
