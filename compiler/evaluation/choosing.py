@@ -7,7 +7,7 @@ lowest log-loss among them is taken. Rows in which nothing is held count only in
 frames, a subset of the frames suffices for the comparison.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from math import fsum, sqrt
@@ -275,8 +275,13 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
     learning, test = samples.rows(fold.train), samples.rows(fold.test)
     _, first, trial = np.unique(test.trials, return_index=True, return_inverse=True)
     weights, held = 1.0 / np.bincount(trial)[trial], ~test.is_none[first]
+    if len(trainings) == 1:
+        models: tuple[Model, ...] = (trainings[0].train(learning),)
+    else:
+        rounds = [int(training.settings["rounds"] or 0) for training in trainings]
+        models = trainings[int(np.argmax(rounds))].stages(learning, rounds)
     tests = []
-    for model in _models(trainings, learning):
+    for model in models:
         scores = model.scores(test.switches, test.codes)
         predicted = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
         loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
@@ -291,14 +296,6 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
             )
         )
     return fold.name, batch, tests
-
-
-def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
-    if len(trainings) == 1:
-        yield trainings[0].train(samples)
-    else:
-        rounds = [int(training.settings["rounds"] or 0) for training in trainings]
-        yield from trainings[int(np.argmax(rounds))].stages(samples, rounds)
 
 
 def _error(gains: NDArray[np.intp], clusters: NDArray[np.generic]) -> float:

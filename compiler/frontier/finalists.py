@@ -192,12 +192,9 @@ def _spread(pool: list[Screened]) -> list[Screened]:
 
 
 def _distance(one: Screened, other: Screened) -> float:
-    return abs(_errors(one) - _errors(other)) + abs(log(one.frame_us / other.frame_us))
-
-
-def _errors(one: Screened) -> float:
-    """Return the error rate on a scale on which halving it is the same distance everywhere."""
-    return log(1.0 - one.mean + _FEWEST)
+    """Return how far error rates and frame times differ: halving either is the same distance everywhere."""
+    errors, other_errors = (log(1.0 - screened.mean + _FEWEST) for screened in (one, other))
+    return abs(errors - other_errors) + abs(log(one.frame_us / other.frame_us))
 
 
 def _different(screened: Sequence[Screened]) -> list[Screened]:
