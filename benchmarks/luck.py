@@ -20,10 +20,9 @@ import numpy as np
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.designs import best_designs, corrected, designs, lucks
-from thenar.compiler.frontier.finalists import evaluate_finalists, finalists
+from thenar.compiler.frontier.finalists import evaluate_finalists, finalists, screen
 from thenar.compiler.frontier.points import By
 from thenar.compiler.frontier.price import Equipment, equipment_for
-from thenar.compiler.frontier.screen import screen
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, Survey
 from thenar.compiler.frontier.wirings import wirings

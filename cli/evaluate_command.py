@@ -204,7 +204,7 @@ def command(
         grasp_set = GraspSet.load(grasps)
         study = evaluate(grasp_set, design, jobs, report, **terms_of(recipe, grasp_set, layout, glove))
     if folder is not None:
-        from thenar.compiler.evaluation.pictures import draw
+        from thenar.compiler.evaluation.study import draw
 
         draw(study, folder)
     if output is not None:
@@ -270,7 +270,7 @@ def _print_grid(title: str, grid: "Grid", note: str = "") -> None:
 
 def _print(study: "Study", *, confusion: bool) -> None:
     """Print all tables, laid out as in the paper, and the confusion matrices if requested."""
-    from thenar.compiler.evaluation.populations import PROTOCOLS
+    from thenar.compiler.evaluation.folds import PROTOCOLS
 
     console = out()
     for protocol in PROTOCOLS:

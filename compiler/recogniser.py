@@ -18,7 +18,7 @@ from .artifact import CompileError
 from .artifact.ensemble import model_fault
 from .artifact.rejecting import rejection_of
 from .evaluation.choosing import choose_training
-from .evaluation.populations import OF
+from .evaluation.folds import OF
 from .limits import check_inputs
 from .model.collapse import Model, collapse
 from .model.substitutes import fit_lost
@@ -116,7 +116,7 @@ class Recogniser:
         balanced = samples.balanced()
         kept = selection.read(samples.rows(balanced))
         check_inputs(len(samples.grasps), len(selection.columns), len(selection.joints), CompileError)
-        if not (kept.inputs != kept.inputs[0]).any():
+        if not kept.varies:
             raise CompileError("no input differs between rows: nothing distinguishes the grasp types")
         candidates, of = Training.candidates(recipe), OF[recipe.by or "subject"]
         by = None if groups is None else groups[balanced]

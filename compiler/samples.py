@@ -217,6 +217,16 @@ class Samples:
             raise SamplesError("taxels are no inputs: turn them into bits by thresholds first")
         return np.hstack([self.switches, self.codes], dtype=np.uint16)
 
+    @property
+    def varies(self) -> bool:
+        """Whether any input differs between the rows: a model of others only knows how frequent the classes are."""
+        return bool((self.inputs != self.inputs[0]).any())
+
+    @property
+    def most_frequent(self) -> int:
+        """The class of most rows, the lowest of several."""
+        return int(np.bincount(self.labels).argmax())
+
     def kept(self, columns: Columns) -> NDArray[np.uint16]:
         """Return the training matrix (n, kept + j): the switches `columns` in their order, then the joints' codes."""
         return self.keeping(columns).inputs

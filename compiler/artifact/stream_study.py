@@ -25,7 +25,6 @@ from thenar.runtime.segmenting.model import SegmentModel
 
 from ..evaluation.folds import Fold, leave_groups_out, trial_folds
 from ..evaluation.rates import RecipeWords, student
-from ..evaluation.study import recipe_words
 from ..movements.learning import LAG_TICKS, Counts, announced_live, live_states
 from ..movements.scores import OVERLAPS, SegmentScore, score_streams, segments_of
 from ..movements.streams import TICK_US, MovementError, movements_of, streams_of
@@ -137,7 +136,7 @@ def study_streams(
         report(len(chosen) + len(results), total)
     return StreamStudy(
         fingerprint=grasp_set.fingerprint(),
-        recipe=recipe_words(options),
+        recipe=RecipeWords.of(options),
         subjects=subjects,
         movements=sum(
             len(segments_of(grasp_set.labels[stream.rows], len(grasp_set.taxonomy.types))) for stream in streams

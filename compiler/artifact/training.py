@@ -11,8 +11,7 @@ from thenar.runtime.manifest import Detected, Of, Protocol, Recognised
 from thenar.runtime.recipe import By, Recipe
 from thenar.runtime.segmenting.model import SegmentModel
 
-from ..evaluation.folds import Fold, leave_groups_out, leave_one_out, trial_folds
-from ..evaluation.populations import OF, groups_of
+from ..evaluation.folds import OF, Fold, groups_of, leave_groups_out, leave_one_out, trial_folds
 from ..evaluation.rates import UNITS, rated
 from ..limits import check_inputs, check_memory, check_types
 from ..movements.learning import learnt

@@ -1,4 +1,4 @@
-"""Model selection inside the training rows: the trainer and its settings are chosen on inner folds.
+"""What is chosen inside the training rows: elements and joints, and by inner folds the trainer and its settings.
 
 Inner folds split no movement; if the fit is to generalise to new subjects (objects, sessions), they also leave subjects
 out. Each candidate is scored by its accuracy on trials, ties by log-loss. Candidates within one standard error of the
@@ -7,25 +7,34 @@ lowest log-loss among them is taken. Rows in which nothing is held count only in
 frames, a subset of the frames suffices for the comparison.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from itertools import groupby
 from math import fsum, sqrt
+from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Compared, Fitting, Of
-from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.recipe import Inputs, Recipe
 
 from ..elementary import softmax_and_loss
 from ..model.collapse import Model, collapse
-from ..samples import Samples, decided
+from ..placement.constraints import Limits
+from ..placement.elements import Elements, bits_of, elements_of, ports_of
+from ..placement.joints import joint_order
+from ..placement.methods.base import METHODS
+from ..placement.placement import select
+from ..placement.ports import PortCosts
+from ..samples import Columns, Samples, decided
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
-from .folds import Fold, leave_groups_out, trial_folds
+from .folds import Fold, Rows, leave_groups_out, trial_folds
 
-Rows = NDArray[np.intp]
+# Returns the results of a function for several tuples of arguments.
+Ask = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], list[Any]]
 
 # Training sets with fewer trials than this are cut into this many inner folds, larger ones into two.
 _FOLDS = ((1500, 4), (20_000, 3))
@@ -38,6 +47,113 @@ _SMALL, _LARGER = 8192, 1.25
 _COMPARED, _FRAMES = 2048, 8
 
 
+def choose_path(
+    samples: Samples,
+    rows: Rows,
+    recipe: Recipe,
+    numbers: tuple[float, ...],
+    ports: PortCosts | None = None,
+    limits: Limits | None = None,
+) -> tuple[Elements, ...]:
+    """Return the elements that a recipe keeps by some rows, for each of several numbers that its method takes."""
+    learning, method = samples.rows(rows), METHODS.named(recipe.placement)
+    learning = learning if recipe.inputs == "both" else learning.with_joints(())
+    if recipe.robust or limits is not None:
+        name = "keep" if method.by_number else "prune"
+        recipes = [replace(recipe, **{name: int(number)}) for number in numbers]
+        return tuple(select(learning, numbered, ports, limits).kept for numbered in recipes)
+    elements = elements_of(learning, recipe.levels)
+    choose = method.chooser(bits_of(learning, elements), None if ports is None else ports_of(ports, elements))
+    return tuple(tuple(elements[column] for column in choose(number)) for number in numbers)
+
+
+def rank_joints(samples: Samples, rows: Rows, elements: Elements) -> Columns:
+    """Return the joints in the order of their value in addition to these elements, in some rows."""
+    return joint_order(bits_of(samples.rows(rows), elements))
+
+
+def _here(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
+    return [function(*args) for args in calls]
+
+
+@dataclass(frozen=True, eq=False)
+class InputChoices:
+    """The elements and joints that recipes choose from rows of samples, such as a fold's training rows: once from each.
+
+    ports, limits  costs and constraints, as for `select`
+    ask            calls functions: in this process, or in workers, with a store
+    """
+
+    samples: Samples
+    ports: PortCosts | None = None
+    limits: Limits | None = None
+    ask: Ask = _here
+    _available: dict[tuple[int | None, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
+    _elements: dict[tuple[Recipe, float, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
+    _orders: dict[tuple[Elements, bytes], Columns] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def n_joints(self) -> int:
+        """The number of joints."""
+        return int(self.samples.codes.shape[1])
+
+    def available(self, rows: Rows, levels: int | None) -> Elements:
+        """Return the elements that there are to choose from in some rows."""
+        place = levels, rows.tobytes()
+        if place not in self._available:
+            self._available[place] = elements_of(self.samples.rows(rows), levels)
+        return self._available[place]
+
+    def choose(self, recipes: Iterable[Recipe], several: Sequence[Rows]) -> None:
+        """Choose the elements of recipes from several rows; what differs in the method's number alone, together."""
+        numbers: dict[Recipe, dict[float, None]] = {}
+        for recipe in recipes:
+            if recipe.inputs != "joints":
+                same, number = _placement(recipe)
+                numbers.setdefault(same, {})[number] = None
+        # Costs that a method does not use are no reason to ask it again.
+        used = {same for same in numbers if METHODS[same.placement].uses_ports or self.limits is not None}
+        ports = {same: self.ports if same in used else None for same in numbers}
+        places = [(same, rows) for same in numbers for rows in several]
+        calls = [(self.samples, rows, same, tuple(numbers[same]), ports[same], self.limits) for same, rows in places]
+        for (same, rows), path in zip(places, self.ask(choose_path, calls), strict=True):
+            for number, elements in zip(numbers[same], path, strict=True):
+                self._elements[same, number, rows.tobytes()] = elements
+
+    def elements(self, recipe: Recipe, rows: Rows) -> Elements:
+        """Return the elements that a recipe keeps by some rows."""
+        if recipe.inputs == "joints":
+            return ()
+        place = *_placement(recipe), rows.tobytes()
+        if place not in self._elements:
+            self.choose([recipe], [rows])
+        return self._elements[place]
+
+    def rank(self, places: Sequence[tuple[Elements, Rows]]) -> None:
+        """Rank the joints, given elements, by rows."""
+        calls = [(self.samples, rows, elements) for elements, rows in places]
+        for (elements, rows), order in zip(places, self.ask(rank_joints, calls), strict=True):
+            self._orders[elements, rows.tobytes()] = order
+
+    def joints(self, elements: Elements, rows: Rows, most: int | None) -> Columns:
+        """Return the best joints, ascending, at most `most`, given these elements and rows; None: all."""
+        if most is None or most >= self.n_joints:
+            return tuple(range(self.n_joints))
+        place = elements, rows.tobytes()
+        if place not in self._orders:
+            self.rank([(elements, rows)])
+        return tuple(sorted(self._orders[place][:most]))
+
+
+def _placement(recipe: Recipe) -> tuple[Recipe, float]:
+    """Return all on which the choice of a recipe's elements depends, but for the number of its method; and that."""
+    method = METHODS.named(recipe.placement)
+    joints = recipe.inputs == "both" and (method.uses_joints or recipe.robust)
+    inputs: Inputs = "both" if joints else "switches"
+    same = Recipe(placement=recipe.placement, inputs=inputs, levels=recipe.levels, robust=recipe.robust)
+    return same, float(recipe.keep or 0 if method.by_number else recipe.prune)
+
+
 def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:
     """Return folds of training rows that split no movement, and no group if there are three or more.
 
@@ -46,12 +162,12 @@ def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None 
     groups  (n,) the subject, object or session of each row, if those are left out
     """
     n_trials = len(np.unique(samples.movements))
-    number = next((folds for most, folds in _FOLDS if n_trials < most), 2)
+    n_folds = next((folds for most, folds in _FOLDS if n_trials < most), 2)
     if groups is not None and len(np.unique(groups)) >= _LEAST_GROUPS:
-        return leave_groups_out(groups, "group", number)
+        return leave_groups_out(groups, "group", n_folds)
     if n_trials < 2:
         return []
-    return trial_folds(samples.labels, samples.movements, min(number, n_trials), seed)
+    return trial_folds(samples.labels, samples.movements, min(n_folds, n_trials), seed)
 
 
 def choose_training(
@@ -95,11 +211,11 @@ def choose_training(
         return Fitting(candidates[0].trainer, _values(candidates[0]))
     grouped = groups is not None and len(np.unique(groups)) >= _LEAST_GROUPS
     clusters = groups if grouped and groups is not None else samples.movements
-    together = [list(each) for _, each in groupby(range(len(candidates)), lambda one: _alike(candidates[one]))]
+    together = [list(batch) for _, batch in groupby(range(len(candidates)), lambda one: _alike(candidates[one]))]
     tasks = [(samples, fold, [candidates[one] for one in batch], batch) for fold in folds for batch in together]
     tests: dict[tuple[int, str], _Test] = {}
-    for done, (name, batch, found) in enumerate(in_workers(_tested, tasks, jobs), 1):
-        tests |= {(one, name): test for one, test in zip(batch, found, strict=True)}
+    for done, (name, batch, several) in enumerate(in_workers(_tested, tasks, jobs), 1):
+        tests |= {(one, name): test for one, test in zip(batch, several, strict=True)}
         if report is not None:
             report(done, len(tasks) + 1)
     scores = [_joined([tests[one, fold.name] for fold in folds]) for one in range(len(candidates))]
@@ -159,42 +275,36 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
     learning, test = samples.rows(fold.train), samples.rows(fold.test)
     _, first, trial = np.unique(test.trials, return_index=True, return_inverse=True)
     weights, held = 1.0 / np.bincount(trial)[trial], ~test.is_none[first]
-    found = []
-    for model in _models(trainings, learning):
+    if len(trainings) == 1:
+        models: tuple[Model, ...] = (trainings[0].train(learning),)
+    else:
+        rounds = [int(training.settings["rounds"] or 0) for training in trainings]
+        models = trainings[int(np.argmax(rounds))].stages(learning, rounds)
+    tests = []
+    for model in models:
         scores = model.scores(test.switches, test.codes)
         predicted = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
         loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
-        found.append(
+        tests.append(
             _Test(
                 fold.test[first[held]],
                 (predicted == test.labels[first])[held],
                 len(first),
                 loss,
-                _table_rows(collapse(model, samples.n_switches)),
+                # The scores of the inputs in use: of each switch, bin, cell of a grid, and line.
+                sum(term.n_rows for term in collapse(model, samples.n_switches).core_terms if term.largest > 0),
             )
         )
-    return fold.name, batch, found
+    return fold.name, batch, tests
 
 
-def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
-    if len(trainings) == 1:
-        yield trainings[0].train(samples)
-    else:
-        rounds = [int(each.settings["rounds"] or 0) for each in trainings]
-        yield from trainings[int(np.argmax(rounds))].stages(samples, rounds)
-
-
-def _table_rows(tables: ScoreTables) -> int:
-    """Return the number of rows of scores for the inputs in use: of each switch, bin, cell of a grid, and line."""
-    return sum(term.n_rows for term in tables.core_terms if term.largest > 0)
-
-
-def _error(gains: NDArray[np.intp], clusters: Rows) -> float:
+def _error(gains: NDArray[np.intp], clusters: NDArray[np.generic]) -> float:
     """Return the standard error of the mean of integers (T,) in clusters, robust to correlation within them."""
-    sizes, own, total = np.bincount(clusters), np.zeros(clusters.max() + 1, np.int64), int(gains.sum())
-    np.add.at(own, clusters, gains)
-    squares = int(((len(gains) * own - sizes * total) ** 2).sum())
-    return sqrt(squares * len(sizes) / max(1, len(sizes) - 1)) / len(gains) ** 2
+    _, number, sizes = np.unique(clusters, return_inverse=True, return_counts=True)
+    sums = np.zeros(len(sizes), np.int64)
+    np.add.at(sums, number, gains)
+    squares = int(((len(gains) * sums - sizes * int(gains.sum())) ** 2).sum())
+    return round(sqrt(squares * len(sizes) / max(1, len(sizes) - 1)) / len(gains) ** 2, 6)
 
 
 def _fitting(
@@ -206,33 +316,34 @@ def _fitting(
     n_folds: int,
 ) -> Fitting:
     # All candidates are tested on the same trials.
-    cluster = np.unique(clusters[scores[0].first], return_inverse=True)[1]
+    clusters = clusters[scores[0].first]
     best = min(range(len(scores)), key=lambda one: (-int(scores[one].hits.sum()), scores[one].loss))
-    found = []
-    for candidate, score in zip(candidates, scores, strict=True):
-        lost = scores[best].hits.astype(np.intp) - score.hits
-        found.append(
+    compared = []
+    for training, score in zip(candidates, scores, strict=True):
+        gains = scores[best].hits.astype(np.intp) - score.hits
+        compared.append(
             Compared(
-                candidate.trainer,
-                _values(candidate),
+                training.trainer,
+                _values(training),
                 correct=int(score.hits.sum()),
                 total=len(score.hits),
-                error=round(_error(score.hits.astype(np.intp), cluster), 6),
+                error=_error(score.hits.astype(np.intp), clusters),
                 loss=score.loss,
-                behind=round(int(lost.sum()) / len(lost), 6),
-                behind_error=round(_error(lost, cluster), 6),
+                behind=round(int(gains.sum()) / len(gains), 6),
+                behind_error=_error(gains, clusters),
                 rows=score.rows,
             )
         )
-    near = [one for one, each in enumerate(found) if each.behind <= each.behind_error]
-    small = max(_SMALL / n_classes, _LARGER * min(found[one].rows for one in near))
-    chosen = min((one for one in near if found[one].rows <= small), key=lambda one: (found[one].loss, one))
+    near = [number for number, other in enumerate(compared) if other.behind <= other.behind_error]
+    small = max(_SMALL / n_classes, _LARGER * min(compared[number].rows for number in near))
+    chosen = min(
+        (number for number in near if compared[number].rows <= small),
+        key=lambda number: (compared[number].loss, number),
+    )
+    # Of each trainer, the most accurate.
     shown = {
-        min(
-            (one for one, each in enumerate(found) if each.trainer == name),
-            key=lambda one: (-found[one].correct, found[one].loss, one),
-        )
-        for name in {each.trainer for each in found}
+        other.trainer: number
+        for number, other in sorted(enumerate(compared), key=lambda pair: (pair[1].correct, -pair[1].loss, -pair[0]))
     }
     return Fitting(
         candidates[chosen].trainer,
@@ -240,14 +351,14 @@ def _fitting(
         of=of,
         folds=n_folds,
         tried=len(candidates),
-        compared=tuple(found[one] for one in sorted(shown | {chosen})),
-        why=_why(found, best, chosen),
+        compared=tuple(compared[number] for number in sorted({*shown.values(), chosen})),
+        why=_why(compared, best, chosen),
     )
 
 
-def _why(found: list[Compared], best: int, chosen: int) -> str:
-    one, top = found[chosen], found[best]
-    rate = f"{100 * one.rate:.1f} % of {one.total} trials in inner folds"
+def _why(compared: list[Compared], best: int, chosen: int) -> str:
+    top = compared[best]
+    rate = f"{100 * compared[chosen].rate:.1f} % of {top.total} trials in inner folds"
     if chosen == best:
         return f"it has the highest accuracy, {rate}"
     return (

@@ -1,12 +1,20 @@
-"""Folds: stratified exactly as in Weka 3.6, and folds that keep related rows on the same side of the split."""
+"""Folds: stratified exactly as in Weka 3.6, or keeping related rows on the same side of the split; the populations that
+they divide, and the rows from which a placement is chosen.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thenar.drivers.errors import ThenarError
+from thenar.runtime.manifest import Of
+
+from ..recordings.graspset import GraspSet
+from ..samples import Samples
+from ..text import INDEPENDENT
 
 
 class EvaluationError(ThenarError, ValueError):
@@ -42,11 +50,11 @@ class JavaRandom:
             if drawn - remainder + bound <= 1 << 31:
                 return remainder
 
-    def shuffle(self, items: list[int]) -> None:
-        """Shuffle `items` in place: for i from the end down to 1, swap items i and nextInt(i + 1)."""
-        for i in range(len(items) - 1, 0, -1):
+    def shuffle(self, order: list[int]) -> None:
+        """Shuffle a list in place: for i from the end down to 1, swap items i and nextInt(i + 1)."""
+        for i in range(len(order) - 1, 0, -1):
             j = self.next_int(i + 1)
-            items[i], items[j] = items[j], items[i]
+            order[i], order[j] = order[j], order[i]
 
 
 Rows = NDArray[np.intp]
@@ -77,7 +85,8 @@ def weka_folds(labels: ArrayLike, n_folds: int, seed: int) -> list[Fold]:
     random = JavaRandom(seed)
     order = list(range(len(values)))
     random.shuffle(order)
-    order = _dealt(_grouped(order, values), n_folds)
+    grouped = _grouped(order, values)
+    order = [row for start in range(n_folds) for row in grouped[start::n_folds]]
     return [_cut(order, n_folds, fold, random) for fold in range(n_folds)]
 
 
@@ -89,8 +98,8 @@ def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed:
     grasp, since rows without one have the highest label. Raises EvaluationError as `weka_folds` does.
     """
     _, first, number = np.unique(trials, return_index=True, return_inverse=True)
-    least = np.asarray(labels)[first]
-    np.minimum.at(least, number, labels)
+    values = np.asarray(labels)[first]
+    np.minimum.at(values, number, labels)
     order = np.argsort(first)
     number = np.argsort(order)[number]
     rows, starts = np.argsort(number, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(number))])
@@ -99,7 +108,7 @@ def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed:
     def expanded(chosen: Rows) -> Rows:
         return np.concatenate([rows[starts[trial] : starts[trial + 1]] for trial in chosen.tolist()])
 
-    folds = weka_folds(least[order], n_folds, seed)
+    folds = weka_folds(values[order], n_folds, seed)
     return [Fold(expanded(fold.train), expanded(fold.test), fold.name) for fold in folds]
 
 
@@ -115,7 +124,6 @@ def check_cut(n_parts: int, n_folds: int, what: str) -> None:
 
 def _grouped(order: list[int], labels: Sequence[object]) -> list[int]:
     """Bring rows of one class together by Weka's swaps, classes by first appearance. Not stable: swaps move others."""
-    order = list(order)
     placed = 1
     while placed < len(order):
         label = labels[order[placed - 1]]
@@ -127,17 +135,13 @@ def _grouped(order: list[int], labels: Sequence[object]) -> list[int]:
     return order
 
 
-def _dealt(order: list[int], n_folds: int) -> list[int]:
-    return [row for start in range(n_folds) for row in order[start::n_folds]]
-
-
 def _cut(order: list[int], n_folds: int, fold: int, random: JavaRandom) -> Fold:
     size, larger = divmod(len(order), n_folds)
     start = fold * size + min(fold, larger)
     stop = start + size + (fold < larger)
-    train = order[:start] + order[stop:]
-    random.shuffle(train)
-    return Fold(np.array(train, dtype=np.intp), np.array(order[start:stop], dtype=np.intp), str(fold + 1))
+    test, order = order[start:stop], order[:start] + order[stop:]
+    random.shuffle(order)
+    return Fold(np.array(order, dtype=np.intp), np.array(test, dtype=np.intp), str(fold + 1))
 
 
 def leave_one_out(groups: NDArray[np.str_], what: str) -> list[Fold]:
@@ -157,11 +161,11 @@ def leave_one_out(groups: NDArray[np.str_], what: str) -> list[Fold]:
 _MOST_GROUPS = 10
 
 
-def leave_groups_out(names: NDArray[np.generic], what: str, most: int = _MOST_GROUPS) -> list[Fold]:
-    """Return the folds of `leave_one_out`; for more than `most` names in names (n,), `most` folds of several names."""
-    found, number = np.unique(names, return_inverse=True)
-    parts = names if len(found) <= most else number % most
-    return leave_one_out(parts.astype(np.str_), what)
+def leave_groups_out(names: NDArray[np.generic], what: str, n_folds: int = _MOST_GROUPS) -> list[Fold]:
+    """Return the folds of `leave_one_out`; for more than `n_folds` names in names (n,), that many of several names."""
+    several, number = np.unique(names, return_inverse=True)
+    groups = names if len(several) <= n_folds else number % n_folds
+    return leave_one_out(groups.astype(np.str_), what)
 
 
 def block_folds(trials: NDArray[np.int64], n_folds: int) -> list[Fold]:
@@ -182,12 +186,158 @@ def block_folds(trials: NDArray[np.int64], n_folds: int) -> list[Fold]:
 
 
 def _fold(tested: NDArray[np.bool_], name: str) -> Fold:
-    return Fold(train=_where(~tested), test=_where(tested), name=name)
-
-
-def _where(mask: NDArray[np.bool_]) -> Rows:
-    return np.flatnonzero(mask)
+    return Fold(np.flatnonzero(~tested), np.flatnonzero(tested), name)
 
 
 def _range(block: NDArray[np.int64]) -> str:
     return f"trials {block[0]}-{block[-1]}" if len(block) > 1 else f"trial {block[0]}"
+
+
+Scheme = Literal["trial", "subject", "object", "session", "block"]
+
+# What the accuracies of each scheme are of.
+OF: dict[Scheme, Of] = {
+    "trial": "within subject",
+    "subject": "new subject",
+    "object": "new object",
+    "session": "new session",
+    "block": "within subject",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Population:
+    """One column of the tables.
+
+    name     the subject whose rows are tested
+    rows     all rows in training or test
+    grasps   class numbers present in `rows`, ascending
+    repeats  folds of each repeat
+    """
+
+    name: str
+    rows: Rows
+    grasps: tuple[int, ...]
+    repeats: tuple[tuple[Fold, ...], ...]
+
+    @property
+    def folds(self) -> list[Fold]:
+        """The folds of all repeats."""
+        return [fold for folds in self.repeats for fold in folds]
+
+
+def populations_of(
+    grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int, seed: int
+) -> tuple[Population, ...]:
+    """Return one population per subject.
+
+    trial, block, object, session: only the subject's own rows are trained on, and all are tested once per repeat.
+    subject: the rows of all others are trained on. Only `trial` has a seed, and so repeats (seed, seed + 1, ...). No
+    scheme has rows of one trial on both sides of a fold. Raises EvaluationError naming a subject that cannot be split.
+    """
+    subjects, everyone, samples = grasp_set.subjects, np.arange(len(grasp_set)), Samples.of(grasp_set)
+
+    def population(name: str, rows: Rows, repeats: Sequence[Sequence[Fold]]) -> Population:
+        grasps = tuple(np.unique(samples.labels[rows]).tolist())
+        return Population(name, rows, grasps, tuple(tuple(fold.of(rows) for fold in folds) for folds in repeats))
+
+    def cut(rows: Rows) -> list[list[Fold]]:
+        """Return the repeats of folds of one subject's rows, numbered within these."""
+        if scheme in ("object", "session"):
+            groups = grasp_set.objects if scheme == "object" else grasp_set.sessions
+            return [leave_one_out(groups[rows], scheme)]
+        if scheme == "block":
+            return [block_folds(grasp_set.trials[rows], n_folds)]
+        labels, trials = samples.labels[rows], samples.trials[rows]
+        return [trial_folds(labels, trials, n_folds, seed + repeat) for repeat in range(repeats)]
+
+    if scheme == "subject":
+        return tuple(population(fold.name, everyone, [[fold]]) for fold in leave_one_out(subjects, "subject"))
+    several = []
+    for name in np.unique(subjects).tolist():
+        rows = np.flatnonzero(subjects == name)
+        try:
+            several.append(population(name, rows, cut(rows)))
+        except EvaluationError as reason:
+            raise EvaluationError(f"subject {name}: {reason}") from reason
+    return tuple(several)
+
+
+def groups_of(grasp_set: GraspSet, scheme: Scheme) -> NDArray[np.str_] | None:
+    """Return the group (n,) that each row is left out with, None if that is its trial; sessions are per subject."""
+    if scheme == "session":
+        return np.char.add(np.char.add(grasp_set.subjects, "\n"), grasp_set.sessions)
+    if scheme == "object":
+        return grasp_set.objects
+    return grasp_set.subjects if scheme == "subject" else None
+
+
+ProtocolName = Literal["paper", "nested"]
+
+
+@dataclass(frozen=True, slots=True)
+class Protocol:
+    """A protocol's name, and one sentence on its meaning."""
+
+    name: ProtocolName
+    meaning: str
+
+    def may_choose(self, population: Population, fold: Fold) -> Rows:
+        """Return the rows from which the placement for this fold may be chosen."""
+        return population.rows if self.name == "paper" else fold.train
+
+    def may_choose_pooled(self, everyone: Rows, fold: Fold) -> Rows:
+        """Return the rows from which a placement common to all subjects may be chosen for this fold."""
+        return everyone if self.name == "paper" else np.setdiff1d(everyone, fold.test)
+
+
+PAPER = Protocol(
+    "paper",
+    "The placement is chosen once, from all rows, test rows included, as the paper did: optimistic.",
+)
+NESTED = Protocol(
+    "nested",
+    "The placement is chosen anew inside each training fold, without the test rows: the accuracy on new grasps.",
+)
+PROTOCOLS = (PAPER, NESTED)
+
+
+def concerns(grasp_set: GraspSet, populations: tuple[Population, ...], scheme: Scheme, n_folds: int) -> tuple[str, ...]:
+    """Return warnings: that grasps are simulated, that rows are stated to be independent, and about grasp types that
+    are the only one, too rare for the folds, or tested but never trained.
+    """
+    origin, samples = grasp_set.simulated, Samples.of(grasp_set)
+    texts = [f"these grasps are simulated ({origin}): the rates are not those of recorded ones"] if origin else []
+    texts += [INDEPENDENT] if grasp_set.independent else []
+    texts += [
+        f"subject {population.name}: every row is of {samples.grasps[population.grasps[0]]}, the only type"
+        for population in populations
+        if len(population.grasps) == 1
+    ]
+    if scheme == "trial":
+        texts += [text for population in populations for text in _rare(samples, population, n_folds)]
+    return (*texts, *(text for population in populations for text in _untrained(samples, population)))
+
+
+def _rare(samples: Samples, population: Population, n_folds: int) -> list[str]:
+    first = np.unique(samples.trials[population.rows], return_index=True)[1]
+    counts = np.bincount(samples.labels[population.rows][first], minlength=samples.n_classes)
+    return [
+        f"subject {population.name} has {counts[label]} trial(s) of {samples.grasps[label]}: "
+        f"fewer than the {n_folds} folds, so some folds do not test it"
+        for label in population.grasps
+        if counts[label] < n_folds
+    ]
+
+
+def _untrained(samples: Samples, population: Population) -> list[str]:
+    """Name the grasp types that some fold tests without training on them, with the number of rows lost."""
+    lost = np.zeros(samples.n_classes, np.intp)
+    for fold in population.repeats[0]:
+        unknown = ~np.isin(samples.labels[fold.test], samples.labels[fold.train])
+        np.add.at(lost, samples.labels[fold.test][unknown], 1)
+    return [
+        f"{lost[label]} row(s) of {samples.grasps[label]} of subject {population.name} are tested by a fold that "
+        "trains no such row: they cannot be recognised"
+        for label in np.flatnonzero(lost)
+    ]

@@ -1,7 +1,7 @@
 """Plan the fits for each table (inputs, placement, folds), and run each distinct fit once."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -11,47 +11,38 @@ from numpy.typing import NDArray
 from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import AUTO, Recipe, changed
 
-from ..placement.elements import Elements, bits_of, elements_of
-from ..placement.joints import joint_order
+from ..placement.elements import Elements
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.methods.filters import random_placement
-from ..placement.placement import Placer
-from ..recordings.graspset import GraspSet
+from ..placement.placement import InputSelection
 from ..samples import Columns, Samples
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
-from .choosing import choose_training
-from .folds import Fold, Rows
-from .populations import Population, Protocol, Scheme, groups_of
+from .choosing import InputChoices, choose_training
+from .folds import Fold, Population, Protocol, Rows
 
 Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
-# For each trainer, the candidates among which each fit chooses.
-Ways = Mapping[str, tuple[Training, ...]]
+# For each learner of a fit, the trainings among which each fit chooses.
+Candidates = Mapping[str, tuple[Training, ...]]
 # Classifiers of scikit-learn with its own settings, neighbours weighted by distance: to compare the trainers with.
 CLASSIFIERS = ("logistic-regression", "5-nearest-neighbours")
+REFERENCE = "logitboost"  # the trainer with which the others are compared
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Data:
-    """All rows from which fits take elements and joints, with their labels (n,) in the taxonomy.
-
-    groups (n,) are what each row is left out with, None: its trial.
+def learners() -> tuple[str, ...]:
+    """Return the methods in the table of trainers: REFERENCE, the other trainers that can be chosen automatically, and
+    CLASSIFIERS.
     """
+    return tuple(dict.fromkeys([REFERENCE, *(name for name in TRAINERS if TRAINERS[name].tried), *CLASSIFIERS]))
 
-    samples: Samples
-    labels: Labels
-    groups: NDArray[np.str_] | None
 
-    @classmethod
-    def of(cls, grasp_set: GraspSet, scheme: Scheme = "trial") -> "Data":
-        """Return the rows of a set."""
-        return cls(Samples.of(grasp_set), grasp_set.labels, groups_of(grasp_set, scheme))
-
-    @property
-    def trials(self) -> Rows:
-        """The trial (n,) of each row."""
-        return self.samples.trials
+def candidates_of(recipe: Recipe) -> Candidates:
+    """Return the candidates of each learner: requested settings apply to the trainers that have them."""
+    trainers = dict.fromkeys([*learners(), recipe.trainer])
+    recipes = {name: recipe if name == recipe.trainer else Recipe(trainer=name) for name in trainers}
+    compared = {name: Training.candidates(recipes[name]) for name in trainers if name not in CLASSIFIERS}
+    return {"": (Training.of(recipe),), **compared}
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,35 +59,39 @@ class FoldFit:
     grasps: tuple[int, ...]
     learner: str = ""
 
-    def read(self, data: Data) -> Samples:
-        """Return all rows with only these inputs."""
-        return bits_of(data.samples.with_joints(self.joints), self.elements)
+    def read(self, samples: Samples, rows: Rows) -> Samples:
+        """Return some rows of a set with only these inputs."""
+        return InputSelection.of(self.elements, self.joints).read(samples.rows(rows))
+
+    def is_blind(self, samples: Samples) -> bool:
+        """Return whether none of the inputs varies among the training rows."""
+        return not self.read(samples, self.fold.train).varies
 
 
-def predictions(data: Data, fit: FoldFit, training: Training, ways: Ways | None = None) -> Labels:
-    """Return the labels predicted for the fold's test rows, by `training` or the fit's learner among `ways`.
+def predictions(
+    samples: Samples, fit: FoldFit, candidates: Candidates, groups: NDArray[np.str_] | None = None
+) -> Labels:
+    """Return the labels predicted for the fold's test rows, by the best of the learner's candidates.
 
-    A blind fit predicts the most frequent label of the training rows (the lowest of several), which is the accuracy to
-    beat.
+    A blind fit predicts the most frequent label of the training rows, which is the accuracy to beat. `groups` (n,) are
+    what each row is left out with, None: its trial.
     """
     grasps, rows = np.array(fit.grasps, dtype=np.intp), fit.fold.train
-    trained = np.searchsorted(grasps, data.labels[rows])
-    if is_blind(data, fit):
-        return np.full(len(fit.fold.test), grasps[np.bincount(trained).argmax()])
-    read = fit.read(data)
-    learning = replace(read.rows(rows), labels=trained, grasps=tuple(map(str, fit.grasps)))
-    test = read.rows(fit.fold.test)
+    read, test = fit.read(samples, rows), fit.read(samples, fit.fold.test)
+    if not read.varies:
+        return np.full(len(fit.fold.test), read.most_frequent)
+    learning = replace(read, labels=np.searchsorted(grasps, read.labels), grasps=tuple(map(str, fit.grasps)))
     if fit.learner in CLASSIFIERS:
-        return grasps[_classified(fit.learner, learning, test.inputs)]
+        return grasps[_classified(fit.learner, learning, test)]
+    (training,) = candidates[""]
     if fit.learner:
-        groups = None if data.groups is None else data.groups[rows]
-        fitting = choose_training(learning, (ways or {})[fit.learner], groups=groups)
+        fitting = choose_training(learning, candidates[fit.learner], groups=None if groups is None else groups[rows])
         training = Training.chosen(fitting, masked=training.masked)
     return grasps[winners(training.train(learning).scores(test.switches, test.codes))]
 
 
-def _classified(name: str, learning: Samples, X: NDArray[np.generic]) -> Labels:
-    """Return the class numbers that one of CLASSIFIERS, on standardised inputs, predicts for rows X (n, d)."""
+def _classified(name: str, learning: Samples, test: Samples) -> Labels:
+    """Return the class numbers that one of CLASSIFIERS, on standardised inputs, predicts for test rows (n,)."""
     from sklearn.linear_model import LogisticRegression
     from sklearn.neighbors import KNeighborsClassifier
     from sklearn.pipeline import make_pipeline
@@ -104,26 +99,21 @@ def _classified(name: str, learning: Samples, X: NDArray[np.generic]) -> Labels:
 
     # scikit-learn's classifiers cannot be fitted to a single class.
     if (learning.labels == learning.labels[0]).all():
-        return np.full(len(X), learning.labels[0])
+        return np.full(len(test.labels), learning.labels[0])
     logistic = name == "logistic-regression"
     classifier = LogisticRegression(max_iter=10_000) if logistic else KNeighborsClassifier(5, weights="distance")
-    made = make_pipeline(StandardScaler(), classifier).fit(learning.inputs.astype(np.float64), learning.labels)
-    return np.asarray(made.predict(X.astype(np.float64)), dtype=np.intp)
-
-
-def is_blind(data: Data, fit: FoldFit) -> bool:
-    """Return whether none of a fit's inputs varies among its training rows."""
-    inputs = fit.read(data).inputs[fit.fold.train]
-    return not (inputs != inputs[0]).any()
+    pipeline = make_pipeline(StandardScaler(), classifier).fit(learning.inputs.astype(np.float64), learning.labels)
+    return np.asarray(pipeline.predict(test.inputs.astype(np.float64)), dtype=np.intp)
 
 
 def run_fits(
-    data: Data,
+    samples: Samples,
     fits: Iterable[FoldFit],
-    training: Training,
+    candidates: Candidates,
+    groups: NDArray[np.str_] | None = None,
+    *,
     jobs: int = -1,
     progress: Progress | None = None,
-    ways: Ways | None = None,
 ) -> dict[FoldFit, Labels]:
     """Return the predictions of every fit. Equal fits are run once; `progress(done, total)` is called after each.
 
@@ -132,17 +122,16 @@ def run_fits(
     """
     todo = list(dict.fromkeys(fits))
     results: dict[FoldFit, Labels] = {}
-    tasks = ((number, data, fit, training, ways) for number, fit in enumerate(todo))
-    for number, found in in_workers(_numbered, tasks, jobs):
-        results[todo[number]] = found
+    tasks = ((number, (samples, fit, candidates, groups)) for number, fit in enumerate(todo))
+    for number, labels in in_workers(_numbered, tasks, jobs):
+        results[todo[number]] = labels
         if progress is not None:
             progress(len(results), len(todo))
     return results
 
 
-def _numbered(task: tuple[int, Data, FoldFit, Training, Ways | None]) -> tuple[int, Labels]:
-    number, data, fit, training, ways = task
-    return number, predictions(data, fit, training, ways)
+def _numbered(task: tuple[int, tuple[Any, ...]]) -> tuple[int, Labels]:
+    return task[0], predictions(*task[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,20 +144,15 @@ class Composition:
     selected: bool
     others: bool
 
-    @property
-    def needs_placement(self) -> bool:
-        """Whether its columns depend on the selected switches."""
-        return self.selected != self.others
+    def __str__(self) -> str:
+        """Return "II Angle + Sel-Co"."""
+        return f"{self.name} {self.what}"
 
-    @property
-    def has_switches(self) -> bool:
-        """Whether it uses any switches."""
-        return self.selected or self.others
-
-    def elements(self, placement: Elements, every: Elements) -> Elements:
+    def elements(self, placement: Elements, known: Elements) -> Elements:
         """Return the elements that it uses, ascending, given the selected and the available ones."""
         kept = set(placement)
-        return tuple(sorted([*kept] * self.selected + [one for one in every if one not in kept] * self.others))
+        others = [element for element in known if element not in kept]
+        return tuple(sorted([*kept] * self.selected + others * self.others))
 
 
 COMPOSITIONS = (
@@ -185,37 +169,22 @@ ANGLE_SELECTED, ANGLE, ALL_SWITCHES, SELECTED = COMPOSITIONS[1], COMPOSITIONS[3]
 
 def available(n_switches: int, n_joints: int) -> tuple[Composition, ...]:
     """Return the compositions that a set has inputs for: without switches only IV, without joints V, VI and VII."""
-    return tuple(c for c in COMPOSITIONS if (n_joints or not c.angle) and (n_switches or not c.has_switches))
+    return tuple(c for c in COMPOSITIONS if (n_joints or not c.angle) and (n_switches or not (c.selected or c.others)))
 
 
 TableName = Literal["compositions", "generality", "pruning", "baselines", "trainers", "joints"]
 Select = Callable[[Population, Fold], Elements]
 
 BASELINES = ("cmim", "mutual-information")
-REFERENCE = "logitboost"  # the trainer with which the others are compared
 JOINTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18)  # numbers of kept joints, without switches
 DRAWS = 5  # random placements to compare with
-
-
-def learners() -> tuple[str, ...]:
-    """Return the methods in the table of trainers: REFERENCE, the other trainers that can be chosen automatically, and
-    CLASSIFIERS.
-    """
-    return tuple(dict.fromkeys([REFERENCE, *(name for name in TRAINERS if TRAINERS[name].tried), *CLASSIFIERS]))
-
-
-def ways_of(recipe: Recipe) -> Ways:
-    """Return the candidates of each trainer, and of AUTO: requested settings apply to the trainers that have them."""
-    trainers = [name for name in learners() if name not in CLASSIFIERS]
-    own = {name: recipe if name == recipe.trainer else Recipe(trainer=name) for name in (*trainers, recipe.trainer)}
-    return {name: Training.candidates(each) for name, each in own.items()}
 
 
 @dataclass(frozen=True, slots=True)
 class CellPlan:
     """The fits of one cell: `runs` of folds, one per repeat; a cell of random draws has all repeats of each draw."""
 
-    part: Population
+    population: Population
     runs: tuple[tuple[FoldFit, ...], ...]
 
     @property
@@ -237,163 +206,135 @@ class RowPlan:
 class Planner:
     """Plans the tables for populations of one set.
 
-    samples  of all rows; placer: chooses elements from the training rows, and its recipe says how many joints
-             classifiers get, chosen from the training rows, given the switches; baselines: methods to compare with.
-             A placement is chosen once from the same rows.
+    choices  of elements and joints, from training rows; recipe: how they are chosen, and how many joints classifiers
+             get, given the switches; baselines: methods to compare with.
     """
 
-    parts: tuple[Population, ...]
-    samples: Samples
-    placer: Placer
+    populations: tuple[Population, ...]
+    choices: InputChoices
+    recipe: Recipe
     prune_list: tuple[int, ...] = ()
     baselines: tuple[str, ...] = BASELINES
-    _chosen: dict[tuple[str, int | None, int, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
-    _elements: dict[bytes, Elements] = field(default_factory=dict, init=False, repr=False)
-    _joint_orders: dict[tuple[Elements, bytes], Columns] = field(default_factory=dict, init=False, repr=False)
 
     @property
-    def recipe(self) -> Recipe:
-        """The recipe of the classifiers."""
-        return self.placer.recipe
+    def samples(self) -> Samples:
+        """All rows."""
+        return self.choices.samples
 
     def table(self, name: TableName, protocol: Protocol) -> list[RowPlan]:
         """Return the rows of a table under a protocol."""
         rows: dict[TableName, Callable[[Protocol], list[RowPlan]]] = {
-            "compositions": self._compositions,
             "generality": self._generality,
             "pruning": self._pruning,
             "baselines": self._baselines,
             "trainers": self._trainers,
-            "joints": lambda _: self._best_joints(),
         }
-        return rows[name](protocol)
-
-    def _compositions(self, protocol: Protocol) -> list[RowPlan]:
-        chosen = partial(self.own, protocol)
-        kinds = available(self._n_switches, self.n_joints)
-        return [self._row(kind.name, kind.what, kind, chosen) for kind in kinds]
+        if name in rows:
+            return rows[name](protocol)
+        if name == "joints":
+            sizes = [*(size for size in JOINTS if size < self.choices.n_joints), self.choices.n_joints]
+            return [self._row(str(n), f"the best {n} joints", ANGLE, lambda *_: (), most=n) for n in sizes]
+        kinds = available(self._n_switches, self.choices.n_joints)
+        return [self._row(kind.name, kind.what, kind, partial(self.placement, protocol)) for kind in kinds]
 
     def _generality(self, protocol: Protocol) -> list[RowPlan]:
-        def chosen_by(giver: Population, part: Population, fold: Fold) -> Elements:
+        def chosen_by(giver: Population, population: Population, fold: Fold) -> Elements:
             # Another subject's placement has never seen this subject's rows: both protocols allow it.
-            own = part is giver
-            return self.own(protocol, part, fold) if own else self.chosen(giver.rows)
+            return self.chosen(protocol.may_choose(population, fold) if population is giver else giver.rows)
 
         return [
             self._row(giver.name, f"placement of subject {giver.name}", SELECTED, partial(chosen_by, giver))
-            for giver in self.parts
+            for giver in self.populations
         ]
 
     def _pruning(self, protocol: Protocol) -> list[RowPlan]:
-        everyone = np.unique(np.concatenate([part.rows for part in self.parts]))
+        everyone = np.unique(np.concatenate([population.rows for population in self.populations]))
 
-        def pooled(least: int, part: Population, fold: Fold) -> Elements:
+        def pooled(least: int, population: Population, fold: Fold) -> Elements:
             return self.chosen(protocol.may_choose_pooled(everyone, fold), prune=least)
 
-        everything = self._row("all", "all switches", ALL_SWITCHES, lambda part, fold: ())
+        everything = self._row("all", "all switches", ALL_SWITCHES, lambda population, fold: ())
         pruned = [self._row(str(s), f"S = {s}", SELECTED, partial(pooled, s)) for s in self.prune_list]
         return [everything, *pruned]
 
     def _baselines(self, protocol: Protocol) -> list[RowPlan]:
-        def baseline(name: str, part: Population, fold: Fold) -> Elements:
-            number = len(self.own(protocol, part, fold))
-            return self.chosen(protocol.may_choose(part, fold), placement=name, keep=number or None, prune=0)
+        def baseline(name: str, population: Population, fold: Fold) -> Elements:
+            number = len(self.placement(protocol, population, fold))
+            return self.chosen(protocol.may_choose(population, fold), placement=name, keep=number or None, prune=0)
 
-        def drawn(draw: int, part: Population, fold: Fold) -> Elements:
-            every = self.elements(fold.train)
-            places = random_placement(len(every), len(self.own(protocol, part, fold)), self.recipe.seed + draw)
-            return tuple(every[place] for place in places)
+        def drawn(draw: int, population: Population, fold: Fold) -> Elements:
+            elements, number = self.elements(fold.train), len(self.placement(protocol, population, fold))
+            return tuple(elements[place] for place in random_placement(len(elements), number, self.recipe.seed + draw))
+
+        def random(population: Population) -> CellPlan:
+            cells = (self.cell(population, SELECTED, partial(drawn, draw)) for draw in range(DRAWS))
+            return CellPlan(population, tuple(run for cell in cells for run in cell.runs))
 
         recipe = METHODS.named(self.recipe.placement)
         what = "the paper's placement" if recipe.name == PAPERS else recipe.help
         baselines = [METHODS.named(name) for name in self.baselines if name != recipe.name]
-        draws = [self._row("random", f"mean of {DRAWS} draws", SELECTED, partial(drawn, draw)) for draw in range(DRAWS)]
         return [
-            self._row(recipe.title, what, SELECTED, partial(self.own, protocol)),
-            *(self._row(each.title, each.help, SELECTED, partial(baseline, each.name)) for each in baselines),
-            replace(draws[0], cells=tuple(map(_joined, zip(*(draw.cells for draw in draws), strict=True)))),
+            self._row(recipe.title, what, SELECTED, partial(self.placement, protocol)),
+            *(self._row(other.title, other.help, SELECTED, partial(baseline, other.name)) for other in baselines),
+            RowPlan("random", f"mean of {DRAWS} draws", tuple(map(random, self.populations))),
         ]
 
     def _trainers(self, protocol: Protocol) -> list[RowPlan]:
-        chosen = partial(self.own, protocol)
+        chosen = partial(self.placement, protocol)
         # Choosing settings takes as long as many fits: a single repeat is run.
-        once = replace(self, parts=tuple(replace(part, repeats=part.repeats[:1]) for part in self.parts))
+        once = replace(
+            self,
+            populations=tuple(replace(population, repeats=population.repeats[:1]) for population in self.populations),
+        )
         return [once._row(name, kind.what, kind, chosen, name) for kind in self.kinds for name in learners()]
-
-    def _best_joints(self) -> list[RowPlan]:
-        sizes = [*(size for size in JOINTS if size < self.n_joints), self.n_joints]
-        return [self._row(str(n), f"the best {n} joints", ANGLE, lambda *_: (), most=n) for n in sizes]
 
     @property
     def kinds(self) -> tuple[Composition, ...]:
         """The inputs for comparing trainers: selected switches and joints, as far as available, and each alone."""
-        there = available(self._n_switches, self.n_joints)
+        there = available(self._n_switches, self.choices.n_joints)
         return tuple(kind for kind in (ANGLE_SELECTED, ANGLE, SELECTED) if kind in there)
-
-    @property
-    def n_joints(self) -> int:
-        """The number of joints."""
-        return int(self.samples.codes.shape[1])
 
     @property
     def _n_switches(self) -> int:
         return self.samples.n_switches + int(self.samples.taxels.shape[1])
 
-    def own(self, protocol: Protocol, part: Population, fold: Fold) -> Elements:
-        """Return the recipe's placement for a fold, chosen from the population's own rows as the protocol allows."""
-        return self.chosen(protocol.may_choose(part, fold))
+    def placement(self, protocol: Protocol, population: Population, fold: Fold) -> Elements:
+        """Return the recipe's placement for a fold, chosen from the population's rows as the protocol allows."""
+        return self.chosen(protocol.may_choose(population, fold))
 
     def elements(self, rows: Rows) -> Elements:
         """Return the elements available in these rows."""
-        key = rows.tobytes()
-        if key not in self._elements:
-            self._elements[key] = elements_of(self.samples.rows(rows), self.recipe.levels)
-        return self._elements[key]
+        return self.choices.available(rows, self.recipe.levels)
 
     def chosen(self, rows: Rows, **changes: Any) -> Elements:
         """Return the elements that the recipe, with other choices `changes`, keeps from these rows, in any order."""
         recipe = changed(self.recipe, changes)
-        method = METHODS.named(recipe.placement)
-        if not self._n_switches or (method.by_number and recipe.keep is None):
+        if not self._n_switches or (METHODS.named(recipe.placement).by_number and recipe.keep is None):
             return ()
-        rows = np.sort(rows)
-        key = method.name, recipe.keep, recipe.prune, rows.tobytes()
-        if key not in self._chosen:
-            self._chosen[key] = self.placer.elements(self.samples.rows(rows), **changes)
-        return self._chosen[key]
-
-    def joints(self, rows: Rows, elements: Elements, most: int | None) -> Columns:
-        """Return the best joints, ascending, at most `most`, given these elements and rows; None: all."""
-        if most is None or most >= self.n_joints:
-            return tuple(range(self.n_joints))
-        key = elements, rows.tobytes()
-        if key not in self._joint_orders:
-            self._joint_orders[key] = joint_order(bits_of(self.samples.rows(rows), elements))
-        return tuple(sorted(self._joint_orders[key][:most]))
+        return self.choices.elements(recipe, np.sort(rows))
 
     def _row(
         self, name: str, what: str, kind: Composition, select: Select, learner: str = "", most: int | None = None
     ) -> RowPlan:
-        return RowPlan(name, what, tuple(self.cell(part, kind, select, learner, most) for part in self.parts))
+        return RowPlan(
+            name, what, tuple(self.cell(population, kind, select, learner, most) for population in self.populations)
+        )
 
     def cell(
-        self, part: Population, kind: Composition, select: Select, learner: str = "", most: int | None = None
+        self, population: Population, kind: Composition, select: Select, learner: str = "", most: int | None = None
     ) -> CellPlan:
-        """Return the fits of composition `kind` on every fold of `part`.
+        """Return the fits of composition `kind` on every fold of a population.
 
         `select` returns the placement for a fold, and `most` is the number of joints kept, None: the recipe's.
         """
         learner = learner or (AUTO if self.recipe.trainer == AUTO else "")
 
         def fit(fold: Fold) -> FoldFit:
-            placement = select(part, fold) if kind.needs_placement else ()
+            # All switches depend on no placement.
+            placement = select(population, fold) if kind.selected != kind.others else ()
             elements = kind.elements(placement, self.elements(fold.train) if kind.others else ())
-            joints = self.joints(fold.train, elements, most or self.recipe.keep_joints) if kind.angle else ()
-            return FoldFit(fold, elements, joints, part.grasps, learner)
+            most_joints = most or self.recipe.keep_joints
+            joints = self.choices.joints(elements, fold.train, most_joints) if kind.angle else ()
+            return FoldFit(fold, elements, joints, population.grasps, learner)
 
-        return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
-
-
-def _joined(cells: tuple[CellPlan, ...]) -> CellPlan:
-    """Return one cell that holds the runs of all."""
-    return CellPlan(cells[0].part, tuple(run for cell in cells for run in cell.runs))
+        return CellPlan(population, tuple(tuple(map(fit, folds)) for folds in population.repeats))

@@ -1,5 +1,8 @@
-"""Accuracies: what each is of, whether it counts trials or frames, and its 95 % interval."""
+"""Accuracies: what each is of, whether it counts trials or frames, its 95 % interval, and the optimism of the best of
+many.
+"""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 from statistics import fmean, stdev
@@ -8,12 +11,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thenar.runtime.manifest import Of, Unit
+from thenar.runtime.manifest import Of, Unit, fit_name
 from thenar.runtime.names import list_names
-from thenar.runtime.recipe import Recipe
+from thenar.runtime.recipe import AUTO, Recipe
 
 from ..samples import decided
 from ..text import counted, interval
+from ..trainers.base import Training
 
 UNITS: tuple[Unit, ...] = ("trials", "frames")
 
@@ -25,6 +29,14 @@ _Z = 1.959963984540054  # the normal distribution's quantile of (1 + LEVEL) / 2
 ALIKE: dict[Unit, float] = {"frames": 0.6, "trials": 0.3}
 WEIGHT = 0.5
 
+# Random draws of units.
+DRAWS = 1000
+# For up to this many units, every possible draw is used once instead of random draws.
+_FEW = 4
+# Units whose hits are summed at a time.
+_BLOCK = 2048
+
+Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 
@@ -34,6 +46,14 @@ class RecipeWords:
 
     method: str
     trainer: str
+
+    @classmethod
+    def of(cls, recipe: Recipe) -> Self:
+        """Return the words for classifiers that all have the same placement and trainer."""
+        training, trainer = Training.of(recipe), "chosen from the training rows"
+        if recipe.trainer != AUTO:
+            trainer = fit_name(training.trainer, training.settings)
+        return cls(placement_words(recipe), trainer)
 
     def __str__(self) -> str:
         """Return "placement: id3, S = 0; trainer: logit, penalty 1"."""
@@ -109,22 +129,26 @@ class Rate:
         ValueError
             If there are no rows, or the shapes do not match.
         """
-        given, truth = np.atleast_2d(np.asarray(predicted)), np.asarray(labels)
+        guesses, truth = np.atleast_2d(np.asarray(predicted)), np.asarray(labels)
         _, first, trial = np.unique(np.asarray(trials), return_index=True, return_inverse=True)
-        if not truth.size or given.shape[1:] != truth.shape or trial.shape != truth.shape:
-            shapes = f"predictions {given.shape} of {truth.size} rows with {trial.size} trials"
+        if not truth.size or guesses.shape[1:] != truth.shape or trial.shape != truth.shape:
+            shapes = f"predictions {guesses.shape} of {truth.size} rows with {trial.size} trials"
             raise ValueError(f"{shapes} do not give a rate")
         clusters: Rows = trial
         alike: Unit = "frames"
-        if groups is not None and len(found := np.unique(np.asarray(groups), return_inverse=True)[1]) and found.max():
-            clusters, alike = found, "trials"
+        if groups is not None and (number := np.unique(np.asarray(groups), return_inverse=True)[1]).any():
+            clusters, alike = number, "trials"
         if unit == "trials":
-            given, truth, clusters = decided(given, trial), truth[first], clusters[first]
-        hits = given == truth
-        correct, sizes = tuple(hits.sum(axis=1).tolist()), np.bincount(clusters)
+            guesses, truth, clusters = decided(guesses, trial), truth[first], clusters[first]
+        hits = guesses == truth
+        correct, sizes = hits.sum(axis=1), np.bincount(clusters)
         recognised = np.bincount(clusters, weights=hits.sum(axis=0)).astype(np.intp)
-        bounds = clustered(recognised.tolist(), sizes.tolist(), alike, len(hits))
-        return cls._held(of, unit, correct, len(clusters), len(sizes), bounds, repeats_a_draw)
+        mean = int(correct.sum()) / hits.size
+        ends = [mean, *clustered(recognised.tolist(), sizes.tolist(), alike, len(hits))]
+        if len(correct) > repeats_a_draw:
+            ends += student([fmean(draw) / len(truth) for draw in correct.reshape(-1, repeats_a_draw).tolist()])
+        low, high = max(0.0, min(ends)), min(1.0, max(ends))
+        return cls(of, unit, tuple(correct.tolist()), len(truth), len(sizes), mean, low, high)
 
     @classmethod
     def counted(cls, correct: tuple[int, ...], total: int, *, of: Of, repeats_a_draw: int = 1) -> Self:
@@ -134,27 +158,9 @@ class Rate:
         """
         if not correct or total < 1 or not all(0 <= count <= total for count in correct):
             raise ValueError(f"{correct} correct of {total} trials do not give a rate")
-        wilson = _wilson(sum(correct) / (len(correct) * total), total, _Z)
-        return cls._held(of, "trials", correct, total, total, wilson, repeats_a_draw)
-
-    @classmethod
-    def _held(
-        cls,
-        of: Of,
-        unit: Unit,
-        correct: tuple[int, ...],
-        total: int,
-        over: int,
-        bounds: tuple[float, float],
-        repeats_a_draw: int,
-    ) -> Self:
-        """Return the rate whose interval contains `bounds`, Student's interval over the draws, and the mean."""
-        mean = sum(correct) / (len(correct) * total)
-        ends = [mean, *bounds]
-        starts = range(0, len(correct), repeats_a_draw)
-        if len(starts) > 1:
-            ends += student([fmean(correct[i : i + repeats_a_draw]) / total for i in starts])
-        return cls(of, unit, correct, total, over, mean, max(0.0, min(ends)), min(1.0, max(ends)))
+        trials = np.arange(total)
+        hits = trials < np.array(correct)[:, np.newaxis]
+        return cls.predicted(hits, np.ones_like(trials), trials, of=of, repeats_a_draw=repeats_a_draw)
 
     @property
     def what(self) -> str:
@@ -251,10 +257,10 @@ def design_effect(recognised: list[int], sizes: list[int], unit: Unit, repeats: 
     if not hits or not misses:
         return prior
     # Integers up to the final quotient: exact on every machine.
-    squares = sum((own * total - size * hits) ** 2 for own, size in zip(recognised, sizes, strict=True))
-    found = max(1.0, n_clusters * squares / ((n_clusters - 1) * total * hits * misses))
-    weight = min(hits, misses) / (repeats * found)
-    return (weight * found + WEIGHT * max(prior, found)) / (weight + WEIGHT)
+    squares = sum((correct * total - size * hits) ** 2 for correct, size in zip(recognised, sizes, strict=True))
+    effect = max(1.0, n_clusters * squares / ((n_clusters - 1) * total * hits * misses))
+    weight = min(hits, misses) / (repeats * effect)
+    return (weight * effect + WEIGHT * max(prior, effect)) / (weight + WEIGHT)
 
 
 def _wilson(p: float, n: float, z: float) -> tuple[float, float]:
@@ -274,3 +280,51 @@ def _quantile(freedom: int) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, (1 + LEVEL) / 2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draws:
+    """The accuracies of c contenders on the drawn units of b draws, (b, c), on the others, (b, c), and on all, (c,).
+
+    Bootstrap bias correction of cross-validation, without retraining: units (trials, or subjects) are drawn with
+    replacement. The contender that is best on the drawn units is evaluated on the others (BBC-CV: Tsamardinos,
+    Greasidou and Borboudakis 2018, Machine Learning 107: 1895). Its mean loss of accuracy over the draws, compared with
+    the accuracy of the overall best on all units, is the luck of that one.
+    """
+
+    drawn: Floats
+    left: Floats
+    every: Floats
+
+    @classmethod
+    def of(cls, hits: NDArray[np.intp], units: NDArray[np.intp], seed: int) -> "Draws":
+        """Return the draws for `hits` (c, m), the correct predictions for each of m trials; `units` (m,) are drawn."""
+        units = np.unique(units, return_inverse=True)[1]
+        sizes = np.bincount(units)
+        n = len(sizes)
+        if n <= _FEW:
+            chosen = np.indices((n,) * n).reshape(n, -1).T
+        else:
+            chosen = np.random.default_rng(seed).integers(n, size=(DRAWS, n))
+        # How often each unit is drawn, (b, n).
+        counts = np.array([np.bincount(draw, minlength=n) for draw in chosen], np.int32)
+        sums = np.zeros((2, len(counts), len(hits)))
+        correct = np.array([np.bincount(units, row) for row in hits]).T
+        for start in range(0, n, _BLOCK):
+            block = slice(start, start + _BLOCK)
+            # Integers below 2^53: the sums are exact in any order.
+            sums[0] += counts[:, block].astype(np.float64) @ correct[block]
+            sums[1] += (counts[:, block] == 0).astype(np.float64) @ correct[block]
+        drawn, left = counts @ sizes, (counts == 0) @ sizes
+        judged = left > 0
+        return cls(sums[0, judged] / drawn[judged, None], sums[1, judged] / left[judged, None], correct.sum(axis=0))
+
+    def luck(self, costs: Floats, limits: Sequence[float]) -> list[float]:
+        """Return, for each limit, the luck of the best contender (c,) with a lower cost; ties go to the cheapest."""
+        order = np.argsort(costs, kind="stable")
+        drawn, left, every = self.drawn[:, order], self.left[:, order], self.every[order]
+        lucks = []
+        for size in np.searchsorted(costs[order], limits).tolist():
+            best, draws = every[:size].argmax(), np.arange(len(drawn))
+            lucks.append(max(float((left[:, best] - left[draws, drawn[:, :size].argmax(axis=1)]).mean()), 0.0))
+        return lucks

@@ -20,14 +20,12 @@ from ..recordings.graspset import GraspSet
 from ..recordings.mcap_recording import import_recordings
 from ..samples import decided
 from .folds import EvaluationError
-from .rates import Rate
+from .rates import Floats, Rate
 
 # As a share of the mean eigenvalue of X X'.
 _PENALTY = 0.1
 # The inverse penalty on the constant added to the scores, as a multiple of that mean.
 _CONSTANT = 1e4
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,22 +65,21 @@ def recognition_so_far(grasp_set: GraspSet) -> InterimAccuracy:
     types with few trials. Raises EvaluationError for a set with one type.
     """
     names = grasp_set.taxonomy.names
-    labels, trials = np.asarray(grasp_set.labels, np.intp), grasp_set.trial_ids
-    classes, label = np.unique(labels, return_inverse=True)
+    classes, labels = np.unique(np.asarray(grasp_set.labels, np.intp), return_inverse=True)
     if len(classes) < 2:
         raise EvaluationError("all trials are of one grasp type: there is nothing to distinguish")
-    _, first, trial = np.unique(trials, return_index=True, return_inverse=True)
-    scores = left_out_scores(_inputs(grasp_set), label, trial)
-    given, truth = decided(scores.argmax(axis=1)[np.newaxis], trial)[0], label[first]
-    found = []
-    for number, name in enumerate(names[one] for one in classes):
-        own = given[truth == number]
-        wrong = np.bincount(own[own != number], minlength=len(classes))
-        taken_for = names[classes[wrong.argmax()]] if wrong.any() and len(own) > 1 else ""
-        found.append(TypeSoFar(name, len(own), *_rate(own == number, len(own) > 1), taken_for))
+    _, first, trial = np.unique(grasp_set.trial_ids, return_index=True, return_inverse=True)
+    scores = left_out_scores(_inputs(grasp_set), labels, trial)
+    predicted, truth = decided(scores.argmax(axis=1)[np.newaxis], trial)[0], labels[first]
+    types = []
+    for number, label in enumerate(classes):
+        guesses = predicted[truth == number]
+        wrong = np.bincount(guesses[guesses != number], minlength=len(classes))
+        taken_for = names[classes[wrong.argmax()]] if wrong.any() and len(guesses) > 1 else ""
+        types.append(TypeSoFar(names[label], len(guesses), *_rate(guesses == number, len(guesses) > 1), taken_for))
     counts = (np.bincount(truth) > 1)[truth]
-    types = tuple(sorted(found, key=lambda one: one.low))
-    return InterimAccuracy(int(counts.sum()), *_rate((given == truth)[counts], bool(counts.any())), types)
+    types.sort(key=lambda kind: kind.low)
+    return InterimAccuracy(int(counts.sum()), *_rate((predicted == truth)[counts], bool(counts.any())), tuple(types))
 
 
 def _rate(hits: NDArray[np.bool_], known: bool) -> tuple[int, float, float]:
@@ -107,12 +104,12 @@ def left_out_scores(inputs: Floats, label: NDArray[np.intp], trial: NDArray[np.i
     kernel += _CONSTANT * mean
     kernel[np.diag_indices_from(kernel)] += _PENALTY * mean * rows[trial]
     inverse = np.linalg.inv(kernel)
-    wanted = 2.0 * np.eye(int(label.max()) + 1)[label] - 1.0
-    weights = inverse @ wanted
-    scores = np.empty_like(wanted)
+    columns = 2.0 * np.eye(int(label.max()) + 1)[label] - 1.0
+    weights = inverse @ columns
+    scores = np.empty_like(columns)
     order = np.argsort(trial, kind="stable")
-    for own in np.split(order, np.cumsum(rows)[:-1]):
-        scores[own] = wanted[own] - np.linalg.solve(inverse[np.ix_(own, own)], weights[own])
+    for block in np.split(order, np.cumsum(rows)[:-1]):
+        scores[block] = columns[block] - np.linalg.solve(inverse[np.ix_(block, block)], weights[block])
     return scores
 
 

@@ -1,40 +1,52 @@
-"""An evaluation: the paper's tables for the user's own recordings, with each distinct fit run once."""
+"""An evaluation: the paper's tables for the user's recordings, with each distinct fit run once; learning curves; and a
+permutation test.
+"""
 
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
-from thenar.runtime.manifest import fit_name
-from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Recipe, changed
+from thenar.runtime.manifest import Of, Unit
+from thenar.runtime.recipe import PAPERS_TRAINER, Recipe, changed
 
 from ..limits import check_memory, check_types
+from ..pictures import painting
 from ..placement.constraints import Limits
 from ..placement.methods.base import METHODS, PAPERS
-from ..placement.placement import Placer
 from ..placement.ports import PortCosts
 from ..recordings.graspset import GraspSet
 from ..recordings.summary import check_trials
 from ..samples import Samples
 from ..text import counted
-from ..trainers.base import Training
-from .folds import EvaluationError
+from ..workers import in_workers
+from .choosing import InputChoices
+from .folds import (
+    NESTED,
+    OF,
+    PROTOCOLS,
+    EvaluationError,
+    Population,
+    ProtocolName,
+    Scheme,
+    concerns,
+    groups_of,
+    populations_of,
+)
 from .learning import Learning, plan_learning
-from .permutation import Permuted, permuted
 from .plan import (
     BASELINES,
-    Data,
     Planner,
     Progress,
     TableName,
-    is_blind,
+    candidates_of,
+    predictions,
     run_fits,
-    ways_of,
 )
-from .populations import NESTED, OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, populations
-from .rates import RecipeWords, placement_words
-from .tables import RateReader, RateTable
+from .rates import RecipeWords
+from .tables import RateReader, RateTable, draw_confusions
 
 TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines", "trainers")
 _NESTED: tuple[TableName, ...] = ("trainers", "joints")
@@ -43,6 +55,7 @@ _NESTED: tuple[TableName, ...] = ("trainers", "joints")
 _OF_ALL_SWITCHES: tuple[TableName, ...] = ("compositions", "pruning")
 _FEWEST_FOLDS = 2
 PAPERS_RECIPE = Recipe(trainer=PAPERS_TRAINER)
+LEARNING_NAME = "learning-curve.svg"
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +95,7 @@ class StudyDesign:
 
     def changed(self, **changes: Any) -> Self:
         """Return a design with other values, by name: fields, choices of the recipe, or settings of its trainer."""
-        names = {each.name for each in fields(self)}
+        names = {choice.name for choice in fields(self)}
         recipe = changed(self.recipe, {name: value for name, value in changes.items() if name not in names})
         return replace(self, **{"recipe": recipe, **{name: changes[name] for name in changes if name in names}})
 
@@ -93,6 +106,39 @@ class LeftOut:
 
     name: TableName
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Permuted:
+    """The accuracy of one composition under the nested protocol, one repeat, compared with shuffled labels.
+
+    Labels are shuffled among the trials of each subject, keeping frames of a trial together; then folds are cut,
+    placements chosen and classifiers trained as with the true labels.
+
+    composition   its name and inputs             of, unit  what the accuracy is of
+    rate          with the true labels            chance    mean accuracy of the permutations
+    permutations  their number, m                 highest   their highest accuracy
+    p             (b + 1) / (m + 1), where b permutations reach the accuracy: the probability of it by chance
+    """
+
+    composition: str
+    recipe: RecipeWords
+    of: Of
+    unit: Unit
+    rate: float
+    permutations: int
+    chance: float
+    highest: float
+    p: float
+
+    def __str__(self) -> str:
+        """Return accuracy, chance level and p-value in a sentence."""
+        return (
+            f"Permutation test of {self.composition}, {self.of}, {self.unit}, nested ({self.recipe}): "
+            f"{100 * self.rate:.1f} %; chance "
+            f"{100 * self.chance:.1f} % (mean of {self.permutations} shuffles of labels within subjects, highest "
+            f"{100 * self.highest:.1f} %); p = {self.p:.2g}"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,68 +230,139 @@ def evaluate(
     design = (design or StudyDesign()).changed(**changes)
     recipe, scheme = design.recipe, design.scheme
     chosen = _of_subjects(grasp_set.without_none(), design.subjects)
-    parts = populations(chosen, scheme, recipe.folds, design.repeats, recipe.seed)
-    reasons = {name: _why_not(name, chosen, parts, design) for name in design.tables}
+    populations = populations_of(chosen, scheme, recipe.folds, design.repeats, recipe.seed)
+    reasons = {name: _why_not(name, chosen, populations, design) for name in design.tables}
     if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
-        _check_all_switches(chosen, parts)
-    planner = Planner(parts, Samples.of(chosen), Placer(recipe, ports, limits), design.prune_list, design.baselines)
+        _check_all_switches(chosen, populations)
+    samples = Samples.of(chosen)
+    planner = Planner(populations, InputChoices(samples, ports, limits), recipe, design.prune_list, design.baselines)
     plans = {
-        (name, each.name): planner.table(name, each)
+        (name, protocol.name): planner.table(name, protocol)
         for name, reason in reasons.items()
         if reason is None
-        for each in PROTOCOLS
-        if each.name in design.protocols and (each is NESTED or name not in _NESTED)
+        for protocol in PROTOCOLS
+        if protocol.name in design.protocols and (protocol is NESTED or name not in _NESTED)
     }
-    data, curves = Data.of(chosen, scheme), None
-    if design.learning:
-        curves = plan_learning(data, chosen.subjects, planner, scheme, recipe.folds, design.repeats)
+    curves = plan_learning(planner, chosen.subjects, scheme, design.repeats) if design.learning else None
     cells = [cell for rows in plans.values() for row in rows for cell in row.cells]
-    fits = [fit for cell in (*cells, *(curves.every if curves else ())) for fit in cell.fits]
+    cells += [cell for row in curves.cells.values() for cell in row] if curves else []
+    fits = dict.fromkeys(fit for cell in cells for fit in cell.fits)
 
-    def report(done: int, total: int, before: int = 0, after: int = 0) -> None:
+    def report(before: int, done: int, _: int) -> None:
         if progress is not None:
-            progress(before + done, before + total + after)
+            progress(before + done, len(fits) + design.permute)
 
-    after = partial(report, after=design.permute)
-    predictions = run_fits(data, fits, Training.of(recipe), jobs, after, ways_of(recipe))
-    test = None
+    groups, candidates = groups_of(chosen, scheme), candidates_of(recipe)
+    predicted = run_fits(samples, fits, candidates, groups, jobs=jobs, progress=partial(report, 0))
+    test, learning = None, None
     if design.permute:
-        words, before = _recipe_of("compositions", recipe), partial(report, before=len(predictions))
-        test = permuted(chosen, parts, scheme, planner.placer, words, design.permute, jobs, before)
-    grasps = tuple(np.unique(chosen.labels).tolist())
-    blind = frozenset(fit for fit in predictions if is_blind(data, fit))
-    reader = RateReader(chosen.labels, data.trials, grasps, predictions, blind, OF[scheme], data.groups)
-    learning = None
+        words = _recipe_of("compositions", recipe)
+        test = _permuted(chosen, planner, scheme, words, design.permute, jobs, partial(report, len(fits)))
+    reader = RateReader(samples, predicted, OF[scheme], groups)
     if curves is not None:
-        words = _recipe_of("trainers", recipe)
-        learning = curves.read(replace(reader, of=curves.of), data.groups, recipe.seed, words)
+        learning = curves.read(reader, recipe.seed, _recipe_of("trainers", recipe))
     empty = grasp_set.is_none & np.isin(grasp_set.subjects, np.unique(chosen.subjects))
     return Study(
         fingerprint=grasp_set.fingerprint(),
         rows=len(chosen),
-        trials=int(data.trials.max()) + 1,
+        trials=int(samples.trials.max()) + 1,
         options=design,
-        grasps=tuple(chosen.taxonomy.types[label] for label in grasps),
-        warnings=concerns(chosen, parts, scheme, recipe.folds),
+        grasps=samples.grasps,
+        warnings=concerns(chosen, populations, scheme, recipe.folds),
         left_out=tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None),
-        tables=tuple(reader.table(*which, rows, _recipe_of(which[0], recipe)) for which, rows in plans.items()),
+        tables=tuple(
+            reader.table(name, protocol, rows, _recipe_of(name, recipe)) for (name, protocol), rows in plans.items()
+        ),
         permuted=test,
         learning=learning,
         rests=len(np.unique(grasp_set.trial_ids[empty])),
     )
 
 
-def recipe_words(recipe: Recipe) -> RecipeWords:
-    """Return the words for classifiers that all have the same placement and trainer."""
-    training, trainer = Training.of(recipe), "chosen from the training rows"
-    if recipe.trainer != AUTO:
-        trainer = fit_name(training.trainer, training.settings)
-    return RecipeWords(placement_words(recipe), trainer)
+def draw(study: Study, folder: Path) -> list[Path]:
+    """Write a picture for each composition and protocol, subjects side by side, and one of learning curves, if present.
+
+    Return the files: `confusion-PROTOCOL-COMPOSITION.png` and LEARNING_NAME in `folder`, which is created if necessary.
+    Raises OSError from the system.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    compositions = [table for table in study.tables if table.name == "compositions"]
+    with painting(font_size=10):
+        curves = [] if study.learning is None else [study.learning.draw(folder / LEARNING_NAME)]
+        return curves + [
+            draw_confusions(study.grasps, table, row, folder) for table in compositions for row in table.rows
+        ]
+
+
+def _permuted(
+    grasp_set: GraspSet,
+    planner: Planner,
+    scheme: Scheme,
+    words: RecipeWords,
+    m: int,
+    jobs: int,
+    progress: Progress,
+) -> Permuted:
+    """Return the test of an evaluation, of m > 0 permutations, with selected switches and joints as far as the set has
+    them; `planner` is that of the true labels.
+    """
+    # Without what it chose for the true labels: it goes to the workers.
+    fresh = replace(planner, choices=replace(planner.choices))
+    tasks = [(grasp_set, fresh, scheme, number) for number in range(m + 1)]
+    correct, total = _recognised(tasks[0])
+    shuffled: list[int] = []
+    for recognised, _ in in_workers(_recognised, tasks[1:], jobs):
+        shuffled += [recognised]
+        progress(len(shuffled), m)
+    return Permuted(
+        composition=str(planner.kinds[0]),
+        recipe=words,
+        of=OF[scheme],
+        unit="trials",
+        rate=correct / total,
+        permutations=m,
+        chance=sum(shuffled) / m / total,
+        highest=max(shuffled) / total,
+        p=(sum(count >= correct for count in shuffled) + 1) / (m + 1),
+    )
+
+
+def _recognised(task: tuple[GraspSet, Planner, Scheme, int]) -> tuple[int, int]:
+    """Return the number of trials that a permutation (0: the true labels) predicts correctly, and the total."""
+    grasp_set, planner, scheme, number = task
+    recipe = planner.recipe
+    if number:
+        grasp_set = shuffled_labels(grasp_set, (recipe.seed, number))
+    samples, populations = Samples.of(grasp_set), planner.populations
+    if scheme == "trial":
+        populations = populations_of(grasp_set, scheme, recipe.folds, 1, recipe.seed)
+    planner = replace(planner, populations=populations, choices=replace(planner.choices, samples=samples))
+    plans = [
+        planner.cell(population, planner.kinds[0], partial(planner.placement, NESTED)) for population in populations
+    ]
+    plans = [replace(plan, runs=plan.runs[:1]) for plan in plans]
+    candidates = candidates_of(recipe)
+    predicted = {fit: predictions(samples, fit, candidates) for plan in plans for fit in plan.fits}
+    rate, _ = RateReader(samples, predicted, OF[scheme], groups_of(grasp_set, scheme)).rates(plans)
+    return rate.correct[0], rate.total
+
+
+def shuffled_labels(grasp_set: GraspSet, seed: tuple[int, ...]) -> GraspSet:
+    """Return the set with its grasp types shuffled among the trials of each subject; trials stay whole."""
+    random = np.random.default_rng(seed)
+    trial = grasp_set.trial_ids
+    _, first = np.unique(trial, return_index=True)
+    subjects, grasps = grasp_set.subjects[first], grasp_set.grasps[first]
+    for subject in np.unique(subjects):
+        rows = np.flatnonzero(subjects == subject)
+        grasps[rows] = grasps[random.permutation(rows)]
+    # The trial number keeps two trials apart that get the same label.
+    return replace(grasp_set, grasps=grasps[trial], trials=trial)
 
 
 def _recipe_of(name: TableName, recipe: Recipe) -> RecipeWords:
     """Return the words for the recipe of a table."""
-    same = recipe_words(recipe)
+    same = RecipeWords.of(recipe)
     methods: dict[TableName, str] = {
         "pruning": f"{PAPERS}, S of the row, all subjects pooled",
         "baselines": f"that of the row, as many elements as {same.method}",
@@ -270,16 +387,17 @@ def _of_subjects(grasp_set: GraspSet, subjects: tuple[str, ...]) -> GraspSet:
     return chosen
 
 
-def _check_all_switches(grasp_set: GraspSet, parts: tuple[Population, ...]) -> None:
+def _check_all_switches(grasp_set: GraspSet, populations: tuple[Population, ...]) -> None:
     """Raise EvaluationError if training on all switches does not fit in memory, before placements are chosen."""
-    switches = grasp_set.switches
-    varying = int(np.count_nonzero(switches.any(axis=0) & ~switches.all(axis=0))) + len(grasp_set.taxel_columns)
-    for part in parts:
-        rows = max((len(fold.train) for fold in part.folds), default=0)
-        check_memory(rows, len(part.grasps), EvaluationError, varying)
+    varying = grasp_set.switches.any(axis=0) & ~grasp_set.switches.all(axis=0)
+    for population in populations:
+        rows = max((len(fold.train) for fold in population.folds), default=0)
+        check_memory(rows, len(population.grasps), EvaluationError, int(varying.sum()) + len(grasp_set.taxel_columns))
 
 
-def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...], design: StudyDesign) -> str | None:
+def _why_not(
+    name: TableName, grasp_set: GraspSet, populations: tuple[Population, ...], design: StudyDesign
+) -> str | None:
     """Return why a table has no meaning for the set and the design, or None."""
     if name == "joints" and not grasp_set.joints:
         return "the set has no joints"
@@ -287,7 +405,7 @@ def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...]
         return None if "nested" in design.protocols else f"{name} are compared under the nested protocol only"
     if name != "compositions" and not grasp_set.element_names:
         return "a placement needs switches, and the set has none"
-    if name == "generality" and len(parts) < 2:
+    if name == "generality" and len(populations) < 2:
         return "another's placement needs a second subject"
     if name == "pruning" and design.recipe.placement != PAPERS:
         return f"S prunes the tree of {PAPERS}, and the recipe has another method"

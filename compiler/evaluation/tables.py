@@ -1,21 +1,26 @@
-"""The paper's tables: cells of accuracies, computed from predictions."""
+"""The paper's tables: cells of accuracies, computed from predictions, and confusion matrices as pictures."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from statistics import fmean
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.files import write_atomically
 from thenar.runtime.manifest import Of
 
-from ..samples import decided
+from ..pictures import rendered
+from ..samples import Samples, decided
 from ..text import interval
-from .folds import Rows
+from .folds import ProtocolName, Rows
 from .plan import REFERENCE, CellPlan, FoldFit, Labels, RowPlan, TableName
-from .populations import ProtocolName
 from .rates import Paired, Rate, RecipeWords, rated
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Predictions = Mapping[FoldFit, Labels]
 Confusion = tuple[tuple[int, ...], ...]
@@ -121,16 +126,13 @@ class RateTable:
 class RateReader:
     """Computes rates from predictions.
 
-    labels, trials  (n,) of each row       grasps  labels that occur
-    predictions     of each fit; blind: the fits without varying inputs
-    of              what the rates are of, with the group (n,) that each row is left out with, None: its trial
+    samples      all rows
+    predictions  of each fit
+    of           what the rates are of, with the group (n,) that each row is left out with, None: its trial
     """
 
-    labels: Labels
-    trials: Rows
-    grasps: tuple[int, ...]
+    samples: Samples
     predictions: Predictions
-    blind: frozenset[FoldFit]
     of: Of
     groups: NDArray[np.str_] | None
 
@@ -138,24 +140,16 @@ class RateReader:
         self, name: TableName, protocol: ProtocolName, plans: Sequence[RowPlan], recipe: RecipeWords
     ) -> RateTable:
         """Return the table for these rows, which were fitted by this recipe."""
-        columns = tuple(cell.part.name for cell in plans[0].cells)
+        columns = tuple(cell.population.name for cell in plans[0].cells)
         rows = [self._row(plan, confusing=name == "compositions") for plan in plans]
         if name == "trainers":
             hits = [self.hits(plan.cells) for plan in plans]
-            first = {plan.what: own for plan, own in zip(plans, hits, strict=True) if plan.name == REFERENCE}
+            first = {plan.what: correct for plan, correct in zip(plans, hits, strict=True) if plan.name == REFERENCE}
             rows = [
-                row if row.name == REFERENCE else replace(row, paired=Paired.of(own, first[row.what], REFERENCE))
-                for row, own in zip(rows, hits, strict=True)
+                row if row.name == REFERENCE else replace(row, paired=Paired.of(correct, first[row.what], REFERENCE))
+                for row, correct in zip(rows, hits, strict=True)
             ]
         return RateTable(name, protocol, recipe, columns, tuple(rows))
-
-    def cell(self, plan: CellPlan, *, confusing: bool) -> Cell:
-        """Return the cell of a plan, with its confusion matrix if `confusing`."""
-        rate, frames = self.rates((plan,))
-        counts = [len(fit.elements) for fit in plan.fits]
-        blind = sum(fit in self.blind for fit in plan.fits)
-        confusion = self._confusion(plan) if confusing else None
-        return Cell(rate, frames, Spread.of(counts), blind, _draws(rate, len(plan.part.repeats)), confusion)
 
     def _row(self, plan: RowPlan, *, confusing: bool) -> RateRow:
         cells = tuple(self.cell(cell, confusing=confusing) for cell in plan.cells)
@@ -164,43 +158,88 @@ class RateReader:
         rate, frames = (cells[0].rate, cells[0].frames) if len(cells) == 1 else self.rates(plan.cells)
         return RateRow(plan.name, plan.what, switches, cells, rate, frames)
 
+    def cell(self, plan: CellPlan, *, confusing: bool) -> Cell:
+        """Return the cell of a plan, with its confusion matrix if `confusing`."""
+        rate, frames = self.rates((plan,))
+        repeats, draws = len(plan.population.repeats), None
+        if len(plan.runs) > repeats:
+            draws = Spread.of((np.reshape(rate.correct, (-1, repeats)).mean(axis=1) / rate.total).tolist())
+        counts = [len(fit.elements) for fit in plan.fits]
+        blind = sum(fit.is_blind(self.samples) for fit in plan.fits)
+        return Cell(rate, frames, Spread.of(counts), blind, draws, self._confusion(plan) if confusing else None)
+
     def rates(self, plans: Sequence[CellPlan]) -> tuple[Rate, Rate | None]:
         """Return the rates by trials and by frames of some cells together; their runs correspond."""
         rows, predicted = self._predicted(plans)
         groups = None if self.groups is None else self.groups[rows]
-        repeats = len(plans[0].part.repeats)
-        a_draw = repeats if len(predicted) > repeats else 1
-        return rated(predicted, self.labels[rows], self.trials[rows], of=self.of, groups=groups, repeats_a_draw=a_draw)
+        repeats = len(plans[0].population.repeats)
+        return rated(
+            predicted,
+            self.samples.labels[rows],
+            self.samples.trials[rows],
+            of=self.of,
+            groups=groups,
+            repeats_a_draw=repeats if len(predicted) > repeats else 1,
+        )
 
     def hits(self, plans: Sequence[CellPlan]) -> NDArray[np.bool_]:
         """Return the correct trials (runs, m) of some cells in each run, in the order of the trials' numbers."""
+        labels, predicted = self._decided(plans)
+        return np.asarray(predicted == labels)
+
+    def _confusion(self, plan: CellPlan) -> Confusion:
+        labels, predicted = self._decided((plan,))
+        counts = np.zeros((self.samples.n_classes,) * 2, dtype=np.intp)
+        np.add.at(counts, (np.broadcast_to(labels, predicted.shape), predicted), 1)
+        return tuple(map(tuple, counts.tolist()))
+
+    def _decided(self, plans: Sequence[CellPlan]) -> tuple[Labels, Labels]:
+        """Return the label (m,) of each trial that some cells test, and the one (runs, m) that each run predicts."""
         rows, predicted = self._predicted(plans)
-        _, first, trial = np.unique(self.trials[rows], return_index=True, return_inverse=True)
-        return np.asarray(decided(predicted, trial) == self.labels[rows[first]])
+        _, first, trial = np.unique(self.samples.trials[rows], return_index=True, return_inverse=True)
+        return self.samples.labels[rows[first]], decided(predicted, trial)
 
     def _predicted(self, plans: Sequence[CellPlan]) -> tuple[Rows, Labels]:
         """Return the rows (n,) that some cells test, and the label (runs, n) that each run predicts for them."""
         rows = np.concatenate([fit.fold.test for plan in plans for fit in plan.runs[0]])
-        predicted = np.zeros((len(plans[0].runs), len(self.labels)), dtype=np.intp)
+        predicted = np.zeros((len(plans[0].runs), len(self.samples.labels)), dtype=np.intp)
         for plan in plans:
             for run, fits in enumerate(plan.runs):
                 for fit in fits:
                     predicted[run, fit.fold.test] = self.predictions[fit]
         return rows, predicted[:, rows]
 
-    def _confusion(self, plan: CellPlan) -> Confusion:
-        rows, predicted = self._predicted((plan,))
-        _, first, trial = np.unique(self.trials[rows], return_index=True, return_inverse=True)
-        true = np.searchsorted(self.grasps, self.labels[rows[first]])
-        counts = np.zeros((len(self.grasps), len(self.grasps)), dtype=np.intp)
-        for found in decided(predicted, trial):
-            np.add.at(counts, (true, np.searchsorted(self.grasps, found)), 1)
-        return tuple(map(tuple, counts.tolist()))
+
+def draw_confusions(grasps: tuple[str, ...], table: RateTable, row: RateRow, folder: Path) -> Path:
+    """Draw the confusion matrices of a row, subjects side by side, into `confusion-PROTOCOL-ROW.png`.
+
+    Colour is the share of the true grasp type's rows; numbers are percent of them, omitted below 1 %.
+    """
+    from matplotlib.figure import Figure
+
+    side = 1.6 + 0.42 * len(grasps)
+    figure = Figure(figsize=(side * len(row.cells) + 0.6, side + 0.4), layout="constrained", dpi=120)
+    figure.suptitle(f"{row.name}: {row.what} ({table.protocol} protocol, {row.rate.what})")
+    all_axes = figure.subplots(1, len(row.cells), squeeze=False)[0]
+    for axes, name, cell in zip(all_axes, table.columns, row.cells, strict=True):
+        if cell.confusion is not None:
+            draw_matrix(axes, grasps, cell.confusion)
+        axes.set_title(f"subject {name}: {100 * cell.rate.mean:.1f} %", fontsize=10)
+    all_axes[0].set_ylabel("true")
+    path = folder / f"confusion-{table.protocol}-{row.name}.png"
+    write_atomically(path, rendered(figure, "png"))
+    return path
 
 
-def _draws(rate: Rate, repeats: int) -> Spread | None:
-    """Return the spread of the draws' own rates, each over its `repeats`; None for a single draw."""
-    if len(rate.correct) == repeats:
-        return None
-    draws = np.reshape(rate.correct, (-1, repeats)).mean(axis=1) / rate.total
-    return Spread.of(draws.tolist())
+def draw_matrix(axes: "Axes", grasps: tuple[str, ...], confusion: "Confusion") -> None:
+    """Draw one matrix of counts into `axes`, as shares of its rows."""
+    counts = np.array(confusion, dtype=np.float64)
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    axes.imshow(shares, cmap="Blues", vmin=0, vmax=1)
+    axes.set_xticks(range(len(grasps)), grasps, rotation=90, fontsize=8)
+    axes.set_yticks(range(len(grasps)), grasps, fontsize=8)
+    axes.set_xlabel("recognised as")
+    for true, predicted in np.argwhere(shares >= 0.01):
+        share = shares[true, predicted]
+        colour = "white" if share > 0.6 else "black"
+        axes.text(predicted, true, f"{100 * share:.0f}", ha="center", va="center", fontsize=7, color=colour)

@@ -10,14 +10,12 @@ from msgspec.structs import replace as changed_to
 
 from thenar.runtime.recipe import Recipe
 
-from ..evaluation.luck import Draws
-from ..evaluation.rates import Rate
+from ..evaluation.rates import Draws, Rate
 from ..trainers.base import TRAINERS, Training
-from .finalists import EvaluatedFinalist
+from .finalists import EvaluatedFinalist, Screened
 from .latency import POLICIES
 from .points import DecisionKind, FrontierPoint, Latency, PointSetting, PointTime, front
 from .price import Classified, PricedTables
-from .screen import Screened
 from .search import placement_of
 from .survey import Cuts, Survey, TrialAccuracy
 from .wirings import NO_TIME, ScanTimes

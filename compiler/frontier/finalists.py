@@ -1,23 +1,30 @@
-"""Finalists: select the placements worth full evaluation, and evaluate all their rounds and tables in all folds."""
+"""From choices to finalists: screen every placement, select those worth full evaluation, and evaluate all their rounds
+and tables in all folds.
+"""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from math import log
 
+import numpy as np
 from msgspec.structs import replace as changed_to
 
 from thenar.runtime.recipe import Inputs, Recipe
 
 from ..evaluation.folds import Fold
 from ..evaluation.rates import Rate
-from ..placement.methods.base import BEST, PAPERS
-from .points import STEP, By, ReferencePoint, front
+from ..placement.elements import Elements
+from ..placement.methods.base import BEST, METHODS, PAPERS
+from .points import STEP, By, Curve, ReferencePoint, front
 from .price import PricedTables
-from .screen import Screened
-from .search import SHAPES, Search, placed, tabled
+from .search import CURVE_SIZES, JOINTS, SHAPES, Search, placed, tabled
 from .survey import Cuts, FoldHits, Survey, TrialAccuracy
 
+# The inputs that need a placement; without joints, only the second.
+ALL_INPUTS: tuple[Inputs, ...] = ("both", "switches")
+# Screening: the frame time hardly depends on the numbers of rounds and rows, so tables of few suffice.
+_ROUNDS, _FEW_ROWS = 12, 1000
 # The paper's S.
 _PAPERS = 62
 
@@ -27,6 +34,21 @@ _USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
 _FEWEST = 0.002
 # The share of the rows that more rounds than the paper's must win in the first repeat.
 _DEEPER = 0.002
+
+
+@dataclass(frozen=True, slots=True)
+class Screened:
+    """A choice after screening: its elements when chosen from all rows, its rate, its frame time (us)."""
+
+    choice: Recipe
+    elements: Elements
+    judged: TrialAccuracy
+    frame_us: float
+
+    @property
+    def mean(self) -> float:
+        """The rate."""
+        return self.judged.rate.mean
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,8 +66,91 @@ class EvaluatedFinalist:
     priced: tuple[PricedTables, ...]
 
 
-def finalists(screened: Sequence[Screened], wanted: Collection[Recipe], most: int) -> tuple[Screened, ...]:
-    """Return at most `most` of `screened`, in their order, plus the `wanted` ones.
+def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
+    """Train every placement once, on the folds of one repeat, and price it in the fastest of its wirings.
+
+    Return the accuracy and frame time of every choice that can be built, with the first trainer; and the curves of all
+    methods, including the baselines.
+    """
+    search, cuts, trainer = survey.search, survey.cuts, survey.search.trainers[0]
+    sizes = {levels: survey.size(levels) for levels in survey.levels}
+    n_elements, kinds = sizes[survey.levels[-1]], ALL_INPUTS if survey.inputs.n_joints else ALL_INPUTS[1:]
+    choices = [
+        placed(method, number, trainer, inputs, levels)
+        for inputs in (kinds if n_elements else ())
+        for levels, size in sizes.items()
+        for method in search.methods
+        for number in METHODS[method].ladder(size)
+    ]
+    baselines = [
+        placed(method, number, trainer, "switches", survey.levels[-1])
+        for method in search.baselines
+        for number in CURVE_SIZES
+        if number <= n_elements
+    ]
+    survey.choose(choices, (cuts.everything, *cuts.screening))
+    survey.choose(baselines, cuts.screening)
+    # Drop placements that keep nothing. Joints alone need no placement.
+    choices = [choice for choice in choices if survey.elements(choice)]
+    choices += [Recipe(trainer=trainer, inputs="joints")] if survey.inputs.n_joints else []
+    rates = _rates(survey, choices, baselines)
+    methods = dict.fromkeys([*search.methods, *search.baselines]) if n_elements else ()
+    return _screened(survey, choices, rates), tuple(_curve(survey, method, rates) for method in methods)
+
+
+def screen_fewer(survey: Survey, screened: Sequence[Screened]) -> tuple[Screened, ...]:
+    """Return the same choices, screened with fewer joints, if joints take time."""
+    # Joints that take no time are all read.
+    most = survey.inputs.n_joints if survey.equipment.records.each_us else 0
+    numbers = [number for number in JOINTS if number < most]
+    choices = [changed_to(one.choice, keep_joints=number) for one in screened for number in numbers]
+    survey.choose_joints(choices, (survey.cuts.everything, *survey.cuts.screening))
+    return _screened(survey, choices, _rates(survey, choices))
+
+
+def screen_others(survey: Survey, screened: Sequence[Screened]) -> tuple[Screened, ...]:
+    """Return the same choices, screened with each of the other trainers."""
+    choices = [changed_to(one.choice, trainer=name) for name in survey.search.trainers[1:] for one in screened]
+    return _screened(survey, choices, _rates(survey, choices))
+
+
+def _rates(survey: Survey, choices: Sequence[Recipe], baselines: Sequence[Recipe] = ()) -> dict[Recipe, TrialAccuracy]:
+    """Return the rates of choices and baselines; baselines choose within the folds only and tune nothing."""
+    cuts, several = survey.cuts, [*choices, *baselines]
+    survey.tune(choices, (cuts.everything, *cuts.screening))
+    rounds = {name: survey.search.alone(name).screened for name in survey.search.trainers}
+    fits = survey.fit(several, cuts.screening, lambda choice: ((rounds[choice.trainer],), ()))
+    return {
+        choice: cuts.judged(cuts.by, {fold: fits[choice, fold].stages[-1] for fold in cuts.screening})
+        for choice in several
+    }
+
+
+def _screened(survey: Survey, choices: Sequence[Recipe], rates: Mapping[Recipe, TrialAccuracy]) -> tuple[Screened, ...]:
+    """Return the choices that can be built."""
+    most = len(survey.samples.labels)
+    rows = np.linspace(0, most - 1, min(_FEW_ROWS, most)).astype(np.intp)
+    prices = survey.prices({choice: (tabled(choice, _ROUNDS),) for choice in choices}, rows)
+    screened = []
+    for choice, (priced,) in prices.items():
+        us = priced.fastest_us(survey.transfer(choice).us)
+        if us is not None and (priced.scans or choice.inputs == "joints"):
+            screened.append(Screened(choice, survey.elements(choice), rates[choice], us))
+    return tuple(screened)
+
+
+def _curve(survey: Survey, method: str, rates: Mapping[Recipe, TrialAccuracy]) -> Curve:
+    """Return a method's rates by the mean number of switches that it kept in the folds, switches alone."""
+    folds, points = survey.cuts.screening, {}
+    for choice, judged in rates.items():
+        if (choice.placement, choice.inputs, choice.levels) == (method, "switches", survey.levels[-1]):
+            points[sum(len(survey.elements(choice, fold)) for fold in folds) / len(folds)] = judged.rate
+    sizes = tuple(sorted(points))
+    return Curve(method, METHODS[method].help, METHODS[method].ours, sizes, tuple(points[size] for size in sizes))
+
+
+def finalists(screened: Sequence[Screened], choices: Collection[Recipe], number: int) -> tuple[Screened, ...]:
+    """Return at most `number` of `screened`, in their order, plus those of certain choices.
 
     They are on a front of accuracy against frame time or, among the same inputs, against the number of switches, and
     are distributed evenly among the kinds of inputs. Of each kind, take the best, then the smallest that ties with it,
@@ -53,11 +158,10 @@ def finalists(screened: Sequence[Screened], wanted: Collection[Recipe], most: in
     and switches count once; those with less than three quarters of the best accuracy are dropped.
     """
     enough = _USEFUL * max((one.mean for one in screened), default=0.0)
-    useful = [one for one in _different(screened) if one.mean >= enough]
-    pool = _fronts(useful)
+    pool = _fronts([one for one in _different(screened) if one.mean >= enough])
     queues = [_spread([one for one in pool if one.choice.inputs == kind]) for kind in _kinds(pool)]
     turns = [one for turn in zip_longest(*queues) for one in turn if one is not None]
-    chosen = {id(one) for one in turns[:most]} | {id(one) for one in screened if one.choice in wanted}
+    chosen = {id(one) for one in turns[:number]} | {id(one) for one in screened if one.choice in choices}
     return tuple(one for one in screened if id(one) in chosen)
 
 
@@ -67,22 +171,20 @@ def _kinds(screened: Sequence[Screened]) -> list[Inputs]:
 
 def _fronts(screened: Sequence[Screened]) -> list[Screened]:
     """Return the choices on a front, in its order."""
-    found = front(screened, lambda one: one.frame_us, lambda one: one.mean, _STEP)
+    best = front(screened, lambda one: one.frame_us, lambda one: one.mean, _STEP)
     for kind in _kinds(screened):
-        mine = [one for one in screened if one.choice.inputs == kind]
-        found += front(mine, lambda one: len(one.elements), lambda one: one.mean, _STEP)
-    known = {id(one) for one in found}
+        pool = [one for one in screened if one.choice.inputs == kind]
+        best += front(pool, lambda one: len(one.elements), lambda one: one.mean, _STEP)
+    known = {id(one) for one in best}
     return [one for one in screened if id(one) in known]
 
 
-def _spread(mine: list[Screened]) -> list[Screened]:
-    """Return all of `mine`, in the order in which they merit full evaluation."""
-    if not mine:
-        return []
-    best = max(mine, key=lambda one: one.mean)
-    level = [one for one in mine if one.mean >= best.mean - _LEVEL]
+def _spread(pool: list[Screened]) -> list[Screened]:
+    """Return the one or more of a pool in the order in which they merit full evaluation."""
+    best = max(pool, key=lambda one: one.mean)
+    level = [one for one in pool if one.mean >= best.mean - _LEVEL]
     order = list(dict.fromkeys([best, min(level, key=lambda one: len(one.elements))]))
-    left = [one for one in mine if one not in order]
+    left = [one for one in pool if one not in order]
     while left:
         order.append(max(left, key=lambda one: min(_distance(one, known) for known in order)))
         left.remove(order[-1])
@@ -90,12 +192,9 @@ def _spread(mine: list[Screened]) -> list[Screened]:
 
 
 def _distance(one: Screened, other: Screened) -> float:
-    return abs(_errors(one) - _errors(other)) + abs(log(one.frame_us / other.frame_us))
-
-
-def _errors(one: Screened) -> float:
-    """Return the error rate on a scale on which halving it is the same distance everywhere."""
-    return log(1.0 - one.mean + _FEWEST)
+    """Return how far error rates and frame times differ: halving either is the same distance everywhere."""
+    errors, other_errors = (log(1.0 - screened.mean + _FEWEST) for screened in (one, other))
+    return abs(errors - other_errors) + abs(log(one.frame_us / other.frame_us))
 
 
 def _different(screened: Sequence[Screened]) -> list[Screened]:
@@ -115,26 +214,25 @@ def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[Eval
     """
     cuts, choices = survey.cuts, [one.choice for one in chosen]
     searches = {choice: survey.search.alone(choice.trainer) for choice in choices}
-    typical = survey.typical(choices)
     survey.choose(choices, cuts.others)
     survey.choose_joints(choices, cuts.others)
-    survey.tune(typical, cuts.others)
-    fits = survey.fit(choices, cuts.screening, lambda one: (searches[one].stages, searches[one].tabled))
-    rows = len(cuts.trials)
-    depths = {one: depth_of(searches[one], [fits[one, fold] for fold in cuts.screening], rows) for one in choices}
-    fits |= survey.fit(choices, cuts.others, lambda one: (depths[one].stages, depths[one].tabled))
-    judged = {
-        choice: _judged(cuts, choice, depth, {fold: fits[choice, fold] for fold in (*cuts.screening, *cuts.others)})
-        for choice, depth in depths.items()
+    survey.tune(choices, cuts.others)
+    fits = survey.fit(choices, cuts.screening, lambda choice: (searches[choice].stages, searches[choice].tabled))
+    depths = {
+        choice: depth_of(search, [fits[choice, fold] for fold in cuts.screening], len(cuts.trials))
+        for choice, search in searches.items()
     }
-    worth = [
-        (choice, tuple(dict.fromkeys([*worthwhile(judged[choice][1]), papers_tables(choice, searches[choice])])))
-        for choice in choices
-    ]
-    prices = survey.prices(worth, cuts.everything.train, lost=True)
-    return tuple(
-        EvaluatedFinalist(one, *judged[one.choice], priced) for one, priced in zip(chosen, prices, strict=True)
-    )
+    fits |= survey.fit(choices, cuts.others, lambda choice: (depths[choice].stages, depths[choice].tabled))
+    judged = {
+        choice: _judged(cuts, choice, search, {fold: fits[choice, fold] for fold in (*cuts.screening, *cuts.others)})
+        for choice, search in depths.items()
+    }
+    recipes = {
+        choice: tuple(dict.fromkeys([*worthwhile(judged[choice][1]), papers_tables(choice, search)]))
+        for choice, search in searches.items()
+    }
+    prices = survey.prices(recipes, cuts.everything.train, lost=True)
+    return tuple(EvaluatedFinalist(one, *judged[one.choice], prices[one.choice]) for one in chosen)
 
 
 def choices_to_mark(n_elements: int, n_joints: int, trainer: str, levels: int | None = None) -> dict[Recipe, str]:
@@ -153,19 +251,19 @@ def choices_to_mark(n_elements: int, n_joints: int, trainer: str, levels: int | 
 
 
 def marks_of(
-    named: Mapping[Recipe, str], closes: Sequence[EvaluatedFinalist], survey: Survey
+    choices: Mapping[Recipe, str], closes: Sequence[EvaluatedFinalist], survey: Survey
 ) -> tuple[ReferencePoint, ...]:
     """Return the marks of those choices that were fully evaluated, with the paper's rounds."""
-    found = []
+    marks = []
     for close in closes:
         choice, size = close.screened.choice, len(close.screened.elements)
-        if choice in named:
+        if choice in choices:
             recipe = papers_tables(choice, survey.search)
             priced = next(tables for tables in close.priced if tables.recipe == recipe)
             us = priced.fastest_us(survey.transfer(choice).us)
             if us is not None:
-                found.append(ReferencePoint(named[choice], size, close.tables[recipe].rate, us))
-    return tuple(found)
+                marks.append(ReferencePoint(choices[choice], size, close.tables[recipe].rate, us))
+    return tuple(marks)
 
 
 def papers_tables(choice: Recipe, search: Search) -> Recipe:
@@ -193,12 +291,12 @@ def worthwhile(tables: Mapping[Recipe, TrialAccuracy]) -> tuple[Recipe, ...]:
     alike: dict[Recipe, list[Recipe]] = {}
     for recipe in tables:
         alike.setdefault(changed_to(recipe, rounds=None), []).append(recipe)
-    found = []
-    for mine in alike.values():
-        best = max(tables[recipe].rate.mean for recipe in mine)
-        level = [recipe for recipe in mine if tables[recipe].rate.mean >= best - STEP]
-        found.append(min(level, key=lambda recipe: recipe.rounds or 1))
-    return tuple(found)
+    fewest = []
+    for recipes in alike.values():
+        best = max(tables[recipe].rate.mean for recipe in recipes)
+        level = [recipe for recipe in recipes if tables[recipe].rate.mean >= best - STEP]
+        fewest.append(min(level, key=lambda recipe: recipe.rounds or 1))
+    return tuple(fewest)
 
 
 def _judged(
@@ -215,8 +313,8 @@ def _judged(
 
     def tables(by: By) -> dict[Recipe, TrialAccuracy]:
         return {
-            each: cuts.judged(by, {fold: fit.tables[row][column] for fold, fit in fits.items()})
-            for each, (row, column) in places.items()
+            recipe: cuts.judged(by, {fold: fit.tables[row][column] for fold, fit in fits.items()})
+            for recipe, (row, column) in places.items()
         }
 
     stages = {
@@ -224,8 +322,8 @@ def _judged(
         for number, stage in enumerate(search.stages)
     }
     frames = {
-        each: cuts.frames({fold: fit.frames[row][column] for fold, fit in fits.items()})
-        for each, (row, column) in (places.items() if len(cuts.people) < len(cuts.trials) else ())
+        recipe: cuts.judged(cuts.by, {fold: fit.frames[row][column] for fold, fit in fits.items()}, "frames").rate
+        for recipe, (row, column) in (places.items() if len(cuts.people) < len(cuts.trials) else ())
     }
-    other = {} if cuts.other is None else {each: judged.rate for each, judged in tables(cuts.other).items()}
+    other = {} if cuts.other is None else {recipe: judged.rate for recipe, judged in tables(cuts.other).items()}
     return stages, tables(cuts.by), frames, other

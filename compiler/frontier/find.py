@@ -30,13 +30,22 @@ from ..samples import Samples
 from ..text import INDEPENDENT, sentence
 from .cache import Cache, Report, Store
 from .designs import Design, Latencies, best_designs, designs, lucks, points_of
-from .finalists import EvaluatedFinalist, choices_to_mark, evaluate_finalists, finalists, marks_of
+from .finalists import (
+    EvaluatedFinalist,
+    Screened,
+    choices_to_mark,
+    evaluate_finalists,
+    finalists,
+    marks_of,
+    screen,
+    screen_fewer,
+    screen_others,
+)
 from .latency import POLICIES, latencies, movements_of
 from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, FrontierPoint, ReferencePoint, Tried, frontier_to_bytes
 from .price import Equipment, equipment_for, measured
 from .replay import Replay, replay_of
-from .screen import Screened, screen, screen_fewer, screen_others
 from .search import TAXEL_LEVELS, Search, placement_of
 from .survey import Cuts, Survey
 from .wirings import is_avr, records_of, wirings
@@ -112,7 +121,7 @@ def find_frontier(
     Returns
     -------
     Frontier
-        A point's rate is corrected for the selection of the best of many; see `thenar.compiler.evaluation.luck`.
+        A point's rate is corrected for the selection of the best of many; see `thenar.compiler.evaluation.rates.Draws`.
 
     Raises
     ------
@@ -129,14 +138,14 @@ def find_frontier(
     """
     samples = _samples(grasp_set.without_none())
     # Levels of one taxel share its conversion.
-    costs = harness is not None or bool(grasp_set.taxel_columns)
-    search, lacking = _installed(search or Search(methods=usual(ours=True, wired=costs)))
+    wired = harness is not None or bool(grasp_set.taxel_columns)
+    search, lacking = _installed(search or Search(methods=usual(ours=True, wired=wired)))
     cuts = Cuts.of(samples, search)
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
-    made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
+    created = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
-        cache = Cache(store, report or _no_progress, _ROUNDS, jobs=jobs)
-        with _remove_created_on_error(made, store):
+        cache = Cache(store, report or (lambda _done, _total: None), _ROUNDS, jobs=jobs)
+        with _remove_created_on_error(created, store):
             records = records_of(
                 grasp_set.joint_names,
                 joint_us,
@@ -147,26 +156,26 @@ def find_frontier(
             options = wirings(harness, target, switches=switches or not taxels, taxels=taxels)
             equipment = equipment_for(target, options, cache, records)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
-            played = _replay(survey, stream)
-            own = () if build is None else (own_build(build, grasp_set, equipment),)
+            replay = _replay(survey, stream)
+            marks = () if build is None else (own_build(build, grasp_set, equipment),)
         untimed = (_UNTIMED.format(list_names(grasp_set.joint_names)),) if records.how == "unknown" else ()
-        found = _found(survey, played, (budget_us, rate), own, (*untimed, *lacking))
+        frontier = _found(survey, replay, (budget_us, rate), marks, (*untimed, *lacking))
         if output is not None:
             # The store moves into the new folder as the same file, and stays locked meanwhile.
             store.finish()
-            publish_folder(_documents(found), output, kept_entries, FrontierError)
-    return found
+            publish_folder(_documents(frontier), output, kept_entries, FrontierError)
+    return frontier
 
 
 @contextmanager
-def _remove_created_on_error(made: Sequence[Path], store: Store) -> Iterator[None]:
+def _remove_created_on_error(created: Sequence[Path], store: Store) -> Iterator[None]:
     """Remove files and folders that a run made if its request is refused; files added by others meanwhile stay."""
     try:
         yield
     except (FrontierError, BuildError, HarnessError):
         store.finish()
         with suppress(OSError):
-            for path in made:
+            for path in created:
                 (path.rmdir if path.is_dir() else path.unlink)()
         raise
 
@@ -213,32 +222,32 @@ def kept_entries(folder: Path) -> list[str]:
     return [path for path in there if path not in _DOCUMENTS]
 
 
-def _documents(found: Frontier) -> dict[str, bytes]:
-    drawn = {f"{name}.svg": data for name, data in pictures(found, "svg").items()}
-    return {FRONTIER_NAME: frontier_to_bytes(found), TABLE_NAME: csv_bytes(found), **drawn}
+def _documents(frontier: Frontier) -> dict[str, bytes]:
+    drawn = {f"{name}.svg": data for name, data in pictures(frontier, "svg").items()}
+    return {FRONTIER_NAME: frontier_to_bytes(frontier), TABLE_NAME: csv_bytes(frontier), **drawn}
 
 
-def _replay(survey: Survey, given: GraspSet | None) -> Replay:
+def _replay(survey: Survey, stream: GraspSet | None) -> Replay:
     """Return the test rows of the first fold as a replay, or the recordings given for it."""
     grasp_set, seed = survey.grasp_set, survey.search.seed
     number = {grasp: label for label, grasp in enumerate(survey.samples.grasps)} | {NONE: -1}
-    if given is None:
+    if stream is None:
         labels = np.array([number[grasp] for grasp in grasp_set.grasps.tolist()], np.intp)
         # The test rows, and the rows of their movements in which nothing is held.
         movements, test = grasp_set.movement_ids, np.flatnonzero(~grasp_set.is_none)[survey.cuts.screening[0].test]
         return replay_of(grasp_set, labels, np.flatnonzero(np.isin(movements, movements[test])), seed=seed)
-    if given.fingerprint() == grasp_set.fingerprint():
+    if stream.fingerprint() == grasp_set.fingerprint():
         raise FrontierError(
             f"the stream equals the training set, {survey.source}: name other recordings with ``stream``, or leave it "
             "out to use held-out rows"
         )
-    if (given.element_names, given.joints) != (grasp_set.element_names, grasp_set.joints):
+    if (stream.element_names, stream.joints) != (grasp_set.element_names, grasp_set.joints):
         raise FrontierError(f"the stream has other switches, taxels or joints than {survey.source}")
-    strange = sorted({str(grasp) for grasp in given.grasps} - set(number))
+    strange = sorted({str(grasp) for grasp in stream.grasps} - set(number))
     if strange:
         raise FrontierError(f"the stream holds {strange[0]!r}, which {survey.source} does not")
-    labels = np.array([number[str(grasp)] for grasp in given.grasps], dtype=np.intp)
-    return replay_of(given, labels, seed=seed)
+    labels = np.array([number[str(grasp)] for grasp in stream.grasps], dtype=np.intp)
+    return replay_of(stream, labels, seed=seed)
 
 
 def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> ReferencePoint:
@@ -275,29 +284,29 @@ def _found(
     survey: Survey,
     replay: Replay,
     goal: tuple[float | None, float | None],
-    own: tuple[ReferencePoint, ...],
+    marks: tuple[ReferencePoint, ...],
     lacking: tuple[str, ...],
 ) -> Frontier:
-    search, equipment, most = survey.search, survey.equipment, survey.levels[-1]
-    n_switches, n_elements = survey.samples.n_switches, survey.size(most)
+    search, equipment, levels = survey.search, survey.equipment, survey.levels[-1]
+    n_switches, n_elements = survey.samples.n_switches, survey.size(levels)
     screened, curves = screen(survey)
     if not screened:
         raise FrontierError(
             f"no placement that was tried can be built for {equipment.model.target}: name other ``methods`` or "
             "another ``target``"
         )
-    several = finalists(screened, (), _WIDER * search.finalists)
-    with_joints = [one for one in screened if one.choice.inputs != "switches"]
-    screened += screen_fewer(survey, finalists(with_joints, (), _FEWER))
-    screened += screen_others(survey, several)
-    named = choices_to_mark(n_elements, survey.n_joints, search.trainers[0], most)
-    closes = evaluate_finalists(survey, finalists(screened, named, search.finalists))
-    every = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
-    by_time, by_switches = best_designs(every)
+    pool = [one for one in screened if one.choice.inputs != "switches"]
+    fewer = screen_fewer(survey, finalists(pool, (), _FEWER))
+    others = screen_others(survey, finalists(screened, (), _WIDER * search.finalists))
+    screened += (*fewer, *others)
+    choices = choices_to_mark(n_elements, survey.inputs.n_joints, search.trainers[0], levels)
+    closes = evaluate_finalists(survey, finalists(screened, choices, search.finalists))
+    several = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
+    by_time, by_switches = best_designs(several)
     best = list(dict.fromkeys([*by_time, *by_switches]))
     times = measured([design.tables.content for design in best], equipment.model, survey.cache)
     kept = [replace(design, measured=times.get(design.tables.content)) for design in best]
-    luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
+    luck = lucks((by_time, by_switches), several, screened, survey.cuts, search.seed)
     points = points_of(kept, _latencies(survey, replay, kept), luck, survey)
     tried = _tried(screened, closes, search)
     claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
@@ -315,17 +324,17 @@ def _found(
         n_switches=n_switches,
         n_taxels=len(survey.grasp_set.taxel_columns),
         n_levels=n_elements - n_switches,
-        n_joints=survey.n_joints,
+        n_joints=survey.inputs.n_joints,
         grasps=survey.samples.grasps,
         target=model.target,
         machine=model.machine,
         folds=search.folds,
         repeats=len(survey.cuts.repeats),
-        combinations=len(POLICIES) * len(every) + len(tried),
+        combinations=len(POLICIES) * len(several) + len(tried),
         points=points,
         tried=tried,
         curves=curves,
-        marks=(*marks_of(named, closes, survey), *own),
+        marks=(*marks_of(choices, closes, survey), *marks),
         skipped=(*lacking, *claimed, *notes, replay.what),
         picked=_picked(points, *goal),
         wanted=_in_words(*goal),
@@ -366,17 +375,17 @@ def _latencies(survey: Survey, replay: Replay, kept: Sequence[Design]) -> Latenc
             fold.train,
             survey.selection(choice, fold),
             replay,
-            tuple((design.tables.recipe, design.frame.us) for design in mine),
+            tuple((design.tables.recipe, design.frame.us) for design in alike),
             survey.training(choice, fold),
             movements,
             seed,
         )
-        for choice, mine in grouped.items()
+        for choice, alike in grouped.items()
     ]
     return {
         (design, kind): latency
-        for mine, found in zip(grouped.values(), survey.cache.ask(latencies, calls), strict=True)
-        for design, several in zip(mine, found, strict=True)
+        for alike, timed in zip(grouped.values(), survey.cache.ask(latencies, calls), strict=True)
+        for design, several in zip(alike, timed, strict=True)
         for kind, latency in zip(POLICIES, several, strict=True)
     }
 
@@ -401,7 +410,3 @@ def _tried(screened: Sequence[Screened], closes: Sequence[EvaluatedFinalist], se
         )
         for one, rounds, rate in (*first, *then)
     )
-
-
-def _no_progress(_done: int, _total: int) -> None:
-    pass

@@ -30,38 +30,32 @@ class Picked:
     def options(self) -> dict[str, object]:
         """The options of `compile_build` that the point determines."""
         setting = self.point.setting
-        settled: dict[str, object] = {
+        names = ("max_bins", "keep_joints", "levels", "rounds")
+        chosen = {name: value for name in names if (value := getattr(setting, name)) is not None}
+        if setting.inputs != "joints":
+            parameter = "keep" if METHODS[setting.placement.method].by_number else "prune"
+            chosen |= {"placement": setting.placement.method, parameter: int(setting.placement.parameter)}
+        return {
             "inputs": setting.inputs,
             "width": setting.width,
             "table_bits": setting.table_bits,
             "trainer": setting.trainer,
             # Settings that are not written are defaults, and none is left to choose.
-            **{own.name: own.default for own in TRAINERS[setting.trainer].settings},
+            **{option.name: option.default for option in TRAINERS[setting.trainer].settings},
             **setting.settings,
+            **chosen,
         }
-        if setting.max_bins is not None:
-            settled["max_bins"] = setting.max_bins
-        if setting.keep_joints is not None:
-            settled["keep_joints"] = setting.keep_joints
-        if setting.levels is not None:
-            settled["levels"] = setting.levels
-        if setting.rounds is not None:
-            settled["rounds"] = setting.rounds
-        if setting.inputs == "joints":
-            return settled
-        parameter = "keep" if METHODS[setting.placement.method].by_number else "prune"
-        return {**settled, "placement": setting.placement.method, parameter: int(setting.placement.parameter)}
 
-    def wired(self, given: Harness | None) -> Harness | Callable[[Sequence[str]], Harness] | None:
-        """Return the wiring for `compile_build`: the given one if the point is wired so, else a function that makes a
+    def wired(self, harness: Harness | None) -> Harness | Callable[[Sequence[str]], Harness] | None:
+        """Return the wiring for `compile_build`: this harness if the point is wired so, else a function that makes a
         new one of its kind for the kept switches.
 
         Raises FrontierError if the point needs the wiring of a glove that is not given.
         """
         setting = self.point.setting
         if not setting.wiring:
-            return given
-        if setting.wiring == AS_WIRED and given is None:
+            return harness
+        if setting.wiring == AS_WIRED and harness is None:
             raise FrontierError(
                 f"point {self.point.number} is read as the glove was wired: name its glove.toml with ``glove``"
             )
@@ -72,8 +66,8 @@ class Picked:
                     f"point {self.point.number} lists {len(self.point.switches)} switches, but its placement keeps "
                     f"{len(kept)}, not the same ones: run thenar frontier again"
                 )
-            if given is not None and setting.wiring == AS_WIRED:
-                return given
+            if harness is not None and setting.wiring == AS_WIRED:
+                return harness
             joints = () if setting.inputs == "switches" else self.point.joints or self.joints
             return WiringOption(setting.wiring, setting.clock_hz).harness_of(kept, joints)
 
@@ -104,17 +98,17 @@ def picked(path: Path, number: int | None, grasp_set: GraspSet) -> Picked:
     ...     grasp_set, Path("build"), **chosen.options, harness=chosen.wired(None)
     ... )  # doctest: +SKIP
     """
-    found = frontier_from_bytes(read_file(path, MAX_BYTES, FrontierError), str(path))
-    wanted = found.picked if number is None else number
-    if wanted is None:
-        raise FrontierError(f"{path} has points 1 to {len(found.points)}: say with ``point`` which to build")
-    if found.fingerprint != grasp_set.fingerprint():
+    frontier = frontier_from_bytes(read_file(path, MAX_BYTES, FrontierError), str(path))
+    number = frontier.picked if number is None else number
+    if number is None:
+        raise FrontierError(f"{path} has points 1 to {len(frontier.points)}: say with ``point`` which to build")
+    if frontier.fingerprint != grasp_set.fingerprint():
         raise FrontierError(
-            f"{path} was found for other recordings ({found.source}): run thenar frontier on these, or compile those"
+            f"{path} was found for other recordings ({frontier.source}): run thenar frontier on these, or compile those"
         )
-    point = found.point(wanted)
+    point = frontier.point(number)
     _check(point, grasp_set, f"{path}: point {point.number}")
-    return Picked(found, point, tuple(joint.name for joint in grasp_set.joints))
+    return Picked(frontier, point, tuple(joint.name for joint in grasp_set.joints))
 
 
 def _check(point: FrontierPoint, grasp_set: GraspSet, what: str) -> None:

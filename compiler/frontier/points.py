@@ -99,7 +99,7 @@ class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     switches    names of the kept switches and levels, in the order in which they were chosen from all rows
     joints      names of the joints that are read, if not all or none
     rate        of new subjects, or pooled: the rate by which the point was chosen, corrected for luck
-    luck        the optimism of picking the best of all that was tried (`evaluation.luck`)
+    luck        the optimism of picking the best of all that was tried (`evaluation.rates.Draws`)
     frames      the rate of single frames, uncorrected (None: a trial has one frame)
     other_rate  the other of the two, uncorrected (None: only one subject)
     scan        reading the switches; transfer: the joints

@@ -4,7 +4,7 @@ A candidate is a `Recipe`: its placement with its number, its inputs, and its tr
 its tables.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -30,14 +30,10 @@ JOINTS = (2, 3, 4, 5, 6, 7, 8, 10, 12, 16)
 TABLED = (10, 30, 100)
 
 
-# A method, whether it uses the joints, and how many levels of a taxel it chooses from.
-Choosing = tuple[str, bool, int | None]
-
-
-def placed(method: str, parameter: int, trainer: str, inputs: Inputs, levels: int | None = None) -> Recipe:
+def placed(method: str, number: int, trainer: str, inputs: Inputs, levels: int | None = None) -> Recipe:
     """Return the candidate whose elements a method chooses, given its number, and the levels of a taxel."""
-    named = {"keep" if METHODS[method].by_number else "prune": parameter}
-    return changed(Recipe(placement=method, trainer=trainer, inputs=inputs, levels=levels), named)
+    changes = {"keep" if METHODS[method].by_number else "prune": number}
+    return changed(Recipe(placement=method, trainer=trainer, inputs=inputs, levels=levels), changes)
 
 
 def placement_of(recipe: Recipe) -> PlacementChoice:
@@ -46,12 +42,6 @@ def placement_of(recipe: Recipe) -> PlacementChoice:
         return PlacementChoice("none", 0.0)
     by_number = METHODS[recipe.placement].by_number
     return PlacementChoice(recipe.placement, float(recipe.keep or 0 if by_number else recipe.prune))
-
-
-def chosen_by(recipe: Recipe) -> Choosing:
-    """Return all on which the choice of a candidate's elements depends, but for its number."""
-    joints = recipe.inputs == "both" and METHODS[recipe.placement].uses_joints
-    return placement_of(recipe).method, joints, recipe.levels
 
 
 def tabled(recipe: Recipe, rounds: int, shape: Recipe = SHAPES[0]) -> Recipe:
@@ -119,7 +109,7 @@ class Search:
         """The trainers, the paper's first; the other properties describe the first: see `alone`."""
         if self.trainer != AUTO:
             return (self.trainer,)
-        names = dict.fromkeys(each.trainer for each in Training.candidates(self._asked(AUTO)))
+        names = dict.fromkeys(training.trainer for training in Training.candidates(self._recipe(AUTO)))
         return tuple(sorted(names, key=lambda name: name != PAPERS_TRAINER))
 
     def alone(self, trainer: str) -> "Search":
@@ -129,19 +119,17 @@ class Search:
     @property
     def training(self) -> Training:
         """The trainer, and values for all its settings: those given, and defaults."""
-        return Training.of(self._asked(self.trainers[0]))
+        return Training.of(self._recipe(self.trainers[0]))
 
     @property
     def candidates(self) -> tuple[Training, ...]:
         """All trainings that the settings leave open; trainers with stages are not varied by rounds."""
         usual = {"rounds": self.training.settings["rounds"]} if self.staged else {}
-        every = Training.candidates(self._asked(self.trainers[0]))
-        found = {
-            tuple(one.settings.items()): one for one in (Training(e.trainer, {**e.settings, **usual}) for e in every)
-        }
-        return tuple(found.values())
+        several = Training.candidates(self._recipe(self.trainers[0]))
+        several = tuple(Training(one.trainer, {**one.settings, **usual}) for one in several)
+        return tuple(one for number, one in enumerate(several) if one not in several[:number])
 
-    def _asked(self, trainer: str) -> Recipe:
+    def _recipe(self, trainer: str) -> Recipe:
         return changed(Recipe(), {"trainer": trainer, **self.settings})
 
     @property
@@ -165,16 +153,4 @@ class Search:
         return self._up_to_last(TABLED)
 
     def _up_to_last(self, rounds: tuple[int, ...]) -> tuple[int, ...]:
-        return (*(each for each in rounds if each < self.rounds), self.rounds) if self.staged else (1,)
-
-
-def candidates(method: str, n_elements: int, trainer: str, inputs: Inputs, levels: int | None) -> Iterator[Recipe]:
-    """Yield the candidates that a frontier tries with a method among `n_elements` elements."""
-    return (placed(method, size, trainer, inputs, levels) for size in METHODS[method].ladder(n_elements))
-
-
-def available_inputs(n_elements: int, n_joints: int) -> tuple[Inputs, ...]:
-    """Return which inputs a set has; joints alone need no placement."""
-    if not n_elements:
-        return ("joints",) if n_joints else ()
-    return ("both", "switches", "joints") if n_joints else ("switches",)
+        return (*(number for number in rounds if number < self.rounds), self.rounds) if self.staged else (1,)

@@ -1,23 +1,23 @@
 """The rows of a frontier and their folds, in which switches are chosen and classifiers trained."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace as changed_to
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import Fitting
+from thenar.runtime.manifest import Fitting, Unit
 from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Inputs, Recipe
 
-from ..evaluation.choosing import choose_training
+from ..evaluation.choosing import InputChoices, choose_path, choose_training, rank_joints
 from ..evaluation.folds import EvaluationError, Fold, Rows, leave_groups_out, trial_folds
 from ..evaluation.rates import Rate
-from ..placement.elements import Elements, bits_of, elements_of, names_of, ports_of
-from ..placement.joints import joint_order
-from ..placement.methods.base import METHODS
+from ..placement.elements import Elements, names_of
 from ..placement.placement import InputSelection
 from ..placement.ports import PortCosts
 from ..recogniser import Recogniser, predicted_classes
@@ -27,12 +27,13 @@ from ..trainers.base import Training
 from .cache import Cache, stored
 from .points import By, PointTime
 from .price import Equipment, PricedTables, price
-from .search import SHAPES, TAXEL_LEVELS, Choosing, Search, chosen_by, placement_of
+from .search import SHAPES, TAXEL_LEVELS, Search
 
 # Settings are selected on the placement whose number of switches is nearest to the paper's.
 _TYPICAL = 33
 
-
+K = TypeVar("K", bound=Hashable)
+R = TypeVar("R")
 # The rounds after which models are tested, and those after which tables are made.
 Depth = tuple[tuple[int, ...], tuple[int, ...]]
 
@@ -93,36 +94,28 @@ class Cuts:
     @property
     def others(self) -> tuple[Fold, ...]:
         """Every other fold that is tested."""
-        every = (*(fold for folds in self.repeats for fold in folds), *self.subjects)
-        return tuple(fold for fold in every if fold not in self.screening)
+        folds = (*(fold for folds in self.repeats for fold in folds), *self.subjects)
+        return tuple(fold for fold in folds if fold not in self.screening)
 
-    def judged(self, by: By, packed: Mapping[Fold, bytes]) -> "TrialAccuracy":
-        """Return the rate of this kind, given the packed bits of each fold's trials, over the available repeats."""
+    def judged(self, by: By, packed: Mapping[Fold, bytes], unit: Unit = "trials") -> "TrialAccuracy":
+        """Return the rate of this kind over the available repeats, given the packed bits of each fold's trials, or of
+        its rows for the unit "frames".
+        """
+        trials = np.arange(len(self.people)) if unit == "trials" else self.trials
         repeats = [folds for folds in self.folds(by) if packed.keys() >= set(folds)]
-        hits = np.zeros((len(repeats), len(self.people)), np.intp)
-        for own, folds in zip(hits, repeats, strict=True):
+        hits = np.zeros((len(repeats), len(trials)), np.intp)
+        for row, folds in zip(hits, repeats, strict=True):
             for fold in folds:
-                tested = np.unique(self.trials[fold.test])
-                own[tested] = np.unpackbits(np.frombuffer(packed[fold], np.uint8), count=len(tested))
-        everyone = np.arange(len(self.people))
-        groups = self.people if by == "new subject" else None
-        rate = Rate.predicted(hits, np.ones_like(everyone), everyone, of=by, groups=groups)
+                tested = np.unique(self.trials[fold.test]) if unit == "trials" else fold.test
+                row[tested] = np.unpackbits(np.frombuffer(packed[fold], np.uint8), count=len(tested))
+        groups = self.people[trials] if by == "new subject" else None
+        rate = Rate.predicted(hits, np.ones_like(trials), trials, of=by, unit=unit, groups=groups)
         return TrialAccuracy(rate, hits.sum(axis=0), len(repeats))
-
-    def frames(self, packed: Mapping[Fold, bytes]) -> Rate:
-        """Return the rate of single frames by which points are chosen, by the packed bits of each fold's rows."""
-        by, repeats = self.by, self.folds(self.by)
-        hits = np.zeros((len(repeats), len(self.trials)), np.intp)
-        for own, folds in zip(hits, repeats, strict=True):
-            for fold in folds:
-                own[fold.test] = np.unpackbits(np.frombuffer(packed[fold], np.uint8), count=len(fold.test))
-        groups = self.people[self.trials] if by == "new subject" else None
-        return Rate.predicted(hits, np.ones_like(self.trials), self.trials, of=by, unit="frames", groups=groups)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrialAccuracy:
-    """A rate of trials, and in how many of `repeats` each trial (m,) was predicted rightly."""
+    """A rate of trials or frames, and in how many of `repeats` each of them (m,) was predicted rightly."""
 
     rate: Rate
     hits: NDArray[np.intp]
@@ -157,9 +150,12 @@ class Survey:
     cuts: Cuts
     equipment: Equipment
     cache: Cache
-    _elements: dict[tuple[Choosing, float, Fold], Elements] = field(default_factory=dict, init=False)
-    _joints: dict[tuple[Choosing, float, Fold], Columns] = field(default_factory=dict, init=False)
     _trainings: dict[tuple[str, Inputs, Fold], Training] = field(default_factory=dict, init=False)
+
+    @cached_property
+    def inputs(self) -> InputChoices:
+        """The elements and joints that choices keep."""
+        return InputChoices(self.samples, self.ports, ask=self.cache.ask)
 
     @property
     def levels(self) -> tuple[int | None, ...]:
@@ -168,20 +164,18 @@ class Survey:
 
     def size(self, levels: int | None) -> int:
         """Return how many elements there are to choose from in all rows."""
-        return len(elements_of(self.samples, levels))
+        return len(self.inputs.available(self.cuts.everything.train, levels))
 
     def elements(self, choice: Recipe, fold: Fold | None = None) -> Elements:
-        """Return the elements that a choice keeps by the training rows of `fold`, or by all rows, once chosen."""
-        if choice.inputs == "joints":
-            return ()
-        return self._elements[chosen_by(choice), placement_of(choice).parameter, fold or self.cuts.everything]
+        """Return the elements that a choice keeps by the training rows of `fold`, or by all rows."""
+        return self.inputs.elements(choice, (fold or self.cuts.everything).train)
 
     def joints(self, choice: Recipe, fold: Fold | None = None) -> Columns:
-        """Return the joints of a choice, ascending, once ranked on the training rows of `fold`, or on all rows."""
-        if choice.keep_joints is None or choice.inputs == "switches":
-            return () if choice.inputs == "switches" else tuple(range(self.n_joints))
-        place = chosen_by(choice), placement_of(choice).parameter, fold or self.cuts.everything
-        return tuple(sorted(self._joints[place][: choice.keep_joints]))
+        """Return the joints of a choice, ascending, by the training rows of `fold`, or by all rows."""
+        if choice.inputs == "switches":
+            return ()
+        rows = (fold or self.cuts.everything).train
+        return self.inputs.joints(self.elements(choice, fold), rows, choice.keep_joints)
 
     def selection(self, choice: Recipe, fold: Fold | None = None) -> InputSelection:
         """Return the inputs that a choice keeps by the training rows of `fold`, or by all rows."""
@@ -190,11 +184,6 @@ class Survey:
     def names(self, choice: Recipe) -> tuple[str, ...]:
         """Return the names of the elements that a choice keeps by all rows."""
         return names_of(self.grasp_set, self.elements(choice))
-
-    @property
-    def n_joints(self) -> int:
-        """How many joints a frame has."""
-        return int(self.samples.codes.shape[1])
 
     def transfer(self, choice: Recipe) -> PointTime:
         """Return the time of reading the joints of a choice."""
@@ -210,67 +199,49 @@ class Survey:
         place = choice.trainer, choice.inputs, fold or self.cuts.everything
         return self._trainings.get(place) or self.search.alone(choice.trainer).candidates[0]
 
-    def typical(self, choices: Iterable[Recipe]) -> list[Recipe]:
-        """Return, for each trainer and kind of inputs with open settings, the choice that selects them."""
+    def choose(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
+        """Choose the switches and levels of all choices from the training rows of these folds."""
+        self.inputs.choose(choices, [fold.train for fold in folds])
+
+    def choose_joints(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
+        """Rank the joints, given the switches, for choices that keep only some, by the training rows of these folds."""
+        some = [choice for choice in choices if choice.keep_joints is not None]
+        places = dict.fromkeys((self.elements(choice, fold), fold) for choice in some for fold in folds)
+        self.inputs.rank([(elements, fold.train) for elements, fold in places])
+
+    def tune(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
+        """Select the open settings of each trainer and kind of inputs on the training rows of these folds, as `compile`
+        does: once, by the choice of the most typical size.
+        """
         alike: dict[tuple[str, Inputs], list[Recipe]] = {}
         for choice in choices:
             if len(self.search.alone(choice.trainer).candidates) > 1:
                 alike.setdefault((choice.trainer, choice.inputs), []).append(choice)
-        return [min(mine, key=lambda one: abs(len(self.elements(one)) - _TYPICAL)) for mine in alike.values()]
-
-    def tune(self, typical: Sequence[Recipe], folds: Sequence[Fold]) -> None:
-        """Select open settings on the training rows of these folds, as `compile` does: by typical choices, once for all
-        of the same trainer and inputs.
-        """
-        places = [(choice, fold) for choice in typical for fold in folds]
-        calls = [
-            (
+        typical = {
+            key: changed_to(min(several, key=lambda one: abs(len(self.elements(one)) - _TYPICAL)), keep_joints=None)
+            for key, several in alike.items()
+        }
+        calls = {
+            (*key, fold): (
                 self.samples,
                 fold.train,
-                self.selection(changed_to(choice, keep_joints=None), fold),
+                self.selection(choice, fold),
                 self.search.alone(choice.trainer).candidates,
                 self.search.seed,
                 self.cuts.by == "new subject",
             )
-            for choice, fold in places
-        ]
-        for (choice, fold), fitting in zip(places, self.cache.ask(choose_settings, calls), strict=True):
-            self._trainings[choice.trainer, choice.inputs, fold] = Training.chosen(fitting)
-
-    def choose(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
-        """Choose the switches and levels of all choices from the training rows of these folds."""
-        asked: dict[Choosing, dict[float, None]] = {}
-        for choice in choices:
-            if choice.inputs != "joints":
-                asked.setdefault(chosen_by(choice), {})[placement_of(choice).parameter] = None
-        places = [(key, fold) for key in asked for fold in folds]
-        calls = [
-            (self.samples, fold.train, *key, tuple(asked[key]), self.ports if METHODS[key[0]].uses_ports else None)
-            for key, fold in places
-        ]
-        for (key, fold), path in zip(places, self.cache.ask(choose_path, calls), strict=True):
-            for number, elements in zip(asked[key], path, strict=True):
-                self._elements[key, number, fold] = elements
-
-    def choose_joints(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
-        """Rank the joints, given the switches, for choices that keep only some, by the training rows of these folds."""
-        some = (one for one in choices if one.keep_joints is not None)
-        alike = {(chosen_by(one), placement_of(one).parameter): one for one in some}
-        places = [(key, fold) for key in alike for fold in folds]
-        calls = [(self.samples, fold.train, self.elements(alike[key], fold)) for key, fold in places]
-        for (key, fold), order in zip(places, self.cache.ask(rank_joints, calls), strict=True):
-            self._joints[(*key, fold)] = order
+            for key, choice in typical.items()
+            for fold in folds
+        }
+        for place, fitting in self._ask(choose_settings, calls).items():
+            self._trainings[place] = Training.chosen(fitting)
 
     def fit(
-        self,
-        choices: Sequence[Recipe],
-        folds: Sequence[Fold],
-        depth: Callable[[Recipe], Depth],
+        self, choices: Sequence[Recipe], folds: Sequence[Fold], depth: Callable[[Recipe], Depth]
     ) -> dict[tuple[Recipe, Fold], FoldHits]:
-        """Return the tallies of every choice in every fold, trained to its `depth`."""
-        places = [(choice, fold) for choice in choices for fold in folds]
-        calls = [
-            (
+        """Return the hits of every choice in every fold, trained to its `depth`."""
+        calls = {
+            (choice, fold): (
                 self.samples,
                 fold,
                 self.selection(choice, fold),
@@ -278,54 +249,37 @@ class Survey:
                 SHAPES if depth(choice)[1] else (),
                 self.training(choice, fold),
             )
-            for choice, fold in places
-        ]
-        return dict(zip(places, self.cache.ask(fit_stages, calls), strict=True))
+            for choice in choices
+            for fold in folds
+        }
+        return self._ask(fit_stages, calls)
 
     def prices(
-        self, several: Sequence[tuple[Recipe, tuple[Recipe, ...]]], rows: Rows, *, lost: bool = False
-    ) -> list[tuple[PricedTables, ...]]:
+        self, recipes: Mapping[Recipe, tuple[Recipe, ...]], rows: Rows, *, lost: bool = False
+    ) -> dict[Recipe, tuple[PricedTables, ...]]:
         """Return the prices of choices trained on these rows, each with the tables of several recipes; see `price`."""
-        calls = [
-            (
+        calls = {
+            choice: (
                 self.samples,
                 self.names(choice),
                 rows,
                 self.selection(choice),
-                recipes,
+                tables,
                 self.training(choice),
                 self.equipment,
                 lost,
             )
-            for choice, recipes in several
-        ]
-        return self.cache.ask(price, calls)
+            for choice, tables in recipes.items()
+        }
+        return self._ask(price, calls)
+
+    def _ask(self, function: Callable[..., R], calls: Mapping[K, tuple[Any, ...]]) -> dict[K, R]:
+        """Return the result of a stored function for each tuple of arguments."""
+        return dict(zip(calls, self.cache.ask(function, list(calls.values())), strict=True))
 
 
-@stored(3)
-def choose_path(
-    samples: Samples,
-    rows: Rows,
-    method: str,
-    joints: bool,
-    levels: int | None,
-    numbers: tuple[float, ...],
-    ports: PortCosts | None,
-) -> tuple[Elements, ...]:
-    """Choose from these levels of the taxels, and the switches, in some rows by one method, for each of its numbers;
-    given the joints, or not.
-    """
-    learning = samples.rows(rows)
-    elements = elements_of(learning, levels)
-    bits = bits_of(learning if joints else learning.with_joints(()), elements)
-    choose = METHODS[method].chooser(bits, None if ports is None else ports_of(ports, elements))
-    return tuple(tuple(elements[column] for column in choose(number)) for number in numbers)
-
-
-@stored(2)
-def rank_joints(samples: Samples, rows: Rows, elements: Elements) -> Columns:
-    """Return the joints in the order of their value in addition to these elements, in some rows."""
-    return joint_order(bits_of(samples.rows(rows), elements))
+stored(4)(choose_path)
+stored(3)(rank_joints)
 
 
 @stored(3)
@@ -357,22 +311,28 @@ def fit_stages(
     Rows get the most frequent type if no selected input varies.
     """
     train, test = (selection.read(samples.rows(rows)) for rows in (fold.train, fold.test))
-    if not (train.inputs != train.inputs[0]).any():
-        same = np.full(len(test.labels), np.bincount(train.labels).argmax())
-        trials, frames = _packed(same, test)
-        return FoldHits((trials,) * len(stages), *(((each,) * len(shapes),) * len(tabled) for each in (trials, frames)))
-    rounds = (*stages, *tabled)
-    made = dict(zip(rounds, Recogniser.stages(samples, Recipe(), fold.train, selection, training, rounds), strict=True))
-    predictions = (winners(made[stage].model.scores(test.switches, test.codes)) for stage in stages)
-    by_stage = tuple(_packed(predicted, test)[0] for predicted in predictions)
-    found = [
-        [
-            _packed(predicted_classes(tables, None, test.switches, test.codes), test)
-            for tables in (replace(made[stage], recipe=shape).integers for shape in shapes)
+    if not train.varies:
+        trials, frames = _packed(np.full(len(test.labels), train.most_frequent), test)
+        by_table = [[(trials, frames)] * len(shapes)] * len(tabled)
+        by_stage = (trials,) * len(stages)
+    else:
+        rounds = (*stages, *tabled)
+        recognisers = Recogniser.stages(samples, Recipe(), fold.train, selection, training, rounds)
+        trained = dict(zip(rounds, recognisers, strict=True))
+        predictions = (winners(trained[stage].model.scores(test.switches, test.codes)) for stage in stages)
+        by_stage = tuple(_packed(predicted, test)[0] for predicted in predictions)
+        by_table = [
+            [
+                _packed(predicted_classes(tables, None, test.switches, test.codes), test)
+                for tables in (replace(trained[stage], recipe=shape).integers for shape in shapes)
+            ]
+            for stage in tabled
         ]
-        for stage in tabled
-    ]
-    return FoldHits(by_stage, *(tuple(tuple(each[which] for each in row) for row in found) for which in (0, 1)))
+    return FoldHits(
+        by_stage,
+        tables=tuple(tuple(trials for trials, _ in row) for row in by_table),
+        frames=tuple(tuple(frames for _, frames in row) for row in by_table),
+    )
 
 
 def _packed(predictions: Rows, test: Samples) -> tuple[bytes, bytes]:

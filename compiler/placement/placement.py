@@ -99,20 +99,6 @@ def select(
     return InputSelection(elements, columns, joints, gains, tree)
 
 
-@dataclass(frozen=True, slots=True)
-class Placer:
-    """A recipe, and the costs and constraints under which it chooses: see `select`."""
-
-    recipe: Recipe
-    ports: PortCosts | None = None
-    limits: Limits | None = None
-
-    def elements(self, samples: Samples, **changes: Any) -> Elements:
-        """Return the elements that the recipe keeps with other choices `changes`, from rows (n, s) of any order."""
-        recipe = changed(self.recipe, {"keep_joints": None, **changes})
-        return select(samples, recipe, self.ports, self.limits).kept
-
-
 def choose(
     samples: Samples,
     method: str = PAPERS,

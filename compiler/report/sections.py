@@ -14,7 +14,7 @@ from thenar.runtime.model.terms.bit import Bit
 from thenar.runtime.recipe import AUTO
 from thenar.runtime.scanning.timing import port_us, reading_of
 
-from ..evaluation.populations import PROTOCOLS
+from ..evaluation.folds import PROTOCOLS
 from ..evaluation.rates import RecipeWords, placement_words
 from ..evaluation.study import Study
 from ..evaluation.tables import RateTable, both

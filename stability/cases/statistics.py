@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 from mpmath import mpf
 
-from thenar.compiler.evaluation.populations import Scheme
+from thenar.compiler.evaluation.folds import Scheme
 from thenar.compiler.evaluation.rates import ALIKE, UNITS, WEIGHT, Rate, clustered
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.manifest import Unit

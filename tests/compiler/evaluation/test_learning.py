@@ -8,13 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
+from thenar.compiler.evaluation.choosing import InputChoices
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.learning import LEAST, expected, plan_learning, power_law
-from thenar.compiler.evaluation.pictures import LEARNING_NAME, draw
-from thenar.compiler.evaluation.plan import Data, Planner, learners
+from thenar.compiler.evaluation.plan import Planner, learners
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.evaluation.study import StudyDesign, evaluate
-from thenar.compiler.placement.placement import Placer
+from thenar.compiler.evaluation.study import LEARNING_NAME, StudyDesign, draw, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.runtime.recipe import Recipe
@@ -25,7 +24,7 @@ QUICK = StudyDesign(Recipe(trainer="logitboost", rounds=3), repeats=1, tables=()
 
 
 def planned(grasps: GraspSet) -> Planner:
-    return Planner((), Samples.of(grasps), Placer(Recipe(seed=3)))
+    return Planner((), InputChoices(Samples.of(grasps)), Recipe(seed=3))
 
 
 @given(st.floats(0, 0.5), st.floats(0, 0.5), st.integers(1, 60))
@@ -77,8 +76,8 @@ def test_where_nothing_is_missed_nothing_is_promised() -> None:
 def test_so_many_trials_of_each_type_and_person_are_trained_on(make_grasps: Make, scheme: str) -> None:
     grasps = make_grasps(per_type=16)
     frames = grasps.rows(np.repeat(np.arange(len(grasps)), 3))
-    data = Data.of(frames, scheme)  # type: ignore[arg-type]
-    plan = plan_learning(data, frames.subjects, planned(frames), scheme, 4, 2)  # type: ignore[arg-type]
+    planner = planned(frames)
+    data, plan = planner.samples, plan_learning(planner, frames.subjects, scheme, 2)  # type: ignore[arg-type]
     last = 12 if scheme == "trial" else 16
     assert plan.repetitions == (2, 4, 8, last)
     assert plan.of == ("pooled" if scheme == "trial" else "new subject")

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.compiler.evaluation.luck import Draws
+from thenar.compiler.evaluation.rates import Draws
 
 SOME_HITS = st.tuples(st.integers(1, 5), st.integers(5, 9)).flatmap(
     lambda shape: arrays(np.intp, shape, elements=st.integers(0, 3))

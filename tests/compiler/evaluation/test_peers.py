@@ -12,7 +12,7 @@ from sklearn.pipeline import make_pipeline
 
 from thenar.compiler import GraspSet, LogitBoostClassifier, SwitchSelector, evaluate
 from thenar.compiler.evaluation.folds import EvaluationError
-from thenar.compiler.evaluation.permutation import shuffled_labels
+from thenar.compiler.evaluation.study import shuffled_labels
 from thenar.compiler.text import INDEPENDENT
 
 Make = Callable[..., GraspSet]

@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from thenar.compiler.evaluation.pictures import draw, draw_matrix
-from thenar.compiler.evaluation.study import StudyDesign, evaluate
+from thenar.compiler.evaluation.study import StudyDesign, draw, evaluate
+from thenar.compiler.evaluation.tables import draw_matrix
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.recipe import Recipe
 

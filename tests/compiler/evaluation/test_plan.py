@@ -1,10 +1,13 @@
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from thenar.compiler import grow_id3
+from thenar.compiler.evaluation.choosing import InputChoices
+from thenar.compiler.evaluation.folds import NESTED, PAPER, Protocol, populations_of
 from thenar.compiler.evaluation.plan import (
     COMPOSITIONS,
     DRAWS,
@@ -13,10 +16,8 @@ from thenar.compiler.evaluation.plan import (
     RowPlan,
     available,
 )
-from thenar.compiler.evaluation.populations import NESTED, PAPER, Protocol, populations
 from thenar.compiler.placement.elements import Element, columns_of
 from thenar.compiler.placement.methods.base import METHODS
-from thenar.compiler.placement.placement import Placer
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.runtime.recipe import Recipe
@@ -53,8 +54,8 @@ both_protocols = pytest.mark.parametrize("protocol", [PAPER, NESTED], ids=lambda
 
 
 def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
-    parts = populations(grasps, "trial", 4, repeats, 1)
-    return Planner(parts, Samples.of(grasps), Placer(Recipe(prune=prune)), (0, 30))
+    populations = populations_of(grasps, "trial", 4, repeats, 1)
+    return Planner(populations, InputChoices(Samples.of(grasps)), Recipe(prune=prune), (0, 30))
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +74,7 @@ def test_every_cell_tests_each_row_of_its_subject_once_a_repeat(planner: Planner
         for line in planner.table(name, protocol):
             for cell in line.cells:
                 for run in cell.runs:
-                    assert np.array_equal(np.sort(np.concatenate([fit.fold.test for fit in run])), cell.part.rows)
+                    assert np.array_equal(np.sort(np.concatenate([fit.fold.test for fit in run])), cell.population.rows)
 
 
 def test_the_papers_placement_is_per_subject_the_nested_one_per_fold(planner: Planner) -> None:
@@ -93,7 +94,7 @@ def test_the_diagonal_of_generality_is_composition_six(planner: Planner, protoco
 def test_off_the_diagonal_both_protocols_take_the_others_placement(planner: Planner) -> None:
     paper, nested = (planner.table("generality", protocol) for protocol in (PAPER, NESTED))
     for i, line in enumerate(paper):
-        giver = planner.parts[i]
+        giver = planner.populations[i]
         given = tuple(sorted(planner.chosen(giver.rows)))
         for j, cell in enumerate(line.cells):
             if i != j:
@@ -108,7 +109,7 @@ def test_pruning_starts_from_all_switches_and_takes_one_placement_for_all_subjec
     table = planner.table("pruning", protocol)
     assert [line.name for line in table] == ["all", "0", "30"]
     assert {fit.elements for cell in table[0].cells for fit in cell.fits} == {tuple(map(Element, range(12)))}
-    everyone = np.concatenate([part.rows for part in planner.parts])
+    everyone = np.concatenate([population.rows for population in planner.populations])
     for line, least in zip(table[1:], (0, 30), strict=True):
         for cell in line.cells:
             for fit in cell.fits:
@@ -135,7 +136,7 @@ def test_baselines_choose_from_the_rows_that_id3_may_choose_from(planner: Planne
     for name, method in (("CMIM", "cmim"), ("top-k", "mutual-information")):
         for cell in row(table, name).cells:
             for fit in cell.fits:
-                seen = cell.part.rows if protocol is PAPER else fit.fold.train
+                seen = cell.population.rows if protocol is PAPER else fit.fold.train
                 assert fit.elements == tuple(sorted(planner.chosen(seen, placement=method, keep=len(fit.elements))))
 
 
@@ -154,3 +155,20 @@ def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps:
 def test_any_method_can_be_a_baseline(make_grasps: Make) -> None:
     table = replace(planner_of(make_grasps()), baselines=("mrmr",)).table("baselines", NESTED)
     assert [line.name for line in table] == ["ID3", "mrmr", "random"]
+
+
+def test_what_differs_in_its_number_alone_is_chosen_together_and_once(make_grasps: Make) -> None:
+    asked: list[tuple[float, ...]] = []
+
+    def ask(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
+        asked.extend(call[3] for call in calls)
+        return [function(*call) for call in calls]
+
+    samples, rows = Samples.of(make_grasps(noise=0.3)), np.arange(5, 40)
+    recipes = [Recipe(placement=name, keep=keep) for name in ("cmim", "mutual-information") for keep in (2, 5)]
+    choices = InputChoices(samples, ask=ask)
+    choices.choose(recipes, [rows])
+    assert asked == [(2.0, 5.0), (2.0, 5.0)]
+    for recipe in recipes:
+        assert choices.elements(recipe, rows) == InputChoices(samples).elements(recipe, rows)
+    assert len(asked) == 2

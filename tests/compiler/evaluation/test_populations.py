@@ -4,8 +4,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thenar.compiler.evaluation.folds import EvaluationError, weka_folds
-from thenar.compiler.evaluation.populations import NESTED, PAPER, Scheme, concerns, populations
+from thenar.compiler.evaluation.folds import (
+    NESTED,
+    PAPER,
+    EvaluationError,
+    Scheme,
+    concerns,
+    populations_of,
+    weka_folds,
+)
 from thenar.compiler.recordings.graspset import GraspSet
 
 Make = Callable[..., GraspSet]
@@ -14,23 +21,22 @@ Make = Callable[..., GraspSet]
 @pytest.mark.parametrize("scheme", ["trial", "object", "block"])
 def test_a_subject_is_trained_and_tested_on_own_rows_alone(make_grasps: Make, scheme: Scheme) -> None:
     grasps = make_grasps()
-    parts = populations(grasps, scheme, n_folds=4, repeats=2, seed=1)
-    assert [part.name for part in parts] == ["A", "B"]
-    for part in parts:
-        own = np.flatnonzero(grasps.subjects == part.name)
-        assert np.array_equal(part.rows, own)
-        assert part.total == len(own)
-        for fold in part.folds:
+    populations = populations_of(grasps, scheme, n_folds=4, repeats=2, seed=1)
+    assert [population.name for population in populations] == ["A", "B"]
+    for population in populations:
+        own = np.flatnonzero(grasps.subjects == population.name)
+        assert np.array_equal(population.rows, own)
+        for fold in population.folds:
             assert np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), own)
 
 
 def test_leaving_a_subject_out_trains_on_all_others(make_grasps: Make) -> None:
     grasps = make_grasps(subjects="ABC")
-    for part in populations(grasps, "subject", n_folds=4, repeats=3, seed=1):
-        ((fold,),) = part.repeats
-        assert set(grasps.subjects[fold.test]) == {part.name}
-        assert set(grasps.subjects[fold.train]) == {*"ABC"} - {part.name}
-        assert len(part.rows) == len(grasps)
+    for population in populations_of(grasps, "subject", n_folds=4, repeats=3, seed=1):
+        ((fold,),) = population.repeats
+        assert set(grasps.subjects[fold.test]) == {population.name}
+        assert set(grasps.subjects[fold.train]) == {*"ABC"} - {population.name}
+        assert len(population.rows) == len(grasps)
 
 
 @pytest.mark.parametrize("scheme", ["trial", "subject", "object", "block"])
@@ -41,15 +47,15 @@ def test_no_scheme_parts_the_frames_of_a_trial(make_grasps: Make, scheme: Scheme
     grasps = make_grasps().rows(order)
     trials = grasps.trial_ids
     assert len(np.unique(trials)) == 96
-    for part in populations(grasps, scheme, n_folds=4, repeats=2, seed=seed):
-        for fold in part.folds:
+    for population in populations_of(grasps, scheme, n_folds=4, repeats=2, seed=seed):
+        for fold in population.folds:
             assert not set(trials[fold.train]) & set(trials[fold.test])
 
 
 def test_repeats_are_wekas_folds_of_the_following_seeds(make_grasps: Make) -> None:
     grasps = make_grasps(subjects="A")
-    (part,) = populations(grasps, "trial", n_folds=4, repeats=3, seed=5)
-    for repeat, folds in enumerate(part.repeats):
+    (population,) = populations_of(grasps, "trial", n_folds=4, repeats=3, seed=5)
+    for repeat, folds in enumerate(population.repeats):
         for fold, weka in zip(folds, weka_folds(grasps.labels, 4, 5 + repeat), strict=True):
             assert np.array_equal(fold.train, weka.train)
             assert np.array_equal(fold.test, weka.test)
@@ -57,13 +63,13 @@ def test_repeats_are_wekas_folds_of_the_following_seeds(make_grasps: Make) -> No
 
 @pytest.mark.parametrize("scheme", ["subject", "object", "block"])
 def test_a_cut_without_chance_is_not_repeated(make_grasps: Make, scheme: Scheme) -> None:
-    assert all(len(part.repeats) == 1 for part in populations(make_grasps(), scheme, 4, 3, 1))
+    assert all(len(population.repeats) == 1 for population in populations_of(make_grasps(), scheme, 4, 3, 1))
 
 
 def test_the_classes_are_those_that_the_subject_shows(make_grasps: Make) -> None:
     grasps = make_grasps(subjects="AB")
     without = grasps.rows((grasps.subjects == "A") | (grasps.grasps != "pinch"))
-    shown = {part.name: part.grasps for part in populations(without, "trial", 4, 1, 1)}
+    shown = {population.name: population.grasps for population in populations_of(without, "trial", 4, 1, 1)}
     assert shown == {"A": (0, 1, 2, 3), "B": (0, 2, 3)}
 
 
@@ -71,27 +77,27 @@ def test_a_subject_who_cannot_be_cut_is_named(make_grasps: Make) -> None:
     grasps = make_grasps()
     few = grasps.rows([*np.flatnonzero(grasps.subjects == "A"), len(grasps) - 1])
     with pytest.raises(EvaluationError, match="subject B: 1 rows cannot be cut into 4 folds"):
-        populations(few, "trial", 4, 1, 1)
+        populations_of(few, "trial", 4, 1, 1)
 
 
 def test_the_paper_lets_test_rows_choose_and_honesty_does_not(make_grasps: Make) -> None:
     grasps = make_grasps()
     everyone = np.arange(len(grasps))
     for scheme in ("trial", "object", "block"):
-        for part in populations(grasps, scheme, 4, 2, 1):
-            for fold in part.folds:
-                assert set(PAPER.may_choose(part, fold)) == set(part.rows)
-                assert set(NESTED.may_choose(part, fold)) == set(part.rows) - set(fold.test)
+        for population in populations_of(grasps, scheme, 4, 2, 1):
+            for fold in population.folds:
+                assert set(PAPER.may_choose(population, fold)) == set(population.rows)
+                assert set(NESTED.may_choose(population, fold)) == set(population.rows) - set(fold.test)
                 assert set(PAPER.may_choose_pooled(everyone, fold)) == set(everyone)
                 assert set(NESTED.may_choose_pooled(everyone, fold)) == set(everyone) - set(fold.test)
 
 
 def test_a_left_out_subject_has_no_say_in_a_nested_placement(make_grasps: Make) -> None:
     grasps = make_grasps()
-    for part in populations(grasps, "subject", 4, 1, 1):
-        (fold,) = part.folds
-        assert part.name not in grasps.subjects[NESTED.may_choose(part, fold)]
-        assert part.name in grasps.subjects[PAPER.may_choose(part, fold)]
+    for population in populations_of(grasps, "subject", 4, 1, 1):
+        (fold,) = population.folds
+        assert population.name not in grasps.subjects[NESTED.may_choose(population, fold)]
+        assert population.name in grasps.subjects[PAPER.may_choose(population, fold)]
 
 
 def keep_some(grasps: GraspSet, grasp: str, n: int) -> GraspSet:
@@ -101,18 +107,18 @@ def keep_some(grasps: GraspSet, grasp: str, n: int) -> GraspSet:
 
 def test_a_balanced_set_is_of_no_concern(make_grasps: Make) -> None:
     grasps = make_grasps()
-    assert concerns(grasps, populations(grasps, "trial", 4, 1, 1), "trial", 4) == ()
+    assert concerns(grasps, populations_of(grasps, "trial", 4, 1, 1), "trial", 4) == ()
 
 
 def test_a_grasp_type_with_fewer_rows_than_folds_is_named(make_grasps: Make) -> None:
     grasps = keep_some(make_grasps(subjects="A"), "tip", 3)
-    (text,) = concerns(grasps, populations(grasps, "trial", 4, 1, 1), "trial", 4)
+    (text,) = concerns(grasps, populations_of(grasps, "trial", 4, 1, 1), "trial", 4)
     assert text.startswith("subject A has 3 trial(s) of tip: fewer than the 4 folds")
 
 
 def test_a_single_row_can_never_be_recognised_and_that_is_said(make_grasps: Make) -> None:
     grasps = keep_some(make_grasps(subjects="A"), "tip", 1)
-    texts = concerns(grasps, populations(grasps, "trial", 4, 1, 1), "trial", 4)
+    texts = concerns(grasps, populations_of(grasps, "trial", 4, 1, 1), "trial", 4)
     assert any(
         text.startswith("1 row(s) of tip of subject A are tested by a fold that trains no such") for text in texts
     )
@@ -122,18 +128,18 @@ def test_leaving_objects_out_warns_of_types_with_one_object(make_grasps: Make) -
     grasps = make_grasps(subjects="A")
     own_object = np.where(grasps.grasps == "hook", "bag", grasps.objects)
     grasps = replace(grasps, objects=own_object)
-    (text,) = concerns(grasps, populations(grasps, "object", 4, 1, 1), "object", 4)
+    (text,) = concerns(grasps, populations_of(grasps, "object", 4, 1, 1), "object", 4)
     assert text.startswith("12 row(s) of hook of subject A")
 
 
 def test_a_subject_of_one_grasp_type_is_named(make_grasps: Make) -> None:
     grasps = make_grasps()
     only = grasps.rows(np.flatnonzero((grasps.subjects == "B") | (grasps.grasps == "tip")))
-    (text,) = concerns(only, populations(only, "trial", 4, 1, 1), "trial", 4)
+    (text,) = concerns(only, populations_of(only, "trial", 4, 1, 1), "trial", 4)
     assert text == "subject A: every row is of tip, the only type"
 
 
 def test_rates_of_simulated_grasps_are_called_that(make_grasps: Make) -> None:
     simulated = replace(make_grasps(), simulated="scene quick, seed 1")
-    (text,) = concerns(simulated, populations(simulated, "trial", 4, 1, 1), "trial", 4)
+    (text,) = concerns(simulated, populations_of(simulated, "trial", 4, 1, 1), "trial", 4)
     assert text.startswith("these grasps are simulated (scene quick, seed 1)")

@@ -5,31 +5,33 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.compiler.evaluation.folds import EvaluationError, Fold
+from thenar.compiler.evaluation.folds import EvaluationError, Fold, Population, Scheme
 from thenar.compiler.evaluation.plan import CLASSIFIERS, REFERENCE, CellPlan, FoldFit, RowPlan, learners
-from thenar.compiler.evaluation.populations import Population, Scheme
 from thenar.compiler.evaluation.rates import Rate, RecipeWords
 from thenar.compiler.evaluation.study import TABLES, Study, StudyDesign, evaluate
 from thenar.compiler.evaluation.tables import RateReader, RateRow, RateTable
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS
 from thenar.runtime.recipe import Recipe
 
-# Six rows of labels 2 and 5 (others do not occur), two folds, two repeats of the same folds; three switches.
-LABELS = np.array([2, 2, 2, 5, 5, 5])
+# Six rows of two types, two folds, two repeats of the same folds; three switches, and a joint.
+SAMPLES = Samples(
+    np.tile(np.eye(3) > 0, (2, 1)), np.arange(6).astype(np.uint16)[:, np.newaxis], np.arange(6) // 3, ("cup", "pen")
+)
 FOLDS = (Fold(np.arange(3, 6), np.arange(3), "1"), Fold(np.arange(3), np.arange(3, 6), "2"))
-PART = Population("A", np.arange(6), (2, 5), (FOLDS, FOLDS))
-FIRST = tuple(FoldFit(fold, (Element(0), Element(1)), (4,), (2, 5)) for fold in FOLDS)
+PART = Population("A", np.arange(6), (0, 1), (FOLDS, FOLDS))
+FIRST = tuple(FoldFit(fold, (Element(0), Element(1)), (0,), (0, 1)) for fold in FOLDS)
 THREE = tuple(map(Element, range(3)))
-SECOND = tuple(FoldFit(fold, elements, (), (2, 5)) for fold, elements in zip(FOLDS, [THREE, ()], strict=True))
+SECOND = tuple(FoldFit(fold, elements, (), (0, 1)) for fold, elements in zip(FOLDS, [THREE, ()], strict=True))
 ANSWERS = {
-    FIRST[0]: np.array([2, 2, 5]),
-    FIRST[1]: np.array([5, 5, 5]),
-    SECOND[0]: np.array([2, 2, 2]),
-    SECOND[1]: np.array([2, 2, 5]),
+    FIRST[0]: np.array([0, 0, 1]),
+    FIRST[1]: np.array([1, 1, 1]),
+    SECOND[0]: np.array([0, 0, 0]),
+    SECOND[1]: np.array([0, 0, 1]),
 }
-READER = RateReader(LABELS, np.arange(6), (2, 5), ANSWERS, frozenset({SECOND[1]}), "within subject", None)
+READER = RateReader(SAMPLES, ANSWERS, "within subject", None)
 CELL = CellPlan(PART, (FIRST, SECOND))
 
 
@@ -64,8 +66,9 @@ def test_a_row_counts_all_its_subjects_and_only_compositions_carry_confusions() 
     folds = tuple(Fold(fold.train + 6, fold.test + 6, fold.name) for fold in FOLDS)
     theirs = tuple(FoldFit(fold, fit.elements, (), fit.grasps) for fold, fit in zip(folds, SECOND, strict=True))
     answers = ANSWERS | {fit: ANSWERS[like] for fit, like in zip(theirs, SECOND, strict=True)}
-    reader = replace(READER, labels=np.tile(LABELS, 2), trials=np.arange(12), predictions=answers)
-    other = Population("B", np.arange(6, 12), (2, 5), (folds, folds))
+    twice = replace(SAMPLES.rows(np.tile(np.arange(6), 2)), trials=np.arange(12), movements=np.arange(12))
+    reader = replace(READER, samples=twice, predictions=answers)
+    other = Population("B", np.arange(6, 12), (0, 1), (folds, folds))
     row = RowPlan("VI", "Sel-Co", (CellPlan(PART, (FIRST, FIRST)), CellPlan(other, (theirs, theirs))))
     recipe = RecipeWords("id3, S = 0", "logitboost, rounds 5")
     table = reader.table("pruning", "paper", (row,), recipe)

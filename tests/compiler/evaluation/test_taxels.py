@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, compile_build, evaluate
-from thenar.compiler.evaluation.plan import Data, FoldFit, predictions
-from thenar.compiler.evaluation.populations import populations
+from thenar.compiler.evaluation.folds import populations_of
+from thenar.compiler.evaluation.plan import FoldFit, predictions
 from thenar.compiler.placement.elements import Element, Elements, bits_of, elements_of, names_of
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import Training
 
 Make = Callable[..., GraspSet]
-TRAINING = Training("logitboost", {"rounds": 6})
+TRAINING = {"": (Training("logitboost", {"rounds": 6}),)}
 
 
 @pytest.fixture(scope="module")
@@ -41,15 +41,15 @@ def plain_by(grasp_set: GraspSet, elements: Elements) -> GraspSet:
 
 @pytest.mark.parametrize("columns", [range(9), (0, 2, 4, 8), (3, 5), (1,), ()])
 def test_a_fold_is_predicted_by_the_levels_of_its_training_rows(padded: GraspSet, columns: Sequence[int]) -> None:
-    (part,) = populations(padded, "trial", 4, 1, 1)
-    for fold in part.folds:
+    (population,) = populations_of(padded, "trial", 4, 1, 1)
+    for fold in population.folds:
         every = elements_of(Samples.of(padded.rows(fold.train)), 2)
         assert len(every) > 9
         elements = tuple(element for element in every if element.column in columns)
         same = tuple(map(Element, range(len(elements))))
-        found = predictions(Data.of(padded), FoldFit(fold, elements, (0,), part.grasps), TRAINING)
-        plain = Data.of(plain_by(padded, elements))
-        assert np.array_equal(found, predictions(plain, FoldFit(fold, same, (0,), part.grasps), TRAINING))
+        found = predictions(Samples.of(padded), FoldFit(fold, elements, (0,), population.grasps), TRAINING)
+        plain = Samples.of(plain_by(padded, elements))
+        assert np.array_equal(found, predictions(plain, FoldFit(fold, same, (0,), population.grasps), TRAINING))
 
 
 def test_evaluate_and_compile_agree_on_the_selected_switches_and_joints(padded: GraspSet, tmp_path: Path) -> None:

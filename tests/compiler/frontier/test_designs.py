@@ -8,11 +8,10 @@ import pytest
 
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.designs import Design, best_designs, designs, lucks, points_of
-from thenar.compiler.frontier.finalists import EvaluatedFinalist
+from thenar.compiler.frontier.finalists import EvaluatedFinalist, Screened
 from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, PointTime
 from thenar.compiler.frontier.price import Classified, PricedTables
-from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Search, placed, tabled
 from thenar.compiler.frontier.survey import Cuts, TrialAccuracy
 from thenar.compiler.frontier.wirings import ScanTimes, records_of

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.frontier.finalists import depth_of, finalists, papers_tables, worthwhile
-from thenar.compiler.frontier.screen import Screened
+from thenar.compiler.frontier.finalists import Screened, depth_of, finalists, papers_tables, worthwhile
 from thenar.compiler.frontier.search import SHAPES, Search, placed, tabled
 from thenar.compiler.frontier.survey import FoldHits, TrialAccuracy
 from thenar.compiler.placement.elements import Element

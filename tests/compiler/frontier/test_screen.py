@@ -7,8 +7,9 @@ from thenar.compiler.frontier.finalists import choices_to_mark
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.price import Classified, PricedTables
-from thenar.compiler.frontier.search import Search, candidates, placed
+from thenar.compiler.frontier.search import Search, placed
 from thenar.compiler.frontier.wirings import ScanTimes
+from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.recipe import PAPERS_TRAINER, Recipe
 
@@ -32,8 +33,7 @@ def test_what_fits_no_flash_has_no_time() -> None:
 
 @pytest.mark.parametrize(("elements", "sizes"), [(9, [1, 2, 3, 4, 6, 8, 9]), (8, [1, 2, 3, 4, 6, 8]), (1, [1])])
 def test_elimination_is_tried_at_every_size_up_to_all_switches(elements: int, sizes: list[int]) -> None:
-    tried = candidates("elimination", elements, PAPERS_TRAINER, "switches", None)
-    assert [choice.keep for choice in tried] == sizes
+    assert [*METHODS["elimination"].ladder(elements)] == sizes
 
 
 def test_the_papers_placements_are_marked_with_all_inputs_that_there_are() -> None:

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from thenar.compiler.boosting.boost import boost
+from thenar.compiler.evaluation.choosing import choose_path
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.frontier.cache import question
 from thenar.compiler.frontier.search import SHAPES, Search
-from thenar.compiler.frontier.survey import Cuts, FoldHits, choose_path, fit_stages
+from thenar.compiler.frontier.survey import Cuts, FoldHits, fit_stages
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.id3 import grow_id3
@@ -21,6 +22,7 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.scores import Scorer
 
 COLUMNS = (3, 0, 7, 9)
@@ -95,7 +97,7 @@ def test_without_an_input_that_varies_the_most_frequent_type_is_answered(grasp_s
 
 def test_a_path_holds_the_placement_of_every_parameter(samples: Samples, cuts: Cuts) -> None:
     rows, prunes = cuts.screening[0].train, (0.0, 10.0, 40.0)
-    path = choose_path(samples, rows, "id3", True, None, prunes, None)
+    path = choose_path(samples, rows, Recipe(), prunes)
     X, y = samples.switches[rows], samples.labels[rows]
     trees = [grow_id3(X, y, min_samples=int(prune)) for prune in prunes]
     assert path == tuple(tuple(map(Element, tree.inputs)) for tree in trees)
@@ -106,7 +108,7 @@ def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -
     several = (((0,) * 14, (1.0,)), ((0,) * 14, (2.0,)), (one, (1.0, 1.0)), (two, (1.0, 1.0)))
     costs = [None, *(PortCosts(*each) for each in several)]
     folds = [*cuts.screening, *cuts.others, cuts.everything]
-    asked = {question(choose_path, (samples, folds[0].train, "id3", True, None, (0.0,), ports), {}) for ports in costs}
+    asked = {question(choose_path, (samples, folds[0].train, Recipe(), (0.0,), ports), {}) for ports in costs}
     asked |= {question(fit_stages, (samples, fold, kept((0,)), (1,), (), (), SEARCH.training), {}) for fold in folds}
     assert len(asked) == len(costs) + len(folds)
 
@@ -176,7 +178,7 @@ def test_a_trial_is_recognised_as_most_of_its_frames_are(make_set: Callable[...,
     judged = cuts.judged("new subject", {fold: fit.stages[0] for fold, fit in fits.items()})
     assert (judged.rate.correct, judged.rate.total, judged.rate.over) == ((right_trials,), len(cuts.people), 3)
     assert (judged.hits.sum(), judged.repeats, judged.rate.what) == (right_trials, 1, "new subject, trials")
-    frames = cuts.frames({fold: fit.frames[0][0] for fold, fit in fits.items()})
+    frames = cuts.judged("new subject", {fold: fit.frames[0][0] for fold, fit in fits.items()}, "frames").rate
     assert (frames.correct, frames.total, frames.what) == ((right_rows,), 288, "new subject, frames")
 
 
