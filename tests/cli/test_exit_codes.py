@@ -25,10 +25,10 @@ def _one_sentence(done: "subprocess.CompletedProcess[str]") -> str:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help_with_an_example(thenar_process: Thenar, command: str) -> None:
-    done = thenar_process(command, "--help")
+def test_every_command_has_help_with_an_example(thenar: Thenar, command: str) -> None:
+    done = thenar(command, "--help")
     assert done.returncode == 0, done.stderr
-    assert f"thenar {command} " in done.stdout.split("Example:")[1]
+    assert re.search(rf"^ +thenar {command} ", done.stdout.split("Example:")[1], re.MULTILINE)
 
 
 def test_no_command_is_loaded_before_it_is_called() -> None:
