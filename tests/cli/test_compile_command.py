@@ -45,10 +45,6 @@ def test_compiling_again_gives_the_same_bytes(thenar: Thenar, set_file: Path, tm
     assert seen[0] == seen[1]
 
 
-def test_help_has_an_example(thenar: Thenar) -> None:
-    assert "Example:\n      thenar compile set.grasps -o build/" in thenar("compile", "--help").stdout
-
-
 def test_every_option_reaches_the_build(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     options = {"prune": 2, "rounds": 3, "inputs": "both", "shrinkage": 0.5, "folds": 2, "seed": 7, "tolerance": 1e-9}
     options |= {"table_bits": 8, "max_bins": 4, "width": 15, "refuse": 0.125}
