@@ -122,6 +122,16 @@ def peak_bytes() -> Callable[[Callable[[], object]], int]:
     return measured
 
 
+@pytest.fixture
+def one_way_to_train(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let each trainer have one set of settings, in this process: how they choose is tested where it is done."""
+    from thenar.compiler import TRAINERS
+
+    few = {"max_bins": 4}
+    for name, more in {"logit": {}, "pairs": {"pairs": 1, "pair_bins": 2}}.items():
+        monkeypatch.setattr(TRAINERS[name], "tried", (few | more,))
+
+
 @pytest.fixture(scope="session")
 def c_compiler() -> str:
     return need_tool("cc")

@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +12,10 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.trainers.base import TRAINERS
 
 from ..sets import grasp_set_of
 
+pytestmark = pytest.mark.usefixtures("one_way_to_train")
 QUICK = ("--rounds", "2", "--repeats", "1", "--jobs", "1")
 
 
@@ -34,16 +33,6 @@ def make_set(per_type: int = 8) -> GraspSet:
         objects=np.full(len(labels), "cup"),
         trials=np.tile(np.arange(per_type), 6),
     )
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _one_way_to_train() -> Iterator[None]:
-    """Let each trainer have one set of settings: how they choose is tested where it is done."""
-    with pytest.MonkeyPatch.context() as patched:
-        few = {"max_bins": 4}
-        for name, more in {"logit": {}, "pairs": {"pairs": 1, "pair_bins": 2}}.items():
-            patched.setattr(TRAINERS[name], "tried", (few | more,))
-        yield
 
 
 @pytest.fixture(scope="module")
