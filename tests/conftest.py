@@ -123,13 +123,12 @@ def peak_bytes() -> Callable[[Callable[[], object]], int]:
 
 
 @pytest.fixture
-def one_way_to_train(monkeypatch: pytest.MonkeyPatch) -> None:
+def one_way_to_train() -> Iterator[None]:
     """Let each trainer have one set of settings, in this process: how they choose is tested where it is done."""
-    from thenar.compiler import TRAINERS
+    from .sets import single_settings
 
-    few = {"max_bins": 4}
-    for name, more in {"logit": {}, "pairs": {"pairs": 1, "pair_bins": 2}}.items():
-        monkeypatch.setattr(TRAINERS[name], "tried", (few | more,))
+    with single_settings():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -1,13 +1,16 @@
-"""Small sets of grasps, made of what matters in them."""
+"""Small sets of grasps, made of what matters in them, and training that chooses nothing."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import ArrayLike
 
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler.trainers.base import TRAINERS
 from thenar.runtime.published import NONE
 
 
@@ -29,3 +32,13 @@ def grasp_set_of(types: Sequence[str], labels: ArrayLike, **columns: Any) -> Gra
         "trials": np.arange(len(rows)),
     }
     return GraspSet(switches=switches, codes=codes, taxonomy=own(types), **(plain | columns))
+
+
+@contextmanager
+def single_settings() -> Iterator[None]:
+    """Let each trainer have one set of settings, so that none are compared."""
+    with pytest.MonkeyPatch.context() as patched:
+        few = {"max_bins": 4}
+        for name, more in {"logit": {}, "pairs": {"pairs": 1, "pair_bins": 2}}.items():
+            patched.setattr(TRAINERS[name], "tried", (few | more,))
+        yield

@@ -23,7 +23,7 @@ from thenar.runtime.recipe import Recipe
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator.handmaps.handmap import hand_map
 
-from ...sets import grasp_set_of
+from ...sets import grasp_set_of, single_settings
 
 TYPES = ("cup", "pen", "plate", "rod")
 # What a name in a recording may hold, and a page must not run, close or break.
@@ -81,6 +81,8 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
     made = compile_build(grasp_set, folder, prune=8, rounds=4, folds=2, harness=harness)
     recipe = Recipe(trainer="logitboost", rounds=2, folds=2, prune=8)
     asked = StudyDesign(recipe, repeats=1, prune_list=(0, 8))
+    with single_settings():
+        study = evaluate(grasp_set, asked, jobs=1)
     return ReportContent(
         manifest=made.manifest,
         tables=made.tables,
@@ -88,7 +90,7 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
         warnings=made.warnings,
         tree=tree,
         confusion=made.confusion,
-        study=evaluate(grasp_set, asked, jobs=1),
+        study=study,
         hand=hand,
         scan=made.scan,
         harness=harness,
