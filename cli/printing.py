@@ -150,15 +150,16 @@ class _Whole(Table):
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Yield the lines of each part."""
         room = options.max_width - 1
-        parts: list[list[Column]] = [[]]
-        for column in self.columns:
-            used = [self._width(each, console, options) for each in (*parts[-1], column)]
-            if len(used) > 2 and sum(used) > room:
-                parts.append([self.columns[0]])
-            parts[-1].append(column)
-        for number, columns in enumerate(parts):
-            part = self._part(columns)
-            part.title = self.title if number == 0 else None
+        widths = [self._width(column, console, options) for column in self.columns]
+        parts: list[list[int]] = [[]]
+        for number, width in enumerate(widths):
+            used = width + sum(widths[other] for other in parts[-1])
+            if len(parts[-1]) > 1 and used > room:
+                parts.append([0])
+            parts[-1].append(number)
+        for numbers in parts:
+            part = self._part([self.columns[number] for number in numbers])
+            part.title = self.title if numbers is parts[0] else None
             yield from Table.__rich_console__(part, console, options)
 
     def _part(self, columns: Sequence[Column]) -> "_Whole":

@@ -122,6 +122,15 @@ def peak_bytes() -> Callable[[Callable[[], object]], int]:
     return measured
 
 
+@pytest.fixture
+def one_way_to_train() -> Iterator[None]:
+    """Let each trainer have one set of settings, in this process: how they choose is tested where it is done."""
+    from .sets import single_settings
+
+    with single_settings():
+        yield
+
+
 @pytest.fixture(scope="session")
 def c_compiler() -> str:
     return need_tool("cc")
@@ -158,11 +167,22 @@ LONGEST = (
 )
 
 
+def pytest_collection(session: pytest.Session) -> None:
+    """Let every worker begin with other files: a file whose assertions one of them has rewritten, the others read."""
+    here, config = Path(__file__).parent, session.config
+    if [Path(argument).absolute() for argument in config.args] == [here]:
+        entries = sorted(str(path) for path in here.iterdir() if path.is_dir() or path.match("test_*.py"))
+        workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+        number = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+        start = len(entries) * number // workers
+        config.args = entries[start:] + entries[:start]
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Let tests in real time be run again, at most twice; put those that take long first."""
     here = Path(__file__).parent
     places = {here / name: place for place, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: places.get(item.path, len(places)))
+    items.sort(key=lambda item: (places.get(item.path, len(places)), item.path))
     for item in items:
         if item.path.relative_to(here).parts[0] in IN_REAL_TIME:
             item.add_marker(pytest.mark.flaky(reruns=2))

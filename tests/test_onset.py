@@ -10,8 +10,9 @@ import pytest
 
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.recipe import Recipe
+
+from .sets import grasp_set_of
 
 NEWTONS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 FAST = Recipe(trainer="logitboost", rounds=10)
@@ -34,14 +35,11 @@ def pressed(trials: int = 24, joints: int = 0, unit: str = "N") -> GraspSet:
     which = np.where(force < 0.3, np.repeat(random.integers(0, 2, trials), 7), kind)
     codes = np.zeros((len(force), 2))
     codes[np.arange(len(force)), which] = np.rint(force * 1000)
-    return GraspSet(
-        switches=np.zeros((len(force), 0), bool),
-        switch_names=(),
-        codes=np.repeat(random.integers(0, 9, (trials, joints)), 7, axis=0).astype(np.uint16),
+    return grasp_set_of(
+        ["hook", "pinch"],
+        kind,
+        codes=np.repeat(random.integers(0, 9, (trials, joints)), 7, axis=0),
         joints=tuple(Joint(f"j{n}", "deg", 0, 0.0, 100, 90.0) for n in range(joints)),
-        grasps=np.array(["hook", "pinch"])[kind],
-        taxonomy=own(["hook", "pinch"]),
-        subjects=np.full(len(force), "A"),
         objects=np.full(len(force), "pen"),
         trials=np.repeat(np.arange(trials), 7),
         taxels=codes.astype(np.uint16),

@@ -10,8 +10,9 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime import Build
+
+from .sets import grasp_set_of
 
 
 @pytest.fixture
@@ -42,18 +43,8 @@ def drawn(seed: int) -> GraspSet:
     random, kinds = np.random.default_rng(seed), ("a", "b", "c", "d")
     label = random.integers(0, 4, 600)
     often = np.where(np.arange(12) // 3 == label[:, np.newaxis], 0.9, 0.05)
-    return GraspSet(
-        switches=random.random((600, 12)) < often,
-        switch_names=tuple(f"s{number}" for number in range(12)),
-        codes=np.zeros((600, 0), np.uint16),
-        joints=(),
-        grasps=np.array(kinds)[label],
-        subjects=np.array(["A", "B"])[np.arange(600) % 2],
-        objects=np.array(["thing"] * 600),
-        sessions=np.array(["1"] * 600),
-        trials=np.arange(600),
-        taxonomy=own(kinds),
-    )
+    people = np.array(["A", "B"])[np.arange(600) % 2]
+    return grasp_set_of(kinds, label, switches=random.random((600, 12)) < often, subjects=people)
 
 
 def test_a_switch_that_sticks_is_found_and_none_without_a_fault(faults: ModuleType, tmp_path: Path) -> None:

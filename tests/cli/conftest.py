@@ -13,21 +13,10 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.recordings.graspset import Joint
-from thenar.compiler.recordings.taxonomy import own
+
+from ..sets import grasp_set_of
 
 Thenar = Callable[..., "subprocess.CompletedProcess[str]"]
-
-
-@pytest.fixture(scope="session")
-def thenar_process() -> Thenar:
-    """Run `thenar` in a process of its own: slower, for what a process has alone."""
-
-    def in_process(*arguments: object) -> "subprocess.CompletedProcess[str]":
-        command = [sys.executable, "-m", "thenar.cli", *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, check=False)
-
-    return in_process
 
 
 @contextmanager
@@ -67,18 +56,10 @@ def small_set() -> GraspSet:
     random = np.random.default_rng(4)
     labels = np.arange(60) % 3
     centres = np.array([[60, 90], [120, 70], [100, 160]])
-    return GraspSet(
-        switches=np.array([[0, 0, 1, 1, 0, 1], [0, 1, 0, 1, 1, 0], [1, 0, 0, 1, 1, 1]], bool)[labels]
-        ^ (random.random((60, 6)) < 0.1),
-        switch_names=tuple(f"s{number}" for number in range(6)),
-        codes=(centres[labels] + random.integers(-20, 20, (60, 2))).astype(np.uint16),
-        joints=tuple(Joint(f"j{number}", "deg", 0, 0.0, 255, 127.5) for number in range(2)),
-        grasps=np.array(["cup", "pen", "rod"])[labels],
-        taxonomy=own(["cup", "pen", "rod"]),
-        subjects=np.full(60, "A"),
-        objects=np.full(60, "thing"),
-        trials=np.arange(60),
-    )
+    closed = np.array([[0, 0, 1, 1, 0, 1], [0, 1, 0, 1, 1, 0], [1, 0, 0, 1, 1, 1]], bool)
+    switches = closed[labels] ^ (random.random((60, 6)) < 0.1)
+    codes = centres[labels] + random.integers(-20, 20, (60, 2))
+    return grasp_set_of(["cup", "pen", "rod"], labels, switches=switches, codes=codes)
 
 
 @pytest.fixture(scope="session")

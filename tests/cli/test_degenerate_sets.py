@@ -67,7 +67,13 @@ def test_place_chooses_or_says_why_not(name: str, path: Path, capsys: pytest.Cap
         assert "one grasp type" in out or "agree in every switch" in out
 
 
-@pytest.mark.parametrize("cut", [[], ["--by", "subject"], ["--by", "object"], ["--by", "block", "--folds", "2"]])
+CUTS = (["--by", "subject"], ["--by", "object"], ["--by", "block", "--folds", "2"])
+QUICK = ["--tables", "compositions", "--trainer", "logitboost"]
+
+
+@pytest.mark.parametrize(
+    "cut", [[], *([*cut, *QUICK] for cut in CUTS), *(pytest.param(cut, marks=pytest.mark.slow) for cut in CUTS)]
+)
 def test_evaluate_gives_rates_or_a_reason(
     name: str, path: Path, cut: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

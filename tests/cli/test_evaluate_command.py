@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +12,10 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import own
-from thenar.compiler.trainers.base import TRAINERS
 
+from ..sets import grasp_set_of
+
+pytestmark = pytest.mark.usefixtures("one_way_to_train")
 QUICK = ("--rounds", "2", "--repeats", "1", "--jobs", "1")
 
 
@@ -23,27 +23,16 @@ def make_set(per_type: int = 8) -> GraspSet:
     random = np.random.default_rng(1)
     labels = np.tile(np.repeat([0, 1, 2], per_type), 2)
     switches = np.eye(3, 6, dtype=bool)[labels] ^ (random.random((len(labels), 6)) < 0.1)
-    return GraspSet(
+    return grasp_set_of(
+        ["hook", "pinch [tip]", "power"],
+        labels,
         switches=switches,
-        switch_names=tuple(f"s{i}" for i in range(6)),
-        codes=(50 * labels[:, np.newaxis] + random.integers(0, 60, (len(labels), 1))).astype(np.uint16),
+        codes=50 * labels[:, np.newaxis] + random.integers(0, 60, (len(labels), 1)),
         joints=(Joint("thumb", "deg", 0, 0.0, 200, 100.0),),
-        grasps=np.array(["hook", "pinch [tip]", "power"])[labels],
-        taxonomy=own(["hook", "pinch [tip]", "power"]),
         subjects=np.repeat(["Ann", "[b]Bob"], len(labels) // 2),
         objects=np.full(len(labels), "cup"),
         trials=np.tile(np.arange(per_type), 6),
     )
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _one_way_to_train() -> Iterator[None]:
-    """Let each trainer have one set of settings: how they choose is tested where it is done."""
-    with pytest.MonkeyPatch.context() as patched:
-        few = {"max_bins": 4}
-        for name, more in {"logit": {}, "pairs": {"pairs": 1, "pair_bins": 2}}.items():
-            patched.setattr(TRAINERS[name], "tried", (few | more,))
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -220,11 +209,6 @@ def test_an_install_without_the_extra_says_what_is_missing(
     monkeypatch.setitem(sys.modules, "joblib", None)
     assert run(["evaluate", grasps, *QUICK, "--jobs", "2"]) == 2
     assert capsys.readouterr().err == 'thenar: joblib is not installed: pip install "thenar[compiler]"\n'
-
-
-def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["evaluate", "--help"]) == 0
-    assert "    thenar evaluate set.grasps --by subject --protocol nested" in capsys.readouterr().out
 
 
 def descendants(pid: int) -> list[int]:

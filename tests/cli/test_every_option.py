@@ -167,6 +167,9 @@ def test_a_value_that_makes_no_sense_is_one_sentence(
             assert code in (0, 1, 2, 130), where
             if number and value in ("nan", "inf", "-inf", ""):
                 assert code == 2, where
+            if isinstance(parameter.type, OutputFile) and value == "nan":
+                assert "nan: the name of the output file must end in " in said, where
+                assert all(ending in said for ending in parameter.type.endings), where
             if isinstance(parameter.type, click.Path) and value in ("missing/new", "junk/new", ""):
                 makes = isinstance(parameter.type, OutputFolder) and value == "missing/new"
                 assert code == 2 or makes, where

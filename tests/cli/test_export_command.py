@@ -59,14 +59,6 @@ def test_simulated_grasps_stay_simulated_on_the_way_through_a_table(grasps: Path
     assert Path(again).read_bytes() == grasps.read_bytes()
 
 
-def test_a_table_of_another_kind_is_refused(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["export", str(grasps), "-o", str(grasps.with_name("t.xlsx"))]) == 2
-    assert (
-        "t.xlsx: the name of the output file must end in .csv, .csv.gz, .tsv, .tsv.gz, .arff or .parquet."
-        in capsys.readouterr().err
-    )
-
-
 def test_a_damaged_set_is_refused_with_the_reason(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
     grasps.write_bytes(grasps.read_bytes()[:-1])
     assert run(["export", str(grasps), "-o", str(grasps.with_name("t.csv"))]) == 2

@@ -68,12 +68,6 @@ def test_a_cost_has_a_unit(thenar: Thenar, build: Path, tmp_path: Path) -> None:
         assert told["cost"]["unit"] == unit
 
 
-def test_the_same_build_gives_the_same_bytes(thenar: Thenar, build: Path, tmp_path: Path) -> None:
-    for name in ("one", "two"):
-        assert thenar("firmware", build, "--target", "avr328p", "-o", tmp_path / name).returncode == 0
-    assert content(tmp_path / "one") == content(tmp_path / "two")
-
-
 def test_a_flash_limit_is_kept(thenar: Thenar, build: Path, tmp_path: Path) -> None:
     limited = ("firmware", build, "--target", "avr328p", "-o", tmp_path / "made", "--json", "--overwrite")
     cost = json.loads(thenar(*limited).stdout)["cost"]

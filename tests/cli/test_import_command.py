@@ -68,22 +68,12 @@ def test_a_faulty_table_is_one_sentence_and_exit_code_2(folder: Path, capsys: py
     assert not (folder / "set.grasps").exists()
 
 
-def test_a_set_must_be_called_grasps(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert thenar_import(folder, output="set.csv") == 2
-    assert "set.csv: the name of the output file must end in .grasps" in capsys.readouterr().err
-
-
 def test_the_old_set_stays_when_the_import_fails(folder: Path) -> None:
     assert thenar_import(folder) == 0
     before = (folder / "set.grasps").read_bytes()
     (folder / "table.csv").write_text("label\n")
     assert thenar_import(folder) == 2
     assert (folder / "set.grasps").read_bytes() == before
-
-
-def test_help_shows_an_example_line_by_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["import", "--help"]) == 0
-    assert "  Example:\n      thenar import glove.csv -o set.grasps\n" in capsys.readouterr().out
 
 
 def test_names_with_brackets_and_colons_are_printed_as_they_are(

@@ -182,7 +182,8 @@ def test_true_trials_of_one_row_in_blocks_are_imported_with_a_warning(
     assert len(set(grasp_set.trial_ids.tolist())) == 60
     assert "warning: the rows look like frames of fewer trials: within a subject, grasp type" in warnings
     assert "they count as trials, because column trial numbers them" in warnings
-    evaluated = thenar("evaluate", tmp_path / "set.grasps", "--tables", "compositions", "--repeats", 1)
+    quick = ("--tables", "compositions", "--repeats", 1, "--rounds", 2, "--jobs", 1)
+    evaluated = thenar("evaluate", tmp_path / "set.grasps", *quick)
     assert evaluated.returncode == 0, evaluated.stderr
     assert "each row counts as a trial" in " ".join(evaluated.stderr.split())
     cells["sample_no"] = cells.pop("trial")

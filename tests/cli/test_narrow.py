@@ -23,6 +23,7 @@ def place(small_set: GraspSet, build_folder: Path, tmp_path: Path, monkeypatch: 
     return tmp_path
 
 
+@pytest.mark.usefixtures("one_way_to_train")
 @pytest.mark.parametrize(
     "line",
     [

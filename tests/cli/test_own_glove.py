@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.manifest_file import manifest_from_bytes
+
+from ..sets import grasp_set_of
 
 Thenar = Callable[..., Any]
 PADS = tuple(f"pad_{finger}_{number}" for finger in ("thumb", "index", "palm") for number in (1, 2, 3))
@@ -34,15 +35,14 @@ def grasps(tmp_path_factory: pytest.TempPathFactory) -> Path:
     closed, centres = random.random((3, len(PADS))) < 0.5, random.integers(500, 3500, (3, len(FLEX)))
     noisy = centres[labels] + random.normal(0, 500, (rows, len(FLEX)))
     path = tmp_path_factory.mktemp("own") / "own.grasps"
-    GraspSet(
+    grasp_set_of(
+        types,
+        labels,
         switches=closed[labels] ^ (random.random((rows, len(PADS))) < 0.1),
         switch_names=PADS,
-        codes=np.clip(noisy, 0, 4095).astype(np.uint16),
+        codes=np.clip(noisy, 0, 4095),
         joints=tuple(Joint(name, "V", 0, 0.0, 4095, 3.3) for name in FLEX),
-        grasps=np.array(types)[labels],
-        taxonomy=own(types),
         subjects=np.where(np.arange(rows) // 3 % 2, "A", "B"),
-        objects=np.full(rows, "thing"),
         trials=np.arange(rows) // 6,
     ).save(path)
     return path

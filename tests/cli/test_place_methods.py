@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from thenar.cli import run
-from thenar.compiler import GraspSet
 from thenar.compiler.placement.kept import kept_names
-from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness
+
+from ..sets import grasp_set_of
 
 Captured = pytest.CaptureFixture[str]
 
@@ -34,17 +34,7 @@ def near_and_far(tmp_path_factory: pytest.TempPathFactory) -> Path:
     switches = np.zeros((80, 10), bool)
     switches[:, 0], switches[:, 1], switches[:, 8] = types & 1, (types >> 1) ^ (np.arange(80) == 27), types >> 1
     path = tmp_path_factory.mktemp("near and far") / "set.grasps"
-    GraspSet(
-        switches=switches,
-        switch_names=tuple(f"s{number}" for number in range(10)),
-        codes=np.zeros((80, 0), np.uint16),
-        joints=(),
-        grasps=np.array(["cup", "pen", "rod", "key"])[types],
-        taxonomy=own(["cup", "pen", "rod", "key"]),
-        subjects=np.full(80, "A"),
-        objects=np.full(80, "thing"),
-        trials=np.arange(80),
-    ).save(path)
+    grasp_set_of(["cup", "pen", "rod", "key"], types, switches=switches).save(path)
     return path
 
 
@@ -102,11 +92,6 @@ def test_what_does_not_go_together_is_one_sentence_and_code_two(
     said = " ".join(capsys.readouterr().err.split())
     assert reason in said
     assert "Traceback" not in said
-
-
-def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["place", "--help"]) == 0
-    assert "thenar place set.grasps --method elimination --keep 16" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,9 @@ from thenar.cli import run
 from thenar.compiler import TRAINERS, GraspSet, Samples, compile_build
 from thenar.compiler.artifact import stream_study
 from thenar.compiler.recordings.graspset import Joint
-from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.trainers.base import Trainer
-from thenar.runtime.published import NONE
+
+from ..sets import grasp_set_of
 
 TYPES = ("hook", "pinch")
 PARTS = (12, 30, 8)
@@ -27,15 +27,14 @@ def movements(tmp_path_factory: pytest.TempPathFactory) -> Path:
     order = [random.permutation([0, 0, 0, 1, 1, 1]) for _ in "ABC"]
     labels = np.concatenate([np.repeat([2, label, 2], PARTS) for each in order for label in each.tolist()])
     n, each = len(labels), sum(PARTS)
-    made = GraspSet(
+    made = grasp_set_of(
+        TYPES,
+        labels,
         switches=(labels[:, None] == np.arange(2)) ^ (random.random((n, 2)) < 0.05),
         switch_names=("palm", "tip"),
-        codes=(np.array([200, 120, 20])[labels] + random.integers(-9, 10, n))[:, None].astype(np.uint16),
+        codes=(np.array([200, 120, 20])[labels] + random.integers(-9, 10, n))[:, None],
         joints=(Joint("bend", "deg", 0, 0.0, 255, 90.0),),
-        grasps=np.array([*TYPES, NONE])[labels],
-        taxonomy=own(TYPES),
         subjects=np.repeat(["A", "B", "C"], 6 * each),
-        objects=np.full(n, "thing"),
         trials=np.arange(n) // each,
     )
     path = tmp_path_factory.mktemp("movements") / "movements.grasps"

@@ -12,12 +12,13 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.glove.files import spec_files
-from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime import Build
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator.handmaps.handmap import hand_map
+
+from ..sets import grasp_set_of
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 NAMES = ("thumb_distal_5", "palm_heel_6", "index_distal_3", "little_distal_8")
@@ -27,17 +28,8 @@ NAMES = ("thumb_distal_5", "palm_heel_6", "index_distal_3", "little_distal_8")
 def hand_set() -> GraspSet:
     """Four switches of the shipped glove that tell three grasp types apart."""
     labels = np.arange(30) % 3
-    return GraspSet(
-        switches=np.array([[0, 0, 1, 1], [0, 1, 0, 1], [1, 0, 0, 0]], bool)[labels],
-        switch_names=NAMES,
-        codes=np.zeros((30, 0), np.uint16),
-        joints=(),
-        grasps=np.array(["cup", "pen", "rod"])[labels],
-        taxonomy=own(["cup", "pen", "rod"]),
-        subjects=np.full(30, "A"),
-        objects=np.full(30, "thing"),
-        trials=np.arange(30),
-    )
+    closed = np.array([[0, 0, 1, 1], [0, 1, 0, 1], [1, 0, 0, 0]])
+    return grasp_set_of(["cup", "pen", "rod"], labels, switches=closed[labels], switch_names=NAMES)
 
 
 @pytest.fixture(scope="module")

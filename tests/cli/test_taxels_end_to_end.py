@@ -14,9 +14,10 @@ import pytest
 
 from thenar.compiler import GraspSet
 from thenar.compiler.recordings.graspset import Joint
-from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recording.reader import Reader
+
+from ..sets import grasp_set_of
 
 # In real time, over a pty.
 pytestmark = pytest.mark.slow
@@ -70,16 +71,10 @@ def pads(folder: Path) -> Path:
     names, random = list(CODES), np.random.default_rng(1)
     labels = np.arange(ROWS) % len(names)
     codes = np.array([CODES[name] for name in names])[labels] + random.integers(-25, 26, (ROWS, 3))
-    grasp_set = GraspSet(
+    grasp_set = grasp_set_of(
+        names,
+        labels,
         switches=random.random((ROWS, 1)) < 0.5,
-        switch_names=("s0",),
-        codes=np.zeros((ROWS, 0), np.uint16),
-        joints=(),
-        grasps=np.array(names)[labels],
-        taxonomy=own(names),
-        subjects=np.full(ROWS, "A"),
-        objects=np.full(ROWS, "thing"),
-        trials=np.arange(ROWS),
         taxels=codes.astype(np.uint16),
         taxel_columns=tuple(Joint(f"p{number}", "N", 20, 0.0, 820, 4.0) for number in range(3)),
     )

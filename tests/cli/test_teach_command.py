@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, Joint, compile_build
-from thenar.compiler.recordings.taxonomy import own
 from thenar.drivers.errors import SettingError
 from thenar.runtime import Build, Glove
 from thenar.runtime.frames import GloveFrame, SwitchFrame
@@ -21,6 +20,8 @@ from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.recording.session import Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.sinks import GraspLine, HealthLine, ProgressLine
+
+from ..sets import grasp_set_of
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 TYPES = ("cup", "pen", "rod")
@@ -65,15 +66,12 @@ def grasps_of(labels: np.ndarray) -> GraspSet:
     """Return a set of frames, 10 ms apart, in which this is held."""
     read = np.array([readings(label) for label in labels.tolist()])
     starts = np.flatnonzero(np.diff(labels, prepend=-1))
-    return GraspSet(
-        switches=(read[:, :1] >> np.arange(3) & 1).astype(bool),
-        switch_names=("s0", "s1", "s2"),
-        codes=read[:, 1:].astype(np.uint16),
+    return grasp_set_of(
+        TYPES,
+        labels,
+        switches=read[:, :1] >> np.arange(3) & 1,
+        codes=read[:, 1:],
         joints=(Joint("bend", "deg", 1, 0.5, 255, 127.5),),
-        grasps=np.array([*TYPES, "none"])[labels],
-        taxonomy=own(TYPES),
-        subjects=np.full(len(labels), "A"),
-        objects=np.full(len(labels), "thing"),
         trials=np.searchsorted(starts, np.arange(len(labels)), side="right") // 2,
         times_us=10_000 * np.arange(len(labels)),
     )

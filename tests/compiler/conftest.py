@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler.recordings.graspset import GraspSet
+
+from ..sets import grasp_set_of
 
 
 def _make_set(
@@ -25,16 +26,12 @@ def _make_set(
     closed = np.random.default_rng(99).random((types, switches)) < 0.5
     centres = np.random.default_rng(98).integers(40, 200, (types, joints))
     names = ("cup", "pen", "plate", "rod", "ball", "key", *(f"g{number}" for number in range(6, types)))[:types]
-    grasp_set = GraspSet(
+    grasp_set = grasp_set_of(
+        [*names, "never seen"],
+        labels,
         switches=closed[labels] ^ (random.random((rows, switches)) < 0.12),
-        switch_names=tuple(f"s{number}" for number in range(switches)),
-        codes=np.clip(centres[labels] + random.normal(0, 25, (rows, joints)), 0, 254).astype(np.uint16),
-        joints=tuple(Joint(f"j{number}", "deg", 0, 0.0, 255, 127.5) for number in range(joints)),
-        grasps=np.array(names)[labels],
-        taxonomy=own([*names, "never seen"]),
+        codes=np.clip(centres[labels] + random.normal(0, 25, (rows, joints)), 0, 254),
         subjects=np.array([f"S{row // types % subjects}" for row in range(rows)]),
-        objects=np.full(rows, "thing"),
-        trials=np.arange(rows),
     )
     return grasp_set if frames == 1 else grasp_set.rows(np.repeat(np.arange(rows), frames))
 

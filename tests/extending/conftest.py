@@ -14,7 +14,8 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.graspset import Joint
-from thenar.compiler.recordings.taxonomy import own
+
+from ..sets import grasp_set_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "extending"
 
@@ -63,18 +64,9 @@ def scene() -> Callable[[int], str]:
 
 
 def _sixty(switches: Any, codes: Any = ((),) * 60, joints: tuple[str, ...] = (), names: Any = "") -> GraspSet:
-    labels, names = np.arange(60) % 3, np.array(names or ["cup", "pen", "rod"])
-    return GraspSet(
-        switches=np.asarray(switches, bool),
-        switch_names=tuple(f"s{number}" for number in range(np.shape(switches)[1])),
-        codes=np.asarray(codes, np.uint16),
-        joints=tuple(Joint(name, "deg", 0, 0.0, 255, 127.5) for name in joints),
-        grasps=names[labels],
-        taxonomy=own(names.tolist()),
-        subjects=np.full(60, "A"),
-        objects=np.full(60, "thing"),
-        trials=np.arange(60),
-    )
+    named = tuple(Joint(name, "deg", 0, 0.0, 255, 127.5) for name in joints)
+    types = names or ("cup", "pen", "rod")
+    return grasp_set_of(types, np.arange(60) % 3, switches=switches, codes=codes, joints=named)
 
 
 @pytest.fixture(scope="session")

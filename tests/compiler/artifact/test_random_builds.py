@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, Joint, compile_build, verify
-from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.recipe import TableBits
+
+from ...sets import grasp_set_of
 
 # Switches, joints and taxels of the sets.
 KINDS = {
@@ -50,15 +51,13 @@ def _random_set(seed: int, kind: str) -> GraspSet:
     rows = np.repeat(np.arange(trials), frames)
     columns = [Joint(f"c{number}", "deg", 0, 0.0, 255, 127.5) for number in range(joints + taxels)]
     coded = np.clip(codes, 0, 65535).astype(np.uint16)[rows]
-    return GraspSet(
+    return grasp_set_of(
+        [f"g{number}" for number in range(types)],
+        np.where(empty, types, labels)[rows],
         switches=closed[shown][rows] ^ (random.random((len(rows), switches)) < 0.1),
-        switch_names=tuple(f"s{number}" for number in range(switches)),
         codes=coded[:, :joints],
         joints=tuple(columns[:joints]),
-        grasps=np.where(empty, "none", np.array([f"g{number}" for number in range(types)])[labels])[rows],
-        taxonomy=own([f"g{number}" for number in range(types)]),
         subjects=np.array([f"S{trial // types % 2}" for trial in range(trials)])[rows],
-        objects=np.full(len(rows), "thing"),
         trials=rows,
         taxels=coded[:, joints:],
         taxel_columns=tuple(columns[joints:]),

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.trainers.base import TRAINERS
+
+from ...sets import grasp_set_of
 
 TYPES = ("hook", "pinch", "power", "tip")
 
@@ -25,13 +26,12 @@ def _make(
     labels = np.tile(np.repeat(np.arange(len(TYPES)), per_type), len(subjects))
     bits = (random.random((len(TYPES), n_switches)) < 0.5)[labels]
     angles = random.integers(20, 200, (len(TYPES), n_joints))[labels]
-    return GraspSet(
+    return grasp_set_of(
+        TYPES,
+        labels,
         switches=bits ^ (random.random(bits.shape) < noise),
-        switch_names=tuple(f"s{i}" for i in range(n_switches)),
-        codes=(angles + random.integers(-20, 21, angles.shape)).astype(np.uint16),
+        codes=angles + random.integers(-20, 21, angles.shape),
         joints=tuple(Joint(f"j{i}", "deg", 0, 0.0, 200, 100.0) for i in range(n_joints)),
-        grasps=np.array(TYPES)[labels],
-        taxonomy=own(TYPES),
         subjects=np.repeat(list(subjects), len(TYPES) * per_type),
         objects=np.tile(["cup", "pen"], len(labels) // 2),
         trials=np.tile(np.arange(per_type), len(subjects) * len(TYPES)),

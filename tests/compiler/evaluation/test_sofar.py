@@ -14,10 +14,11 @@ from thenar.compiler.evaluation.sofar import (
     recording_so_far,
 )
 from thenar.compiler.recordings.graspset import Joint
-from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
+
+from ...sets import grasp_set_of
 
 
 def trained(inputs: np.ndarray, label: np.ndarray, weight: np.ndarray, penalty: float, constant: float) -> np.ndarray:
@@ -49,16 +50,13 @@ def grasps(repetitions: int, *, noise: float, seed: int = 3) -> GraspSet:
     random = np.random.default_rng(seed)
     labels = np.tile(np.arange(3), repetitions)
     centres = np.array([60, 150, 150])
-    return GraspSet(
-        switches=np.array([[1, 0, 0], [0, 1, 0], [0, 1, 0]], bool)[labels],
+    return grasp_set_of(
+        ["cup", "pen", "rod"],
+        labels,
+        switches=np.array([[1, 0, 0], [0, 1, 0], [0, 1, 0]])[labels],
         switch_names=("a", "b", "c"),
-        codes=(centres[labels] + random.normal(0, noise, len(labels)))[:, None].astype(np.uint16),
+        codes=(centres[labels] + random.normal(0, noise, len(labels)))[:, None],
         joints=(Joint("j", "raw", 1, 1.0, 255, 255.0),),
-        grasps=np.array(["cup", "pen", "rod"])[labels],
-        taxonomy=own(["cup", "pen", "rod"]),
-        subjects=np.full(len(labels), "A"),
-        objects=np.full(len(labels), "thing"),
-        trials=np.arange(len(labels)),
     )
 
 

@@ -124,6 +124,7 @@ def test_evaluations_are_identical_on_any_number_of_workers(make_grasps: Make, s
     assert msgspec.json.encode(again) == msgspec.json.encode(study)
 
 
+@pytest.mark.usefixtures("one_way_to_train")
 def test_rows_in_which_nothing_is_held_change_no_table(
     make_grasps: Make, with_none: Callable[[GraspSet], GraspSet]
 ) -> None:
@@ -162,6 +163,7 @@ def test_a_composition_without_inputs_predicts_the_most_frequent_grasp(make_gras
     assert row(table(study, "compositions"), "V").cells[0].no_inputs == 0
 
 
+@pytest.mark.usefixtures("one_way_to_train")
 def test_one_subject_alone_has_nobody_elses_placement(make_grasps: Make) -> None:
     grasps = make_grasps(n_switches=5)
     study = evaluate(grasps, QUICK.changed(rounds=2, subjects=("B",)), jobs=1)
@@ -181,6 +183,7 @@ def test_one_subjects_pruning_at_equal_s_is_composition_six(make_grasps: Make) -
         assert row(table(study, "baselines", protocol), "ID3").cells[0].rate == six
 
 
+@pytest.mark.usefixtures("one_way_to_train")
 @pytest.mark.parametrize("scheme", ["subject", "object", "block"])
 def test_other_cuts_have_one_repeat_and_a_column_a_subject(make_grasps: Make, scheme: Scheme) -> None:
     quick = QUICK.changed(rounds=2, scheme=scheme, protocols=("nested",))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import own
-from thenar.runtime.published import NONE
+
+from ...sets import grasp_set_of
 
 TYPES = ("pinch", "hook", "fist")
 BEFORE, HELD, AFTER = 15, 30, 10
@@ -26,15 +26,14 @@ def movements(subjects: str = "AB", repetitions: int = 3, seed: int = 1, noise: 
     switches = (labels[:, None] == np.arange(len(TYPES))) ^ (random.random((len(labels), len(TYPES))) < noise)
     codes = np.clip(np.where(labels < len(TYPES), 60 * labels + 60, 10) + random.integers(-8, 9, len(labels)), 0, 255)
     owners = np.repeat([subject for subject, *_ in parts], sizes)
-    return GraspSet(
+    return grasp_set_of(
+        TYPES,
+        labels,
         switches=switches,
         switch_names=("tip", "palm", "side"),
-        codes=codes[:, None].astype(np.uint16),
+        codes=codes[:, None],
         joints=(Joint("bend", "deg", 0, 0.0, 255, 90.0),),
-        grasps=np.array([*TYPES, NONE])[labels],
-        taxonomy=own(TYPES),
         subjects=owners,
-        objects=np.full(len(labels), "thing"),
         trials=np.repeat([trial for _, trial, _ in parts], sizes),
         times_us=np.concatenate([10_000 * np.arange(np.count_nonzero(owners == each)) for each in subjects]),
     )

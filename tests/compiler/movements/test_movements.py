@@ -9,26 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.movements.streams import frames_are_dense, hold_of, holds_of, movements_of
-from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler.recordings.graspset import GraspSet
+
+from ...sets import grasp_set_of
 
 TYPES = ("cup", "pen", "rod")
 SWITCHES, JOINTS = 6, 2
 
 
 def set_of(switches: Any, codes: Any, labels: Any, trials: Any, objects: Any = "thing") -> GraspSet:
-    labels = np.asarray(labels, np.intp)
-    return GraspSet(
-        switches=np.asarray(switches, bool),
-        switch_names=tuple(f"s{number}" for number in range(np.shape(switches)[1])),
-        codes=np.asarray(codes, np.uint16),
-        joints=tuple(Joint(f"j{number}", "deg", 0, 0.0, 255, 127.5) for number in range(np.shape(codes)[1])),
-        grasps=np.array(TYPES)[labels],
-        taxonomy=own(TYPES),
-        subjects=np.full(len(labels), "A"),
-        objects=np.broadcast_to(objects, len(labels)),
-        trials=np.broadcast_to(trials, len(labels)).astype(np.int64),
-    )
+    things, numbers = (np.broadcast_to(values, len(labels)) for values in (objects, trials))
+    return grasp_set_of(TYPES, labels, switches=switches, codes=codes, objects=things, trials=numbers)
 
 
 def movement(

@@ -16,13 +16,14 @@ from thenar.compiler.hand import HandShape
 from thenar.compiler.model.compare import worst_case
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.report.content import ReportContent
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator.handmaps.handmap import hand_map
+
+from ...sets import grasp_set_of, single_settings
 
 TYPES = ("cup", "pen", "plate", "rod")
 # What a name in a recording may hold, and a page must not run, close or break.
@@ -57,16 +58,14 @@ def _make_set(switch_names: tuple[str, ...], types: tuple[str, ...], joint_names
     labels = np.arange(rows) % len(types)
     closed = random.random((len(types), len(switch_names))) < 0.4
     centres = random.integers(40, 200, (len(types), len(joint_names)))
-    return GraspSet(
+    return grasp_set_of(
+        types,
+        labels,
         switches=closed[labels] ^ (random.random((rows, len(switch_names))) < 0.15),
         switch_names=switch_names,
-        codes=np.clip(centres[labels] + random.normal(0, 30, (rows, len(joint_names))), 0, 255).astype(np.uint16),
+        codes=np.clip(centres[labels] + random.normal(0, 30, (rows, len(joint_names))), 0, 255),
         joints=tuple(Joint(name, "deg", 0, 0.0, 255, 127.5) for name in joint_names),
-        grasps=np.array(types)[labels],
-        taxonomy=own(types),
         subjects=np.where(np.arange(rows) % 8 < 4, "A", "B"),
-        objects=np.full(rows, "thing"),
-        trials=np.arange(rows),
     )
 
 
@@ -82,6 +81,8 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
     made = compile_build(grasp_set, folder, prune=8, rounds=4, folds=2, harness=harness)
     recipe = Recipe(trainer="logitboost", rounds=2, folds=2, prune=8)
     asked = StudyDesign(recipe, repeats=1, prune_list=(0, 8))
+    with single_settings():
+        study = evaluate(grasp_set, asked, jobs=1)
     return ReportContent(
         manifest=made.manifest,
         tables=made.tables,
@@ -89,7 +90,7 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
         warnings=made.warnings,
         tree=tree,
         confusion=made.confusion,
-        study=evaluate(grasp_set, asked, jobs=1),
+        study=study,
         hand=hand,
         scan=made.scan,
         harness=harness,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
-from thenar.compiler.firmware.probes import STREAM_TICKS, Lost, Predictions, Probes, states_of
+from thenar.compiler.firmware.probes import STREAM_TICKS, Lost, Predictions, Probes, joined, states_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest, Rejection
@@ -99,16 +99,17 @@ def test_every_state_is_python_s_with_missing_inputs_ends_and_restarts(
     manifest = described(tables, describe, kind)
     assert manifest.segments is not None
     frames, lost = movements(tables, 8)
-    for missing in (None, lost):
-        found = running(manifest, tables, frames, missing)
-        scores = scores_of(Build(manifest, tables), frames, np.zeros_like(lost) if missing is None else lost)
-        assert np.array_equal(found.scores, scores)
-        refused = found.classes == tables.n_classes
-        assert refused.any() == (kind == "refusals")
-        expected = states_of(manifest.segments, scores, refused)
-        assert len(set(expected.tolist())) > 3
-        assert found.states is not None
-        np.testing.assert_array_equal(found.states, expected)
+    frames, lost = joined(frames, frames), np.vstack([np.zeros_like(lost), lost])
+    found = running(manifest, tables, frames, lost)
+    scores = scores_of(Build(manifest, tables), frames, lost)
+    assert np.array_equal(found.scores, scores)
+    refused = found.classes == tables.n_classes
+    expected = states_of(manifest.segments, scores, refused)
+    assert found.states is not None
+    np.testing.assert_array_equal(found.states, expected)
+    for half in (slice(TICKS), slice(TICKS, None)):
+        assert refused[half].any() == (kind == "refusals")
+        assert len(set(expected[half].tolist())) > 3
 
 
 def test_a_build_without_costs_of_segments_has_no_decoder(

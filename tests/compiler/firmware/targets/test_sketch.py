@@ -35,19 +35,16 @@ BOARD = r"""
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string>
-#include <vector>
+#include <string.h>
 enum { LOW, HIGH, INPUT, OUTPUT, INPUT_PULLUP };
 enum { A0 = 100, A1, A2, A3, A4, A5, A6, A7, A8, A9, A10, A11, A12, A13, A14, A15 };
 static const int registers[] = {REGISTERS}; /* PL, CP, Q7 */
 static const int analog[] = {ANALOG};
-static int levels[256], modes[256], closed[256], counts[256], wired_to[256];
-static std::vector<int> chain;
-static size_t at;
+static int levels[256], modes[256], closed[256], counts[256], wired_to[256], chain[256], at;
 void pinMode(int pin, int mode) { modes[pin] = mode; }
 void digitalWrite(int pin, int level) {
     if (modes[pin] != OUTPUT) abort();
-    if (pin == registers[0] && level == LOW) { chain.assign(closed, closed + 256); at = 0; }
+    if (pin == registers[0] && level == LOW) { memcpy(chain, closed, sizeof chain); at = 0; }
     if (pin == registers[1] && level == HIGH && levels[pin] == LOW) at++;
     levels[pin] = level;
 }
@@ -77,13 +74,13 @@ int analogRead(int pin) {
 void delay(int) {}
 void delayMicroseconds(int) {}
 static struct {
-    std::string said, line;
+    char said[256], line[256];
     void begin(long) {}
-    void print(int number) { line += std::to_string(number); }
-    void print(char letter) { if (letter == '\n') println(""); else line += letter; }
-    void print(const char *text) { line += text; }
-    void println(const char *text) { said = line + text; line = ""; }
-    void println(int number) { said = line + std::to_string(number); line = ""; }
+    void print(const char *text) { strcat(line, text); }
+    void print(int number) { sprintf(line + strlen(line), "%d", number); }
+    void print(char letter) { if (letter == '\n') println(""); else sprintf(line + strlen(line), "%c", letter); }
+    void println(const char *text) { print(text); strcpy(said, line); line[0] = 0; }
+    void println(int number) { print(number); println(""); }
 } Serial;
 #include "Recognise.ino"
 int main() {
@@ -94,7 +91,7 @@ int main() {
     int number;
     for (int i = 0; scanf("%d", &number) == 1;) {
         (i < SWITCHES_THERE ? closed[i] : counts[i - SWITCHES_THERE]) = number;
-        if (++i == SWITCHES_THERE + SENSORS_THERE) { loop(); puts(Serial.said.c_str()); i = 0; }
+        if (++i == SWITCHES_THERE + SENSORS_THERE) { loop(); puts(Serial.said); i = 0; }
     }
 }
 """
