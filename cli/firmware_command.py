@@ -12,8 +12,8 @@ from .parameters import OneOf, OutputFolder, existing_file, existing_folder
 from .printing import echo, json_flag, progress, show
 
 if TYPE_CHECKING:
+    from thenar.compiler.firmware.costs import Measured
     from thenar.compiler.firmware.generate import Firmware
-    from thenar.compiler.firmware.measuring import Measured
 
 
 def _targets() -> Iterable[str]:
@@ -97,8 +97,8 @@ def command(
         thenar firmware build/ --target esp32 -o components/thenar_glove
         thenar firmware build/ --mode rows --glove glove.toml -o board/
     """
+    from thenar.compiler.firmware.costs import measure as measured_of
     from thenar.compiler.firmware.generate import Firmware, write_folder
-    from thenar.compiler.firmware.measuring import measure as measured_of
     from thenar.compiler.firmware.sensors import sensors_of
     from thenar.runtime.build import Build
     from thenar.runtime.calibration import load_calibration

@@ -15,8 +15,8 @@ from thenar.runtime.model.integers import IntegerTables
 
 from ..publication import check_folder, entries, publish_folder
 from . import FirmwareError
-from .choose import PartFit, fit_for
 from .classifier import LIBRARY_NAME, Library
+from .costs import PartFit, fit_for
 from .sensors import Sensors
 from .targets import TARGETS, Target
 from .words import Names, check_name

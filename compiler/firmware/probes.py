@@ -19,13 +19,13 @@ from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import SegmentModel
 
 from . import FirmwareError
-from .costs import Unit
+from .classifier import lag_of
 from .layout import Layout
-from .segments import lag_of
 from .words import string
 
 Frames = NDArray[np.uint8]
 Lost = NDArray[np.bool_]
+Unit = Literal["cycles", "instructions", ""]
 STREAM_TICKS = 200
 """The frames that a program's decoder of segments takes before it begins afresh."""
 

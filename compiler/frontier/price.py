@@ -9,9 +9,8 @@ from thenar.runtime.model.integers import IntegerTables, tables_from_bytes, tabl
 from thenar.runtime.recipe import Recipe
 
 from ..evaluation.folds import Rows
-from ..firmware.choose import PartFit
 from ..firmware.classifier import LIBRARY_NAME, Library
-from ..firmware.measuring import run_counted, slow_frames
+from ..firmware.costs import PartFit, run_counted, slow_frames
 from ..firmware.words import numbered
 from ..placement.placement import InputSelection
 from ..recogniser import Recogniser

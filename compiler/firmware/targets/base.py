@@ -5,13 +5,21 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from .. import FirmwareError
-from ..costs import Formula
 from ..tools import Tool
 
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
     from ..probes import Frames, Lost, Predictions
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """What a classifier costs on a core: `cycles` a term of `costs.terms`, the bytes of the core in flash and RAM."""
+
+    cycles: Mapping[str, float]
+    flash: int
+    ram: int
 
 
 @dataclass(frozen=True, kw_only=True)

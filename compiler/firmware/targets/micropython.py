@@ -31,7 +31,7 @@ class MicroPython(Target):
         """Return path -> text of the Python module and of its README."""
         from thenar.firmware_templates.rendering import render
 
-        from ..segments import times_of
+        from ..classifier import times_of
 
         names = library.names
         values = {
@@ -144,7 +144,7 @@ def _sensor_values(library: "Library") -> dict[str, object]:
 
 def _segment_values(library: "Library") -> dict[str, object] | None:
     """Return the template's values for the decoder of segments; None where the build has no segment costs."""
-    from ..segments import decoder_values
+    from ..classifier import decoder_values
 
     if (model := library.names.segments) is None:
         return None

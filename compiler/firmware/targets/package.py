@@ -7,8 +7,7 @@ Layout and fields of the Arduino library are those of its specification, revisio
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..costs import Formula
-from .base import Target
+from .base import Formula, Target
 from .cortex_m import MEMBER as _CORTEX_M
 
 if TYPE_CHECKING:

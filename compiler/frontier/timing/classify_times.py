@@ -18,7 +18,7 @@ from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.scores import Scorer
 
 from ...firmware import FirmwareError
-from ...firmware.choose import PartFit, fit_for
+from ...firmware.costs import PartFit, fit_for
 from ...firmware.probes import random_frames
 from ...firmware.targets import TARGETS, Target, timed
 from ..points import FrontierError, How

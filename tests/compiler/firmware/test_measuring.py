@@ -3,8 +3,8 @@ from collections.abc import Callable
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
+from thenar.compiler.firmware.costs import Measured, measure
 from thenar.compiler.firmware.generate import Firmware
-from thenar.compiler.firmware.measuring import Measured, measure
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.model.integers import IntegerTables

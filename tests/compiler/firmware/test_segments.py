@@ -10,8 +10,8 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.compiler.firmware import FirmwareError
+from thenar.compiler.firmware.classifier import segment_files
 from thenar.compiler.firmware.generate import Firmware
-from thenar.compiler.firmware.segments import segment_files
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.package import Package
 from thenar.compiler.firmware.tools import call, workshop

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.classifier import LAG_US, Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import Predictions, Probes, lost_inputs
-from thenar.compiler.firmware.segments import LAG_US
 from thenar.compiler.firmware.sensors import Sensor, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
