@@ -107,16 +107,9 @@ def features(layout: Layout) -> str:
     return f"{layout.group} switches a lookup" if layout.group > 1 else "one switch a lookup"
 
 
-def largest_classifier(target: Target) -> int:
-    """Return the default limit of flash for a classifier: three quarters of the part's, so that scanning and sending
-    have room; never more than the target's `most_flash`.
-    """
-    return min(target.flash * 3 // 4, target.most_flash)
-
-
 def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> PartFit:
-    """Return the fit of `tables` on a target, whose flash the classifier may fill up to `flash` bytes, by default
-    `largest_classifier`.
+    """Return the fit of `tables` on a target, whose flash the classifier may fill up to `flash` bytes, by default three
+    quarters, so that scanning and sending have room, and never more than its `most_flash`.
 
     Of the layouts, it is the fastest that takes half of the part's flash or less; otherwise the smallest. Raises
     FirmwareError if it does not fit, or the part has less flash than `flash`.
@@ -129,7 +122,7 @@ def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> 
         )
     *faster, smallest = GROUPS
     share = target.flash // _FAST_SHARE
-    allowed = largest_classifier(target) if flash is None else flash
+    allowed = min(target.flash * 3 // 4, target.most_flash) if flash is None else flash
     for group in faster:
         with suppress(FirmwareError):
             fit = _fit(target, tables, group, allowed)

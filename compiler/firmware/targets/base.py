@@ -101,10 +101,6 @@ class Target:
         """Return path -> text of the classifier alone, for `run`: in C, unless the target overrides it."""
         return library.files
 
-    def said(self, library: "Library") -> str:
-        """Return a remark on the written files, a sentence without its full stop; "" if there is none."""
-        return ""
-
     def missing(self) -> str | None:
         """Return why code cannot be compiled and run here, and what to install; None if it can."""
         return f"thenar has no simulator of {self.named}"

@@ -28,21 +28,8 @@ class MicroPython(Target):
     """Any board that runs MicroPython."""
 
     def files(self, library: "Library") -> dict[str, str]:
-        """Return path -> text of the Python module and of its README."""
-        from thenar.firmware_templates.rendering import render
-
-        from ..classifier import times_of
-
-        names = library.names
-        values = {
-            "name": library.name,
-            "switches": len(names.switches),
-            "joints": len(names.joints),
-            "rejection": names.rejection,
-            "segments": names.segments is not None,
-            **({} if names.segments is None else times_of(names.segments)),
-        }
-        return {**self.sources(library), "README.md": render("micropython/README.md.j2", **values)}
+        """Return path -> text: the Python module alone."""
+        return self.sources(library)
 
     def sources(self, library: "Library") -> dict[str, str]:
         """Return the Python module."""
