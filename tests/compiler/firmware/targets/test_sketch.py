@@ -177,8 +177,8 @@ def test_every_frame_is_answered_as_by_python(
     package = TARGETS[target]
     assert isinstance(package, Package)
     values = package.example_values(library)
-    counts = {"74HC165": values["registers"], "CD74HC4067": values["multiplexers"]}
-    assert all(f"{count} {part}" in parts for part, count in counts.items() if part in parts)
+    needed = {"74HC165": values["registers"], "CD74HC4067": values["multiplexers"]}
+    assert all(f"{count} {part}" in parts for part, count in needed.items() if part in parts)
     for path, text in package.files(library).items():
         (tmp_path / Path(path).name).write_text(text)
     if not known:
