@@ -160,9 +160,7 @@ for tick in range({ticks}):
 """
 
 
-def test_a_segmenter_begins_afresh(
-    make_tables: MakeTables, describe: Describe, tmp_path: Path
-) -> None:
+def test_a_segmenter_begins_afresh(make_tables: MakeTables, describe: Describe, tmp_path: Path) -> None:
     tables = make_tables(**SHAPES["small"])
     model = structs.replace(SegmentModel.usual(tables.n_classes, False, tables.scale / 8), enter=(40,) * 7)
     manifest = structs.replace(describe(tables), segments=model)
