@@ -27,11 +27,11 @@ from rich.table import Table
 
 from thenar.compiler import TRAINERS
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.choose import fit_for
 from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.costs import fit_for
 from thenar.compiler.firmware.layout import Layout
-from thenar.compiler.firmware.simavr import harness
 from thenar.compiler.firmware.targets import TARGETS, Target
+from thenar.compiler.firmware.targets.avr import harness
 from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
 from thenar.compiler.firmware.words import numbered
 from thenar.compiler.model.collapse import Model, collapse

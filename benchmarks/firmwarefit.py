@@ -11,23 +11,24 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.costs import NAME_BYTES, Formula, terms
+from thenar.compiler.firmware.costs import NAME_BYTES, estimate, sizes, terms
 from thenar.compiler.firmware.layout import GROUPS, Layout
-from thenar.compiler.firmware.measuring import sizes
 from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
 from thenar.compiler.firmware.targets import TARGETS, Target
+from thenar.compiler.firmware.targets.base import Formula
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.model.integers import COARSE, IntegerTables
 from thenar.runtime.model.terms.line import Slope
@@ -132,7 +133,7 @@ def fitted(names: Sequence[str], points: Sequence[Point], values: Sequence[int])
 
 def errors(formula: Formula, points: Sequence[Point], *, avr: bool) -> dict[str, NDArray[np.float64]]:
     """Return the relative errors of time, flash and RAM."""
-    costs = [formula.cost(point.layout, avr=avr) for point in points]
+    costs = [estimate(formula, point.layout, avr=avr) for point in points]
     names = [NAME_BYTES * point.layout.tables.n_classes for point in points]
     pairs = {
         "time": [(cost.cycles, point.time) for cost, point in zip(costs, points, strict=True)],

@@ -15,8 +15,8 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from thenar.compiler.firmware.segments import segment_files
-from thenar.compiler.firmware.simavr import harness
+from thenar.compiler.firmware.classifier import segment_files
+from thenar.compiler.firmware.targets.avr import harness
 from thenar.compiler.firmware.tools import (
     AVR_COMPILER,
     HOST_COMPILER,

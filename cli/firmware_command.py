@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,8 +13,8 @@ from .parameters import OneOf, OutputFolder, existing_file, existing_folder
 from .printing import echo, json_flag, progress, show
 
 if TYPE_CHECKING:
-    from thenar.compiler.firmware.generate import Firmware
-    from thenar.compiler.firmware.measuring import Measured
+    from thenar.compiler.firmware.costs import Measured, PartFit
+    from thenar.compiler.firmware.targets import Target
 
 
 def _targets() -> Iterable[str]:
@@ -97,9 +98,12 @@ def command(
         thenar firmware build/ --target esp32 -o components/thenar_glove
         thenar firmware build/ --mode rows --glove glove.toml -o board/
     """
-    from thenar.compiler.firmware.generate import Firmware, write_folder
-    from thenar.compiler.firmware.measuring import measure as measured_of
+    from thenar.compiler.firmware.classifier import Library
+    from thenar.compiler.firmware.costs import fit_for
+    from thenar.compiler.firmware.costs import measure as measured_of
+    from thenar.compiler.firmware.generate import write_folder
     from thenar.compiler.firmware.sensors import sensors_of
+    from thenar.compiler.firmware.targets import TARGETS
     from thenar.runtime.build import Build
     from thenar.runtime.calibration import load_calibration
     from thenar.runtime.harness.loading import load_harness
@@ -115,20 +119,22 @@ def command(
     if glove is not None or calibration is not None:
         hand = None if calibration is None else load_calibration(calibration)
         sensors = sensors_of(loaded.manifest, None if glove is None else load_harness(glove), hand)
-    firmware = Firmware(loaded.tables, loaded.manifest, target, name, flash_limit, sensors)
-    fit = firmware.fit
+    member = TARGETS[target]
+    fit = fit_for(member, loaded.tables, flash_limit)
+    library = Library(name, loaded.manifest, fit.layout, fit.notes(), sensors)
     measured = None
     if measure:
         with progress(f"measuring on {fit.target.part}"):
-            measured = measured_of(firmware.library(), fit)
-    files = firmware.files(None if measured is None else fit.notes(measured.note))
+            measured = measured_of(library, fit)
+        library = replace(library, notes=fit.notes(measured.note))
+    files = member.files(library)
     if output is not None:
         write_folder(files, output, overwrite=overwrite)
     # The host has no cycle counts and so no cost.
     cost = fit.cost
     costs = cost and {"time": cost.cycles, "unit": fit.target.unit, "flash": cost.flash, "ram": cost.ram}
     document = {"part": fit.target.part, "layout": fit.words, "cost": costs, "measured": measured}
-    show(document | {"files": sorted(files)}, lambda _: _print(firmware, measured, output))
+    show(document | {"files": sorted(files)}, lambda _: _print(member, fit, measured, output))
     return 0
 
 
@@ -164,15 +170,10 @@ def _check(target: str | None, writes: bool, measures: bool, names_both: bool) -
         raise click.UsageError("glove.toml names its calibration: leave out --calibration, or --glove.")
 
 
-def _print(firmware: "Firmware", measured: "Measured | None", output: Path | None) -> None:
-    from thenar.compiler.firmware.targets import TARGETS
-
-    echo(f"layout {firmware.fit.words}")
+def _print(target: "Target", fit: "PartFit", measured: "Measured | None", output: Path | None) -> None:
+    echo(f"layout {fit.words}")
     if measured is not None:
         echo(measured.note)
     if output is not None:
-        target = TARGETS[firmware.target]
-        if said := target.said(firmware.library()):
-            echo(f"{said}.")
         next_step = target.next_step.format(folder=shlex.quote(str(output)))
-        echo(f"{output}: firmware for {firmware.target}; {next_step}")
+        echo(f"{output}: firmware for {target.name}; {next_step}")

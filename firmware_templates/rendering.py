@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def _environment() -> "Environment":
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    return Environment(
+    environment = Environment(
         loader=PackageLoader(__package__, "."),
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -22,12 +22,8 @@ def _environment() -> "Environment":
         autoescape=False,  # neither C nor make is HTML
         auto_reload=False,
     )
-
-
-@lru_cache(maxsize=1)
-def _version() -> str:
-    """Return our version; it is cached, since the lookup takes half a millisecond."""
-    return version("thenar")
+    environment.globals["thenar_version"] = version("thenar")  # the lookup takes half a millisecond
+    return environment
 
 
 def render(template: str, **values: object) -> str:
@@ -36,8 +32,9 @@ def render(template: str, **values: object) -> str:
     Templates may use `origin`, a line that names the version and the template. Raises jinja2's UndefinedError if a
     template uses a value that is not given.
     """
-    origin = f"thenar {_version()}, template {template}."
-    return _environment().get_template(template).render(origin=origin, **values)
+    environment = _environment()
+    origin = f"thenar {environment.globals['thenar_version']}, template {template}."
+    return environment.get_template(template).render(origin=origin, **values)
 
 
 def file_text(path: str) -> str:

@@ -22,7 +22,7 @@ from ..boosting.classifier import LogitBoostClassifier
 from ..boosting.stumps import Stumps
 from ..evaluation.folds import Fold
 from ..firmware.classifier import LIBRARY_NAME
-from ..firmware.generate import Firmware, write_folder
+from ..firmware.generate import firmware_files, write_folder
 from ..model.collapse import Model
 from ..placement.elements import elements_of
 from ..placement.methods.base import METHODS, PAPERS
@@ -67,7 +67,7 @@ def export_c(
     name : str
         The prefix of every C name.
     flash : int, optional
-        Bytes of flash that the classifier may use; None: half of the part's flash.
+        Bytes of flash that the classifier may use; None: three quarters of the part's flash.
     overwrite : bool
         Whether existing files may be replaced.
 
@@ -85,7 +85,7 @@ def export_c(
     >>> sorted(path.name for path in export_c(Build.load("build"), "firmware", "host"))[:2]
     ['Makefile', 'check.c']
     """
-    files = Firmware(build.tables, build.manifest, target, name, flash).files()
+    files = firmware_files(build.tables, build.manifest, target, name, flash)
     write_folder(files, Path(folder), overwrite=overwrite)
     return tuple(Path(folder) / path for path in files)
 

@@ -20,8 +20,8 @@ from thenar.runtime.names import list_names, nearest
 from thenar.runtime.scores import LANE_OFFSET
 
 from ..firmware import FirmwareError
-from ..firmware.choose import PartFit, features, fit_for, smallest_fit
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library
+from ..firmware.costs import PartFit, features, fit_for, smallest_fit
 from ..firmware.generate import LARGEST
 from ..firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames, states_of
 from ..firmware.targets import TARGETS

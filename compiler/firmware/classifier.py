@@ -1,25 +1,30 @@
-"""The classifier of a build in C: the core, which is the same for every build, and the tables of one build."""
+"""The classifier of a build in C: the core, which is the same for every build, and the tables of one build; likewise
+the decoder of segments and the costs that a build has learnt for it.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 from textwrap import wrap
+from typing import Any
 
 from thenar.firmware_templates.rendering import file_text, render
-from thenar.runtime.manifest import Rejection
+from thenar.runtime.manifest import Manifest, Rejection
 from thenar.runtime.model.terms.line import Slope
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.softmax import Softmax
 
+from . import FirmwareError
 from .layout import Layout, Rows, StoredBins
-from .segments import SEGMENT_FILES, segment_files
 from .sensors import Sensors, codes_files, sensors_of
-from .words import Names, answers_of, comment, identifiers, inputs_in_words, joint_in_words, none_of, string
+from .words import answers_of, check_name, comment, identifiers, inputs_in_words, joint_in_words, none_of, string
 
 LIBRARY_NAME = "glove"
 """The default name of the library: its files are thenar_glove.h and so on."""
 FIRMWARE_NAME = "firmware"
 CORE_FILES = ("thenar.h", "thenar_block.h", "thenar.c")
+SEGMENT_FILES = ("thenar_segments.h", "thenar_segments.c")
 LIBRARY_FILES = (
     *CORE_FILES,
     *SEGMENT_FILES,
@@ -29,7 +34,10 @@ LIBRARY_FILES = (
 
 COLUMNS = 120
 _INDENT = "    "
-_FOLDER = "tables/"
+
+LAG_US = 150_000
+_MOST_STATES = 255  # which a byte numbers
+_NO_CHANGE = {"enter": 0, "direct": 0, "leave": 0}
 
 
 @dataclass(frozen=True)
@@ -39,13 +47,18 @@ class Library:
     name   of the files, thenar_NAME: one that words.check_name allows
     notes  lines for the opening comment of its header
     glove  the known sensors of a glove; None: only the names are known
+
+    Raises FirmwareError if the name cannot be used in C.
     """
 
     name: str
-    names: Names
+    names: Manifest
     layout: Layout
     notes: tuple[str, ...] = ()
     glove: Sensors | None = None
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
 
     @property
     def sensors(self) -> Sensors:
@@ -54,17 +67,12 @@ class Library:
 
     @cached_property
     def files(self) -> dict[str, str]:
-        """The classifier alone, name -> text: the core, and the tables."""
-        return {name: file_text(f"core/{name}") for name in CORE_FILES} | self.tables
-
-    @cached_property
-    def tables(self) -> dict[str, str]:
-        """The files that are generated for the build: thenar_NAME.h and .c."""
+        """The classifier alone, name -> text: the core, and the tables thenar_NAME.h and .c."""
+        files = {name: file_text(f"core/{name}") for name in CORE_FILES}
         values = _values(self.name, self.names, self.layout, self.notes)
-        return {
-            f"thenar_{self.name}{ending}": render(f"{_FOLDER}thenar_NAME{ending}.j2", **values)
-            for ending in (".h", ".c")
-        }
+        for ending in (".h", ".c"):
+            files[f"thenar_{self.name}{ending}"] = render(f"tables/thenar_NAME{ending}.j2", **values)
+        return files
 
     @cached_property
     def whole(self) -> dict[str, str]:
@@ -93,19 +101,14 @@ class Library:
         return " ".join(path.replace(".c", ".o") for path in self.sources)
 
 
-def number_lines(numbers: Iterable[object]) -> list[str]:
-    """Return lines of numbers, separated by commas."""
-    return _lines(map(str, numbers))
-
-
-def _lines(cells: Iterable[str]) -> list[str]:
+def _lines(cells: Iterable[object]) -> list[str]:
     """Return cells without breaks as lines, separated by commas."""
-    text = ", ".join(cells)
+    text = ", ".join(map(str, cells))
     width = COLUMNS - len(_INDENT)
     return [_INDENT + line for line in wrap(f"{text},", width, break_on_hyphens=False)] if text else []
 
 
-def _values(name: str, names: Names, layout: Layout, notes: Sequence[str]) -> dict[str, object]:
+def _values(name: str, names: Manifest, layout: Layout, notes: Sequence[str]) -> dict[str, object]:
     """Return the values for the templates of the tables."""
     tables, texts = layout.tables, answers_of(names)
     own, pairs = layout.bins[: len(layout.binned)], layout.bins[len(layout.binned) :]
@@ -133,8 +136,8 @@ def _values(name: str, names: Names, layout: Layout, notes: Sequence[str]) -> di
         "bins": [f"{_INDENT}{_bins(each)}," for each in own],
         "n_bins": len(own),
         "grids": [f"{_INDENT}{_grid(*pair)}," for pair in zip(pairs[::2], pairs[1::2], strict=True)],
-        "thresholds": number_lines(f"{step}u" for step in layout.thresholds),
-        "means": [line for row in layout.means.astype("int16").tolist() for line in number_lines(row)],
+        "thresholds": _lines(f"{step}u" for step in layout.thresholds),
+        "means": [line for row in layout.means.astype("int16").tolist() for line in _lines(row)],
         "rejection": _rejection(names.rejection),
         **_enumerations(name, names),
     }
@@ -153,7 +156,7 @@ def _line(line: Slope) -> str:
     return f"{{{line.joint}u, {line.low}u, {line.high - line.low}u, {left}u, {right}u}}"
 
 
-def _section_lines(names: Names, layout: Layout) -> Iterable[str]:
+def _section_lines(names: Manifest, layout: Layout) -> Iterable[str]:
     for title, inputs, rows in layout.sections:
         said = [names.switches[n].name if title == "switches" else names.joints[n].name for n in inputs]
         yield from ["", *_remark(f"{title}: {', '.join(map(comment, said))}")]
@@ -180,14 +183,14 @@ def _rejection(rejection: Rejection | None) -> dict[str, object] | None:
     if rejection is None:
         return None
     return {
-        "least_scores": number_lines(rejection.least_scores),
-        "closed": number_lines(f"{count}u" for count in chain(*rejection.closed)),
-        "ranges": number_lines(f"{code}u" for code in chain(*chain(*rejection.ranges))),
+        "least_scores": _lines(rejection.least_scores),
+        "closed": _lines(f"{count}u" for count in chain(*rejection.closed)),
+        "ranges": _lines(f"{code}u" for code in chain(*chain(*rejection.ranges))),
         "outside": rejection.outside,
     }
 
 
-def _enumerations(name: str, names: Names) -> dict[str, list[str]]:
+def _enumerations(name: str, names: Manifest) -> dict[str, list[str]]:
     """Return the lines of the enumerations in the header."""
     kinds = {
         "grasp": [(grasp, comment(grasp)) for grasp in names.grasps],
@@ -210,3 +213,70 @@ def _enumerators(prefix: str, named: Sequence[tuple[str, str]]) -> list[str]:
             lines[-1] += " */"
             lines.append(line)
     return lines
+
+
+def segment_files(name: str, model: SegmentModel) -> dict[str, str]:
+    """Return the texts of the decoder, and of the costs thenar_`name`_segments.h and .c.
+
+    Raises FirmwareError if there are too many states.
+    """
+    values = decoder_values(model)
+    limit = -(-model.most * 256 // model.gain) << model.shift
+    clipped = model.most if limit <= 65535 else min((65535 >> model.shift) * model.gain >> 8, model.most)
+    values |= {
+        "name": name,
+        "upper": name.upper(),
+        "limit": min(limit, 65535),
+        "clipped": clipped,
+        "one_leave": len(set(model.leave)) == 1,
+    }
+    costs = {
+        f"thenar_{name}_segments{ending}": render(f"tables/thenar_NAME_segments{ending}.j2", **values)
+        for ending in (".h", ".c")
+    }
+    return {path: file_text(f"core/{path}") for path in SEGMENT_FILES} | costs
+
+
+def decoder_values(model: SegmentModel) -> dict[str, Any]:
+    """Return the values for a template of the decoder in any language. Raises FirmwareError for too many states."""
+    if model.n_types >= _MOST_STATES:
+        raise FirmwareError(f"{model.n_types} grasp types: the segment decoder takes at most {_MOST_STATES - 1}")
+    states, rings = _laid_out(model)
+    return {
+        "model": model,
+        "types": model.n_types,
+        "refusal": model.refusal,
+        "lag": lag_of(model),
+        "states": states,
+        "groups": rings,
+        "waiting": rings[-1]["end"] if rings else 0,
+        "mask_bytes": -(-len(states) // 8),
+    }
+
+
+def lag_of(model: SegmentModel) -> int:
+    """Return the ticks until a tick's state is known."""
+    return min(max(LAG_US // model.tick_us, 1), 250)
+
+
+def _laid_out(model: SegmentModel) -> tuple[list[dict[str, int]], list[dict[str, int]]]:
+    """Return the costs of each state, and its ring and place in it; and the rings in which states wait until they have
+    lasted long enough, one for each shortest duration: from `begin` to `end`, `width` a row.
+    """
+    numbers: dict[int, int] = {}
+    rings: list[dict[str, int]] = []
+    end, K = 0, model.n_types
+    for least in sorted({each for each in model.least if each > 1}, key=model.least.index):
+        width, begin = model.least.count(least), end
+        end = begin + width * (least - 1)
+        numbers[least] = len(rings)
+        rings.append({"begin": begin, "end": end, "width": width})
+    usual = max(model.stay, key=model.stay.count)
+    states = []
+    for k, least in enumerate(model.least):
+        change = {"enter": model.enter[k], "direct": model.direct[k], "leave": model.leave[k]} if k < K else _NO_CHANGE
+        # Only differences between states matter, so the usual cost is subtracted; smaller ones wrap modulo 2^16.
+        stay = (model.stay[k] - usual) % 65536
+        place = {"ring": numbers.get(least, 0), "place": model.least[:k].count(least)}
+        states.append({**change, "stay": stay, "least": least, **place})
+    return states, rings

@@ -5,66 +5,36 @@ objects, belong to the user and are kept.
 """
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Mapping
 from pathlib import Path
 
 from thenar.runtime.files import read_file
+from thenar.runtime.manifest import Manifest
 from thenar.runtime.model.integers import IntegerTables
 
 from ..publication import check_folder, entries, publish_folder
 from . import FirmwareError
-from .choose import PartFit, fit_for
 from .classifier import LIBRARY_NAME, Library
-from .sensors import Sensors
-from .targets import TARGETS, Target
-from .words import Names, check_name
+from .costs import fit_for
+from .targets import TARGETS
 
 
-@dataclass(frozen=True, eq=False)
-class Firmware:
-    """The library that classifies frames by `tables`, for `target`, one of TARGETS.
+def firmware_files(
+    tables: IntegerTables, names: Manifest, target: str, name: str = LIBRARY_NAME, flash: int | None = None
+) -> dict[str, str]:
+    """Return path -> text of the library that classifies frames by `tables`; the result is deterministic.
 
-    names        the names of grasp types, switches and joints: a build's manifest, or words.numbered(tables)
-    name         of its files and functions: lower-case letters, digits and _, at most 32
-    flash        how many bytes of flash the classifier may take; None: three quarters of the part's
-    sensors      the known sensors of the glove whose readings a library converts; None: only the names are known
+    names   of grasp types, switches and joints: a build's manifest, or words.numbered(tables)
+    target  one of TARGETS
+    name    of its files and functions: lower-case letters, digits and _, at most 32
+    flash   how many bytes of flash the classifier may take; None: three quarters of the part's
 
-    Raises FirmwareError if the name cannot be used in C; MemberError if there is no such target.
+    Raises FirmwareError if the name cannot be used in C, or the build does not fit; MemberError if there is no such
+    target.
     """
-
-    tables: IntegerTables
-    names: Names
-    target: str
-    name: str = LIBRARY_NAME
-    flash: int | None = None
-    sensors: Sensors | None = None
-
-    def __post_init__(self) -> None:
-        check_name(self.name)
-        TARGETS.named(self.target)
-
-    @property
-    def _target(self) -> Target:
-        return TARGETS.named(self.target)
-
-    @cached_property
-    def fit(self) -> PartFit:
-        """The part of the target, and the layout of the build. Raises FirmwareError if it does not fit."""
-        return fit_for(self._target, self.tables, self.flash)
-
-    def library(self, notes: Sequence[str] = ()) -> Library:
-        """Return the classifier alone, with lines for its opening comments."""
-        return Library(self.name, self.names, self.fit.layout, tuple(notes), self.sensors)
-
-    def files(self, notes: Sequence[str] | None = None) -> dict[str, str]:
-        """Return path -> text of the firmware; the result is deterministic.
-
-        notes are lines for the opening comment of the classifier's header, by default those of the fit. Raises
-        FirmwareError where the build does not fit.
-        """
-        return self._target.files(self.library(self.fit.notes() if notes is None else notes))
+    member = TARGETS.named(target)
+    fit = fit_for(member, tables, flash)
+    return member.files(Library(name, names, fit.layout, fit.notes()))
 
 
 SUMS = "SHA256SUMS"

@@ -19,13 +19,13 @@ from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import SegmentModel
 
 from . import FirmwareError
-from .costs import Unit
+from .classifier import lag_of
 from .layout import Layout
-from .segments import lag_of
 from .words import string
 
 Frames = NDArray[np.uint8]
 Lost = NDArray[np.bool_]
+Unit = Literal["cycles", "instructions", ""]
 STREAM_TICKS = 200
 """The frames that a program's decoder of segments takes before it begins afresh."""
 
@@ -125,7 +125,8 @@ def record_values(name: str, layout: Layout, *, lost: bool = False) -> dict[str,
     It reads the file "frames" and writes the file "predictions", or stdin and stdout: first the names, then the input
     of `answers_from`.
     """
-    tables, lost_bytes = layout.tables, _lost_bytes(layout) if lost else 0
+    tables = layout.tables
+    lost_bytes = -(-(tables.n_switches + tables.n_joints) // 8) if lost else 0
     return {
         "name": name,
         "lost_bytes": lost_bytes,
@@ -141,10 +142,6 @@ def answers_in(printed: bytes, frames: Frames, layout: Layout) -> Predictions:
     """Return the predictions that a program wrote after the names. Raises FirmwareError like its two parts."""
     names, rest = names_in(printed, layout)
     return replace(answers_from(rest, frames, layout), names=names)
-
-
-def _lost_bytes(layout: Layout) -> int:
-    return -(-(layout.tables.n_switches + layout.tables.n_joints) // 8)
 
 
 def with_lost(frames: Frames, lost: Lost | None) -> Frames:

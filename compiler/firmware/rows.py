@@ -8,12 +8,13 @@ from operator import xor
 
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.harness.wiring import BoardMatrix, BoardWiring, BusWiring, Harness, StreamWiring
+from thenar.runtime.manifest import Manifest
 from thenar.runtime.names import list_names, shortened
 from thenar.runtime.scanning.ports import ports_of
 from thenar.runtime.scanning.timing import reading_of
 
 from . import FirmwareError
-from .words import Names, check_name, comment, string
+from .words import check_name, comment, string
 
 _SEPARATORS = ",*$"
 _BITS_A_BYTE = 10  # on a serial line
@@ -29,7 +30,7 @@ class _Kept:
     readings: tuple[str, ...]
 
     @classmethod
-    def of(cls, names: Names, harness: Harness) -> "_Kept":
+    def of(cls, names: Manifest, harness: Harness) -> "_Kept":
         """Return those of a build; a level that is wired as a switch is a switch."""
         wired = set(harness.switches)
         switches = (each.name for each in names.switches if each.threshold is None or each.name in wired)
@@ -60,14 +61,14 @@ class _Kept:
         return len(f"$row,{number},{clock},{'F' * self.nibbles}{f',{number}' * len(self.readings)}*00\r\n")
 
 
-def rows_files(name: str, names: Names, harness: Harness) -> dict[str, str]:
+def rows_files(name: str, names: Manifest, harness: Harness) -> dict[str, str]:
     """Return path -> text of a folder with a sketch for every board of the harness that has elements of a build.
 
     Parameters
     ----------
     name : str
         The name of the sketch, as `words.check_name` allows it; the second board's is `name`_2.
-    names : Names
+    names : Manifest
         The build's manifest.
     harness : Harness
         The glove, whose streams describe the boards.

@@ -14,12 +14,12 @@ from thenar.firmware_templates.rendering import render
 from thenar.runtime.calibration import Meaning, codes_of_bytes, load_calibration, numbers_of, place_of
 from thenar.runtime.code_line import FARTHEST, FRACTION, CodeLine, Point, code_point
 from thenar.runtime.harness.wiring import Harness, Range, StreamWiring
-from thenar.runtime.manifest import Calibration, Threshold
+from thenar.runtime.manifest import Calibration, Manifest, Threshold
 from thenar.runtime.sources.rows import JOINT_CODES, steps_of
 from thenar.runtime.taxels import TaxelCalibration, calibration_of, count_limit
 
 from . import FirmwareError
-from .words import Names, comment, identifiers
+from .words import comment, identifiers
 
 _RAW = "raw"
 
@@ -99,7 +99,7 @@ class Sensors:
         return self.known and all(sensor.grid is not None for sensor in self.every)
 
 
-def sensors_of(names: Names, harness: Harness | None = None, calibration: GloveCalibration | None = None) -> Sensors:
+def sensors_of(names: Manifest, harness: Harness | None = None, calibration: GloveCalibration | None = None) -> Sensors:
     """Return the sensors of a build, with the readings known from a glove's `harness` and its joints' `calibration`.
 
     Raises SettingError where these do not match the build, FirmwareError where a stream's ranges are not whole numbers.

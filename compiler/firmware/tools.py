@@ -45,25 +45,19 @@ def workshop(files: Mapping[str, str | bytes]) -> Iterator[Path]:
 
     Raises FirmwareError if they cannot be written.
     """
-    with _new_folder() as name:
-        for path, content in files.items():
-            _write(Path(name, path), content.encode() if isinstance(content, str) else content)
-        yield Path(name)
-
-
-def _new_folder() -> TemporaryDirectory[str]:
     try:
-        return TemporaryDirectory(prefix="thenar-")
+        folder = TemporaryDirectory(prefix="thenar-")
     except OSError as wrong:
         raise FirmwareError(f"no temporary folder: {wrong.strerror}; set $TMPDIR to another place") from None
-
-
-def _write(path: Path, content: bytes) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-    except OSError as wrong:
-        raise FirmwareError(f"{path} cannot be written: {wrong.strerror}; is the disk full?") from None
+    with folder as name:
+        for path, content in files.items():
+            inside = Path(name, path)
+            try:
+                inside.parent.mkdir(parents=True, exist_ok=True)
+                inside.write_bytes(content.encode() if isinstance(content, str) else content)
+            except OSError as wrong:
+                raise FirmwareError(f"{inside} cannot be written: {wrong.strerror}; is the disk full?") from None
+        yield Path(name)
 
 
 def call(command: Sequence[str], folder: Path, given: bytes = b"", limit_s: float = LIMIT_S) -> bytes:

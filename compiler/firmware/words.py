@@ -4,61 +4,20 @@ import hashlib
 import re
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import version
-from typing import Protocol
 
-from thenar.runtime.manifest import Calibration, Rejection, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.published import NONE
-from thenar.runtime.segmenting.model import SegmentModel
+from thenar.runtime.recipe import Recipe
 
 from . import FirmwareError
 
 _LONGEST_NAME = 32
 
 
-class Names(Protocol):
-    """The names and models of a build other than its tables. A Manifest has them, and so has `numbered(tables)`."""
-
-    @property
-    def grasps(self) -> tuple[str, ...]:
-        """The K grasp types."""
-        ...
-
-    @property
-    def switches(self) -> tuple[Switch, ...]:
-        """The switches in the order of the tables."""
-        ...
-
-    @property
-    def joints(self) -> tuple[Calibration, ...]:
-        """The joints in the order of the tables, and the meaning of their codes."""
-        ...
-
-    @property
-    def tables_sha256(self) -> str:
-        """The digest of the tables."""
-        ...
-
-    @property
-    def thenar(self) -> str:
-        """The version of thenar that made them."""
-        ...
-
-    @property
-    def rejection(self) -> Rejection | None:
-        """The rejection model, if there is one."""
-        ...
-
-    @property
-    def segments(self) -> SegmentModel | None:
-        """The costs of segments, if the build has learnt them."""
-        ...
-
-
-def answers_of(names: Names) -> tuple[str, ...]:
+def answers_of(names: Manifest) -> tuple[str, ...]:
     """Return the possible results for a frame: the grasp types, and "none" if it is not one of them but a frame can be
     rejected, or a segment can be of no type.
     """
@@ -66,33 +25,27 @@ def answers_of(names: Names) -> tuple[str, ...]:
     return (*names.grasps, NONE) if names.rejection is not None or segments else names.grasps
 
 
-def none_of(names: Names) -> int | None:
+def none_of(names: Manifest) -> int | None:
     """Return the number of "none" among the possible results for a frame; None if it is not one of them."""
     return len(found) - 1 if (found := answers_of(names))[-1] == NONE else None
 
 
-@dataclass(frozen=True, slots=True)
-class Numbered:
-    """Names that are only numbers, for tables without a build: see `numbered`."""
-
-    grasps: tuple[str, ...]
-    switches: tuple[Switch, ...]
-    joints: tuple[Calibration, ...]
-    tables_sha256: str
-    thenar: str
-    rejection: Rejection | None = None
-    segments: None = None
-
-
 @lru_cache(maxsize=4)
-def numbered(tables: IntegerTables) -> Numbered:
-    """Return names for tables alone: "type 0", "s0", "j0" and so on."""
-    return Numbered(
+def numbered(tables: IntegerTables) -> Manifest:
+    """Return a manifest for tables without a build, in which names are numbers: "type 0", "s0", "j0" and so on."""
+    return Manifest(
+        schema=SCHEMA,
+        checksum="",
+        thenar=version("thenar"),
+        tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
+        ensemble_sha256="",
+        source=Origin("", 0, "", tables.n_switches, joints=tables.n_joints),
+        options=Recipe(),
         grasps=tuple(f"type {number}" for number in range(tables.n_classes)),
         switches=tuple(Switch(number, f"s{number}", 0.0) for number in range(tables.n_switches)),
         joints=tuple(Calibration(number, f"j{number}", "raw", 0, 0.0, 1, 1.0) for number in range(tables.n_joints)),
-        tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
-        thenar=version("thenar"),
+        proof=Proof(16, tables.scale, tables.bound, 0.0, 0.0, 0, 0),
+        rates=(),
     )
 
 

@@ -22,9 +22,8 @@ from thenar.runtime.scores import Scorer
 
 from ..evaluation.folds import Rows
 from ..firmware import FirmwareError
-from ..firmware.choose import PartFit, fit_for
 from ..firmware.classifier import LIBRARY_NAME, Library
-from ..firmware.measuring import run_counted, slow_frames
+from ..firmware.costs import PartFit, fit_for, run_counted, slow_frames
 from ..firmware.probes import random_frames
 from ..firmware.targets import TARGETS, Target, timed
 from ..firmware.words import numbered

@@ -152,9 +152,7 @@ def test_firmware_is_replaced_when_asked_and_the_users_files_stay(thenar: Thenar
     assert "thenar_glove.c" not in content(tmp_path / "made")
 
 
-def test_a_gloves_ranges_calibrate_its_pins_and_fitting_boards_are_listed(
-    thenar: Thenar, build: Path, tmp_path: Path
-) -> None:
+def test_a_gloves_ranges_calibrate_its_pins(thenar: Thenar, build: Path, tmp_path: Path) -> None:
     joints = [joint.name for joint in Build.load(build).manifest.joints]
     ranges = ", ".join(f"{name} = [0, 1023]" for name in joints)
     glove = tmp_path / "glove.toml"
@@ -163,7 +161,6 @@ def test_a_gloves_ranges_calibrate_its_pins_and_fitting_boards_are_listed(
         made = tmp_path / f"made{known}"
         done = thenar("firmware", build, "--target", "arduino", *given, "-o", made)
         assert done.returncode == 0, done.stderr
-        assert "\nthe example Recognise fits Arduino Uno and Nano and Mega as it is.\n" in done.stdout
         header = (made / "src" / "thenar_glove_codes.h").read_text()
         assert f"#define THENAR_GLOVE_CALIBRATED {known} " in header
         sketch = (made / "examples/Recognise/Recognise.ino").read_text()

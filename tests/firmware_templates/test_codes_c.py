@@ -7,19 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.sensors import Sensor, Sensors, sensors_of
-from thenar.compiler.firmware.words import Numbered, numbered
+from thenar.compiler.firmware.words import numbered
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError
 from thenar.runtime.calibration import CodeTables, codes_of_bytes, numbers_of
 from thenar.runtime.code_line import FARTHEST, CodeLine, Point
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.manifest import Calibration, Switch, Threshold
+from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.sources.rows import _Grid, steps_of
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine, count_limit
@@ -73,7 +74,7 @@ def compiled(shared_library: SharedLibrary) -> Callable[..., Codes]:
     """Return what compiles the codes of some names."""
 
     def compiled(
-        names: Numbered, sensors: Sensors | None = None, take: str = "return 0u;", highest: int = 900
+        names: Manifest, sensors: Sensors | None = None, take: str = "return 0u;", highest: int = 900
     ) -> Codes:
         layout = Layout(tables_of(names, highest))
         files = Library("hand", names, layout, glove=sensors).whole
@@ -83,7 +84,7 @@ def compiled(shared_library: SharedLibrary) -> Callable[..., Codes]:
     return compiled
 
 
-def tables_of(names: Numbered, highest: int) -> IntegerTables:
+def tables_of(names: Manifest, highest: int) -> IntegerTables:
     random = np.random.default_rng(1)
     s, j, k = len(names.switches), len(names.joints), 3
 
@@ -96,10 +97,10 @@ def tables_of(names: Numbered, highest: int) -> IntegerTables:
     )
 
 
-def names_of(joints: Sequence[Calibration], switches: Sequence[Switch] = ()) -> Numbered:
+def names_of(joints: Sequence[Calibration], switches: Sequence[Switch] = ()) -> Manifest:
     zeros = [np.zeros(shape, np.int16) for shape in (3, (1, 3), (1, 3), (0, 3))]
     tables = IntegerTables.of(zeros[0], zeros[1], (), (), zeros[2], zeros[3], 1.0)
-    return replace(numbered(tables), joints=tuple(joints), switches=tuple(switches) or (Switch(0, "s0", 0.0),))
+    return structs.replace(numbered(tables), joints=tuple(joints), switches=tuple(switches) or (Switch(0, "s0", 0.0),))
 
 
 def joint(

@@ -17,7 +17,7 @@ from material import GRASPS, SWITCHES, Format, build_files, grasp_set, harness, 
 from mutating import Mutate, altered, json_file, npz_file, sealed
 
 from thenar.compiler.artifact.verify import verify
-from thenar.compiler.firmware.generate import Firmware, sums, write_folder
+from thenar.compiler.firmware.generate import firmware_files, sums, write_folder
 from thenar.compiler.frontier.cache import Store
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.points import frontier_to_bytes
@@ -110,7 +110,7 @@ def _spec(build: Build, _folder: Path) -> None:
 
 
 def _firmware(build: Build, _folder: Path) -> None:
-    Firmware(build.tables, build.manifest, "host").files()
+    firmware_files(build.tables, build.manifest, "host")
 
 
 def _member(name: str, mutate: Mutate, sealed_again: Callable[[bytes], bytes]) -> Format:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.firmware.simavr import harness, missing
+from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.firmware.targets.avr import harness
 
 Compile = Callable[..., Path]
 
@@ -16,7 +17,7 @@ def program(tool: Callable[[str], str]) -> Callable[[str], Path]:
     """Return what gives the path of a program of the harness."""
     for name in ("avr-gcc", "make"):
         tool(name)
-    if (gone := missing()) is not None:
+    if (gone := TARGETS["avr328p"].missing()) is not None:
         assert "libsimavr" in gone, gone
         tool("libsimavr-dev")
     return harness

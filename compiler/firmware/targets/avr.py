@@ -1,18 +1,31 @@
-"""AVRs: the parts of Arduino's Uno and Mega."""
+"""AVRs: the parts of Arduino's Uno and Mega, whose code runs in libsimavr: it counts cycles, and the stack needed.
 
+The programs that run AVR code are linked to libsimavr, which is under the GPL 3, so they are not part of the product:
+`verify` and the tests build them from the sources in a checkout of thenar on first use.
+"""
+
+import atexit
+import os
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, ClassVar
 
-from ..costs import Formula
-from ..tools import AVR_COMPILER
-from .base import Target
+from .. import FirmwareError
+from ..tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lacking, workshop
+from .base import Formula, Target
 
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
     from ..probes import Frames, Lost, Predictions
+
+_CLOCK_HZ = 16_000_000  # of the simulated time, which is not measured
+_MAKE: Tool = (("make",), "make")
+_WORDS = 6  # bytes of a prediction after the scores: type, margin, probability
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,9 +51,13 @@ class Avr(Target):
 
     def missing(self) -> str | None:
         """Return which of avr-gcc and simavr is missing, and how to install it; None if neither is."""
-        from ..simavr import missing
-
-        return missing()
+        if gone := lacking(AVR_COMPILER, HOST_COMPILER, _MAKE):
+            return gone
+        try:
+            harness("simavr_classify")
+        except FirmwareError as error:
+            return str(error)
+        return None
 
     def run(
         self,
@@ -51,10 +68,110 @@ class Avr(Target):
         *,
         lost: "Lost | None" = None,
     ) -> "Predictions":
-        """Return the predictions for frames (n, F) in simavr, as in the base class, with their cycles and stack."""
-        from ..simavr import run
+        """Return the predictions for frames (n, F) in simavr, as in the base class.
 
-        return run(files, name, layout, frames, self.part, self.flags, lost=lost)
+        Their cost is the cycles from the first instruction of thenar_classify to the end of its return, without the
+        call; their stack the maximum of all frames, the return address included. With `lost` both are not measured,
+        and margin and probability are returned as well.
+        """
+        from ..probes import check_frames, record_files, with_lost
+
+        check_frames(frames, layout)
+        command = [find(AVR_COMPILER), *STRICT, *self.flags]
+        program = harness("simavr_classify")
+        main = record_files(name, layout, "avr", lost=lost is not None)
+        sent, entry = with_lost(frames, lost), "classify" if lost is None else "predict"
+        with workshop({**files, **main}) as folder:
+            sources = sorted(path for path in (*files, *main) if path.endswith((".c", ".S")))
+            call([*command, *sources, "-o", "classifier.elf"], folder)
+            found = _symbols(folder)
+            size = 2 * layout.tables.n_classes
+            if lost is None:
+                given = _symbol(found, "memory", 2 * layout.memory)
+                said = given + layout.frame_size  # scores follow the inputs
+            else:
+                size += _WORDS
+                given, said = _symbol(found, "thenar_record", sent.shape[1]), _symbol(found, "thenar_said", size)
+            spans = f"{given:#x}:{sent.shape[1]}", f"{said:#x}:{size}"
+            places = (hex(_symbol(found, symbol)) for symbol in (f"thenar_{entry}", "_end"))
+            printed = call(
+                [str(program), self.part, str(_CLOCK_HZ), "classifier.elf", *places, *spans], folder, sent.tobytes()
+            )
+        predictions = _answers(printed, len(frames), layout, words=0 if lost is None else _WORDS)
+        return predictions if lost is None else replace(predictions, cost=None, unit="", stack=None)
+
+
+def harness(program: str) -> Path:
+    """Return the path of the harness's `program`, compiled at most once per process.
+
+    Its sources are in the folder $THENAR_SIMAVR, by default tests/simavr of the checkout that contains this file.
+    Raises FirmwareError if they are missing or do not compile.
+    """
+    named = os.environ.get("THENAR_SIMAVR")
+    folder = Path(named) if named else Path(__file__).resolve().parents[3] / "tests" / "simavr"
+    if not (folder / "simavr_classify.c").is_file():
+        raise FirmwareError(
+            f"{folder} has no harness for simavr: set THENAR_SIMAVR to the folder tests/simavr of thenar's sources"
+        )
+    return _built(folder, program)
+
+
+@lru_cache
+def _built(sources: Path, program: str) -> Path:
+    if gone := lacking(HOST_COMPILER, _MAKE):
+        raise FirmwareError(gone)
+    folder = mkdtemp(prefix="thenar-simavr-")
+    atexit.register(rmtree, folder, ignore_errors=True)
+    built = Path(folder, program)
+    try:
+        call(["make", "-C", str(sources), f"BUILD={built.parent}", str(built)], sources)
+    except FirmwareError as error:
+        if "sim_avr.h" in str(error) or "lsimavr" in str(error):
+            raise FirmwareError("libsimavr not found; Debian: apt-get install libsimavr-dev") from None
+        raise
+    return built
+
+
+def _symbols(folder: Path) -> dict[str, tuple[int, int]]:
+    """Return address and size of the symbols of the compiled program, data from 0x800000 on."""
+    lines = call(["avr-nm", "--format=posix", "classifier.elf"], folder).decode().splitlines()
+    words = [line.split() for line in lines]
+    return {word[0]: (int(word[2], 16), int(word[3], 16) if len(word) > 3 else 0) for word in words}
+
+
+def _symbol(found: Mapping[str, tuple[int, int]], name: str, size: int | None = None) -> int:
+    """Return the address of a symbol of `size` bytes, if given. Raises FirmwareError if it is missing or differs."""
+    if name not in found:
+        raise FirmwareError(f"the compiled program has no {name}")
+    address, held = found[name]
+    if size not in (None, held):
+        raise FirmwareError(f"{name} has {held} bytes in the compiled program, but {size} in its layout")
+    return address
+
+
+def _answers(printed: bytes, frames: int, layout: "Layout", *, words: int) -> "Predictions":
+    """Return the predictions; `words` is the size of type, margin and probability, 0 where these were not requested."""
+    import numpy as np
+
+    from ..probes import Predictions
+
+    classes = layout.tables.n_classes
+    said = [("said", "<u2", (words // 2,))] if words else []
+    counted = [("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")]
+    record = np.dtype([("scores", "<i2", (classes,)), *said, *counted])
+    if len(printed) != frames * record.itemsize:
+        raise FirmwareError(f"the simulator gave {len(printed)} bytes for {frames} frames of {record.itemsize} bytes")
+    records = np.frombuffer(printed, record)
+    stack = int(records["stack"].max()) if frames else None
+    return Predictions(
+        records["scores"].astype(np.int16),
+        records["grasp"].astype(np.uint16),
+        margins=records["said"][:, 1].astype(np.uint16) if words else None,
+        shares=records["said"][:, 2].astype(np.uint16) if words else None,
+        cost=records["cycles"].astype(np.uint32),
+        unit="cycles",
+        stack=stack,
+    )
 
 
 # `lpm` reaches the first 64 KiB of the flash, which the tables share with all other constants. The clocks are those of
@@ -71,58 +188,57 @@ _avr = partial(
     size=(("avr-size",), "binutils-avr"),
 )
 
-_ATMEGA328P = _avr(
-    name="avr328p",
-    formula=Formula(
-        cycles={
-            "one": 378.1,
-            "blocks": 136.5,
-            "classes": 34.9,
-            "bytes": 71.78,
-            "groups": 33.38,
-            "rows": 112.9,
-            "lines": 122.9,
-            "distances": 73.62,
-            "shifts": 6.288,
-            "bins": 121.9,
-            "halves": 30.26,
-        },
-        flash=2288,
-        ram=60,
+MEMBER = (
+    _avr(
+        name="avr328p",
+        formula=Formula(
+            cycles={
+                "one": 378.1,
+                "blocks": 136.5,
+                "classes": 34.9,
+                "bytes": 71.78,
+                "groups": 33.38,
+                "rows": 112.9,
+                "lines": 122.9,
+                "distances": 73.62,
+                "shifts": 6.288,
+                "bins": 121.9,
+                "halves": 30.26,
+            },
+            flash=2288,
+            ram=60,
+        ),
+        part="atmega328p",
+        rank=10,
+        flags=("-mmcu=atmega328p", "-Os"),
+        flash=32 << 10,
+        ram=2 << 10,
+        programmer="arduino",
     ),
-    part="atmega328p",
-    rank=10,
-    flags=("-mmcu=atmega328p", "-Os"),
-    flash=32 << 10,
-    ram=2 << 10,
-    programmer="arduino",
-)
-
-_ATMEGA2560 = _avr(
-    name="avr2560",
-    formula=Formula(
-        cycles={
-            "one": 379.1,
-            "blocks": 136.6,
-            "classes": 34.9,
-            "bytes": 71.77,
-            "groups": 33.38,
-            "rows": 112.9,
-            "lines": 122.9,
-            "distances": 73.58,
-            "shifts": 6.299,
-            "bins": 123.9,
-            "halves": 30.26,
-        },
-        flash=2292,
-        ram=60,
+    _avr(
+        name="avr2560",
+        formula=Formula(
+            cycles={
+                "one": 379.1,
+                "blocks": 136.6,
+                "classes": 34.9,
+                "bytes": 71.77,
+                "groups": 33.38,
+                "rows": 112.9,
+                "lines": 122.9,
+                "distances": 73.58,
+                "shifts": 6.299,
+                "bins": 123.9,
+                "halves": 30.26,
+            },
+            flash=2292,
+            ram=60,
+        ),
+        part="atmega2560",
+        rank=11,
+        flags=("-mmcu=atmega2560", "-Os"),
+        flash=256 << 10,
+        ram=8 << 10,
+        programmer="wiring",
     ),
-    part="atmega2560",
-    rank=11,
-    flags=("-mmcu=atmega2560", "-Os"),
-    flash=256 << 10,
-    ram=8 << 10,
-    programmer="wiring",
 )
-
-MEMBER = (_ATMEGA328P, _ATMEGA2560)

@@ -5,13 +5,21 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from .. import FirmwareError
-from ..costs import Formula
 from ..tools import Tool
 
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
     from ..probes import Frames, Lost, Predictions
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """What a classifier costs on a core: `cycles` a term of `costs.terms`, the bytes of the core in flash and RAM."""
+
+    cycles: Mapping[str, float]
+    flash: int
+    ram: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,10 +100,6 @@ class Target:
     def sources(self, library: "Library") -> dict[str, str]:
         """Return path -> text of the classifier alone, for `run`: in C, unless the target overrides it."""
         return library.files
-
-    def said(self, library: "Library") -> str:
-        """Return a remark on the written files, a sentence without its full stop; "" if there is none."""
-        return ""
 
     def missing(self) -> str | None:
         """Return why code cannot be compiled and run here, and what to install; None if it can."""

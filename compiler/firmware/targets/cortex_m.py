@@ -2,9 +2,8 @@
 
 from functools import partial
 
-from ..costs import Formula
 from ..tools import ARM_COMPILER
-from .base import Target
+from .base import Formula, Target
 
 _core = partial(
     Target,

@@ -5,7 +5,7 @@ to the flash, the PSRAM or the USB port, have no pull-up (which only analog inpu
 chips or modules. Analog pins are those of ADC1, since ADC2 does not convert while Wi-Fi is on.
 """
 
-from ..costs import Formula
+from .base import Formula
 from .package import M4, Package, family
 from .riscv import MEMBER as _RISCV
 

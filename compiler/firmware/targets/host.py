@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from ..probes import Frames, Lost, Predictions
 
 # With sanitizers -O1, as their manuals advise: -O2 takes half as long again to compile.
-_PLAIN = ("-O2",)
 _SANITIZED = ("-O1", "-g1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
@@ -51,12 +50,11 @@ class Host(Target):
         *,
         lost: "Lost | None" = None,
         compiler: str | None = None,
-        sanitize: bool = True,
     ) -> "Predictions":
         """Return the predictions for frames (n, F), as in the base class.
 
-        compiler  "gcc" or "clang"; by default the first that is installed
-        sanitize  with the address and undefined behaviour sanitizers: a finding is an error
+        `compiler` is "gcc" or "clang", by default the first that is installed. A finding of the address and undefined
+        behaviour sanitizers is an error.
         """
         from ..probes import answers_in, check_frames, record_files, with_lost
 
@@ -71,7 +69,7 @@ class Host(Target):
         )
         with workshop({**files, **main}) as folder:
             sources = sorted(path for path in (*files, *main) if path.endswith(".c"))
-            call([command, *STRICT, *(_SANITIZED if sanitize else _PLAIN), *sources, "-o", "classifier"], folder)
+            call([command, *STRICT, *_SANITIZED, *sources, "-o", "classifier"], folder)
             return answers_in(
                 call([str(folder / "classifier")], folder, with_lost(frames, lost).tobytes()), frames, layout
             )

@@ -28,21 +28,8 @@ class MicroPython(Target):
     """Any board that runs MicroPython."""
 
     def files(self, library: "Library") -> dict[str, str]:
-        """Return path -> text of the Python module and of its README."""
-        from thenar.firmware_templates.rendering import render
-
-        from ..segments import times_of
-
-        names = library.names
-        values = {
-            "name": library.name,
-            "switches": len(names.switches),
-            "joints": len(names.joints),
-            "rejection": names.rejection,
-            "segments": names.segments is not None,
-            **({} if names.segments is None else times_of(names.segments)),
-        }
-        return {**self.sources(library), "README.md": render("micropython/README.md.j2", **values)}
+        """Return path -> text: the Python module alone."""
+        return self.sources(library)
 
     def sources(self, library: "Library") -> dict[str, str]:
         """Return the Python module."""
@@ -144,7 +131,7 @@ def _sensor_values(library: "Library") -> dict[str, object]:
 
 def _segment_values(library: "Library") -> dict[str, object] | None:
     """Return the template's values for the decoder of segments; None where the build has no segment costs."""
-    from ..segments import decoder_values
+    from ..classifier import decoder_values
 
     if (model := library.names.segments) is None:
         return None

@@ -1,28 +1,35 @@
 """The classifier as a package for every microcontroller ecosystem: Arduino, PlatformIO, ESP-IDF, Zephyr, pico-sdk and
-plain CMake. Targets differ in the core whose cost is estimated, not in the files.
+plain CMake. Targets differ in the core whose cost is estimated, and in the pins of the example, not in the files.
 
 Layout and fields of the Arduino library are those of its specification, revision 1.5.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count, islice
 from typing import TYPE_CHECKING, Any
 
-from ..costs import Formula
-from .base import Target
+from .base import Formula, Target
 from .cortex_m import MEMBER as _CORTEX_M
 
 if TYPE_CHECKING:
     from ..classifier import Library
-    from ..example import Pins
 
 _VERSION = "1.0.0"
-
-_FUNCTIONS = (
-    *("init", "set_switch", "set_code", "lose_switch", "lose_joint"),
-    *("classify", "decide", "margin", "probability", "name"),
+_BESIDE = (
+    "library.properties",
+    "library.json",
+    "idf_component.yml",
+    "zephyr/module.yml",
+    "CMakeLists.txt",
+    "README.md",
+    "LICENSE",
 )
-_OF_CODES = ("codes_init", "calibrate", "calibrated", "code_of", "set_reading")
-_CONSTANTS = ("CLASSES", "SWITCHES", "JOINTS", "MEMORY", "NAME_BYTES")
+
+# On Arduino's boards, pins 0 and 1 are those of the serial port, and 13 that of the LED.
+_FIRST, _LED = 2, 13
+_ON_MULTIPLEXER, _ON_REGISTER = 16, 8
+_ADDRESS_PINS, _REGISTER_PINS = 4, 3  # S0 to S3; PL, CP and Q7
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,79 +43,75 @@ class Package(Target):
     digital: tuple[int, ...] = ()
     analog: tuple[int, ...] = ()
 
-    @property
-    def example_pins(self) -> "Pins | None":
-        """The pins for the example, if they are known."""
-        from ..example import Pins
-
-        return Pins(self.part, self.digital, self.analog) if self.digital else None
-
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text of the package thenar_NAME: the classifier in src/, the files that each ecosystem
         requires, a self test in check/, and an example for Arduino.
         """
         from thenar.firmware_templates.rendering import render
 
-        from ..example import Wiring, example_values
         from ..probes import CHECKS, check_header
-        from ..words import comment, inputs_in_words, markdown
+        from ..words import inputs_in_words, markdown
 
-        name, names, wiring = library.name, library.names, Wiring.of(library, self.example_pins)
+        name, names, sensors = library.name, library.names, library.sensors
         counts = {"switches": len(names.switches), "joints": len(names.joints)}
-        grasps = [comment(grasp) for grasp in names.grasps]
         values = {
             **{"name": name, "version": _VERSION, "thenar": markdown(names.thenar), "checks": CHECKS},
-            **{"grasps": grasps, **counts, "wiring": str(wiring), "on_pins": library.sensors.on_pins},
-            "sensors": bool(library.sensors.every),
-            "known": library.sensors.known,
-            "points": [
-                (n, *map(markdown, (sensor.name, *sensor.says))) for n, sensor in enumerate(library.sensors.every)
-            ],
-            "sentence": f"Recognises {len(grasps)} grasp types from {inputs_in_words(**counts)} of a glove.",
+            **{**counts, "on_pins": sensors.on_pins, "known": sensors.known},
+            "points": [(n, *map(markdown, (sensor.name, *sensor.says))) for n, sensor in enumerate(sensors.every)],
+            "sentence": f"Recognises {len(names.grasps)} grasp types from {inputs_in_words(**counts)} of a glove.",
             "sources": library.sources,
             "headers": [f"src/{path}" for path in library.whole if path.endswith(".h")],
-            "words": _keywords(name, names.segments is not None, bool(library.sensors.every)),
         }
         return {
             **{f"src/{path}": text for path, text in library.whole.items()},
             **{path: render(f"package/{path.rsplit('/', 1)[-1]}.j2", **values) for path in _BESIDE},
             "check/check.c": render("host/check.c.j2", name=name, checks=CHECKS),
             f"check/thenar_{name}_check.h": check_header(name, library.layout, names.grasps),
-            "examples/Recognise/Recognise.ino": render(
-                "package/Recognise.ino.j2", name=name, **example_values(library, wiring)
-            ),
+            "examples/Recognise/Recognise.ino": render("package/Recognise.ino.j2", **self.example_values(library)),
         }
 
-    def said(self, library: "Library") -> str:
-        """Return which boards the example fits."""
-        from ..example import Wiring
+    def example_values(self, library: "Library") -> dict[str, Any]:
+        """Return the values for the example, which chooses by the macros of a board what is to be on which pin."""
+        from ..words import comment
 
-        return str(Wiring.of(library, self.example_pins))
+        sensors = library.sensors
+        said = [comment(f"{sensor.name}: {' and '.join(sensor.says)}") for sensor in sensors.every]
+        plain = [number for number, switch in enumerate(library.names.switches) if switch.threshold is None]
+        names = [comment(library.names.switches[number].name) for number in plain]
+        pins = list(islice(self._digital_pins(), len(names) + _ADDRESS_PINS + _REGISTER_PINS))
+        analog = [*map(str, self.analog)] if self.digital else [f"A{number}" for number in range(len(said))]
+        analog += ["0"] * (len(said) - len(analog))  # multiplexers replace the rest
 
+        def needed(pins_of_inputs: int) -> int:
+            """Return how many pins a known part needs for as many; otherwise the least that a board must have."""
+            return pins_of_inputs if self.digital else max(pins[:pins_of_inputs], default=0) + 1
 
-_BESIDE = (
-    "library.properties",
-    "keywords.txt",
-    "library.json",
-    "idf_component.yml",
-    "zephyr/module.yml",
-    "zephyr/Kconfig",
-    "CMakeLists.txt",
-    "README.md",
-    "LICENSE",
-)
+        return {
+            "name": library.name,
+            "part": self.named if self.digital else None,
+            "part_analog": len(self.analog),
+            "part_pins": len(self.digital) + len(self.analog),
+            "switches": list(zip(plain, pins + [-1] * len(names), names, strict=False)),
+            "registers": -(-len(names) // _ON_REGISTER),
+            "sensors": list(zip(analog, said, strict=False)),
+            "multiplexers": -(-len(said) // _ON_MULTIPLEXER),
+            "sorts": "taxels" if not sensors.joints and sensors.taxels else "joints",
+            "on_pins": sensors.on_pins,
+            "needed": needed(len(names)),
+            "needed_multiplexed": needed(len(names) + _ADDRESS_PINS),
+            "needed_at_least": needed(_REGISTER_PINS + _ADDRESS_PINS),
+            "register_pins": pins[:_REGISTER_PINS],
+            "address_pins": pins[len(names) :][:_ADDRESS_PINS],
+            "address_pins_behind_registers": pins[_REGISTER_PINS:][:_ADDRESS_PINS],
+            "output_pins": analog[: -(-len(said) // _ON_MULTIPLEXER)],
+        }
 
-
-def _keywords(name: str, segments: bool, codes: bool) -> list[tuple[str, str]]:
-    """Return each word of the library with its keyword class in the Arduino editor."""
-    own = f"thenar_{name}"
-    types = ["thenar", *[f"{own}_codes"] * codes, *["thenar_segmenter"] * segments]
-    functions = [f"thenar_{word}" for word in _FUNCTIONS]
-    functions += [f"thenar_segment_{word}" for word in ("start", "push")] * segments
-    functions += [f"{own}_{word}" for word in _OF_CODES] * codes
-    constants = [f"{own}_model", *(f"{own}_{word}".upper() for word in _CONSTANTS)]
-    kinds = {"KEYWORD1": types, "KEYWORD2": functions, "LITERAL1": constants}
-    return [(word, kind) for kind, words in kinds.items() for word in words]
+    def _digital_pins(self) -> Iterator[int]:
+        """Yield the digital pins in the order of their use; on a known part, the analog ones from the last on, too."""
+        if self.digital:
+            yield from (*self.digital, *reversed(self.analog))
+        else:
+            yield from (number for number in count(_FIRST) if number != _LED)
 
 
 M0PLUS, M4 = (target.formula for target in _CORTEX_M)

@@ -1,8 +1,7 @@
 """A 32-bit RISC-V core with multiplication and compressed instructions: RV32IMAC, as in a GD32VF103 or an FE310."""
 
-from ..costs import Formula
 from ..tools import RISCV_COMPILER
-from .base import Target
+from .base import Formula, Target
 
 # Flash, RAM and clock are those of the GD32VF103CB (Longan Nano).
 MEMBER = Target(

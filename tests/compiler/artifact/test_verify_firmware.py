@@ -12,10 +12,9 @@ from thenar.compiler.artifact import verify_firmware as verify_firmware_module
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.artifact.verify_firmware import FirmwareTrial, verify_firmware
 from thenar.compiler.firmware import FirmwareError, classifier
-from thenar.compiler.firmware.choose import fit_for
-from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.classifier import Library, segment_files
+from thenar.compiler.firmware.costs import fit_for
 from thenar.compiler.firmware.probes import Probes, extreme_frames, random_frames
-from thenar.compiler.firmware.segments import segment_files
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.words import string
 from thenar.runtime.build import Build

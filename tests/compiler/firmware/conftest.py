@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware import simavr
 from thenar.compiler.firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, random_frames
+from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
@@ -120,5 +120,5 @@ def same_as_python() -> Callable[..., None]:
 def avr(tool: Callable[[str], str]) -> None:
     """Need an AVR's compiler and simulator."""
     tool("avr-gcc")
-    if simavr.missing() is not None:
+    if TARGETS["avr328p"].missing() is not None:
         tool("libsimavr-dev")

@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.choose import features, fit_for, largest_classifier, smallest_fit
+from thenar.compiler.firmware.costs import estimate, features, fit_for, smallest_fit
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.model.integers import IntegerTables
@@ -43,19 +43,16 @@ def test_a_fit_is_said_in_a_sentence(tables: IntegerTables) -> None:
 
 def test_what_takes_too_much_flash_or_ram_is_refused_with_a_remedy(wide_tables: IntegerTables) -> None:
     assert SMALL.formula is not None
-    cost = SMALL.formula.cost(Layout(wide_tables, 1), avr=True)
+    cost = estimate(SMALL.formula, Layout(wide_tables, 1), avr=True)
     assert fit_for(SMALL, wide_tables, cost.flash).cost == cost
     told = (
         f"about {cost.flash} bytes of flash and {cost.ram} of RAM on an atmega328p, but {cost.flash - 1} and 2048 are"
     )
     with pytest.raises(FirmwareError, match=f"{told} allowed: compile with a higher ``prune``, .*or use a larger part"):
         fit_for(SMALL, wide_tables, cost.flash - 1)
+    # Three quarters of the flash are allowed.
     with pytest.raises(FirmwareError, match="but 24576 and 100 are allowed"):
         fit_for(replace(SMALL, ram=100), wide_tables)
-
-
-def test_a_classifier_may_take_three_quarters_of_the_flash() -> None:
-    assert [largest_classifier(TARGETS[name]) for name in ("avr328p", "avr2560")] == [24 << 10, 48 << 10]
 
 
 def test_no_more_flash_is_allowed_than_the_part_has(tables: IntegerTables) -> None:

@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.firmware.generate import Firmware
+from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.costs import fit_for
 from thenar.compiler.firmware.sensors import sensors_of
+from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Threshold
@@ -70,7 +72,8 @@ def files_of(case: str, make_tables: MakeTables, describe: Describe) -> dict[str
         raw = tuple(replace(joint, unit="raw", code_a=1, code_b=255) for joint in manifest.joints)
         manifest = replace(manifest, joints=raw)
         build, sensors = Build(manifest, tables), sensors_of(manifest, parse_harness(STREAM, "glove.toml"))
-    return Firmware(build.tables, build.manifest, platform, sensors=sensors).files()
+    fit = fit_for(TARGETS[platform], build.tables)
+    return TARGETS[platform].files(Library("glove", build.manifest, fit.layout, fit.notes(), sensors))
 
 
 def looked_at(program: str, files: Mapping[str, str], folder: Path, options: tuple[str, ...]) -> set[Finding]:

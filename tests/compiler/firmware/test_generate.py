@@ -6,8 +6,10 @@ from pathlib import Path
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.classifier import CORE_FILES
-from thenar.compiler.firmware.generate import Firmware, write_folder
+from thenar.compiler.firmware.classifier import CORE_FILES, Library
+from thenar.compiler.firmware.costs import fit_for
+from thenar.compiler.firmware.generate import firmware_files, write_folder
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
@@ -27,8 +29,7 @@ def build(make_tables: MakeTables, describe: Describe) -> Build:
 
 
 def classifier(build: Build, platform: str) -> dict[str, str]:
-    request = Firmware(build.tables, build.manifest, platform)
-    return request.files()
+    return firmware_files(build.tables, build.manifest, platform)
 
 
 def make(folder: Path, *arguments: str) -> str:
@@ -55,13 +56,12 @@ def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
 
 @pytest.mark.parametrize("platform", TARGETS)
 def test_files_are_called_by_the_name_and_no_name_is_rewritten(build: Build, platform: str) -> None:
-    request = Firmware(build.tables, build.manifest, platform, name="anne_2")
-    files = request.files()
+    files = firmware_files(build.tables, build.manifest, platform, name="anne_2")
     assert any("thenar_anne_2" in path or "thenar_anne_2" in text for path, text in files.items())
     own = {path: text for path, text in files.items() if path.removeprefix("src/") not in CORE_FILES}
     assert not any("thenar_glove" in path or "thenar_glove" in text for path, text in own.items())
     with pytest.raises(FirmwareError, match="'Anne' cannot be the name"):
-        Firmware(build.tables, build.manifest, platform, name="Anne")
+        firmware_files(build.tables, build.manifest, platform, name="Anne")
 
 
 @pytest.mark.parametrize(("switches", "joints", "words"), [(9, 0, "9 switches"), (0, 3, "3 joints")])
@@ -75,7 +75,7 @@ def test_nobody_reads_of_inputs_that_there_are_none_of(
 
 
 def test_on_this_machine_the_layout_is_told_without_a_microcontrollers_cycles(build: Build) -> None:
-    fit = Firmware(build.tables, build.manifest, "host").fit
+    fit = fit_for(TARGETS["host"], build.tables)
     assert fit.target.part == "host"
     assert fit.words.startswith("for this machine: ")
     assert not re.search("atmega|cycles|instructions", fit.words)
@@ -84,36 +84,35 @@ def test_on_this_machine_the_layout_is_told_without_a_microcontrollers_cycles(bu
 @pytest.mark.parametrize("platform", [name for name, target in TARGETS.items() if target.formula])
 def test_more_flash_than_the_part_has_is_refused(build: Build, platform: str) -> None:
     part = TARGETS[platform]
-    assert Firmware(build.tables, build.manifest, platform, flash=part.flash).fit.target is part
+    assert fit_for(TARGETS[platform], build.tables, part.flash).target is part
     with pytest.raises(FirmwareError, match=f"{part.part} has {part.flash} bytes$"):
-        Firmware(build.tables, build.manifest, platform, flash=part.flash + 1).files()
+        firmware_files(build.tables, build.manifest, platform, flash=part.flash + 1)
 
 
 def test_a_part_is_never_chosen_beyond_its_flash(build: Build) -> None:
-    fit = Firmware(build.tables, build.manifest, "arduino", flash=1 << 20).fit
+    fit = fit_for(TARGETS["arduino"], build.tables, 1 << 20)
     assert fit.target.part == "atmega328p"
 
 
 def test_notes_stand_in_the_opening_of_the_header(build: Build) -> None:
-    request = Firmware(build.tables, build.manifest, "avr328p")
-    files = request.files(("measured on a rainy day",))
-    assert "measured on a rainy day" in files["thenar_glove.h"].split("*/")[0]
+    library = Library("glove", build.manifest, Layout(build.tables), ("measured on a rainy day",))
+    assert "measured on a rainy day" in TARGETS["avr328p"].files(library)["thenar_glove.h"].split("*/")[0]
 
 
 @pytest.mark.parametrize("platform", ["avr328p", "cortex-m4", "arduino"])
 def test_too_little_flash_is_refused(build: Build, platform: str) -> None:
     with pytest.raises(FirmwareError, match=r"takes about \d+ bytes of flash"):
-        Firmware(build.tables, build.manifest, platform, flash=500).files()
+        firmware_files(build.tables, build.manifest, platform, flash=500)
 
 
 @pytest.mark.slow
 def test_a_build_too_large_for_an_uno_gets_a_larger_part(make_tables: MakeTables, describe: Describe) -> None:
     tables = make_tables(classes=40, switches=40, joints=12, bins=30)
     build = Build(describe(tables), tables)
-    assert Firmware(build.tables, build.manifest, "arduino").fit.target.part == "atmega2560"
+    assert fit_for(TARGETS["arduino"], build.tables).target.part == "atmega2560"
     for classes, bins, part in ((60, 60, "cortex-m4"), (90, 60, "host")):
         huge = make_tables(classes=classes, switches=60, joints=20, bins=bins)
-        assert Firmware(huge, describe(huge), "arduino").fit.target.part == part
+        assert fit_for(TARGETS["arduino"], huge).target.part == part
     huge = make_tables(classes=200, switches=60, joints=20, bins=60)
     with pytest.raises(FirmwareError, match="firmware has at most 65535"):
-        _ = Firmware(huge, describe(huge), "arduino").fit
+        _ = fit_for(TARGETS["arduino"], huge)

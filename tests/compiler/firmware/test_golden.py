@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.firmware.classifier import CORE_FILES
-from thenar.compiler.firmware.generate import Firmware
+from thenar.compiler.firmware.generate import firmware_files
 from thenar.compiler.firmware.rows import rows_files
 from thenar.firmware_templates.rendering import file_text
 from thenar.runtime.build import Build
@@ -87,7 +87,7 @@ def made(case: str) -> dict[str, str]:
     build = small_build()
     if case == "rows":
         return rows_files("board", build.manifest, parse_harness(GLOVE, "glove.toml"))
-    files = Firmware(build.tables, build.manifest, case).files()
+    files = firmware_files(build.tables, build.manifest, case)
     core = {path: text for path, text in files.items() if Path(path).name in CORE_FILES}
     assert {Path(path).name: text for path, text in core.items()} == {
         name: file_text(f"core/{name}") for name in CORE_FILES

@@ -3,8 +3,9 @@ from collections.abc import Callable
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.generate import Firmware
-from thenar.compiler.firmware.measuring import Measured, measure
+from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.costs import Measured, fit_for, measure
+from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.model.integers import IntegerTables
@@ -24,8 +25,8 @@ def build(make_tables: MakeTables, describe: Describe) -> Build:
 
 
 def measured(build: Build, platform: str) -> Measured:
-    firmware = Firmware(build.tables, build.manifest, platform)
-    return measure(firmware.library(), firmware.fit)
+    fit = fit_for(TARGETS[platform], build.tables)
+    return measure(Library("glove", build.manifest, fit.layout), fit)
 
 
 @pytest.mark.parametrize("platform", ["avr328p", "avr2560"])
@@ -41,9 +42,8 @@ def test_all_that_is_static_is_counted_and_said(build: Build, platform: str, too
 
 
 def test_on_this_machine_nothing_is_counted(build: Build) -> None:
-    firmware = Firmware(build.tables, build.manifest, "host")
     with pytest.raises(FirmwareError, match="nothing was counted on host"):
-        measure(firmware.library(), firmware.fit)
+        measured(build, "host")
 
 
 def test_without_the_tools_it_says_what_to_install(build: Build, monkeypatch: pytest.MonkeyPatch) -> None:

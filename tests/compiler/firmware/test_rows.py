@@ -16,7 +16,7 @@ import tomli_w
 from msgspec.structs import replace
 
 from thenar.compiler.firmware.rows import rows_files
-from thenar.compiler.firmware.simavr import harness as simavr_program
+from thenar.compiler.firmware.targets.avr import harness as simavr_program
 from thenar.drivers.i2c.chips import CHIPS, Device
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold

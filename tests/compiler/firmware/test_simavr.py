@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware import FirmwareError, simavr
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.firmware_templates.rendering import file_text
@@ -44,7 +44,7 @@ BOTH = pytest.mark.parametrize("target", [SMALL, LARGE], ids=["328P", "2560"])
 @pytest.fixture(autouse=True)
 def installed(tool: Callable[[str], str]) -> None:
     tool("avr-gcc")
-    if (gone := simavr.missing()) is not None:
+    if (gone := SMALL.missing()) is not None:
         assert "libsimavr" in gone, gone
         tool("libsimavr-dev")
 
@@ -97,12 +97,12 @@ def test_what_is_missing_is_named_with_the_packages_that_bring_it(
 ) -> None:
     with monkeypatch.context() as changed:
         changed.setenv("THENAR_SIMAVR", str(tmp_path))
-        assert "has no harness for simavr: set THENAR_SIMAVR" in str(simavr.missing())
+        assert "has no harness for simavr: set THENAR_SIMAVR" in str(SMALL.missing())
         lacks_libsimavr = "all:\n%:\n\t@echo 'fatal error: simavr/sim_avr.h: No such file' >&2; exit 1\n"
         (tmp_path / "Makefile").write_text(lacks_libsimavr)
         (tmp_path / "simavr_classify.c").touch()
-        assert simavr.missing() == "libsimavr not found; Debian: apt-get install libsimavr-dev"
+        assert SMALL.missing() == "libsimavr not found; Debian: apt-get install libsimavr-dev"
     monkeypatch.setenv("PATH", str(tmp_path))
-    gone = simavr.missing()
+    gone = SMALL.missing()
     assert gone is not None
     assert gone.endswith("Debian: apt-get install gcc-avr avr-libc gcc make")

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.firmware import simavr
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.sensors import Sensors, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.firmware.targets.avr import harness
 from thenar.compiler.firmware.tools import STRICT, call, find, workshop
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.harness.loading import parse_harness
@@ -119,7 +119,7 @@ def test_codes_are_python_s_on_an_avr(library: Callable[[bool], Library], tool: 
     assert target.compiler is not None
     asked = [(reading, number) for number in range(len(made.sensors.every)) for reading in readings]
     sent = np.array(asked, [("reading", "<i4"), ("sensor", "<u2")]).tobytes()
-    program = simavr.harness("simavr_classify")
+    program = harness("simavr_classify")
     with workshop({**made.whole, "main.c": AVR}) as folder:
         sources = sorted(path for path in (*made.whole, "main.c") if path.endswith((".c", ".S")))
         call([find(target.compiler), *STRICT, *target.flags, *sources, "-o", "codes.elf"], folder)

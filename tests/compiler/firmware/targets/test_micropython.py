@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.classifier import LAG_US, Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import Predictions, Probes, lost_inputs
-from thenar.compiler.firmware.segments import LAG_US
 from thenar.compiler.firmware.sensors import Sensor, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
@@ -147,7 +146,7 @@ def test_margin_probability_and_refusal_are_python_s(
     assert of_none == f"{k} none"
 
 
-# At every tick the state, the newest state, whether they are of one segment; each third of the stream begins afresh.
+# The state at every tick; each third of the stream begins afresh.
 FOLLOWING = """
 import thenar_hand as library
 glove, segmenter = library.Glove(), library.Segmenter()
@@ -157,14 +156,11 @@ for tick in range({ticks}):
         segmenter.start()
     for number in range({switches}):
         glove.set_switch(number, number % 5 == tick // {still} % 5)
-    state = segmenter.push(glove, glove.classify())
-    print(state, segmenter.newest(), segmenter.same() + 0)
+    print(segmenter.push(glove, glove.classify()))
 """
 
 
-def test_a_segmenter_gives_its_newest_state_and_same_segment_flag(
-    make_tables: MakeTables, describe: Describe, tmp_path: Path
-) -> None:
+def test_a_segmenter_begins_afresh(make_tables: MakeTables, describe: Describe, tmp_path: Path) -> None:
     tables = make_tables(**SHAPES["small"])
     model = structs.replace(SegmentModel.usual(tables.n_classes, False, tables.scale / 8), enter=(40,) * 7)
     manifest = structs.replace(describe(tables), segments=model)
@@ -179,10 +175,9 @@ def test_a_segmenter_gives_its_newest_state_and_same_segment_flag(
             decoder = Decoder(model, LAG_US // model.tick_us)
         bits = np.arange(tables.n_switches) % 5 == tick // still % 5
         found = decoder.push(build.scores(bits, np.zeros(tables.n_joints, np.uint16)).tolist())
-        known = found.tick >= 0 and found.start == found.newest_start
-        expected.append(f"{found.state} {found.newest} {int(known)}")
+        expected.append(str(found.state))
     assert lines == expected
-    assert len(set(expected)) > 5
+    assert len(set(expected)) > 3
 
 
 CONVERTING = """

@@ -166,15 +166,6 @@ def test_the_properties_are_those_that_the_specification_asks_for(make_tables: M
     assert fields["sentence"] == "Recognises 5 grasp types from 9 switches and 3 joints of a glove."
 
 
-def test_keywords_are_words_of_the_header_a_tab_and_a_kind(make_tables: MakeTables, library: Library) -> None:
-    made = library(Layout(make_tables()))
-    header = "".join((made / "src" / f"thenar{part}.h").read_text() for part in ("", "_hand", "_hand_codes"))
-    rows = [line.split("\t") for line in (made / "keywords.txt").read_text().splitlines()]
-    assert {kind for _, kind in rows} == {"KEYWORD1", "KEYWORD2", "LITERAL1"}
-    assert all(re.search(rf"\b{word}\b", header) for word, _ in rows)
-    assert ["thenar_classify", "KEYWORD2"] in rows
-
-
 def test_names_that_are_no_words_of_c_do_no_harm(
     make_tables: MakeTables, describe: Describe, library: Library, sketch: Sketch, tmp_path: Path
 ) -> None:

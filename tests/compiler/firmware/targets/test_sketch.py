@@ -4,7 +4,6 @@ import dataclasses
 import re
 import subprocess
 from collections.abc import Callable
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,6 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.example import BOARDS, ArduinoBoard, Wiring, example_values
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.sensors import Sensors, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
@@ -25,6 +23,9 @@ from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
 from thenar.runtime.model.integers import IntegerTables
 
 VARIANTS = Path("/usr/share/arduino/hardware/arduino/avr/variants")
+# The macros of Arduino's boards.
+MACROS = ("NUM_DIGITAL_PINS", "PIN_A0", "NUM_ANALOG_INPUTS")
+BOARDS = {"Uno": (20, 14, 6), "Nano": (20, 14, 8), "Mega": (70, 54, 16)}
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
@@ -172,9 +173,9 @@ def test_every_frame_is_answered_as_by_python(
     library = Library("hand", manifest, layout, glove=sensors if known and joints + taxels else None)
     package = TARGETS[target]
     assert isinstance(package, Package)
-    wiring = Wiring.of(library, package.example_pins)
-    assert str(wiring.on(BOARDS[board]) if board else wiring.of_part) == parts
-    values: dict[str, Any] = example_values(library, wiring)
+    values = package.example_values(library)
+    needed = {"74HC165": values["registers"], "CD74HC4067": values["multiplexers"]}
+    assert all(f"{count} {part}" in parts for part, count in needed.items() if part in parts)
     for path, text in package.files(library).items():
         (tmp_path / Path(path).name).write_text(text)
     if not known:
@@ -185,7 +186,7 @@ def test_every_frame_is_answered_as_by_python(
         (tmp_path / "Recognise.ino").write_text(before + table + after)
     behind = "address_pins_behind_registers" if "165" in parts else "address_pins"
     given = {
-        **(macros(BOARDS[board]) if board else {}),
+        **(macros(board) if board else {}),
         "SWITCHES_THERE": switches,
         "SENSORS_THERE": joints + taxels,
         "REGISTERS": listed(values["register_pins"]),
@@ -219,9 +220,9 @@ def listed(pins: Any) -> str:
     return ",".join(map(str, pins))
 
 
-def macros(board: ArduinoBoard) -> dict[str, int]:
+def macros(board: str) -> dict[str, int]:
     """Return the macros of a board of Arduino's."""
-    return {"NUM_DIGITAL_PINS": board.digital, "PIN_A0": board.first_analog, "NUM_ANALOG_INPUTS": board.analog}
+    return dict(zip(MACROS, BOARDS[board], strict=True))
 
 
 @pytest.mark.parametrize("board", BOARDS)
@@ -232,63 +233,28 @@ def test_macros_are_those_of_arduinos_core(tool: Callable[[str], str], board: st
     part = "atmega2560" if board == "Mega" else "atmega328p"
     command = [tool("avr-gcc"), f"-mmcu={part}", "-E", "-dM", str(VARIANTS / variant / "pins_arduino.h")]
     defined = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    found = {name: re.search(rf"#define {name} +\(?(\d+)\)?$", defined, re.MULTILINE) for name in macros(BOARDS[board])}
-    assert {name: int(match[1]) for name, match in found.items() if match is not None} == macros(BOARDS[board])
+    found = {name: re.search(rf"#define {name} +\(?(\d+)\)?$", defined, re.MULTILINE) for name in MACROS}
+    assert {name: int(match[1]) for name, match in found.items() if match is not None} == macros(board)
 
 
-def test_what_is_printed_is_what_the_sketch_chooses_on_each_board(
-    tool: Callable[[str], str], make_tables: MakeTables, describe: Describe
+@pytest.mark.parametrize(
+    ("target", "board", "switches", "joints", "lacks"),
+    [
+        ("arduino", "Uno", 2, 97, "too few analog inputs, even for one to each multiplexer"),
+        ("arduino", "Nano", 2, 97, ""),
+        ("esp32c3", "", 9, 16, ""),
+        ("esp32c3", "", 9, 17, "too few pins, even with multiplexers"),
+    ],
+)
+def test_the_example_for_a_board_with_too_few_pins_does_not_compile(
+    tool: Callable[[str], str], make_tables: MakeTables, target: str, board: str, switches: int, joints: int, lacks: str
 ) -> None:
-    """From no switch to more than a Mega has pins for, without sensors and with few and many, in one preprocessing."""
-    text, expected = "", []
-    for joints, switches in product((0, 1, 6, 7, 16, 17), range(1, 71)):
-        build = build_of(make_tables, describe, switches, joints, 0)
-        library = Library("hand", build.manifest, Layout(build.tables))
-        wiring, sketch = Wiring.of(library), TARGETS["arduino"].files(library)["examples/Recognise/Recognise.ino"]
-        for board in BOARDS.values():
-            parts = wiring.on(board)
-            assert parts is not None
-            expected.append(f"{int(parts.registers > 0)} {int(parts.multiplexers > 0)}")
-            text += chosen(sketch, macros(board))
-    command = [tool("gcc"), "-E", "-P", "-x", "c", "-"]
-    done = subprocess.run(command, input=text, capture_output=True, text=True, check=False)
-    assert done.stderr == ""
-    assert [line for line in done.stdout.splitlines() if line.strip()] == expected
-    assert len(set(expected)) == 4
-
-
-def chosen(sketch: str, given: dict[str, int]) -> str:
-    """Return what preprocesses to two digits: whether a sketch has registers and multiplexers with these macros."""
-    lines = [line for line in sketch.splitlines() if line.startswith("#") and "include" not in line]
-    used = {match[1] for line in lines if (match := re.match(r"#define (\w+)", line))}
-    before = [f"#define {name} {value}" for name, value in {**given, "SHOW_READINGS": 1}.items()]
-    for name in ("SHIFT_REGISTERS", "MULTIPLEXERS"):
-        lines += [f"#ifdef {name}", f"#define {name}_THERE 1", "#else", f"#define {name}_THERE 0", "#endif"]
-        used.add(f"{name}_THERE")
-    after = [f"#undef {name}" for name in sorted({*used, *given, "SHOW_READINGS", "SHIFT_REGISTERS", "MULTIPLEXERS"})]
-    return "\n".join([*before, *lines, "SHIFT_REGISTERS_THERE MULTIPLEXERS_THERE", *after, ""])
-
-
-def test_a_library_says_which_boards_the_example_fits(make_tables: MakeTables) -> None:
-    def said(switches: int, joints: int, target: str = "arduino") -> str:
-        tables = make_tables(switches=switches, joints=joints, bins=3)
-        return TARGETS[target].said(Library("hand", numbered(tables), Layout(tables)))
-
-    assert said(9, 3) == "the example Recognise fits Arduino Uno and Nano and Mega as it is"
-    assert said(16, 0) == "the example Recognise fits Arduino Uno and Nano and Mega as it is"
-    assert said(20, 7) == (
-        "the example Recognise fits Arduino Uno with 3 74HC165 and 1 CD74HC4067; Nano with 3 74HC165; Mega as it is"
-    )
-    assert said(2, 97) == (
-        "the example Recognise fits Arduino Uno in no way, for want of pins; Nano and Mega with 7 CD74HC4067"
-    )
-    assert said(8, 0, "esp32c3") == "the example Recognise fits an esp32c3 as it is"
-    assert said(9, 12, "esp32c3") == "the example Recognise fits an esp32c3 with 2 74HC165 and 1 CD74HC4067"
-    assert said(9, 17, "esp32c3") == "the example Recognise fits an esp32c3 in no way, for want of pins"
-
-
-def test_the_example_for_a_part_with_too_few_pins_does_not_compile(make_tables: MakeTables) -> None:
-    tables = make_tables(switches=9, joints=17, bins=3)
+    tables = make_tables(switches=switches, joints=joints, bins=3)
     library = Library("hand", numbered(tables), Layout(tables))
-    sketch = TARGETS["esp32c3"].files(library)["examples/Recognise/Recognise.ino"]
-    assert '\n#error "an esp32c3 has too few pins, even with multiplexers: read the inputs in another way"\n' in sketch
+    sketch = TARGETS[target].files(library)["examples/Recognise/Recognise.ino"]
+    lines = [line for line in sketch.splitlines() if "#include" not in line]
+    given = [f"-D{name}={value}" for name, value in ({"CALIBRATED": 1} | (macros(board) if board else {})).items()]
+    command = [tool("gcc"), "-E", "-P", "-x", "c", *given, "-"]
+    done = subprocess.run(command, input="\n".join(lines), capture_output=True, text=True, check=False)
+    assert (done.returncode != 0) == bool(lacks)
+    assert lacks in done.stderr

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import pytest
 
-from thenar.compiler.firmware.simavr import missing
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.frontier.price import ClassifyModel, count_steps, fitting, random_tables
 from thenar.runtime.model.integers import tables_to_bytes
@@ -17,7 +16,7 @@ TABLES = [random_tables(33, 16, 14), random_tables(20, 0, 14), random_tables(8, 
 def simavr(tool: Callable[[str], str]) -> None:
     for name in ("avr-gcc", "make"):
         tool(name)
-    if missing() is not None:
+    if TARGETS["avr328p"].missing() is not None:
         tool("libsimavr-dev")
 
 

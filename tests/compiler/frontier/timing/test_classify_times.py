@@ -1,6 +1,6 @@
 import pytest
 
-from thenar.compiler.firmware.choose import fit_for
+from thenar.compiler.firmware.costs import fit_for
 from thenar.compiler.firmware.targets import TARGETS, timed
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.price import ClassifyModel, classify_us, fit_here, random_tables
