@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from .frontier.find import find_frontier
     from .frontier.points import Frontier
     from .frontier.search import Search
-    from .placement.id3 import grow_id3
     from .placement.methods.base import METHODS
     from .placement.placement import Placement, place
     from .placement.selectors import SwitchSelector
+    from .placement.tree import grow_id3
     from .recordings.columns import ColumnRoles
     from .recordings.export import from_dataframe, to_dataframe
     from .recordings.graspset import GraspSet, Joint
@@ -70,7 +70,7 @@ _HOMES = {
     ".frontier.find": ("find_frontier",),
     ".frontier.points": ("Frontier",),
     ".frontier.search": ("Search",),
-    ".placement.id3": ("grow_id3",),
+    ".placement.tree": ("grow_id3",),
     ".placement.methods.base": ("METHODS",),
     ".placement.placement": ("Placement", "place"),
     ".placement.selectors": ("SwitchSelector",),

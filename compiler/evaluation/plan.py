@@ -12,9 +12,9 @@ from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import AUTO, Recipe, changed
 
 from ..placement.elements import Elements, bits_of, elements_of
-from ..placement.joints import joint_order
 from ..placement.methods.base import METHODS, PAPERS
-from ..placement.methods.filters import random_placement
+from ..placement.methods.baselines import random_placement
+from ..placement.methods.elimination import joint_order
 from ..placement.placement import Placer
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples

@@ -16,8 +16,8 @@ from ..evaluation.choosing import choose_training
 from ..evaluation.folds import EvaluationError, Fold, Rows, leave_groups_out, trial_folds
 from ..evaluation.rates import Rate
 from ..placement.elements import Elements, bits_of, elements_of, names_of, ports_of
-from ..placement.joints import joint_order
 from ..placement.methods.base import METHODS
+from ..placement.methods.elimination import joint_order
 from ..placement.placement import InputSelection
 from ..placement.ports import PortCosts
 from ..recogniser import Recogniser, predicted_classes

@@ -13,22 +13,19 @@ from msgspec.structs import replace
 
 from thenar.runtime.recipe import Recipe, changed
 
-from ..elementary import LN_2
 from ..limits import check_types
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..sensors import SensorCount
+from . import PlacementError
 from .constraints import Bound, Limits
-from .cooccurrence import Cooccurrence
 from .elements import Elements, bits_of, elements_of, names_of, ports_of
-from .gain import entropy_bits
-from .id3 import grow_id3
-from .inputs import PlacementError
-from .joints import kept_joints
+from .gain import CellCounter, NodeCounts, entropy_bits, gain_bits
 from .methods.base import METHODS, PAPERS, Method
+from .methods.elimination import joint_order
 from .ports import PortCosts
 from .robust import most_robust
-from .tree import Tree
+from .tree import Tree, grow_id3
 
 Progress = Callable[[int, int], None]
 
@@ -162,9 +159,26 @@ def _picked(
 
 def information_alone(samples: Samples, columns: Columns) -> tuple[float, ...]:
     """Return the information (bits) about the grasp type in each of the switches `columns` alone."""
-    counts = Cooccurrence(samples.switches, samples.labels, samples.n_classes)
-    alone = counts.information() / (len(samples.labels) * LN_2)
-    return tuple(float(alone[column]) for column in columns)
+    counter = CellCounter(samples.switches, samples.labels, samples.n_classes)
+    totals = np.bincount(samples.labels, minlength=samples.n_classes)
+    node = NodeCounts(totals, counter.count(np.arange(len(samples.labels))), counter.starts)
+    return tuple(gain_bits(node.table(column)) for column in columns)
+
+
+def kept_joints(samples: Samples, most: int | None, limits: Limits | None = None) -> Columns:
+    """Return at most `most` joints to keep, ascending, given the switches of these rows; None: all that `limits` allow.
+
+    Raises PlacementError if the limits require more joints.
+    """
+    every: Columns = tuple(range(samples.codes.shape[1]))
+    if not every:
+        return ()
+    keep, never, most = ((), (), most or len(every)) if limits is None else limits.on_joints(most)
+    every = tuple(joint for joint in every if joint not in never)
+    if most >= len(every) or not most:
+        return every[:most]
+    order = dict.fromkeys((*keep, *joint_order(samples)))
+    return tuple(sorted([joint for joint in order if joint not in never][:most]))
 
 
 class Kept(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.placement.id3 import grow_id3
-from thenar.compiler.placement.tree import Tree
+from thenar.compiler.placement.tree import Tree, grow_id3
 
 from ..finding import Case, Finding, Worst
 from ..inputs.small_sets import parity

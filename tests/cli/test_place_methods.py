@@ -6,7 +6,7 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
-from thenar.compiler.placement.kept import kept_names
+from thenar.compiler.placement.drawing import kept_names
 from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness

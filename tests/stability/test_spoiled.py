@@ -22,8 +22,8 @@ from thenar.compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.model import collapse
 from thenar.compiler.placement import gain
-from thenar.compiler.placement.cooccurrence import Cooccurrence
-from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.gain import Cooccurrence
+from thenar.compiler.placement.tree import grow_id3
 from thenar.runtime.build import Build, Recognition
 from thenar.runtime.model import quantise
 from thenar.runtime.model.integers import IntegerTables

@@ -14,9 +14,9 @@ from thenar.compiler.frontier.search import SHAPES, Search
 from thenar.compiler.frontier.survey import Cuts, FoldHits, choose_path, fit_stages
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.elements import Element
-from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.placement.ports import PortCosts
+from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.runtime.model.quantise import quantise

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.hand import HandShape
-from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.report.content import ReportContent
 from thenar.compiler.report.frontier import frontier_view
 from thenar.compiler.report.hand import hand_picture
