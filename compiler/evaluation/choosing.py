@@ -19,9 +19,9 @@ from thenar.runtime.manifest import Compared, Fitting, Of
 from thenar.runtime.model.tables import ScoreTables
 
 from ..elementary import softmax_and_loss
-from ..model.collapse import Model, collapse
+from ..model.collapse import collapse
 from ..samples import Samples, decided
-from ..trainers.base import TRAINERS, Training
+from ..trainers.base import TRAINERS, Model, Training
 from ..workers import in_workers
 from .folds import Fold, leave_groups_out, trial_folds
 

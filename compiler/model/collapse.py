@@ -18,17 +18,12 @@ from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.base import HIGHEST_CODE, CoreTerm
 from thenar.runtime.model.terms.bins import Bins
 
-from ..boosting.stumps import Stumps, spread
-from ..elementary import add_exactly
+from ..elementary import Floats, add_exactly
+from ..trainers.base import Model
+from ..trainers.stumps import Stumps, spread
 
 # Rows of stump outputs that are expanded at a time: 2 MB with 1000 classes.
 _WRITTEN_OUT = 256
-
-Floats = NDArray[np.float64]
-
-
-# The models that trainers return: score tables, or an ensemble that collapses to them.
-Model = Stumps | ScoreTables
 
 
 def collapse(model: Model, n_switches: int) -> ScoreTables:

@@ -13,7 +13,9 @@ from thenar.runtime.model.quantise import as_deployed, rounding_error
 from thenar.runtime.model.tables import TIE, ScoreTables, winners
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 
-from .collapse import Floats, Model, collapse
+from ..elementary import Floats
+from ..trainers.base import Model
+from .collapse import collapse
 
 COLLAPSE_TOLERANCE = 1e-12  # of the sum of the magnitudes that are added up
 

@@ -25,10 +25,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary import LN_2, log
+from ..elementary import LN_2, Floats, log
 
 Counts = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 UNIT: float = 2.0**-53
 _FIRST_DIGITS = 40

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from thenar.runtime.recipe import Recipe, changed
 
+from ..elementary import LN_2
 from ..limits import check_types
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
@@ -20,7 +21,7 @@ from ..sensors import SensorCount
 from . import PlacementError
 from .constraints import Bound, Limits
 from .elements import Elements, bits_of, elements_of, names_of, ports_of
-from .gain import CellCounter, NodeCounts, entropy_bits, gain_bits
+from .gain import Cooccurrence, entropy_bits
 from .methods.base import METHODS, PAPERS, Method
 from .methods.elimination import joint_order
 from .ports import PortCosts
@@ -159,10 +160,9 @@ def _picked(
 
 def information_alone(samples: Samples, columns: Columns) -> tuple[float, ...]:
     """Return the information (bits) about the grasp type in each of the switches `columns` alone."""
-    counter = CellCounter(samples.switches, samples.labels, samples.n_classes)
-    totals = np.bincount(samples.labels, minlength=samples.n_classes)
-    node = NodeCounts(totals, counter.count(np.arange(len(samples.labels))), counter.starts)
-    return tuple(gain_bits(node.table(column)) for column in columns)
+    counts = Cooccurrence(samples.switches, samples.labels, samples.n_classes)
+    alone = counts.information() / (len(samples.labels) * LN_2)
+    return tuple(float(alone[column]) for column in columns)
 
 
 def kept_joints(samples: Samples, most: int | None, limits: Limits | None = None) -> Columns:

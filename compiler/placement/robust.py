@@ -13,9 +13,9 @@ import numpy as np
 
 from thenar.runtime.model.quantise import quantise
 
-from ..additive.logit import fit_logit
 from ..model.faults import count_faults
 from ..samples import Columns, Samples
+from ..trainers.logit import fit_logit
 
 # Shares of the switches that are lost in each training row; the accuracy that a placement may cost without a fault.
 SHARES = (0.05, 0.1, 0.2)

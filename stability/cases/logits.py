@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, BINS, TOLERANCE, ColumnTables, fit_logit
-from thenar.compiler.additive.pairs import fit_pairs
+from thenar.compiler.trainers.logit import BINS, ColumnTables, fit_logit
+from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE, TOLERANCE
+from thenar.compiler.trainers.pairs import fit_pairs
 from thenar.runtime.model.integers import LIMIT
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import ScoreTables

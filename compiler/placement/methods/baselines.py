@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...elementary import add_up, log
+from ...elementary import Floats, add_up, log
 from ...samples import Columns
 from .. import PlacementError
-from ..gain import Cooccurrence, Floats, n_log_n
+from ..gain import Cooccurrence, n_log_n
 from .base import Bits, Labels, Method, ranked
 
 _SEED = 0

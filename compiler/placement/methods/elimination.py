@@ -22,12 +22,10 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...boosting.boost import boost
-from ...boosting.exactsums import SUM_BITS, dot, exact_sum
-from ...elementary import LN_2, add_up, exp, log, softmax, softmax_and_loss
+from ...elementary import LN_2, SUM_BITS, Floats, add_up, dot, exact_sum, exp, log, softmax, softmax_and_loss
 from ...model.collapse import collapse
 from ...samples import Columns, Samples
-from ..gain import Floats
+from ...trainers.logitboost import boost
 from ..ports import PortCosts
 from .base import BEST, FINE, Method, first_of
 

@@ -11,9 +11,10 @@ from scipy.optimize import minimize
 from scipy.special import logsumexp
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, PENALTY, SMOOTHNESS, ColumnTables, fit_logit
-from thenar.compiler.boosting.boost import BoostingError
 from thenar.compiler.elementary import softmax
+from thenar.compiler.trainers.base import BoostingError
+from thenar.compiler.trainers.logit import PENALTY, SMOOTHNESS, ColumnTables, fit_logit
+from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.compiler.boosting import binning
-from thenar.compiler.boosting.binning import Binned, ManyValued, TwoValued, bin_columns, midpoints
+from thenar.compiler.trainers import binning
+from thenar.compiler.trainers.binning import Binned, ManyValued, TwoValued, bin_columns, midpoints
 
 NUMBERS = st.sampled_from([0.0, 1.0, 2.0, 5.0, -3.0, np.nan]) | st.floats(-10, 10)
 MATRICES = arrays(np.float64, st.tuples(st.integers(1, 12), st.integers(1, 5)), elements=NUMBERS)

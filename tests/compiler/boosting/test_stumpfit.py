@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.compiler.boosting import stumpfit
-from thenar.compiler.boosting.binning import bin_columns, midpoints
-from thenar.compiler.boosting.stumpfit import Targets, fit_stumps
+from thenar.compiler.trainers import stumps
+from thenar.compiler.trainers.binning import bin_columns, midpoints
+from thenar.compiler.trainers.stumps import Targets, fit_stumps
 
 NUMBERS = st.sampled_from([0.0, 1.0]) | st.integers(0, 6).map(float) | st.just(np.nan)
 Z_MAX = 3.0
@@ -89,7 +89,7 @@ def _is_looked_at_exactly(X: np.ndarray, weights: np.ndarray, responses: np.ndar
         return
     quick = fit_stumps(binned, targets, Z_MAX)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stumpfit, "_slack", lambda *_: np.full(len(weights), np.inf))
+        patch.setattr(stumps, "_slack", lambda *_: np.full(len(weights), np.inf))
         whole = fit_stumps(binned, targets, Z_MAX)
     assert np.array_equal(quick.columns, whole.columns)
     assert np.array_equal(quick.thresholds, whole.thresholds)

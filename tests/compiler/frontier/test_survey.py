@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler.boosting.boost import boost
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.frontier.cache import question
 from thenar.compiler.frontier.search import SHAPES, Search
@@ -19,6 +18,7 @@ from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
+from thenar.compiler.trainers.logitboost import boost
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners
 from thenar.runtime.scores import Scorer

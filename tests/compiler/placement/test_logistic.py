@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.boosting.exactsums import dot
+from thenar.compiler.elementary import dot
 from thenar.compiler.placement.methods.elimination import RIDGE, Logistic
 
 Bits = npt.NDArray[np.bool_]

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary import Floats
+
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
-
-Floats = NDArray[np.float64]
 
 # Elements of the sums over a batch of cells: 512 KiB of doubles stay in a processor's cache.
 _BATCH_ELEMENTS = 1 << 16
