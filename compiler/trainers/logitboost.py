@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..elementary import Floats, add_exactly, softmax_and_loss
 from ..limits import check_memory
 from .base import BoostingError, Number, Report, Setting, Trainer, check_rows
-from .binning import TwoValued, bin_columns
+from .binning import bin_columns
 from .stumps import Stumps, Targets, centred, fit_stumps
 
 if TYPE_CHECKING:
@@ -59,8 +59,7 @@ def boost(
         # Scale by a power of two, which changes no result: sums of huge weights stay finite, of tiny ones exact.
         weights = np.ldexp(weights, -np.frexp(weights.max())[1])
     binned = bin_columns(X, max_bins)
-    many = sum(len(group.columns) for group in binned.groups if not isinstance(group, TwoValued))
-    check_memory(len(X), n_classes, BoostingError, len(binned.home) - many, many)
+    check_memory(len(X), n_classes, BoostingError, len(binned.two.columns), len(binned.many.columns))
     # glibc returns freed memory above twice the largest array ever freed to the system, and faults it in again.
     np.empty(_LARGE_BYTES, dtype=np.uint8)
     member = labels == np.arange(n_classes)[:, np.newaxis]
@@ -70,7 +69,7 @@ def boost(
     used = np.zeros(X.shape[1], dtype=np.int64) if ties == "least-used" else None
     fitted: list[tuple[NDArray[np.int32], Floats, Floats]] = []
     stopped = False
-    while len(fitted) < rounds and binned.groups and not stopped:
+    while len(fitted) < rounds and binned.columns and not stopped:
         targets = Targets(*weights_and_responses(probability, member, z_max, weights))
         stumps = fit_stumps(binned, targets, z_max, used)
         # Drop the outputs: with a million rows they would take a hundred megabytes a round.

@@ -150,12 +150,8 @@ def columns_of(
 
 def column_edges(X: NDArray[np.generic], max_bins: int | None, weights: Floats | None = None) -> list[Floats]:
     """Return the edges of each column's bins; none for a column without splits."""
-    binned, found = bin_columns(X, max_bins, weights), []
-    for number in range(X.shape[1]):
-        group, position = binned.home.get(number, (None, 0))
-        splits = range(group.n_splits(position)) if group is not None else ()
-        found.append(np.array([group.threshold(position, split) for split in splits if group is not None], np.float64))
-    return found
+    columns = bin_columns(X, max_bins, weights).columns
+    return [columns[number].edges if number in columns else np.zeros(0) for number in range(X.shape[1])]
 
 
 def bins_of(x: Floats, edges: Floats) -> NDArray[np.intp]:
