@@ -234,9 +234,8 @@ class AdditiveLogitClassifier(AdditiveClassifier):
     """Multinomial logistic regression on a table of scores for each input.
 
     Inputs are bits, integer codes or floating-point numbers, X (n, d). An input of two values adds a row of scores at
-    the upper one; any other adds the row of its bin. NaN is a missing value: it has a separate row where the training
-    set has any, and adds the mean otherwise. The objective is convex, so the solution is unique. The trainer `logit`
-    fits the same model, and `compile` makes a build of a fitted classifier.
+    the upper one; any other adds the row of its bin. The objective is convex, so the solution is unique. The trainer
+    `logit` fits the same model, and `compile` makes a build of a fitted classifier.
 
     Parameters
     ----------
@@ -260,8 +259,7 @@ class AdditiveLogitClassifier(AdditiveClassifier):
     classes_ : ndarray, shape (K,)
         The labels, in the order of the columns of scores and probabilities.
     tables_ : ColumnTables
-        The rows of scores: `bias` (K,); for each column its `edges` and `rows`, the last row for a missing value; and
-        the `lines` of some columns.
+        The rows of scores: `bias` (K,); for each column its `edges` and `rows`; and the `lines` of some columns.
 
     Examples
     --------

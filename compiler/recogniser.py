@@ -21,7 +21,7 @@ from .evaluation.choosing import choose_training
 from .evaluation.populations import OF
 from .limits import check_inputs
 from .model.collapse import collapse
-from .model.substitutes import fit_lost
+from .model.faults import fit_lost
 from .placement.constraints import Limits
 from .placement.elements import Elements
 from .placement.placement import InputSelection, select

@@ -15,7 +15,7 @@ from thenar.runtime.model.terms.line import Line
 from ..elementary import Floats, on_one_grid
 from ..limits import check_memory
 from .base import BoostingError, Report, Setting, Trainer, check_rows
-from .newton import TOLERANCE, Column, Fit, Ruler, bins_of, columns_of
+from .newton import TOLERANCE, Column, Fit, Ruler, columns_of
 
 if TYPE_CHECKING:
     from ..samples import Samples
@@ -35,11 +35,11 @@ class Rise(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColumnTables:
-    """F_k(x) = bias_k + sum over columns of rows[column][bin, k], for columns of any numbers, NaN for missing.
+    """F_k(x) = bias_k + sum over columns of rows[column][bin, k], for columns of any numbers.
 
     bias   (K,)
     edges  for each column, ascending (B - 1,): the bin of x is the number of edges below it
-    rows   for each column (B + 1, K), the last one for a missing value
+    rows   for each column (B, K)
     lines  for some columns, an additional contribution in proportion to x
     """
 
@@ -53,10 +53,10 @@ class ColumnTables:
         scores = np.tile(self.bias, (len(X), 1))
         for column, (edges, rows) in enumerate(zip(self.edges, self.rows, strict=True)):
             x = np.asarray(X[:, column], np.float64)
-            scores += rows[bins_of(x, edges)]
+            scores += rows[np.searchsorted(edges, x)]
             if column in self.lines:
                 low, high, row = self.lines[column]
-                scores += (np.clip(np.nan_to_num(x, nan=low), low, high) - low)[:, np.newaxis] * row
+                scores += (np.clip(x, low, high) - low)[:, np.newaxis] * row
         return scores
 
     def columns(self, order: Sequence[int]) -> "ColumnTables":
@@ -97,7 +97,7 @@ def fit_logit(
     counted: int = 0,
     held: NDArray[np.bool_] | None = None,
 ) -> ColumnTables:
-    """Fit X (n, d) numbers (NaN: missing), labels (n,) in 0..n_classes-1, weights (n,) >= 0.
+    """Fit X (n, d) finite numbers, labels (n,) in 0..n_classes-1, weights (n,) >= 0.
 
     `penalty` pulls rows towards zero, `smoothness` pulls those of neighbouring bins towards each other. Columns have at
     most `max_bins` bins (2 or more; None: one for each value) that hold frames as evenly as possible. With `linear` a
@@ -114,6 +114,8 @@ def fit_logit(
     if not FINEST <= tolerance < 1:
         raise BoostingError(f"tolerance={tolerance} must be at least {FINEST:g} and below 1")
     check_rows(X, labels, n_classes, weights)
+    if X.dtype.kind == "f" and np.isnan(X).any():
+        raise BoostingError("the inputs hold NaN: a logit has no scores for a missing value")
     check_memory(len(X), n_classes, BoostingError, *X.shape[1:])
     scale = 1.0
     if weights is not None:
@@ -125,10 +127,10 @@ def fit_logit(
     count = count_of(columns[:counted], heavy)
     pulls = penalty * scale, smoothness * scale
     rows = Fit([*columns, *count], labels, n_classes, *pulls, weights, held).minimum(tolerance)
-    return tables_of(columns, spread_out(columns, rows, count), heavy)
+    return tables_of(columns, spread_out(columns, rows, count))
 
 
-def count_of(columns: Sequence["Column"], weights: Floats) -> list["Column"]:
+def count_of(columns: Sequence[Column], weights: Floats) -> list[Column]:
     """Return a list with a column that counts the set bits of `columns`; an empty list if the count adds no
     information.
 
@@ -141,7 +143,7 @@ def count_of(columns: Sequence["Column"], weights: Floats) -> list["Column"]:
     return [Column(np.zeros(0), np.zeros(len(number), np.intp), 0, Ruler.of(number, weights), free=True)]
 
 
-def spread_out(columns: Sequence["Column"], rows: Floats, count: Sequence["Column"]) -> Floats:
+def spread_out(columns: Sequence[Column], rows: Floats, count: Sequence[Column]) -> Floats:
     """Return rows of `columns` that include the contribution of their count, the last column."""
     if not count or count[0].line is None:
         return rows
@@ -152,15 +154,16 @@ def spread_out(columns: Sequence["Column"], rows: Floats, count: Sequence["Colum
     return rows
 
 
-def tables_of(columns: Sequence["Column"], rows: Floats, held: Floats) -> ColumnTables:
-    """Return the rows (r, K) of a minimum as tables; `held` (n,) are the frames' weights."""
+def tables_of(columns: Sequence[Column], rows: Floats) -> ColumnTables:
+    """Return the rows (r, K) of a minimum as tables."""
     bias, *parts = np.split(rows, np.cumsum([1, *(column.n_rows for column in columns[:-1])])) if columns else [rows]
     bias, tables, lines = bias[0], [], {}
     for number, (column, own) in enumerate(zip(columns, parts, strict=True)):
         if column.line is not None:
             bias = bias - column.line.centre * own[0]
             lines[number] = Rise(column.line.low, column.line.high, own[0] / column.line.unit)
-        tables.append(column.table(own, held))
+            own = np.zeros_like(own)
+        tables.append(np.vstack([np.zeros((column.first, own.shape[1])), own]))
     return ColumnTables(bias, tuple(column.edges for column in columns), tuple(tables), lines)
 
 

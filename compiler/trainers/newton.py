@@ -1,7 +1,7 @@
 """Columns of frames as rows of scores, and the minimum of their penalised loss, by Newton's method.
 
-A column of two values is one row of scores, added at the upper value; any other has a row for each of its bins, and one
-for missing values, if there are any. Over the rows W (r, K), the first of which is the bias, this is minimised:
+A column of two values is one row of scores, added at the upper value; any other has a row for each of its bins. Over
+the rows W (r, K), the first of which is the bias, this is minimised:
 
     sum over frames i of u_i (log sum_k exp F_ik - F_iy)  +  1/2 sum over rows j of pull_j |W_j|^2
         + 1/2 smoothness * (sum of |W_j+1 - W_j|^2 over neighbouring bins j and j + 1 of a column),      F = D W
@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary import Floats, add_up, dot, exact_sum, on_one_grid, softmax_and_loss
+from ..elementary import Floats, dot, exact_sum, on_one_grid, softmax_and_loss
 from .base import BoostingError
 from .binning import bin_columns
 
@@ -44,31 +44,27 @@ _UNSOLVED = 0.3  # of the gradient that a step may leave
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ruler:
-    """A column measured in units from low, rounded to marks: centre + steps (n,); 0 steps where it is missing."""
+    """A column measured in units from low, rounded to marks: centre + steps (n,)."""
 
     low: float
     high: float
     unit: float
-    mean: float
     centre: float
     steps: Floats
     variance: float
 
     @classmethod
     def of(cls, x: Floats, weights: Floats) -> "Ruler":
-        """Return the ruler for numbers (n,), at least two of which differ, NaN for missing."""
-        there = ~np.isnan(x)
-        low, high = float(np.min(x[there])), float(np.max(x[there]))
+        """Return the ruler for numbers (n,), at least two of which differ."""
+        low, high = float(x.min()), float(x.max())
         if not math.isfinite(high - low):
             raise BoostingError(f"a column from {low} to {high} is too wide for a line: scale it")
         # A power of two, so that integers within a range below 1024 lie on marks.
         unit = math.ldexp(1.0, math.frexp(high - low)[1] - 1)
-        places = _marked(np.where(there, (x - low) / unit, 0.0))
-        heavy = weights * there
-        mean = dot(heavy, places) / exact_sum(heavy)
-        centre = float(_marked(np.array(mean)))
-        steps = np.where(there, places - centre, 0.0)
-        return cls(low, high, unit, mean, centre, steps, dot(heavy, steps * steps) / exact_sum(heavy))
+        places, total = _marked((x - low) / unit), exact_sum(weights)
+        centre = float(_marked(np.array(dot(weights, places) / total)))
+        steps = places - centre
+        return cls(low, high, unit, centre, steps, dot(weights, steps * steps) / total)
 
 
 def _marked(units: Floats) -> Floats:
@@ -78,7 +74,7 @@ def _marked(units: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Column:
-    """A column of frames: its edges, the bin (n,) of each frame, the last for missing, and the first bin with a row.
+    """A column of frames: its edges, the bin (n,) of each frame, and the first bin with a row.
 
     A line has one row instead of its only bin. For two columns together, bins number the `cells` row by row, each with
     a row, and `smoothness` pulls neighbours in both directions. `smoothness` does not pull a `free` line.
@@ -104,9 +100,7 @@ class Column:
 
     def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
         """Return the frames, rows and values of the column's entries in the design, each (entries,)."""
-        values = (self.bins >= self.first).astype(np.float64)
-        if self.line is not None:
-            values = np.where(self.bins == 0, self.line.steps, values)
+        values = (self.bins >= self.first).astype(np.float64) if self.line is None else self.line.steps
         frames = np.flatnonzero(values)
         return frames, self.bins[frames] - self.first, values[frames]
 
@@ -117,18 +111,6 @@ class Column:
             pulls[0] = (pulls[0] + (0.0 if self.free else smoothness)) * self.line.variance
         return pulls
 
-    def table(self, rows: Floats, weights: Floats) -> Floats:
-        """Return the contribution of each bin and of a missing value: if none was seen, the mean over the frames."""
-        table = np.vstack([np.zeros((self.first, rows.shape[1])), rows])
-        if self.line is not None:
-            table[0] = 0.0
-            table[1:] += self.line.centre * rows[0]
-        if len(table) == len(self.edges) + 2:
-            return table
-        shares = np.bincount(self.bins, weights) / weights.sum()
-        mean = add_up(shares[:, np.newaxis] * table) if self.line is None else self.line.mean * rows[0]
-        return np.vstack([table, mean])
-
 
 def columns_of(
     X: NDArray[np.generic], max_bins: int | None, weights: Floats | None, straight: Floats | None
@@ -137,14 +119,14 @@ def columns_of(
     columns = []
     for number, edges in enumerate(column_edges(X, max_bins, weights)):
         x = np.asarray(X[:, number], np.float64)
-        bins = bins_of(x, edges)
+        bins: NDArray[np.intp] = np.searchsorted(edges, x)
         # A single bin is redundant with the bias, and one of two bins with the other.
         if bins.max() < 2:
             columns.append(Column(edges, bins, 1))
         elif straight is None or not len(edges):
             columns.append(Column(edges, bins, 0))
         else:
-            columns.append(Column(np.zeros(0), np.isnan(x).astype(np.intp), 0, Ruler.of(x, straight)))
+            columns.append(Column(np.zeros(0), np.zeros(len(x), np.intp), 0, Ruler.of(x, straight)))
     return columns
 
 
@@ -152,12 +134,6 @@ def column_edges(X: NDArray[np.generic], max_bins: int | None, weights: Floats |
     """Return the edges of each column's bins; none for a column without splits."""
     columns = bin_columns(X, max_bins, weights).columns
     return [columns[number].edges if number in columns else np.zeros(0) for number in range(X.shape[1])]
-
-
-def bins_of(x: Floats, edges: Floats) -> NDArray[np.intp]:
-    """Return the bin (n,) of each number, the number of edges below it; NaN gets the bin after the last."""
-    bins: NDArray[np.intp] = np.searchsorted(edges, x) + np.isnan(x)
-    return bins
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -72,7 +72,7 @@ def fit_pairs(
             tolerance, rows
         )
     own = 1 + sum(column.n_rows for column in (*columns, *count))
-    tables = tables_of(columns, spread_out(columns, rows[:own], count), np.ones(len(X))).score_tables(s)
+    tables = tables_of(columns, spread_out(columns, rows[:own], count)).score_tables(s)
     blocks = np.split(rows[own:], np.cumsum([column.n_rows for column in made])[:-1]) if found else []
     grids = []
     for (a, b), block in sorted(zip(found, blocks, strict=True), key=lambda each: each[0]):

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.model.collapse import collapse
-from thenar.compiler.model.substitutes import fit_lost
+from thenar.compiler.model.faults import fit_lost
 from thenar.compiler.placement.tree import Tree, grow_id3
 from thenar.compiler.trainers.logitboost import boost
 from thenar.compiler.trainers.stumps import Stumps

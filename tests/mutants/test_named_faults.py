@@ -139,7 +139,7 @@ FAULTS = (
     ),
     Fault(
         "what stands in for all switches at once is not fitted",
-        "compiler/model/substitutes.py",
+        "compiler/model/faults.py",
         "if switches and (joints != joints[0]).any():",
         "if False:",
         "tests/stability/test_catalogue.py::test_a_case_holds_quickly[missing]",
