@@ -81,12 +81,7 @@ def compare(
     for counts, factor in ((plus, times), (minus, -times), (other_plus, -other_times), (other_minus, other_times)):
         for count in counts.ravel().tolist():
             difference[count] += factor
-    return sign_of_f_sum(difference)
-
-
-def sign_of_f_sum(coefficients: Mapping[int, int]) -> int:
-    """Return the sign of the sum over n of coefficients[n] * f(n), with f(n) = n ln n and f(0) = 0."""
-    return sign_of_log_sum({n: n * times for n, times in coefficients.items() if n})
+    return sign_of_log_sum({n: n * factor for n, factor in difference.items() if n})
 
 
 def sign_of_log_sum(multiples: Mapping[int, int]) -> int:

@@ -46,11 +46,6 @@ class Node(msgspec.Struct, frozen=True):
         """Whether this is a decision at which no input has a gain alone."""
         return self.input is not None and self.gain == 0
 
-    @property
-    def is_mixed_leaf(self) -> bool:
-        """Whether this is a leaf of rows of several classes."""
-        return self.input is None and max(self.counts) < self.size
-
 
 class Tree(msgspec.Struct, frozen=True, dict=True):
     """An ID3 tree over `n_inputs` inputs: nodes in preorder, classes in ascending order, pruned by `min_samples`."""
@@ -123,7 +118,8 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
     @property
     def n_undecided(self) -> int:
         """Number of leaves of several classes whose rows agree in every input; pruned leaves do not count."""
-        return sum(node.is_mixed_leaf and node.size >= self.min_samples for node in self.nodes)
+        leaves = (node for node in self.nodes if node.input is None)
+        return sum(max(leaf.counts) < leaf.size and leaf.size >= self.min_samples for leaf in leaves)
 
     def remarks(self, what: str = "input") -> Iterator[str]:
         """Yield warnings: decisions without a gain, and leaves that no input can split."""
@@ -173,7 +169,12 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
                 waiting.append(
                     (child, f"{below}{'└─' if last else '├─'} {value}: ", below + ("   " if last else "│  "))
                 )
-        return "\n".join([*lines, _summary(self)])
+        pruned = f", pruned at S = {self.min_samples}" if self.min_samples else ""
+        summary = (
+            f"{len(self.inputs)} of {self.n_inputs} inputs, {len(self.nodes)} nodes, {self.n_leaves} leaves, "
+            f"depth {self.depth}{pruned}"
+        )
+        return "\n".join([*lines, "; ".join([summary, *self.remarks()])])
 
 
 def grow_id3(X: ArrayLike, y: ArrayLike, min_samples: int = 0) -> Tree:
@@ -291,15 +292,6 @@ def node_text(node: Node, names: Sequence[str], class_names: Sequence[str]) -> s
         return f"{names[node.input]}?  {node.size} rows, {gain}"
     most = max(node.counts)
     return f"{class_names[node.majority]}  {most if most == node.size else f'{most} of {node.size}'} rows"
-
-
-def _summary(tree: Tree) -> str:
-    pruned = f", pruned at S = {tree.min_samples}" if tree.min_samples else ""
-    said = (
-        f"{len(tree.inputs)} of {tree.n_inputs} inputs, {len(tree.nodes)} nodes, {tree.n_leaves} leaves, "
-        f"depth {tree.depth}{pruned}"
-    )
-    return "; ".join([said, *tree.remarks()])
 
 
 _WHOLE = "not a whole number >= 0"

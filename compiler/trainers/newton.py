@@ -116,9 +116,10 @@ def columns_of(
     X: NDArray[np.generic], max_bins: int | None, weights: Floats | None, straight: Floats | None
 ) -> list[Column]:
     """Return the columns; those of more than two values as lines, if their weights (n,) are given as `straight`."""
-    columns = []
-    for number, edges in enumerate(column_edges(X, max_bins, weights)):
+    columns, binned = [], bin_columns(X, max_bins, weights).columns
+    for number in range(X.shape[1]):
         x = np.asarray(X[:, number], np.float64)
+        edges = binned[number].edges if number in binned else np.zeros(0)
         bins: NDArray[np.intp] = np.searchsorted(edges, x)
         # A single bin is redundant with the bias, and one of two bins with the other.
         if bins.max() < 2:
@@ -128,12 +129,6 @@ def columns_of(
         else:
             columns.append(Column(np.zeros(0), np.zeros(len(x), np.intp), 0, Ruler.of(x, straight)))
     return columns
-
-
-def column_edges(X: NDArray[np.generic], max_bins: int | None, weights: Floats | None = None) -> list[Floats]:
-    """Return the edges of each column's bins; none for a column without splits."""
-    columns = bin_columns(X, max_bins, weights).columns
-    return [columns[number].edges if number in columns else np.zeros(0) for number in range(X.shape[1])]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ pairs and the contribution of a pair depends on no other input. Then all tables 
 between neighbouring cells, in both directions, pulled towards zero: again a convex function.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -21,9 +21,10 @@ from thenar.runtime.model.terms.grid import Grid
 from ..elementary import Floats, exact_sum, on_one_grid
 from ..limits import check_memory
 from .base import BoostingError, Report, Setting, Trainer, check_rows
+from .binning import BinnedColumn, bin_columns
 from .logit import BINS, count_of, of_none, spread_out, tables_of
 from .logit import MEMBER as LOGIT
-from .newton import TOLERANCE, Column, Fit, column_edges, columns_of, sparse
+from .newton import TOLERANCE, Column, Fit, columns_of, sparse
 
 if TYPE_CHECKING:
     from ..samples import Samples
@@ -64,10 +65,10 @@ def fit_pairs(
     count = count_of(columns[:counted], np.ones(len(X)))
     alone = Fit([*columns, *count], labels, n_classes, penalty, smoothness, None, held)
     rows = alone.minimum(tolerance)
-    edges = column_edges(codes, pair_bins)
-    found = _ranked(edges, codes, alone.residuals(rows), pairs)
+    binned = bin_columns(codes, pair_bins).columns
+    found = _ranked(binned, alone.residuals(rows), pairs)
     if found:
-        made = [_cells(edges, codes, pair, pair_smoothness) for pair in found]
+        made = [_column(binned[a], binned[b], pair_smoothness) for a, b in found]
         rows = Fit([*columns, *count, *made], labels, n_classes, penalty, smoothness, None, held).minimum(
             tolerance, rows
         )
@@ -76,31 +77,28 @@ def fit_pairs(
     blocks = np.split(rows[own:], np.cumsum([column.n_rows for column in made])[:-1]) if found else []
     grids = []
     for (a, b), block in sorted(zip(found, blocks, strict=True), key=lambda each: each[0]):
-        one, other = (np.floor(edges[joint]).astype(np.uint16) for joint in (a, b))
+        one, other = (np.floor(binned[joint].edges).astype(np.uint16) for joint in (a, b))
         grids.append(Grid((a, b), (one, other), block.reshape(len(one) + 1, len(other) + 1, n_classes)))
     return ScoreTables(tables.bias, (*tables.terms, *grids))
 
 
-def _bins(edges: Sequence[Floats], codes: NDArray[np.uint16], joint: int) -> NDArray[np.intp]:
-    bins: NDArray[np.intp] = np.searchsorted(edges[joint], codes[:, joint])
-    return bins
+def _cells(one: BinnedColumn, other: BinnedColumn) -> NDArray[np.intp]:
+    """Return the cell (n,) of each frame in the grid of two joints' bins, numbered row by row."""
+    cells: NDArray[np.intp] = one.bins.astype(np.intp) * (len(other.edges) + 1) + other.bins
+    return cells
 
 
-def _cells(edges: Sequence[Floats], codes: NDArray[np.uint16], pair: tuple[int, int], smoothness: float) -> Column:
-    one, other = (_bins(edges, codes, joint) for joint in pair)
-    shape = len(edges[pair[0]]) + 1, len(edges[pair[1]]) + 1
-    return Column(np.zeros(0), one * shape[1] + other, 0, cells=shape, smoothness=smoothness)
+def _column(one: BinnedColumn, other: BinnedColumn, smoothness: float) -> Column:
+    shape = len(one.edges) + 1, len(other.edges) + 1
+    return Column(np.zeros(0), _cells(one, other), 0, cells=shape, smoothness=smoothness)
 
 
-def _ranked(
-    edges: Sequence[Floats], codes: NDArray[np.uint16], residuals: tuple[Floats, Floats], most: int
-) -> list[tuple[int, int]]:
+def _ranked(binned: Mapping[int, BinnedColumn], residuals: tuple[Floats, Floats], most: int) -> list[tuple[int, int]]:
     """Return the pairs of joints with the largest gain, at most `most`, no joint twice; ties go to the first."""
-    n, gains = len(codes), []
+    n, gains = len(residuals[0]), []
     over, spread = (on_one_grid(each, n) for each in residuals)
-    bins = {joint: _bins(edges, codes, joint) for joint in range(codes.shape[1]) if len(edges[joint])}
-    for a, b in combinations(bins, 2):
-        cells = bins[a] * (len(edges[b]) + 1) + bins[b]
+    for a, b in combinations(sorted(binned), 2):
+        cells = _cells(binned[a], binned[b])
         members = sparse(np.ones(n), cells, np.arange(n), (int(cells.max()) + 1, n))
         sums, spreads = members @ over, members @ spread
         gains.append((exact_sum(sums * sums / (spreads + 1.0)), a, b))

@@ -116,17 +116,14 @@ class Logistic:
             rows = _rounded(self.rows + length * direction, _ROW_BITS)
             evaluated = self._evaluate(rows)
             if evaluated[1] < self.loss + _ENOUGH * length * slope:
-                self._go_to(rows, evaluated)
+                before, gradient = self.rows, self._gradient
+                self._stand(rows, evaluated)
+                moved, turned = self.rows - before, self._gradient - gradient
+                if dot(moved, turned) > 0:
+                    self._pairs = [*self._pairs, (moved, turned)][-_MEMORY:]
                 return True
             length *= 0.5
         return False
-
-    def _go_to(self, rows: Floats, evaluated: tuple[Floats, float]) -> None:
-        before, slope = self.rows, self._gradient
-        self._stand(rows, evaluated)
-        moved, turned = self.rows - before, self._gradient - slope
-        if dot(moved, turned) > 0:
-            self._pairs = [*self._pairs, (moved, turned)][-_MEMORY:]
 
     def _direction(self) -> Floats:
         """Return minus the gradient times the inverse Hessian estimated from past steps and gradient changes."""
