@@ -25,7 +25,7 @@ LARGEST_Z_MAX = 100.0
 # Close to 32 MiB, the largest value that glibc respects.
 _LARGE_BYTES = 31 << 20
 TIES = ("first", "least-used")
-# Far below this, all scores of a hundred rounds would lie within the tolerance of a tie (stumps.TIE).
+# Far below this, all scores of a hundred rounds would lie within the tolerance of a tie (tables.TIE).
 SMALLEST_SHRINKAGE = 1e-6
 
 
