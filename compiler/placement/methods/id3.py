@@ -19,9 +19,8 @@ and it becomes a leaf. Risks are integers, so g is compared exactly; of equal li
 first, descendants before ancestors.
 """
 
-import collections
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from heapq import heapify, heappop, heappush
 
@@ -37,37 +36,22 @@ from .base import PAPERS, Chooser, Method, first_of
 _BITS = 30
 
 
-@dataclass(frozen=True)
-class PruningPath:
-    """The pruning sequence of a tree: the first n of `order`, numbers of its nodes, become leaves, for n = 0 to all.
+def weakest_links(tree: Tree, brought: Sequence[int]) -> tuple[int, ...]:
+    """Return the numbers of the decisions that become leaves, in their order, until the root is one.
 
-    n_inputs   (links + 1,) the number of distinct inputs in the tree after the first n links are removed
+    `brought` is how much the decision at each node lowers the risk, 0 for a leaf.
     """
-
-    tree: Tree
-    order: tuple[int, ...]
-    n_inputs: tuple[int, ...]
-
-    def placement(self, most: float) -> tuple[int, ...]:
-        """Return the inputs, in preorder of their nodes, of the largest tree on the path with at most `most` inputs."""
-        links = next(n for n, inputs in enumerate(self.n_inputs) if inputs <= max(most, 0))
-        return tuple(dict.fromkeys(_labels(self.tree, {*self.order[:links]})))
-
-
-def weakest_links(tree: Tree, brought: Sequence[int]) -> PruningPath:
-    """Return the pruning path of `tree`, given how much the decision at each node lowers the risk (0 for a leaf)."""
     standing = [node.input is not None for node in tree.nodes]
     # The reduction by each node and those below it, and their links.
     total, links = list(brought), [max(len(node.values) - 1, 0) for node in tree.nodes]
     for number in range(len(tree.nodes) - 1, 0, -1):
         total[tree.parents[number]] += total[number]
         links[tree.parents[number]] += links[number]
-    labels = collections.Counter(node.input for node in tree.nodes if node.input is not None)
 
     def key(number: int) -> tuple[Fraction, int]:
         return Fraction(total[number], links[number]), -number
 
-    order, n_inputs = list[int](), [len(labels)]
+    order: list[int] = []
     waiting = [key(number) for number, remaining in enumerate(standing) if remaining]
     heapify(waiting)
     while waiting:
@@ -78,10 +62,8 @@ def weakest_links(tree: Tree, brought: Sequence[int]) -> PruningPath:
         below = [number]
         while below:
             node = below.pop()
-            label = tree.nodes[node].input
-            if label is not None and standing[node]:
+            if standing[node]:
                 standing[node] = False
-                labels -= collections.Counter([label])
                 below += tree.children[node]
         above = tree.parents[number]
         while above >= 0:
@@ -90,13 +72,21 @@ def weakest_links(tree: Tree, brought: Sequence[int]) -> PruningPath:
             heappush(waiting, key(above))
             above = tree.parents[above]
         order.append(number)
-        n_inputs.append(len(labels))
-    return PruningPath(tree, tuple(order), tuple(n_inputs))
+    return tuple(order)
 
 
 def entropy_brought(tree: Tree) -> list[int]:
     """Return by how much each node's decision lowers the entropy of the training rows."""
     return [round(Fraction(node.gain) * node.size * 2**_BITS) for node in tree.nodes]
+
+
+def pruned(tree: Tree, order: Sequence[int]) -> Chooser:
+    """Return m -> the inputs of the largest tree with at most m inputs, after the first of `order` became leaves."""
+
+    def inputs(leaves: int) -> Columns:
+        return tuple(dict.fromkeys(_labels(tree, {*order[:leaves]})))
+
+    return lambda most: inputs(bisect_left(range(len(order)), -max(most, 0), key=lambda n: -len(inputs(n))))
 
 
 def _labels(tree: Tree, leaves: set[int]) -> Iterator[int]:
@@ -128,7 +118,7 @@ def _papers(samples: Samples, _: PortCosts | None) -> Chooser:
 def _cost_complexity(samples: Samples, _: PortCosts | None) -> Chooser:
     """Return m -> the inputs, at most m, of the tree after cost-complexity pruning by entropy of the rows."""
     tree = grow_id3(samples.switches, samples.labels)
-    return weakest_links(tree, entropy_brought(tree)).placement
+    return pruned(tree, weakest_links(tree, entropy_brought(tree)))
 
 
 def cost_aware_order(samples: Samples, ports: PortCosts | None = None) -> Columns:

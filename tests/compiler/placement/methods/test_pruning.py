@@ -10,7 +10,7 @@ from sklearn.tree import DecisionTreeClassifier
 
 from thenar.compiler import grow_id3
 from thenar.compiler.placement.gain import gain_bits
-from thenar.compiler.placement.methods.id3 import entropy_brought, weakest_links
+from thenar.compiler.placement.methods.id3 import entropy_brought, pruned, weakest_links
 from thenar.compiler.placement.tree import Node, Tree
 
 
@@ -36,9 +36,8 @@ def labels_of(tree: Tree, leaves: set[int]) -> tuple[int, ...]:
 @given(trees())
 def test_the_weakest_link_of_all_that_stand_goes_each_time(drawn: tuple[Tree, list[int]]) -> None:
     tree, brought = drawn
-    path = weakest_links(tree, brought)
     leaves: set[int] = set()
-    for number in path.order:
+    for number in weakest_links(tree, brought):
         g = {}
         for link in below(tree, 0, leaves):
             branch = below(tree, link, leaves)
@@ -51,10 +50,9 @@ def test_the_weakest_link_of_all_that_stand_goes_each_time(drawn: tuple[Tree, li
 @given(trees(), st.integers(0, 7))
 def test_a_placement_is_of_the_largest_tree_that_asks_for_no_more(drawn: tuple[Tree, list[int]], most: int) -> None:
     tree, brought = drawn
-    path = weakest_links(tree, brought)
-    sizes = [labels_of(tree, set(path.order[:n])) for n in range(len(path.order) + 1)]
-    assert path.n_inputs == tuple(map(len, sizes))
-    assert path.placement(most) == next(inputs for inputs in sizes if len(inputs) <= most)
+    order = weakest_links(tree, brought)
+    sizes = [labels_of(tree, set(order[:n])) for n in range(len(order) + 1)]
+    assert pruned(tree, order)(most) == next(inputs for inputs in sizes if len(inputs) <= most)
 
 
 def tree_of(model: DecisionTreeClassifier) -> Tree:
@@ -78,11 +76,12 @@ def test_trees_pruned_by_entropy_are_scikit_learns(seed: int) -> None:
     X = (random.random((4, 12)) < 0.5)[y] ^ (random.random((150, 12)) < 0.25)
     model = DecisionTreeClassifier(criterion="entropy", random_state=0).fit(X, y)
     alphas = np.unique(model.cost_complexity_pruning_path(X, y).ccp_alphas.round(9))
-    path = weakest_links(tree_of(model), entropy_brought(tree_of(model)))
+    tree = tree_of(model)
+    order = weakest_links(tree, entropy_brought(tree))
     assert len(alphas) > 10
     for alpha in (alphas[1:] + alphas[:-1]) / 2:
-        pruned = DecisionTreeClassifier(criterion="entropy", random_state=0, ccp_alpha=float(alpha)).fit(X, y)
-        decisions = sum(node.input is not None for node in tree_of(pruned).nodes)
-        cuts = (set(path.order[:gone]) for gone in range(len(path.order) + 1))
-        leaves = next(cut for cut in cuts if len(below(path.tree, 0, cut)) == decisions)
-        assert labels_of(path.tree, leaves) == tree_of(pruned).inputs
+        theirs = tree_of(DecisionTreeClassifier(criterion="entropy", random_state=0, ccp_alpha=float(alpha)).fit(X, y))
+        decisions = sum(node.input is not None for node in theirs.nodes)
+        cuts = (set(order[:gone]) for gone in range(len(order) + 1))
+        leaves = next(cut for cut in cuts if len(below(tree, 0, cut)) == decisions)
+        assert labels_of(tree, leaves) == theirs.inputs
