@@ -29,8 +29,8 @@ from rich.table import Table
 from synthetic import grasp_like
 from weka import installed, logitboost, write_arff
 
-from thenar.compiler.additive.logit import fit_logit
-from thenar.compiler.boosting.boost import boost
+from thenar.compiler.trainers.logit import fit_logit
+from thenar.compiler.trainers.logitboost import boost
 from thenar.runtime.model.tables import winners
 
 CLASSES, ROUNDS = 14, 100

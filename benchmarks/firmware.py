@@ -34,7 +34,8 @@ from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.firmware.targets.avr import harness
 from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
 from thenar.compiler.firmware.words import numbered
-from thenar.compiler.model.collapse import Model, collapse
+from thenar.compiler.model.collapse import collapse
+from thenar.compiler.trainers.base import Model
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import quantise
 

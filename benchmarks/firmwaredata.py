@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import track
 from sklearn.model_selection import LeaveOneGroupOut, StratifiedKFold
 
-from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.samples import Samples
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import simulate

@@ -64,7 +64,7 @@ def peak_mib() -> float:
 def trainer(what: str, depth: int) -> Callable[[Any, Any], Any]:
     """Return a training of thenar's tree, or of scikit-learn's with at most this depth."""
     if what == "thenar":
-        from thenar.compiler.placement.id3 import grow_id3
+        from thenar.compiler.placement.tree import grow_id3
 
         return partial(grow_id3, min_samples=MIN_SAMPLES)
     from sklearn.tree import DecisionTreeClassifier

@@ -8,11 +8,11 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from thenar.compiler.boosting.boost import boost
 from thenar.compiler.evaluation.folds import Fold
 from thenar.compiler.placement.methods.base import METHODS, PAPERS, Chooser
 from thenar.compiler.placement.ports import port_costs
 from thenar.compiler.samples import Columns, Samples
+from thenar.compiler.trainers.logitboost import boost
 from thenar.compiler.workers import in_workers
 from thenar.runtime.model.tables import winners
 from thenar.runtime.scanning.ports import whole_scan

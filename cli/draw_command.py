@@ -102,7 +102,7 @@ def _check_options(
 
 
 def _without_grasps(hand: "HandShape", numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
-    from thenar.compiler.placement.kept import kept_names
+    from thenar.compiler.placement.drawing import kept_names
     from thenar.simulator.handmaps import draw as handpanels
 
     if not kept:

@@ -19,14 +19,12 @@ if TYPE_CHECKING:
     from thenar.runtime.model.terms.line import Line
     from thenar.runtime.recipe import Recipe
 
-    from .additive.classifier import AdditiveLogitClassifier
     from .artifact import CompileError
     from .artifact.compile import compile_build
     from .artifact.documents import BuildReport, Documents
     from .artifact.estimator import compile, export_c  # noqa: A004
     from .artifact.verify import FaultCheck, Verification, verify, verify_faults
-    from .boosting.boost import BoostingError
-    from .boosting.classifier import LogitBoostClassifier
+    from .classifiers import AdditiveLogitClassifier, LogitBoostClassifier
     from .cluster import dask_cluster
     from .evaluation.folds import EvaluationError
     from .evaluation.study import Study, StudyDesign, evaluate
@@ -34,16 +32,16 @@ if TYPE_CHECKING:
     from .frontier.find import find_frontier
     from .frontier.points import Frontier
     from .frontier.search import Search
-    from .placement.id3 import grow_id3
     from .placement.methods.base import METHODS
     from .placement.placement import Placement, place
     from .placement.selectors import SwitchSelector
+    from .placement.tree import grow_id3
     from .recordings.columns import ColumnRoles
     from .recordings.export import from_dataframe, to_dataframe
     from .recordings.graspset import GraspSet, Joint
     from .recordings.merging import merge, split
     from .samples import Samples
-    from .trainers.base import TRAINERS, Setting, Trainer
+    from .trainers.base import TRAINERS, BoostingError, Setting, Trainer
 
 _HOMES = {
     "thenar.drivers.errors": ("ThenarError",),
@@ -55,14 +53,12 @@ _HOMES = {
     "thenar.runtime.model.terms.grid": ("Grid",),
     "thenar.runtime.model.terms.line": ("Line",),
     "thenar.runtime.recipe": ("Recipe",),
-    ".additive.classifier": ("AdditiveLogitClassifier",),
     ".artifact.compile": ("compile_build",),
     ".artifact.documents": ("BuildReport", "Documents"),
     ".artifact": ("CompileError",),
     ".artifact.estimator": ("compile", "export_c"),
     ".artifact.verify": ("FaultCheck", "Verification", "verify", "verify_faults"),
-    ".boosting.boost": ("BoostingError",),
-    ".boosting.classifier": ("LogitBoostClassifier",),
+    ".classifiers": ("AdditiveLogitClassifier", "LogitBoostClassifier"),
     ".cluster": ("dask_cluster",),
     ".evaluation.folds": ("EvaluationError",),
     ".evaluation.study": ("Study", "StudyDesign", "evaluate"),
@@ -70,7 +66,7 @@ _HOMES = {
     ".frontier.find": ("find_frontier",),
     ".frontier.points": ("Frontier",),
     ".frontier.search": ("Search",),
-    ".placement.id3": ("grow_id3",),
+    ".placement.tree": ("grow_id3",),
     ".placement.methods.base": ("METHODS",),
     ".placement.placement": ("Placement", "place"),
     ".placement.selectors": ("SwitchSelector",),
@@ -79,7 +75,7 @@ _HOMES = {
     ".recordings.graspset": ("GraspSet", "Joint"),
     ".recordings.merging": ("merge", "split"),
     ".samples": ("Samples",),
-    ".trainers.base": ("TRAINERS", "Setting", "Trainer"),
+    ".trainers.base": ("TRAINERS", "BoostingError", "Setting", "Trainer"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

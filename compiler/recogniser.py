@@ -20,14 +20,14 @@ from .artifact.rejecting import rejection_of
 from .evaluation.choosing import choose_training
 from .evaluation.folds import OF
 from .limits import check_inputs
-from .model.collapse import Model, collapse
-from .model.substitutes import fit_lost
+from .model.collapse import collapse
+from .model.faults import fit_lost
 from .placement.constraints import Limits
 from .placement.elements import Elements
 from .placement.placement import InputSelection, select
 from .placement.ports import PortCosts
 from .samples import Samples
-from .trainers.base import Report, Training
+from .trainers.base import Model, Report, Training
 
 Classes = NDArray[np.intp]
 Scores = NDArray[np.float64]

@@ -13,9 +13,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import Floats, softmax
+from thenar.compiler.trainers.logitboost import boost
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.model.tables import winners
 

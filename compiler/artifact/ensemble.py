@@ -30,8 +30,9 @@ from thenar.runtime.model.terms.line import Line
 from thenar.runtime.sealed import seal, unseal
 
 from ..arrays import AnyArray, pack, unpack
-from ..boosting.stumps import Stumps
-from ..model.collapse import Model, collapse
+from ..model.collapse import collapse
+from ..trainers.base import Model
+from ..trainers.stumps import Stumps
 
 KIND = b"THNRENSM"
 STUMPS, TABLES, LINES, PAIRS, OTHERS = 1, 2, 3, 4, 5  # formats
@@ -47,7 +48,7 @@ _DTYPES = {
 _DTYPES[LINES] = _DTYPES[TABLES] | {"lines": "<i8", "line_rows": "<f8"}
 _DTYPES[PAIRS] = _DTYPES[TABLES] | {"pairs": "<i8", "pair_thresholds": "<u2", "pair_rows": "<f8"}
 
-# Larger than any value of boosting (boost.LARGEST_Z_MAX); for thresholds, larger than every code.
+# Larger than any value of boosting (logitboost.LARGEST_Z_MAX); for thresholds, larger than every code.
 _LARGEST_VALUE, _LARGEST_THRESHOLD = 1e6, 1e6
 
 

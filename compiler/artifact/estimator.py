@@ -16,14 +16,10 @@ from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.published import NONE
 from thenar.runtime.recipe import By, Inputs, Recipe, TableBits
 
-from ..additive.classifier import AdditiveLogitClassifier
-from ..additive.logit import ColumnTables
-from ..boosting.classifier import LogitBoostClassifier
-from ..boosting.stumps import Stumps
+from ..classifiers import AdditiveLogitClassifier, LogitBoostClassifier
 from ..evaluation.folds import Fold
 from ..firmware.classifier import LIBRARY_NAME
 from ..firmware.generate import firmware_files, write_folder
-from ..model.collapse import Model
 from ..placement.elements import elements_of
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import InputSelection, information_alone
@@ -32,6 +28,9 @@ from ..recogniser import Recogniser, Scores
 from ..recordings.graspset import GraspSet
 from ..recordings.summary import check_trials
 from ..samples import Columns, Samples
+from ..trainers.base import Model
+from ..trainers.logit import ColumnTables
+from ..trainers.stumps import Stumps
 from . import CompileError
 from .compile import BuildAssembly, Wired, check_target
 from .documents import BuildReport, Documents, Progress

@@ -12,13 +12,13 @@ from thenar.runtime.build import ENSEMBLE_NAME, Build, read_member
 from thenar.runtime.errors import BuildError
 from thenar.runtime.manifest import Faults, Unit
 
-from ..boosting.stumps import Stumps
 from ..evaluation.rates import rated
-from ..model.collapse import Model
 from ..model.compare import Comparison, WorstCase, compare, worst_case
 from ..model.faults import count_faults, groups_of, worst_faults
 from ..recogniser import predicted_classes
 from ..recordings.graspset import GraspSet
+from ..trainers.base import Model
+from ..trainers.stumps import Stumps
 from . import CompileError
 from .documents import Progress
 from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault

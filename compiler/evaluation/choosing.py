@@ -21,15 +21,15 @@ from thenar.runtime.manifest import Compared, Fitting, Of
 from thenar.runtime.recipe import Inputs, Recipe
 
 from ..elementary import softmax_and_loss
-from ..model.collapse import Model, collapse
+from ..model.collapse import collapse
 from ..placement.constraints import Limits
 from ..placement.elements import Elements, bits_of, elements_of, ports_of
-from ..placement.joints import joint_order
 from ..placement.methods.base import METHODS
+from ..placement.methods.elimination import joint_order
 from ..placement.placement import select
 from ..placement.ports import PortCosts
 from ..samples import Columns, Samples, decided
-from ..trainers.base import TRAINERS, Training
+from ..trainers.base import TRAINERS, Model, Training
 from ..workers import in_workers
 from .folds import Fold, Rows, leave_groups_out, trial_folds
 

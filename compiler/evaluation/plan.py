@@ -13,7 +13,7 @@ from thenar.runtime.recipe import AUTO, Recipe, changed
 
 from ..placement.elements import Elements
 from ..placement.methods.base import METHODS, PAPERS
-from ..placement.methods.filters import random_placement
+from ..placement.methods.baselines import random_placement
 from ..placement.placement import InputSelection
 from ..samples import Columns, Samples
 from ..trainers.base import TRAINERS, Training

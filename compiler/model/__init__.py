@@ -1,1 +1,1 @@
-"""Collapse an ensemble of stumps to score tables, and quantise those to integers with proved bounds."""
+"""Models on their way to a build: collapsed to score tables, compared with their integers, and judged under faults."""

@@ -7,10 +7,6 @@ of class j, which reads one input. So the sum of everything that the rounds add 
 input alone: for a switch a constant, and a row that is added if it is closed; for a joint a row per interval of codes.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import islice
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,17 +14,9 @@ from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.base import HIGHEST_CODE, CoreTerm
 from thenar.runtime.model.terms.bins import Bins
 
-from ..boosting.stumps import Stumps, spread
-from ..elementary import add_exactly
-
-# Rows of stump outputs that are expanded at a time: 2 MB with 1000 classes.
-_WRITTEN_OUT = 256
-
-Floats = NDArray[np.float64]
-
-
-# The models that trainers return: score tables, or an ensemble that collapses to them.
-Model = Stumps | ScoreTables
+from ..elementary import Floats, add_exactly
+from ..trainers.base import Model
+from ..trainers.stumps import Stumps, spread
 
 
 def collapse(model: Model, n_switches: int) -> ScoreTables:
@@ -41,7 +29,7 @@ def collapse(model: Model, n_switches: int) -> ScoreTables:
     """
     if isinstance(model, ScoreTables):
         return _core(model)
-    stumps = model
+    stumps, classes = model, np.tile(np.arange(model.n_classes), model.n_rounds)
     left, right = _contributions(stumps, 0), _contributions(stumps, 1)
     columns, floors = stumps.columns.ravel(), np.floor(stumps.thresholds.ravel())
     bias = np.zeros(stumps.n_classes)
@@ -49,13 +37,13 @@ def collapse(model: Model, n_switches: int) -> ScoreTables:
     thresholds, joint_rows = [], []
     for column in range(stumps.n_inputs):
         mine = np.flatnonzero(columns == column)
+        sides = left[:, mine], right[:, mine]
         if column < n_switches:
-            opened = _where(floors[mine] >= 0, left[mine], right[mine])
-            closed = _where(floors[mine] >= 1, left[mine], right[mine])
-            bias += _sums(opened, [len(mine)])[0].sum(axis=0)
-            switch_rows[column] = _sums(closed.less(opened), [len(mine)])[0].sum(axis=0)
+            opened, closed = (np.where(floors[mine] >= value, *sides) for value in (0, 1))
+            bias += _sums(opened, classes[mine], stumps.n_classes, [len(mine)])[0].sum(axis=0)
+            switch_rows[column] = _sums(closed - opened, classes[mine], stumps.n_classes, [len(mine)])[0].sum(axis=0)
         else:
-            steps, rows = _joint(floors[mine], left[mine], right[mine])
+            steps, rows = _joint(floors[mine], *sides, classes[mine], stumps.n_classes)
             thresholds.append(steps)
             joint_rows.append(rows)
     return ScoreTables.of(bias, switch_rows, thresholds, joint_rows)
@@ -75,65 +63,37 @@ def _core(tables: ScoreTables) -> ScoreTables:
     return ScoreTables(tables.bias, (*tables.bits, *bins, *sorted(further, key=lambda part: part.inputs)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Contributions:
-    """The contributions of n stumps to K classes: `own` (n,) to each stump's own class, one of `classes` (n,), and
-    `others` (n,) to each other class. As an (n, K) array they would take gigabytes with a thousand classes.
+def _contributions(stumps: Stumps, branch: int) -> Floats:
+    """Return the contributions (2, M K) of the M K stumps in a branch: to the stump's own class, and to each other one.
+
+    Centring spreads each output over the classes. For all K classes they would take gigabytes with a thousand classes.
     """
-
-    own: Floats
-    others: Floats
-    classes: NDArray[np.intp]
-    n_classes: int
-
-    def __len__(self) -> int:
-        return len(self.own)
-
-    def __getitem__(self, chosen: NDArray[np.intp] | slice) -> "_Contributions":
-        return _Contributions(self.own[chosen], self.others[chosen], self.classes[chosen], self.n_classes)
-
-    def less(self, other: "_Contributions") -> "_Contributions":
-        """Return these contributions minus those of the same stumps in another branch."""
-        return _Contributions(self.own - other.own, self.others - other.others, self.classes, self.n_classes)
-
-    def rows(self) -> Iterator[Floats]:
-        """Yield a row (K,) for each stump."""
-        for start in range(0, len(self), _WRITTEN_OUT):
-            part = self[start : start + _WRITTEN_OUT]
-            written = np.repeat(part.others[:, np.newaxis], self.n_classes, axis=1)
-            written[np.arange(len(part)), part.classes] = part.own
-            yield from written
+    return np.array(spread(stumps.values[:, :, branch].ravel(), stumps.n_classes, stumps.shrinkage))
 
 
-def _contributions(stumps: Stumps, branch: int) -> _Contributions:
-    """Return the contributions of the M K stumps in a branch: centring spreads each output over the classes."""
-    own, others = spread(stumps.values[:, :, branch].ravel(), stumps.n_classes, stumps.shrinkage)
-    return _Contributions(own, others, np.tile(np.arange(stumps.n_classes), stumps.n_rounds), stumps.n_classes)
-
-
-def _where(chosen: NDArray[np.bool_], one: _Contributions, other: _Contributions) -> _Contributions:
-    own, others = np.where(chosen, one.own, other.own), np.where(chosen, one.others, other.others)
-    return _Contributions(own, others, one.classes, one.n_classes)
-
-
-def _joint(floors: Floats, left: _Contributions, right: _Contributions) -> tuple[NDArray[np.uint16], Floats]:
+def _joint(
+    floors: Floats, left: Floats, right: Floats, classes: NDArray[np.intp], n_classes: int
+) -> tuple[NDArray[np.uint16], Floats]:
     """Return (thresholds (T,), rows (T + 1, K)) of one joint's stumps; thresholds beyond the codes need no bin."""
     order = np.argsort(floors, kind="stable")
     steps = np.unique(floors[(floors >= 0) & (floors < HIGHEST_CODE)])
     # The smallest code of each bin represents all of its codes: no threshold lies between them.
     passed = np.searchsorted(floors[order], np.append(0.0, steps + 1)).tolist()
-    answer_right = _sums(right[order], passed)
-    answer_left = _sums(left[order[::-1]], [len(order) - n for n in reversed(passed)])[::-1]
-    high, low = add_exactly(answer_right[:, 0], answer_right[:, 1], answer_left[:, 0])
-    return steps.astype(np.uint16), high + (low + answer_left[:, 1])
+    back, remaining = order[::-1], [len(order) - n for n in reversed(passed)]
+    from_right = _sums(right[:, order], classes[order], n_classes, passed)
+    from_left = _sums(left[:, back], classes[back], n_classes, remaining)[::-1]
+    high, low = add_exactly(from_right[:, 0], from_right[:, 1], from_left[:, 0])
+    return steps.astype(np.uint16), high + (low + from_left[:, 1])
 
 
-def _sums(contributions: _Contributions, stops: list[int]) -> Floats:
+def _sums(contributions: Floats, classes: NDArray[np.intp], n_classes: int, stops: list[int]) -> Floats:
     """Return the sums of the first n contributions for each n in `stops`, ascending, in two parts: (stops, 2, K)."""
-    total = carry = np.zeros(contributions.n_classes)
-    sums, done, rows = [], 0, contributions.rows()
+    total = carry = np.zeros(n_classes)
+    sums, done = [], 0
     for stop in stops:
-        for row in islice(rows, stop - done):
+        for stump in range(done, stop):
+            row = np.full(n_classes, contributions[1, stump])
+            row[classes[stump]] = contributions[0, stump]
             total, carry = add_exactly(total, carry, row)
         sums.append((total, carry))
         done = stop

@@ -13,7 +13,9 @@ from thenar.runtime.model.quantise import as_deployed, rounding_error
 from thenar.runtime.model.tables import TIE, ScoreTables, winners
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 
-from .collapse import Floats, Model, collapse
+from ..elementary import Floats
+from ..trainers.base import Model
+from .collapse import collapse
 
 COLLAPSE_TOLERANCE = 1e-12  # of the sum of the magnitudes that are added up
 
@@ -133,7 +135,12 @@ def compare(
     tables = collapse(model, bits.shape[1])
     by_model = model.scores(bits, codes)
     by_tables = tables.scores(bits, codes)
-    by_integers = _deployed_scores(integers, bits, codes, report)
+    scorer, by_integers = Scorer(integers), np.empty((len(bits), integers.n_classes), np.int64)
+    for row, (switches, joints) in enumerate(zip(bits, codes, strict=True)):
+        by_integers[row] = scorer.biased_scores(switches, joints)
+        if report is not None and row % 1000 == 999:
+            report(row + 1, len(bits))
+    by_integers -= LANE_OFFSET
     deployed = as_deployed(tables, integers.grid)
     steps = deployed.scores(bits, codes) * integers.scale
     best_two = np.sort(steps, axis=1)[:, -2:]
@@ -151,15 +158,3 @@ def compare(
         margins=margins,
         covered=margins > 2 * (error + slack),
     )
-
-
-def _deployed_scores(
-    integers: IntegerTables, bits: Flags, codes: NDArray[np.uint16], report: Callable[[int, int], None] | None
-) -> NDArray[np.int64]:
-    scorer = Scorer(integers)
-    scores = np.empty((len(bits), integers.n_classes), np.int64)
-    for row, (switches, joints) in enumerate(zip(bits, codes, strict=True)):
-        scores[row] = scorer.biased_scores(switches, joints)
-        if report is not None and row % 1000 == 999:
-            report(row + 1, len(bits))
-    return scores - LANE_OFFSET

@@ -18,8 +18,8 @@ from thenar.runtime.recipe import Recipe
 
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
+from . import PlacementError
 from .elements import Elements
-from .inputs import PlacementError
 from .ports import PortCosts, record_times_us
 
 Bits = NDArray[np.bool_]

@@ -1,13 +1,18 @@
-"""The picture of ID3's tree."""
+"""What is drawn of a placement: the picture of ID3's tree, and the names of the kept switches."""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from thenar.runtime.files import write_atomically
+import msgspec
+
+from thenar.runtime.build import load_manifest
+from thenar.runtime.files import read_file, write_atomically
+from thenar.runtime.names import fault, shortened
+from thenar.runtime.nesting import check_json
 
 from ..pictures import on_paper, painting, rendered
-from .inputs import PlacementError
+from . import PlacementError
 from .placement import Placement
 from .tree import Node, Tree, edge_label, names_for, sizes_of
 
@@ -18,6 +23,8 @@ _LINE_INCHES, _STEP_INCHES, _KEY_INCHES, _LARGEST_INCHES = 0.17, 0.22, 2.0, 200.
 _KEY_LINES = 2
 _LETTER_INCHES = 0.062  # of _FONT_SIZE
 _FONT_SIZE = 7
+_LARGEST_LIST = 4_000_000  # bytes; a placement of the largest set has fewer
+_WANTED = "name a build folder, a file of `thenar place -o`, or a text file with one name per line"
 
 
 def draw_placement(placement: Placement, path: Path) -> None:
@@ -72,3 +79,37 @@ def _draw_box(axes: "Axes", box: tuple[float, float, float, float], label: str, 
     colour = on_paper("leaf" if leaf else "decision")
     axes.add_patch(Rectangle((x, y), width, height, facecolor=colour, edgecolor=on_paper("paper"), linewidth=0.8))
     axes.text(x + _STEP_INCHES / 3, y + 0.5, label, color=on_paper("ink"), va="center_baseline")
+
+
+def kept_names(path: Path) -> tuple[str, ...]:
+    """Return the names of the kept switches, in the order in which they were chosen.
+
+    path is a build's folder, a JSON file (a placement's document, or an array of names), or a text file with one name
+    per line. Raises PlacementError if it is none of these or names no switch, BuildError if it is a damaged build.
+    """
+    names = tuple(kept.name for kept in load_manifest(path).switches) if path.is_dir() else _of_file(path)
+    for name in names:
+        if reason := fault(name):
+            raise PlacementError(f"{path}: switch {shortened(repr(name))} {reason}")
+    if not names:
+        raise PlacementError(f"{path} keeps no switches: there is nothing to draw")
+    return names
+
+
+def _of_file(path: Path) -> tuple[str, ...]:
+    try:
+        text = read_file(path, _LARGEST_LIST, PlacementError).decode()
+    except UnicodeDecodeError:
+        raise PlacementError(f"{path} is not a text file: {_WANTED}") from None
+    if text.lstrip()[:1] not in ("{", "["):
+        return tuple(filter(None, map(str.strip, text.splitlines())))
+    try:
+        check_json(text.encode())
+        found = msgspec.json.decode(text)
+        if isinstance(found, dict):
+            switches = msgspec.convert(found.get("switches"), list[dict[str, Any]])
+            found = [switch.get("name") for switch in switches]
+        return msgspec.convert(found, tuple[str, ...])
+    except ValueError as reason:
+        why = shortened(str(reason))
+        raise PlacementError(f"{path} is not a list of switches ({why}): {_WANTED}") from None

@@ -23,8 +23,7 @@ from thenar.runtime.names import level_name
 
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
-from .exact import Counts
-from .gain import NodeCounts, best_position, first_of_most_gain, gain_bits
+from .gain import Counts, NodeCounts, best_position, first_of_most_gain, gain_bits
 from .ports import PortCosts
 
 # Normal noise passes the fence in one row of 40,000: six times the quartile. A type with fewer rows has no fence.

@@ -1,24 +1,151 @@
-"""Information gain: find the input with the most gain, or the most gain per cost, exactly, and compute that gain.
+"""Information about the class from counts: the input with the most gain, or the most gain per cost, exactly.
 
-With f(n) = n ln n, counts n_vc of class c at value v, n_v and n_c their sums and n the number of rows,
+With f(m) = m ln m, counts n_vc of class c at value v, n_v and n_c their sums and n the number of rows,
 
     n * gain = f(n) - sum over c of f(n_c) + sum over v of [ sum over c of f(n_vc) - f(n_v) ]
 
-in which only the sum over v, the score, depends on the input. If floating point cannot separate two inputs, integer
-arithmetic does (`exact`).
+in which only the sum over v, the score, depends on the input. The information of a bit a given a bit b is, with the
+counts n_cab of class c and values of a and b,
+
+    n * I(class; a | b) = sum f(n_cab) - sum f(n_ab) - sum f(n_cb) + sum f(n_b);    without b, as if b were constant
+
+If floating point cannot separate two such sums, they are compared by their signs as integer multiples of logarithms.
 """
 
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from decimal import Context, Decimal
 from functools import lru_cache
-from math import fsum
+from math import fsum, gcd
+from math import log as ln
 from sys import float_info
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import NDArray
 
-from ..elementary import LN_2, log
-from .exact import Counts, Floats, compare, error_bound, first_best, n_log_n
+from ..elementary import LN_2, Floats, log
+
+Counts = NDArray[np.int64]
+
+UNIT: float = 2.0**-53
+_FIRST_DIGITS = 40
+
+
+def n_log_n(counts: NDArray[Any], logarithm: Callable[[Floats], Floats] = np.log) -> Floats:
+    """Return f(m) = m ln m of every count; f(0) = 0."""
+    floats = counts.astype(np.float64)
+    return np.asarray(floats * logarithm(np.maximum(floats, 1.0)))
+
+
+def error_bound(n: int, terms: int, times: int) -> float:
+    """Bound the error of a floating-point sum of f over `terms` counts, whose absolute values add up to times * f(n).
+
+    A term f(m) is off by 16 relative units of 2^-53 at most: the logarithm by 4 ulp, which are 8 units, and the product
+    by half of one, which is 1 unit. The 7 units left cover a division of the sum by a cost, and the comparison. The sum
+    adds at most terms - 1 units of the sum of the absolute values.
+    """
+    rows = float(max(n, 2))
+    return times * rows * ln(rows) * (terms + 16) * UNIT
+
+
+def first_best(plus: Counts, minus: Counts, costs: Counts | None = None) -> int:
+    """Return the first candidate of maximum value, compared exactly.
+
+    A candidate's value is the sum of f over its row of `plus` (candidates, p), less that over its row of `minus`
+    (candidates, q), divided by its cost: an integer > 0 (None: all cost the same). Values must be at least 0; costs
+    that differ must ascend.
+    """
+    # f(0) = f(1) = 0. Among candidates of the same counts, the first is the cheapest.
+    parts = (np.where(part > 1, part, 0) for part in (plus, minus))
+    terms = np.concatenate([np.sort(part, axis=1) for part in parts], axis=1)
+    prices = [1] * len(terms) if costs is None else costs.tolist()
+    best, others = 0, np.arange(len(terms))
+    while True:
+        others = others[(terms[others] != terms[others[0]]).any(axis=1)]
+        if not len(others):
+            return best
+        other = int(others[0])
+        if compare(plus[other], minus[other], plus[best], minus[best], prices[best], prices[other]) > 0:
+            best = other
+
+
+def compare(
+    plus: Counts, minus: Counts, other_plus: Counts, other_minus: Counts, times: int = 1, other_times: int = 1
+) -> int:
+    """Return the exact sign of times * (f(plus) - f(minus)) - other_times * (f(other_plus) - f(other_minus)), where f
+    of counts is the sum over them.
+    """
+    difference: Counter[int] = Counter()
+    for counts, factor in ((plus, times), (minus, -times), (other_plus, -other_times), (other_minus, other_times)):
+        for count in counts.ravel().tolist():
+            difference[count] += factor
+    return sign_of_log_sum({n: n * factor for n, factor in difference.items() if n})
+
+
+def sign_of_log_sum(multiples: Mapping[int, int]) -> int:
+    """Return the sign, -1, 0 or 1, of the sum over m of multiples[m] * ln m, for integers m >= 1.
+
+    The sum is zero exactly if the product of all m ** multiples[m] is 1, which the exponents over a base of pairwise
+    coprime numbers decide. Otherwise decimal arithmetic of rising precision finds the sign after finitely many steps.
+    """
+    terms = {m: times for m, times in multiples.items() if times and m > 1}
+    if not terms or _product_is_one(terms):
+        return 0
+    digits = _FIRST_DIGITS
+    while True:
+        total, bound = _log_sum(terms, digits)
+        if total.copy_abs() > bound:
+            return 1 if total > 0 else -1
+        digits *= 2
+
+
+def _product_is_one(terms: Mapping[int, int]) -> bool:
+    base = _coprime_base(list(terms))
+    return all(sum(times * _multiplicity(m, factor) for m, times in terms.items()) == 0 for factor in base)
+
+
+def _coprime_base(numbers: list[int]) -> list[int]:
+    """Return pairwise coprime numbers > 1 such that each of `numbers` is a product of their powers."""
+    base: list[int] = []
+    todo = list(numbers)
+    while todo:
+        number = todo.pop()
+        meets = next((factor for factor in base if gcd(factor, number) > 1), None)
+        if number == 1 or number in base:
+            continue
+        if meets is None:
+            base.append(number)
+        else:
+            common = gcd(meets, number)
+            base.remove(meets)
+            todo += [common, meets // common, number // common]
+    return base
+
+
+def _multiplicity(number: int, factor: int) -> int:
+    times = 0
+    while number % factor == 0:
+        number //= factor
+        times += 1
+    return times
+
+
+def _log_sum(terms: Mapping[int, int], digits: int) -> tuple[Decimal, Decimal]:
+    """Return the sum in decimal arithmetic and a bound on its error.
+
+    Logarithm, product and each addition are correctly rounded: at most (number of terms + 2) errors of relative size
+    10^(1 - digits), each of at most the sum of the terms' absolute values; twice that covers their products.
+    """
+    context = Context(prec=digits)
+    total = size = Decimal(0)
+    for m, times in terms.items():
+        term = context.multiply(Decimal(times), context.ln(Decimal(m)))
+        total = context.add(total, term)
+        size = context.add(size, context.abs(term))
+    error = context.multiply(size, Decimal(2 * (len(terms) + 2)))
+    return total, context.scaleb(error, 1 - digits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +159,7 @@ class NodeCounts:
 
     totals: Counts
     cells: Counts
-    starts: npt.NDArray[np.intp]
+    starts: NDArray[np.intp]
 
     def first_values(self) -> Counts:
         """Return (K, n_columns) rows of each class at the first value of each input."""
@@ -45,7 +172,7 @@ class NodeCounts:
         table: Counts = self.tables(np.array([position]))[0]
         return table
 
-    def tables(self, positions: npt.NDArray[np.intp]) -> Counts:
+    def tables(self, positions: NDArray[np.intp]) -> Counts:
         """Return the tables (n_positions, K, most values of any) of several inputs, padded with zeros."""
         stops = np.append(self.starts[1:], self.cells.shape[1])
         sizes = stops[positions] - self.starts[positions]
@@ -68,7 +195,7 @@ class CellCounter:
     starts   (n_columns,) the first cell of each of `columns`
     """
 
-    def __init__(self, X: npt.NDArray[Any], labels: npt.NDArray[np.intp], n_classes: int) -> None:
+    def __init__(self, X: NDArray[Any], labels: NDArray[np.intp], n_classes: int) -> None:
         self.X, self._labels, self._classes = X, labels, np.arange(n_classes)[:, np.newaxis]
         if X.dtype == np.bool_ or not X.size or X.max() <= 1:
             self.columns, self._cells = np.arange(X.shape[1]), X.astype(np.bool_, copy=False)
@@ -81,7 +208,7 @@ class CellCounter:
             self._cells = np.concatenate(cells, axis=1)
         self.starts = np.cumsum([0, *(len(each) - 1 for each in self.values)])[:-1].astype(np.intp)
 
-    def count(self, rows: npt.NDArray[np.intp]) -> Counts:
+    def count(self, rows: NDArray[np.intp]) -> Counts:
         """Return the cells (n_classes, n_cells) of the node that holds `rows`."""
         counts = np.zeros((len(self._classes), self._cells.shape[1]), np.int64)
         for start in range(0, len(rows), _BLOCK):
@@ -91,7 +218,7 @@ class CellCounter:
         return counts
 
 
-def best_position(node: NodeCounts, columns: npt.NDArray[np.intp]) -> int | None:
+def best_position(node: NodeCounts, columns: NDArray[np.intp]) -> int | None:
     """Return the position of the input of maximum gain, None if no input varies at the node.
 
     `columns` (n_columns,) are the inputs' numbers: of equal gains, the lowest number wins.
@@ -137,7 +264,7 @@ def first_of_most_gain(tables: Counts, costs: Counts | None = None) -> int:
     return first_best(plus, minus, costs)
 
 
-def _scores(node: NodeCounts) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def _scores(node: NodeCounts) -> tuple[Floats, NDArray[np.bool_]]:
     """Return each input's score and whether it has more than one value at the node."""
     first = node.first_values()
     first_sizes, cell_sizes = first.sum(axis=0), node.cells.sum(axis=0)
@@ -158,7 +285,7 @@ def _score_bound(node: NodeCounts) -> float:
     return error_bound(int(node.totals.sum()), (len(node.totals) + 1) * most_values, 2)
 
 
-def compare_scores(one: npt.NDArray[Any], other: npt.NDArray[Any]) -> int:
+def compare_scores(one: NDArray[Any], other: NDArray[Any]) -> int:
     """Return the exact sign of score(one) - score(other); tables (K, n_values) of integer counts."""
     return compare(one, one.sum(axis=0), other, other.sum(axis=0))
 
@@ -193,3 +320,50 @@ def entropy_bits(totals: list[int]) -> float:
 @lru_cache(maxsize=1 << 16)
 def _n_log_n(n: int) -> float:
     return float(n_log_n(np.array(n), log))
+
+
+class Cooccurrence:
+    """Counts of all pairs of bits X (n, d) bool in each of n_classes classes `labels` (n,)."""
+
+    def __init__(self, X: NDArray[np.bool_], labels: NDArray[np.intp], n_classes: int) -> None:
+        self._X, self._labels, self._counter = X, labels, CellCounter(X, labels, n_classes)
+        self._totals = np.bincount(labels, minlength=n_classes)
+        self._ones = self._counter.count(np.arange(len(X)))
+        ones = self._ones.sum(axis=0)
+        self.varying = np.flatnonzero((ones > 0) & (ones < len(X)))
+        # Four sums, each of at most n ln n, of 6 (K + 1) terms together.
+        self.error_bound = error_bound(len(X), 6 * (n_classes + 1), 4)
+
+    def information(self, given: int | None = None) -> Floats:
+        """Return n * I(class; a | given) for every bit a, (d,), in nats."""
+        ones = self._ones
+        tables = np.stack([self._totals[:, np.newaxis] - ones, ones], axis=2)[..., np.newaxis]
+        if given is not None:
+            # The counts of rows in which the given bit is set, and of the others.
+            inside = np.flatnonzero(self._X[:, given])
+            totals, ones = np.bincount(self._labels[inside], minlength=len(ones)), self._counter.count(inside)
+            part = np.stack([totals[:, np.newaxis] - ones, ones], axis=2)[..., np.newaxis]
+            tables = np.concatenate([tables - part, part], axis=3)
+        cells, bits, classes, rest = (n_log_n(part).sum(axis=(0, 2, 3)) for part in _parts(tables))
+        return np.asarray(cells - bits - classes + rest)
+
+    def sign(self, one: tuple[int, int | None], other: tuple[int, int | None]) -> int:
+        """Return the sign of I(class; a | b) of pair `one` minus that of pair `other`, exactly."""
+        return compare(*self._terms(*one), *self._terms(*other))
+
+    def _terms(self, bit: int, given: int | None) -> tuple[Counts, Counts]:
+        """Return the counts whose f are added in n * I(class; bit | given), and those whose f are subtracted."""
+        value = 2 * self._X[:, bit] + (0 if given is None else self._X[:, given])
+        counts = np.bincount(4 * self._labels + value, minlength=4 * len(self._totals))
+        cells, bits, classes, rest = (part.ravel() for part in _parts(counts.reshape(-1, 1, 2, 2)))
+        return np.concatenate([cells, rest]), np.concatenate([bits, classes])
+
+
+def _parts(tables: Counts) -> tuple[Counts, Counts, Counts, Counts]:
+    """Return the counts of the four sums, each of four axes: class, bit, its value, value of the given bit."""
+    return (
+        tables,
+        tables.sum(axis=0, keepdims=True),
+        tables.sum(axis=2, keepdims=True),
+        tables.sum(axis=(0, 2), keepdims=True),
+    )

@@ -1,7 +1,7 @@
 """The placement: which switches of a set of grasps a method keeps, in its order, and with which result."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import accumulate
 from math import inf
@@ -9,28 +9,33 @@ from typing import Any, Self
 
 import msgspec
 import numpy as np
-from msgspec.structs import replace
+from msgspec import structs
 
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.recipe import Recipe, changed
 
 from ..elementary import LN_2
 from ..limits import check_types
+from ..model.faults import count_faults
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..sensors import SensorCount
+from ..trainers.logit import fit_logit
+from . import PlacementError
 from .constraints import Bound, Limits
-from .cooccurrence import Cooccurrence
 from .elements import Elements, bits_of, elements_of, names_of, ports_of
-from .gain import entropy_bits
-from .id3 import grow_id3
-from .inputs import PlacementError
-from .joints import kept_joints
+from .gain import Cooccurrence, entropy_bits
 from .methods.base import METHODS, PAPERS, Method
+from .methods.elimination import joint_order
 from .ports import PortCosts
-from .robust import most_robust
-from .tree import Tree
+from .tree import Tree, grow_id3
 
 Progress = Callable[[int, int], None]
+
+# Shares of the switches that are lost in each training row; the accuracy that a placement may cost without a fault.
+SHARES = (0.05, 0.1, 0.2)
+MOST_LOSS = 0.01
+_PENALTY = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,11 +151,76 @@ def _picked(
         refused += set(order) - set(kept)
 
 
+def spread(samples: Samples, share: float) -> Samples:
+    """Return the rows with this share of the switches lost in each, replaced by another row's values."""
+    n, switches = len(samples.labels), samples.switches.copy()
+    random = np.random.default_rng([n, round(1000 * share)])
+    for column in switches.T:
+        lost, others = random.random(n) < share, random.permutation(n)
+        column[lost] = column[others[lost]]
+    return replace(samples, switches=switches)
+
+
+def most_robust(samples: Samples, pick: Callable[[Samples], Columns]) -> Columns:
+    """Return the placement whose worst single lost switch costs least: that of `pick` on these rows, or on rows in
+    which some switches are lost, from which a method also keeps switches that can stand in for them.
+
+    The best share of lost switches depends on the rows and on how many switches are kept. So several are tried, and
+    evaluated by cross-validation on halves of the trials. Of the placements about as accurate as the best, the one with
+    the highest accuracy under its worst lost switch is taken.
+    """
+    plain = pick(samples)
+    tried = [plain, *(pick(spread(samples, share))[: len(plain)] for share in SHARES)]
+    tried = list(dict.fromkeys(tried))
+    if len(tried) == 1 or len(np.unique(samples.trials)) < 2:
+        return plain
+    counted = [_left(samples, columns) for columns in tried]
+    enough = max(correct for correct, _ in counted) - MOST_LOSS * len(np.unique(samples.trials))
+    return tried[max(range(len(tried)), key=lambda one: (counted[one][0] >= enough, counted[one][1], -one))]
+
+
+def _left(samples: Samples, columns: Sequence[int]) -> tuple[int, int]:
+    """Return how many trials the switches `columns`, and the joints, predict rightly in held-out halves; and how many
+    with the worst switch lost.
+    """
+    _, first, trial = np.unique(samples.trials, return_index=True, return_inverse=True)
+    # Every other trial of each class.
+    half = np.empty(len(first), np.intp)
+    half[np.argsort(samples.labels[first], kind="stable")] = np.arange(len(first)) % 2
+    half = half[trial]
+    kept, correct, lost = samples.keeping(tuple(columns)), 0, np.zeros(len(columns), np.int64)
+    for tested in (0, 1):
+        learnt, test = kept.rows(half != tested), kept.rows(half == tested)
+        rows = learnt.masked()
+        tables = fit_logit(rows.inputs, rows.labels, rows.n_classes, penalty=_PENALTY).score_tables(kept.n_switches)
+        integers = quantise(tables, learnt.switches, learnt.codes)
+        found = count_faults(integers, test.switches, test.codes, test.labels, test.trials)
+        correct += found.correct
+        lost += found.lost[: len(columns)]
+    return correct, int(lost.min(initial=correct))
+
+
 def information_alone(samples: Samples, columns: Columns) -> tuple[float, ...]:
     """Return the information (bits) about the grasp type in each of the switches `columns` alone."""
     counts = Cooccurrence(samples.switches, samples.labels, samples.n_classes)
     alone = counts.information() / (len(samples.labels) * LN_2)
     return tuple(float(alone[column]) for column in columns)
+
+
+def kept_joints(samples: Samples, most: int | None, limits: Limits | None = None) -> Columns:
+    """Return at most `most` joints to keep, ascending, given the switches of these rows; None: all that `limits` allow.
+
+    Raises PlacementError if the limits require more joints.
+    """
+    every: Columns = tuple(range(samples.codes.shape[1]))
+    if not every:
+        return ()
+    keep, never, most = ((), (), most or len(every)) if limits is None else limits.on_joints(most)
+    every = tuple(joint for joint in every if joint not in never)
+    if most >= len(every) or not most:
+        return every[:most]
+    order = dict.fromkeys((*keep, *joint_order(samples)))
+    return tuple(sorted([joint for joint in order if joint not in never][:most]))
 
 
 class Kept(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -363,6 +433,6 @@ def _kept_of(grasp_set: GraspSet, selection: InputSelection) -> tuple[Kept, ...]
         return tuple(found)
     entropy, together = entropy_bits(list(selection.tree.nodes[0].counts)), accumulate(selection.gains)
     return tuple(
-        replace(one, gain_bits=gain, cumulative_share=so_far / entropy)
+        structs.replace(one, gain_bits=gain, cumulative_share=so_far / entropy)
         for one, gain, so_far in zip(found, selection.gains, together, strict=True)
     )

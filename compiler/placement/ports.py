@@ -15,7 +15,7 @@ from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import glove_us
 
-from .inputs import PlacementError
+from . import PlacementError
 
 
 @dataclass(frozen=True, slots=True)

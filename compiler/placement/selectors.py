@@ -10,10 +10,10 @@ from thenar.drivers.extras import optional
 from ..samples import Samples
 from .constraints import Limits
 from .elements import elements_of
-from .inputs import check_bits
 from .methods.base import BEST, METHODS
 from .placement import choose
 from .ports import PortCosts
+from .tree import check_bits
 
 with optional():
     from sklearn.base import BaseEstimator

@@ -1,21 +1,24 @@
-"""A grown decision tree: predicts and prints.
+"""The paper's ID3: a decision tree by its steps 1 to 6, pruned by S, that predicts and prints.
 
-Nodes are in preorder: a node, then its children's subtrees in the order of their values. That order and each node's
-number of values determine the children.
+Ties of gain are decided exactly. Nodes are in preorder: a node, then its children's subtrees in the order of their
+values. That order and each node's number of values determine the children.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike, NDArray
 
 from ..text import counted
-from .inputs import PlacementError, check_matrix
+from . import PlacementError
+from .gain import CellCounter, Counts, NodeCounts, best_position, gain_bits
 
 Label = bool | int | float | str
+Rows = NDArray[np.intp]
 
 
 class Node(msgspec.Struct, frozen=True):
@@ -42,11 +45,6 @@ class Node(msgspec.Struct, frozen=True):
     def gains_nothing(self) -> bool:
         """Whether this is a decision at which no input has a gain alone."""
         return self.input is not None and self.gain == 0
-
-    @property
-    def is_mixed_leaf(self) -> bool:
-        """Whether this is a leaf of rows of several classes."""
-        return self.input is None and max(self.counts) < self.size
 
 
 class Tree(msgspec.Struct, frozen=True, dict=True):
@@ -120,7 +118,8 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
     @property
     def n_undecided(self) -> int:
         """Number of leaves of several classes whose rows agree in every input; pruned leaves do not count."""
-        return sum(node.is_mixed_leaf and node.size >= self.min_samples for node in self.nodes)
+        leaves = (node for node in self.nodes if node.input is None)
+        return sum(max(leaf.counts) < leaf.size and leaf.size >= self.min_samples for leaf in leaves)
 
     def remarks(self, what: str = "input") -> Iterator[str]:
         """Yield warnings: decisions without a gain, and leaves that no input can split."""
@@ -133,7 +132,7 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
             leaves = counted(self.n_undecided, "leaf", "leaves")
             yield f"at {leaves} rows of several classes agree in every {what}"
 
-    def predict(self, X: npt.ArrayLike) -> npt.NDArray[Any]:
+    def predict(self, X: ArrayLike) -> NDArray[Any]:
         """Return the label (n,) of each row of X (n, n_inputs); an unseen value gets the node's majority."""
         matrix = check_matrix(X)
         if matrix.shape[1] != self.n_inputs:
@@ -170,7 +169,88 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
                 waiting.append(
                     (child, f"{below}{'└─' if last else '├─'} {value}: ", below + ("   " if last else "│  "))
                 )
-        return "\n".join([*lines, _summary(self)])
+        pruned = f", pruned at S = {self.min_samples}" if self.min_samples else ""
+        summary = (
+            f"{len(self.inputs)} of {self.n_inputs} inputs, {len(self.nodes)} nodes, {self.n_leaves} leaves, "
+            f"depth {self.depth}{pruned}"
+        )
+        return "\n".join([*lines, "; ".join([summary, *self.remarks()])])
+
+
+def grow_id3(X: ArrayLike, y: ArrayLike, min_samples: int = 0) -> Tree:
+    """Grow the paper's tree.
+
+    A node is terminal if its rows have one label, are fewer than `min_samples`, or agree in every input; it then
+    predicts the majority class, of equal ones the lowest. An input that is constant at a node is never chosen; of
+    equal gains, exactly compared, the lowest number wins. If no input has a gain, the same rule holds: the
+    lowest-numbered one that varies is chosen, and the node's gain is 0.
+
+    Parameters
+    ----------
+    X : array-like, shape (n, d)
+        Bool or integers >= 0, with any number of values per input.
+    y : array-like, shape (n,)
+        Labels that can be sorted.
+    min_samples : int
+        The paper's S: nodes of fewer rows decide nothing; 0 does not prune.
+
+    Returns
+    -------
+    Tree
+        Its `inputs` are the columns that it tests, in preorder; `gains` are in bits.
+
+    Raises
+    ------
+    PlacementError
+        If X or y are not such data; the message names row and column.
+
+    Examples
+    --------
+    >>> from thenar.compiler import grow_id3
+    >>> grow_id3([[0, 0], [0, 1], [1, 0], [1, 1]], ["pen", "pen", "cup", "cup"]).inputs
+    (0,)
+    """
+    if min_samples < 0:
+        raise PlacementError(f"min_samples is {min_samples}, a number of rows >= 0 is needed")
+    matrix = check_matrix(X)
+    classes, labels = check_labels(y, len(matrix))
+    nodes = _nodes(CellCounter(matrix, labels, len(classes)), np.bincount(labels), min_samples)
+    return Tree(tuple(nodes), tuple(classes.tolist()), matrix.shape[1], min_samples)
+
+
+def _nodes(counter: CellCounter, totals: Counts, min_samples: int) -> Iterator[Node]:
+    """Yield the nodes in preorder; `totals` (K,) are the rows of each class. A stack replaces recursion: trees may be
+    deep.
+    """
+    # The rows of each node to be made, its class totals, and its cells if they are already known.
+    waiting: list[tuple[Rows, Counts, Counts | None]] = [(np.arange(len(counter.X)), totals, None)]
+    while waiting:
+        rows, totals, cells = waiting.pop()
+        position = None
+        if len(counter.columns) and _goes_on(totals, min_samples):
+            cells = counter.count(rows) if cells is None else cells
+            counted = NodeCounts(totals, cells, counter.starts)
+            position = best_position(counted, counter.columns)
+        if position is None:
+            yield Node(tuple(totals.tolist()))
+            continue
+        table = counted.table(position)
+        present = np.flatnonzero(table.any(axis=0))
+        column, values = int(counter.columns[position]), counter.values[position][present]
+        yield Node(tuple(totals.tolist()), column, gain_bits(table), tuple(values.tolist()))
+        taken = counter.X[rows, column]
+        parts, tables = [rows[taken == value] for value in values], table[:, present].T
+        known: list[Counts | None] = [None] * len(parts)
+        small, *others = np.argsort([len(part) for part in parts], kind="stable").tolist()
+        if len(others) == 1 and _goes_on(tables[others[0]], min_samples):
+            # Count the smaller of two children only; the larger gets the rest.
+            known[small] = counter.count(parts[small])
+            known[others[0]] = counted.cells - known[small]
+        waiting += reversed(list(zip(parts, tables, known, strict=True)))
+
+
+def _goes_on(totals: Counts, min_samples: int) -> bool:
+    return int(np.count_nonzero(totals)) > 1 and int(totals.sum()) >= min_samples
 
 
 def sizes_of(tree: Tree) -> list[int]:
@@ -214,10 +294,64 @@ def node_text(node: Node, names: Sequence[str], class_names: Sequence[str]) -> s
     return f"{class_names[node.majority]}  {most if most == node.size else f'{most} of {node.size}'} rows"
 
 
-def _summary(tree: Tree) -> str:
-    pruned = f", pruned at S = {tree.min_samples}" if tree.min_samples else ""
-    said = (
-        f"{len(tree.inputs)} of {tree.n_inputs} inputs, {len(tree.nodes)} nodes, {tree.n_leaves} leaves, "
-        f"depth {tree.depth}{pruned}"
-    )
-    return "; ".join([said, *tree.remarks()])
+_WHOLE = "not a whole number >= 0"
+
+
+def check_matrix(X: ArrayLike) -> NDArray[Any]:
+    """Return X (n, d) as an array of bool or int, all values >= 0; floats with integer values become ints.
+
+    Raises PlacementError that names row and column of the first other entry.
+    """
+    matrix = np.asarray(X)
+    if matrix.ndim != 2:
+        raise PlacementError(f"X has {matrix.ndim} dimensions, (rows, inputs) are needed")
+    if matrix.dtype.kind not in "biuf":
+        raise PlacementError(f"X holds {matrix.dtype}, bits or non-negative whole numbers are needed")
+    if matrix.dtype.kind == "f":
+        # Comparisons with NaN are false, so this finds NaN as well.
+        _refuse(~((matrix >= 0) & (matrix < 2**62) & (matrix == np.floor(matrix))), matrix, _WHOLE)
+        return matrix.astype(np.int64)
+    if matrix.dtype.kind == "i" and matrix.size and matrix.min() < 0:
+        _refuse(matrix < 0, matrix, _WHOLE)
+    return matrix
+
+
+def _refuse(bad: NDArray[np.bool_], matrix: NDArray[Any], why: str) -> None:
+    if bad.any():
+        row, column = (int(index) for index in np.argwhere(bad)[0])
+        raise PlacementError(f"X holds {matrix[row, column]} in row {row}, column {column}: {why}")
+
+
+def check_bits(X: ArrayLike) -> NDArray[np.bool_]:
+    """Return X (n, d) as bool; raise PlacementError that names the first entry that is neither 0 nor 1."""
+    matrix = check_matrix(X)
+    if matrix.size and matrix.dtype != np.bool_ and matrix.max() > 1:
+        _refuse(matrix > 1, matrix, "neither 0 nor 1")
+    return matrix.astype(np.bool_, copy=False)
+
+
+def check_labels(y: ArrayLike, n_rows: int) -> tuple[NDArray[Any], NDArray[np.intp]]:
+    """Return the sorted classes (K,) of y and the class number of each row (n,).
+
+    Raises PlacementError if y is empty, does not have one label for each row, holds NaN or infinity, or cannot be
+    sorted.
+    """
+    labels = np.asarray(y)
+    if labels.shape != (n_rows,):
+        raise PlacementError(f"y has shape {labels.shape}, one label for each of the {n_rows} rows of X is needed")
+    if not n_rows:
+        raise PlacementError("there are no rows: a placement needs at least one labelled grasp")
+    if (strange := _not_finite(labels)).any():
+        row = int(strange.argmax())
+        raise PlacementError(f"y is {labels[row]} in row {row}: every row needs a label")
+    try:
+        classes, numbers = np.unique(labels, return_inverse=True)
+    except TypeError as mixed:
+        raise PlacementError(f"the labels in y cannot be sorted ({mixed}): use text or numbers, not both") from None
+    return classes, numbers
+
+
+def _not_finite(labels: NDArray[Any]) -> NDArray[np.bool_]:
+    if labels.dtype.kind == "O":
+        return np.array([isinstance(label, float) and not math.isfinite(label) for label in labels.tolist()])
+    return ~np.isfinite(labels) if labels.dtype.kind == "f" else np.zeros(len(labels), np.bool_)

@@ -1,25 +1,37 @@
-"""The interface of trainers, and the registry of all trainers."""
+"""The interface of trainers, the registry of all trainers, and the check of the rows that they train on."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from thenar.drivers.errors import ThenarError
 from thenar.drivers.members import Members
 from thenar.runtime.manifest import Fitting
+from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.recipe import AUTO, Recipe
 
+from ..elementary import Floats
+from .stumps import Stumps
+
 if TYPE_CHECKING:
-    from ..model.collapse import Model
     from ..samples import Samples
 
+# The models that trainers return: score tables, or an ensemble that collapses to them.
+Model = Stumps | ScoreTables
 Report = Callable[[int, int], None]
 Number = float | int | str | None
 
 
 class TrainerError(ThenarError, ValueError):
     """An unknown setting of a trainer, or a value out of its range."""
+
+
+class BoostingError(ThenarError, ValueError):
+    """An invalid training set, or an invalid option of a fit to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +111,7 @@ class Trainer(ABC):
     staged: bool = False
 
     @abstractmethod
-    def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "Model":
+    def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> Model:
         """Return a model of `samples`.
 
         Parameters
@@ -118,7 +130,7 @@ class Trainer(ABC):
             and settings only, to the last bit.
         """
 
-    def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> "tuple[Model, ...]":
+    def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> tuple[Model, ...]:
         """Return a model for each of these numbers of rounds, from one training; see `train`.
 
         Staged trainers override this method. Each model is the one that `train` returns for that number of rounds, to
@@ -205,11 +217,11 @@ class Training:
         """Return the training that was chosen."""
         return cls(fitting.trainer, TRAINERS.named(fitting.trainer).checked(fitting.settings), masked)
 
-    def train(self, samples: "Samples", report: Report | None = None) -> "Model":
+    def train(self, samples: "Samples", report: Report | None = None) -> Model:
         """Return the trainer's model of `samples`."""
         return TRAINERS.named(self.trainer).train(self._rows(samples), self.settings, report)
 
-    def stages(self, samples: "Samples", rounds: Sequence[int]) -> "tuple[Model, ...]":
+    def stages(self, samples: "Samples", rounds: Sequence[int]) -> tuple[Model, ...]:
         """Return the trainer's models of `samples` after each of these numbers of rounds."""
         return TRAINERS.named(self.trainer).stages(self._rows(samples), self.settings, rounds)
 
@@ -243,3 +255,22 @@ def _asked(options: Recipe) -> list[tuple[Trainer, dict[str, Number]]]:
         size = {name: len(names[name]) for name in takers}
         takers = [name for at, name in enumerate(takers) if not any(size[one] < size[name] for one in takers[:at])]
     return [(TRAINERS[name], given) for name in takers]
+
+
+def check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int, weights: Floats | None) -> None:
+    """Raise BoostingError unless these arguments form a valid training set."""
+    if X.ndim != 2 or len(X) == 0 or labels.shape != (len(X),):
+        raise BoostingError(f"inputs {X.shape} and labels {labels.shape} must be (n, d) and (n,) with at least one row")
+    if labels.min() < 0 or labels.max() >= n_classes:
+        raise BoostingError(f"labels run from {labels.min()} to {labels.max()}, classes from 0 to {n_classes - 1}")
+    if weights is not None:
+        check_weights(weights, len(X))
+    if X.dtype.kind == "f" and np.isinf(X).any():
+        row, column = np.argwhere(np.isinf(X))[0]
+        raise BoostingError(f"row {row}, column {column} is infinite; a joint angle is finite or NaN for missing")
+
+
+def check_weights(weights: Floats, n: int) -> None:
+    """Raise BoostingError unless these are valid weights of n rows."""
+    if weights.shape != (n,) or not (np.isfinite(weights).all() and (weights >= 0).all() and weights.any()):
+        raise BoostingError("row weights must be (n,) finite, non-negative numbers, not all zero")

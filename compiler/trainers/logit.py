@@ -1,14 +1,170 @@
-"""The additive multinomial logit."""
+"""The additive multinomial logit: all score tables fitted at once, the unique minimum of a convex function."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .base import Report, Setting, Trainer
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.base import HIGHEST_CODE
+from thenar.runtime.model.terms.line import Line
+
+from ..elementary import Floats, on_one_grid
+from ..limits import check_memory
+from .base import BoostingError, Report, Setting, Trainer, check_rows
+from .newton import TOLERANCE, Column, Fit, Ruler, columns_of
 
 if TYPE_CHECKING:
-    from thenar.runtime.model.tables import ScoreTables
-
     from ..samples import Samples
+
+BINS = 16
+PENALTY, SMOOTHNESS = 0.5, 2.0
+FINEST = 1e-12  # the least tolerance
+
+
+class Rise(NamedTuple):
+    """A column's line: row (K,) times (x - low), x between low and high."""
+
+    low: float
+    high: float
+    row: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColumnTables:
+    """F_k(x) = bias_k + sum over columns of rows[column][bin, k], for columns of any numbers.
+
+    bias   (K,)
+    edges  for each column, ascending (B - 1,): the bin of x is the number of edges below it
+    rows   for each column (B, K)
+    lines  for some columns, an additional contribution in proportion to x
+    """
+
+    bias: Floats
+    edges: tuple[Floats, ...]
+    rows: tuple[Floats, ...]
+    lines: Mapping[int, Rise] = field(default_factory=dict)
+
+    def scores(self, X: NDArray[np.generic]) -> Floats:
+        """Return F (n, K) of X (n, d)."""
+        scores = np.tile(self.bias, (len(X), 1))
+        for column, (edges, rows) in enumerate(zip(self.edges, self.rows, strict=True)):
+            x = np.asarray(X[:, column], np.float64)
+            scores += rows[np.searchsorted(edges, x)]
+            if column in self.lines:
+                low, high, row = self.lines[column]
+                scores += (np.clip(x, low, high) - low)[:, np.newaxis] * row
+        return scores
+
+    def columns(self, order: Sequence[int]) -> "ColumnTables":
+        """Return the tables of the columns in another order."""
+        edges, rows = (tuple(part[column] for column in order) for part in (self.edges, self.rows))
+        return ColumnTables(
+            self.bias, edges, rows, {at: self.lines[c] for at, c in enumerate(order) if c in self.lines}
+        )
+
+    def score_tables(self, n_switches: int) -> ScoreTables:
+        """Return the tables of [switches | joint codes], the first `n_switches` columns being switches."""
+        bias, switch_rows = self.bias, np.zeros((n_switches, len(self.bias)))
+        for column in range(n_switches):
+            opened, closed = self.rows[column][np.searchsorted(self.edges[column], [0.0, 1.0])]
+            bias, switch_rows[column] = bias + opened, closed - opened
+        thresholds, joint_rows = [], []
+        for edges, rows in zip(self.edges[n_switches:], self.rows[n_switches:], strict=True):
+            floors = np.unique(np.floor(edges))
+            steps = floors[(floors >= 0) & (floors < HIGHEST_CODE)]
+            thresholds.append(steps.astype(np.uint16))
+            # The smallest code of each bin.
+            joint_rows.append(rows[np.searchsorted(edges, np.append(0.0, steps + 1))])
+        lines = (Line(column - n_switches, int(low), int(high), row) for column, (low, high, row) in self.lines.items())
+        return ScoreTables.of(bias, switch_rows, thresholds, joint_rows, [*lines])
+
+
+def fit_logit(
+    X: NDArray[np.generic],
+    labels: NDArray[np.intp],
+    n_classes: int,
+    *,
+    penalty: float = PENALTY,
+    smoothness: float = SMOOTHNESS,
+    max_bins: int | None = BINS,
+    linear: bool = False,
+    tolerance: float = TOLERANCE,
+    weights: Floats | None = None,
+    counted: int = 0,
+    held: NDArray[np.bool_] | None = None,
+) -> ColumnTables:
+    """Fit X (n, d) finite numbers, labels (n,) in 0..n_classes-1, weights (n,) >= 0.
+
+    `penalty` pulls rows towards zero, `smoothness` pulls those of neighbouring bins towards each other. Columns have at
+    most `max_bins` bins (2 or more; None: one for each value) that hold frames as evenly as possible. With `linear` a
+    column of more than two values adds scores in proportion to them, between minimum and maximum, and `smoothness`
+    pulls the contribution of one standard deviation. The number of set bits among the first `counted` columns adds
+    scores as well, with the weak pull of a bin, so that their common effect is learned at once. Frames in `held` (n,)
+    are known not to be of the last class, which learns nothing from them. No derivative of the loss is larger at the
+    solution than `tolerance` times the sum of weights. Raises BoostingError.
+    """
+    if not (0 < penalty < math.inf and 0 <= smoothness < math.inf):
+        raise BoostingError(f"penalty={penalty} must be above 0, and smoothness={smoothness} at least 0, both finite")
+    if max_bins is not None and max_bins < 2:
+        raise BoostingError(f"max_bins={max_bins} must be at least 2: a single bin carries no information")
+    if not FINEST <= tolerance < 1:
+        raise BoostingError(f"tolerance={tolerance} must be at least {FINEST:g} and below 1")
+    check_rows(X, labels, n_classes, weights)
+    if X.dtype.kind == "f" and np.isnan(X).any():
+        raise BoostingError("the inputs hold NaN: a logit has no scores for a missing value")
+    check_memory(len(X), n_classes, BoostingError, *X.shape[1:])
+    scale = 1.0
+    if weights is not None:
+        # Scale by a power of two, which changes no result: sums of huge weights stay finite, of tiny ones exact.
+        scale = float(np.ldexp(1.0, -np.frexp(weights.max())[1]))
+        weights = on_one_grid(weights * scale, len(X))
+    heavy = np.ones(len(X)) if weights is None else weights
+    columns = columns_of(X, max_bins, weights, heavy if linear else None)
+    count = count_of(columns[:counted], heavy)
+    pulls = penalty * scale, smoothness * scale
+    rows = Fit([*columns, *count], labels, n_classes, *pulls, weights, held).minimum(tolerance)
+    return tables_of(columns, spread_out(columns, rows, count))
+
+
+def count_of(columns: Sequence[Column], weights: Floats) -> list[Column]:
+    """Return a list with a column that counts the set bits of `columns`; an empty list if the count adds no
+    information.
+
+    `weights` (n,) are those of frames.
+    """
+    bits = [column.bins for column in columns if column.counts]
+    number: Floats = np.add.reduce(bits, axis=0).astype(np.float64) if len(bits) > 1 else np.zeros(1)
+    if number.min() == number.max():
+        return []
+    return [Column(np.zeros(0), np.zeros(len(number), np.intp), 0, Ruler.of(number, weights), free=True)]
+
+
+def spread_out(columns: Sequence[Column], rows: Floats, count: Sequence[Column]) -> Floats:
+    """Return rows of `columns` that include the contribution of their count, the last column."""
+    if not count or count[0].line is None:
+        return rows
+    ruler, rows, each = count[0].line, rows[:-1].copy(), rows[-1] / count[0].line.unit
+    rows[0] -= (ruler.low + ruler.unit * ruler.centre) * each
+    starts = 1 + np.cumsum([0, *(column.n_rows for column in columns[:-1])])
+    rows[[start for start, column in zip(starts.tolist(), columns, strict=True) if column.counts]] += each
+    return rows
+
+
+def tables_of(columns: Sequence[Column], rows: Floats) -> ColumnTables:
+    """Return the rows (r, K) of a minimum as tables."""
+    bias, *parts = np.split(rows, np.cumsum([1, *(column.n_rows for column in columns[:-1])])) if columns else [rows]
+    bias, tables, lines = bias[0], [], {}
+    for number, (column, own) in enumerate(zip(columns, parts, strict=True)):
+        if column.line is not None:
+            bias = bias - column.line.centre * own[0]
+            lines[number] = Rise(column.line.low, column.line.high, own[0] / column.line.unit)
+            own = np.zeros_like(own)
+        tables.append(np.vstack([np.zeros((column.first, own.shape[1])), own]))
+    return ColumnTables(bias, tuple(column.edges for column in columns), tuple(tables), lines)
 
 
 class Logit(Trainer):
@@ -17,10 +173,12 @@ class Logit(Trainer):
     name = "logit"
     what = "multinomial logistic regression on a table for each input"
     settings = (
-        Setting("penalty", "Pull of scores towards zero (logit).", float, 0.5, 1e-6, 1e6),
-        Setting("smoothness", "Pull of a joint's neighbouring bins towards each other (logit).", float, 2.0, 0.0, 1e6),
+        Setting("penalty", "Pull of scores towards zero (logit).", float, PENALTY, 1e-6, 1e6),
         Setting(
-            "max_bins", "Most bins per joint; fewer make smaller tables.  [default: no limit; logit: 16]", int, 16, 2
+            "smoothness", "Pull of a joint's neighbouring bins towards each other (logit).", float, SMOOTHNESS, 0.0, 1e6
+        ),
+        Setting(
+            "max_bins", "Most bins per joint; fewer make smaller tables.  [default: no limit; logit: 16]", int, BINS, 2
         ),
         Setting("linear", "1: joints add scores in proportion to their codes, without bins (logit).", int, 0, 0, 1),
     )
@@ -35,10 +193,8 @@ class Logit(Trainer):
         {"penalty": 0.3, "smoothness": 1.0, "linear": 1},
     )
 
-    def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":
+    def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> ScoreTables:
         """Return the tables. Raises BoostingError for settings that make no sense."""
-        from ..additive.logit import BINS, fit_logit
-
         given = {**settings, "max_bins": settings["max_bins"] or BINS, "linear": bool(settings["linear"])}
         tables = fit_logit(samples.inputs, samples.labels, samples.n_classes, **given, **of_none(samples))
         return tables.score_tables(samples.n_switches)

@@ -1,17 +1,131 @@
-"""LogitBoost on decision stumps, the paper's trainer."""
+"""LogitBoost on decision stumps, the paper's trainer (Friedman, Hastie, Tibshirani 2000; Weka 3.6's choices).
 
-from collections.abc import Mapping, Sequence
+Where Weka's result depends on rounding, thenar uses a numerically stable rule instead (docs/project/weka-parity.md):
+sums are exact (elementary), a branch with almost no weight counts as empty, and branch outputs are clipped to +-z_max.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from .base import Number, Report, Setting, Trainer
+import numpy as np
+from numpy.typing import NDArray
+
+from ..elementary import Floats, add_exactly, softmax_and_loss
+from ..limits import check_memory
+from .base import BoostingError, Number, Report, Setting, Trainer, check_rows
+from .binning import bin_columns
+from .stumps import Stumps, Targets, centred, fit_stumps
 
 if TYPE_CHECKING:
-    from ..boosting.stumps import Stumps
     from ..samples import Samples
 
-
-# As boosting.boost.TIES.
+# Ties are counted on a grid whose units grow with the square of z_max: far above this, all stumps would tie.
+LARGEST_Z_MAX = 100.0
+# Close to 32 MiB, the largest value that glibc respects.
+_LARGE_BYTES = 31 << 20
 TIES = ("first", "least-used")
+# Far below this, all scores of a hundred rounds would lie within the tolerance of a tie (tables.TIE).
+SMALLEST_SHRINKAGE = 1e-6
+
+
+def boost(
+    X: NDArray[np.generic],
+    labels: NDArray[np.intp],
+    n_classes: int,
+    *,
+    rounds: int = 100,
+    shrinkage: float = 1.0,
+    z_max: float = 3.0,
+    tolerance: float | None = None,
+    weights: Floats | None = None,
+    max_bins: int | None = None,
+    ties: str = "first",
+    on_round: Callable[[int, int], None] | None = None,
+) -> tuple[Stumps, tuple[float, ...]]:
+    """Train `rounds` rounds on X (n, d) numbers (NaN: missing), labels (n,) in 0..n_classes-1, weights (n,) >= 0.
+
+    Stops early where the mean log-likelihood changes by less than `tolerance` in a round (Weka's -L; None: never), or
+    where no column varies. With `max_bins` (2 or more) columns have at most that many bins, which hold rows as evenly
+    as possible. Between stumps that explain the same, `ties` takes the lowest column ("first", Weka's rule), or the one
+    that the fewest stumps have used so far ("least-used"). `on_round(done, rounds)` is called after every round.
+
+    Return the ensemble, and the losses before the first round and after every round: the mean of -ln P(true class).
+    Raises BoostingError.
+    """
+    _check_options(rounds, shrinkage, z_max, tolerance, max_bins, ties)
+    check_rows(X, labels, n_classes, weights)
+    if weights is not None:
+        # Scale by a power of two, which changes no result: sums of huge weights stay finite, of tiny ones exact.
+        weights = np.ldexp(weights, -np.frexp(weights.max())[1])
+    binned = bin_columns(X, max_bins)
+    check_memory(len(X), n_classes, BoostingError, len(binned.two.columns), len(binned.many.columns))
+    # glibc returns freed memory above twice the largest array ever freed to the system, and faults it in again.
+    np.empty(_LARGE_BYTES, dtype=np.uint8)
+    member = labels == np.arange(n_classes)[:, np.newaxis]
+    scores = carry = np.zeros((n_classes, len(X)))
+    probability, loss = softmax_and_loss(scores, labels, weights)
+    losses = [loss]
+    used = np.zeros(X.shape[1], dtype=np.int64) if ties == "least-used" else None
+    fitted: list[tuple[NDArray[np.int32], Floats, Floats]] = []
+    stopped = False
+    while len(fitted) < rounds and binned.columns and not stopped:
+        targets = Targets(*weights_and_responses(probability, member, z_max, weights))
+        stumps = fit_stumps(binned, targets, z_max, used)
+        # Drop the outputs: with a million rows they would take a hundred megabytes a round.
+        fitted.append((stumps.columns, stumps.thresholds, stumps.values))
+        scores, carry = add_exactly(scores, carry, centred(stumps.outputs, shrinkage))
+        probability, loss = softmax_and_loss(scores + carry, labels, weights)
+        losses.append(loss)
+        stopped = tolerance is not None and abs(losses[-2] - losses[-1]) < tolerance
+        if on_round is not None:
+            on_round(len(fitted), rounds)
+    return _stack(fitted, X.shape[1], n_classes, shrinkage, stopped), tuple(losses)
+
+
+def weights_and_responses(
+    probability: Floats, member: NDArray[np.bool_], z_max: float, row_weights: Floats | None
+) -> tuple[Floats, Floats]:
+    """Return w and w z (K, n) for P (K, n): z = 1/P or -1/(1 - P) within +-z_max, w z = Y - P."""
+    complement = 1.0 - probability
+    own = np.where(member, probability, complement)
+    other = np.where(member, complement, probability)  # |Y - P|
+    sizes = other if row_weights is None else other * row_weights
+    # |z| = min(1/own, z_max), so w = |Y - P| / |z| = |Y - P| * max(own, 1/z_max): no division, hence none by zero.
+    return sizes * np.maximum(own, 1.0 / z_max), np.where(member, sizes, -sizes)
+
+
+def _stack(
+    fitted: list[tuple[NDArray[np.int32], Floats, Floats]], n_inputs: int, n_classes: int, shrinkage: float, early: bool
+) -> Stumps:
+    rounds = len(fitted)
+    return Stumps(
+        n_inputs,
+        np.array([columns for columns, _, _ in fitted], dtype=np.int32).reshape(rounds, n_classes),
+        np.array([thresholds for _, thresholds, _ in fitted]).reshape(rounds, n_classes),
+        np.array([values for _, _, values in fitted]).reshape(rounds, n_classes, 3),
+        shrinkage,
+        early,
+    )
+
+
+def _check_options(
+    rounds: int, shrinkage: float, z_max: float, tolerance: float | None, max_bins: int | None, ties: str
+) -> None:
+    if ties not in TIES:
+        raise BoostingError(f"ties={ties!r} must be one of {', '.join(TIES)}")
+    if rounds < 1:
+        raise BoostingError(f"rounds={rounds} must be at least 1")
+    if max_bins is not None and max_bins < 2:
+        raise BoostingError(f"max_bins={max_bins} must be at least 2: a single bin carries no information")
+    if not SMALLEST_SHRINKAGE <= shrinkage <= 1:
+        raise BoostingError(f"shrinkage={shrinkage} must be at least {SMALLEST_SHRINKAGE:g} and at most 1")
+    if not 1 < z_max <= LARGEST_Z_MAX:
+        raise BoostingError(f"z_max={z_max} must be above 1 and at most {LARGEST_Z_MAX:g}")
+    if tolerance is not None and not 0 <= tolerance < math.inf:
+        raise BoostingError(
+            f"tolerance={tolerance} must be a change of the loss of at least 0; leave it out to train all rounds"
+        )
 
 
 class LogitBoost(Trainer):
@@ -29,8 +143,7 @@ class LogitBoost(Trainer):
     )
     settings = (
         Setting("rounds", "Rounds of LogitBoost.", int, 100, 1),
-        # Equal to boosting.boost.SMALLEST_SHRINKAGE, which is not imported for a help text.
-        Setting("shrinkage", "Factor on the contribution of each round.", float, 1.0, 1e-6, 1.0),
+        Setting("shrinkage", "Factor on the contribution of each round.", float, 1.0, SMALLEST_SHRINKAGE, 1.0),
         Setting("tolerance", "Stop after a round that changes the mean loss by less than this.", float, None, 0),
         Setting("max_bins", "Most bins per joint; fewer make smaller tables.  [default: no limit]", int, None, 2),
         Setting("ties", "Between equal stumps, take the first or the least used input.", str, "first", names=TIES),
@@ -41,13 +154,11 @@ class LogitBoost(Trainer):
         recipe = {"shrinkage": 1.0, "max_bins": None, "ties": "first"} if "rounds" in given else {}
         return super().candidates({**recipe, **given})
 
-    def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "Stumps":
+    def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> Stumps:
         """Return the ensemble. Raises BoostingError for settings that make no sense."""
-        from ..boosting.boost import boost
-
         return boost(samples.inputs, samples.labels, samples.n_classes, **settings, on_round=report)[0]
 
-    def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> "tuple[Stumps, ...]":
+    def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> tuple[Stumps, ...]:
         """Return the ensembles of the first rounds, cut from the longest training."""
         longest = self.train(samples, {**settings, "rounds": max(rounds)})
         return tuple(longest.first(each) for each in rounds)

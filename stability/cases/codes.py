@@ -9,12 +9,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.boosting.boost import boost
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.recordings.columns import ColumnRoles, JointColumns
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
 from thenar.compiler.recordings.table import read_table
+from thenar.compiler.trainers.logitboost import boost
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 
 from ..finding import Case, Finding, Worst

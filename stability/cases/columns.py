@@ -5,9 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.boosting.boost import boost
-from thenar.compiler.placement.id3 import grow_id3
-from thenar.compiler.placement.tree import Tree
+from thenar.compiler.placement.tree import Tree, grow_id3
+from thenar.compiler.trainers.logitboost import boost
 
 from ..finding import Case, Finding, Worst
 from ..inputs.small_sets import parity

@@ -13,7 +13,7 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from thenar.compiler.boosting.boost import boost
+from thenar.compiler.trainers.logitboost import boost
 from thenar.runtime.model.tables import winners
 
 from ..checks.roundings import ROUNDING, share_error

@@ -9,9 +9,9 @@ from mpmath import mpf
 from numpy.typing import NDArray
 
 from thenar.compiler.artifact.compile import compile_build
-from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import softmax
+from thenar.compiler.trainers.logitboost import boost
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.build import Build
 from thenar.runtime.model.tables import winners
 

@@ -7,8 +7,7 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.compiler.placement.cooccurrence import Cooccurrence
-from thenar.compiler.placement.gain import best_position, compare_scores, entropy_bits, gain_bits
+from thenar.compiler.placement.gain import Cooccurrence, best_position, compare_scores, entropy_bits, gain_bits
 
 from ..checks.roundings import ROUNDING, part_of
 from ..finding import REFERENCE, Case, Finding, Worst

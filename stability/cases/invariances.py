@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.model.collapse import collapse
-from thenar.compiler.model.substitutes import fit_lost
-from thenar.compiler.placement.id3 import grow_id3
-from thenar.compiler.placement.tree import Tree
+from thenar.compiler.model.faults import fit_lost
+from thenar.compiler.placement.tree import Tree, grow_id3
+from thenar.compiler.trainers.logitboost import boost
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, BINS, TOLERANCE, ColumnTables, fit_logit
-from thenar.compiler.additive.pairs import fit_pairs
+from thenar.compiler.trainers.logit import BINS, ColumnTables, fit_logit
+from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE, TOLERANCE
+from thenar.compiler.trainers.pairs import fit_pairs
 from thenar.runtime.model.integers import LIMIT
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import ScoreTables
@@ -96,8 +97,8 @@ def _unrest(hard: HardSet, tables: ColumnTables, pulls: tuple[float, float]) -> 
     for x, edges, rows in zip(hard.X.T, tables.edges, tables.rows, strict=True):
         bins = np.searchsorted(edges, x)
         two = len(edges) < 2
-        pulled = [penalty] if two else [BIN_SHARE * penalty] * (len(edges) + 1)
-        own = rows[1:2] if two else rows[:-1]
+        own = rows[1:] if two else rows
+        pulled = [penalty if two else BIN_SHARE * penalty] * len(own)
         steps = [(number, number + 1, smoothness) for number in range(len(pulled) - 1)]
         columns.append(ReferenceColumn((bins - two).tolist(), own.tolist(), pulled, steps))
     largest = largest_derivative(columns, hard.labels.tolist(), weights.tolist())

@@ -10,9 +10,9 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import Floats
 from thenar.compiler.model.collapse import collapse
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.quantise import balance, quantise
 
 from ..checks.roundings import ROUNDING, SMALLEST, part_of

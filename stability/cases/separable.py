@@ -14,9 +14,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.model.collapse import collapse
+from thenar.compiler.trainers.logitboost import boost
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.integers import LIMIT, IntegerTables
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners

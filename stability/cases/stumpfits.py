@@ -8,9 +8,9 @@ from fractions import Fraction
 import numpy as np
 from mpmath import mpf
 
-from thenar.compiler.boosting.binning import bin_columns, midpoints
-from thenar.compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
 from thenar.compiler.elementary import Floats
+from thenar.compiler.trainers.binning import bin_columns, midpoints
+from thenar.compiler.trainers.stumps import FittedStumps, Targets, fit_stumps
 
 from ..checks.class_rounds import ClassRound, branches
 from ..finding import REFERENCE, Case, Finding, Worst

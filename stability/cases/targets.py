@@ -6,9 +6,8 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from thenar.compiler.boosting.boost import weights_and_responses
-from thenar.compiler.boosting.exactsums import on_grids
-from thenar.compiler.elementary import Floats, softmax
+from thenar.compiler.elementary import Floats, on_grids, softmax
+from thenar.compiler.trainers.logitboost import weights_and_responses
 
 from ..checks.roundings import ROUNDING, SMALLEST, share_error
 from ..finding import REFERENCE, Case, Finding, Worst

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from thenar.compiler.boosting.boost import boost
+from thenar.compiler.trainers.logitboost import boost
 
 from ..checks.class_rounds import see_round
 from ..checks.roundings import ROUNDING

@@ -1,6 +1,6 @@
 """One round at 60 digits, class by class, and the error bounds of its sums.
 
-A class's weights w and responses r = w z are rounded to whole units (compiler/boosting/exactsums.py), with a sum of
+A class's weights w and responses r = w z are rounded to whole units (compiler/elementary.py), with a sum of
 magnitudes of 2^50 to 2^52 units; the remainders are rounded to units 52 - log2(2 n) bits finer. All sums of units are
 exact.
 
@@ -15,8 +15,8 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import Floats
+from thenar.compiler.trainers.stumps import Stumps
 
 from ..finding import Worst
 from ..inputs.hard_data import HardSet

@@ -8,9 +8,9 @@ from itertools import chain
 
 import numpy as np
 
-from thenar.compiler.boosting.boost import weights_and_responses
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import Floats, softmax_and_loss
+from thenar.compiler.trainers.logitboost import weights_and_responses
+from thenar.compiler.trainers.stumps import Stumps
 
 from ..inputs.hard_data import HardSet
 from .roundings import ROUNDING

@@ -42,7 +42,7 @@ def largest_derivative(columns: Sequence[ReferenceColumn], labels: Sequence[int]
         for frame, row in enumerate(column.added):
             if row >= 0:
                 sums[row] = [total + own for total, own in zip(sums[row], residuals[frame], strict=True)]
-        largest = max(largest, *(abs(each) for row in _held(column, sums) for each in row))
+        largest = max([largest, *(abs(each) for row in _held(column, sums) for each in row)])
     return largest
 
 

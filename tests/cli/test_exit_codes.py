@@ -201,7 +201,7 @@ def test_an_import_without_its_extra_says_which_one_it_needs() -> None:
     extras = {name: found[1] if (found := hint.fullmatch(text)) else text for name, text in said.items()}
     assert set(extras.values()) <= EXTRAS.keys(), extras
     for name, extra in (
-        ("compiler.boosting.classifier", "compiler"),
+        ("compiler.classifiers", "compiler"),
         ("runtime.web", "web"),
         ("stability", "stability"),
     ):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from thenar.cli import run
-from thenar.compiler.placement.kept import kept_names
+from thenar.compiler.placement.drawing import kept_names
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness
 

@@ -7,8 +7,8 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.compiler.boosting.boost import boost
 from thenar.compiler.evaluation.rates import Rate
+from thenar.compiler.trainers.logitboost import boost
 from thenar.stability.cases import elementary, information, scoretables, stumpfits, targets
 from thenar.stability.cases.statistics import WILSON_BOUND
 from thenar.stability.cases.stumpfits import Problem

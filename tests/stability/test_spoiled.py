@@ -13,17 +13,18 @@ import msgspec
 import numpy as np
 import pytest
 
+from thenar.compiler import elementary as arithmetic
 from thenar.compiler import elementary as functions
-from thenar.compiler.additive.logit import ColumnTables, fit_logit
-from thenar.compiler.additive.pairs import fit_pairs
-from thenar.compiler.boosting import exactsums, stumps
-from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.model import collapse
 from thenar.compiler.placement import gain
-from thenar.compiler.placement.cooccurrence import Cooccurrence
-from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.gain import Cooccurrence
+from thenar.compiler.placement.tree import grow_id3
+from thenar.compiler.trainers import stumps
+from thenar.compiler.trainers.logit import ColumnTables, fit_logit
+from thenar.compiler.trainers.logitboost import boost
+from thenar.compiler.trainers.pairs import fit_pairs
+from thenar.compiler.trainers.stumps import FittedStumps, Targets, fit_stumps
 from thenar.runtime.build import Build, Recognition
 from thenar.runtime.model import quantise
 from thenar.runtime.model.integers import IntegerTables
@@ -113,11 +114,11 @@ def spoil_targets(patch: Patch) -> None:
         sizes = np.where(member, 1.0 - p, p) * u
         return sizes * own, np.where(member, sizes, -sizes) * (1 + 2.0**-51)
 
-    def off_the_grids(values: np.ndarray) -> tuple[exactsums.OnGrid, exactsums.OnGrid]:
-        coarse, fine = exactsums.on_grids(values)
+    def off_the_grids(values: np.ndarray) -> tuple[arithmetic.OnGrid, arithmetic.OnGrid]:
+        coarse, fine = arithmetic.on_grids(values)
         return (
-            exactsums.OnGrid(coarse.units + 0.25, coarse.exponents),
-            exactsums.OnGrid(np.rint(fine.units / 4) * 4, fine.exponents),
+            arithmetic.OnGrid(coarse.units + 0.25, coarse.exponents),
+            arithmetic.OnGrid(np.rint(fine.units / 4) * 4, fine.exponents),
         )
 
     patch.setattr(targets, "weights_and_responses", unclamped)

@@ -13,7 +13,7 @@ from thenar.drivers.members import Members
 from thenar.runtime.names import shortened
 
 from ...samples import Columns, Samples
-from ..inputs import PlacementError
+from .. import PlacementError
 from ..ports import PortCosts
 
 Chooser = Callable[[float], Columns]

@@ -1,9 +1,10 @@
 """Backward elimination: repeatedly drop the switch whose row of the score tables raises the loss least when removed.
 
-The tables are those that boosting converges to (`logistic`), of all remaining switches and of the joints. While many
-switches are left, the few whose rows are cheapest to replace by their means are dropped together. The last FINE are
-dropped one at a time, from CANDIDATES candidates: the tables are refitted without each, since the others may
-compensate. Of equally likely candidates the lowest number is tried, of equally good ones the likeliest is dropped.
+The tables are those that boosting converges to, one row of scores for each bit, fitted jointly (`Logistic`), of all
+remaining switches and of the joints. While many switches are left, the few whose rows are cheapest to replace by their
+means are dropped together. The last LAST are dropped one at a time, from CANDIDATES candidates: the tables are refitted
+without each, since the others may compensate. Of equally likely candidates the lowest number is tried, of equally good
+ones the likeliest is dropped.
 
 With the times of ports, a rise in loss is weighed against the time of the port, split among its remaining switches: the
 last one of a port pays for all of it.
@@ -12,24 +13,25 @@ last one of a port pays for all of it.
 its stumps collapse to one row of scores per switch. The cheapest are dropped, BOOSTED_SHARE of them at once while many
 are left; then boosting starts again. Of equally cheap ones the lowest number is dropped first.
 
-The joints' codes, if any, are always kept. Of many rows, a sample is used.
+The joints' codes, if any, are always kept here. Of many rows, a sample is used. Joints, each of which takes time to
+digitise and to send, are dropped in the same way, one at a time, after the switches are chosen.
 """
+
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...boosting.boost import boost
-from ...elementary import LN_2, add_up, exp, log, softmax
+from ...elementary import LN_2, SUM_BITS, Floats, add_up, dot, exact_sum, exp, log, softmax, softmax_and_loss
 from ...model.collapse import collapse
 from ...samples import Columns, Samples
-from ..exact import Floats
-from ..logistic import Logistic
+from ...trainers.logitboost import boost
 from ..ports import PortCosts
 from .base import BEST, FINE, Method, first_of
 
 Bits = NDArray[np.bool_]
 
-# With at most FINE left they are dropped one at a time, each from CANDIDATES candidates.
+# With at most LAST left they are dropped one at a time, each from CANDIDATES candidates.
 LAST, CANDIDATES = 40, 6
 # The share of the remaining switches that is dropped at once while many are left.
 SHARE = 0.05
@@ -38,10 +40,111 @@ FIRST_STEPS, TRIAL_STEPS, STEPS = 60, 3, 5
 # Weight of a port's mean time, relative to a weight of 1 for the switch itself.
 PORT_WEIGHT = 16.0
 MOST_ROWS = 8192
+# Of the joints.
+JOINT_ROWS, JOINT_CANDIDATES = 2048, 4
 BINS = 8
 BOOSTED_ROUNDS, BOOSTED_SHARE = 40, 0.12
 # Number of factors in 0.5 .. 1 that are multiplied before their exponents are extracted: 2^-512 is no underflow.
 _FACTORS = 512
+RIDGE = 1.0
+# Pairs of steps that L-BFGS remembers.
+_MEMORY = 6
+# Rows are multiples of 2^-28, below 2^24 in sum, so every sum of them is exact.
+_ROW_BITS = 28
+_ENOUGH = 1e-4  # of the slope, for Armijo's rule
+_MOST_HALVINGS = 12
+
+
+class Logistic:
+    """Multinomial logistic regression on `bits` (c, n), that can be continued, with or without all its columns.
+
+    Boosted stumps on bits are a row of scores for each bit, added where it is set; boosting approaches them one column
+    a round and stops early. Here all rows W (c + 1, K) are fitted at once to labels (n,), to the minimum of
+
+        sum over frames of -ln P(class) + RIDGE / 2 * (sum of squares of the bits' rows),    F = W' [bits; 1]
+
+    so the value of a row does not depend on the order of rounds. The fit uses L-BFGS (Nocedal and Wright, Numerical
+    Optimization, 2nd ed., algorithm 7.4). Rows and residuals are put on grids on which matrix products are exact, so
+    the fit has the same bits on every machine.
+
+    rows         (c + 1, K) on the grid, the last one the bias
+    probability  (K, n) P of every class in every frame, at `rows`
+    """
+
+    def __init__(self, bits: NDArray[np.bool_], labels: NDArray[np.intp], n_classes: int) -> None:
+        n = bits.shape[1]
+        self._inputs = np.concatenate([bits, np.ones((1, n), np.bool_)]).astype(np.float64)
+        self._labels = labels
+        self._member = (labels == np.arange(n_classes)[:, np.newaxis]).astype(np.float64)
+        self._residual_bits = SUM_BITS - n.bit_length()
+        self._pairs: list[tuple[Floats, Floats]] = []
+        self._stand(np.zeros((len(self._inputs), n_classes)))
+
+    def improve(self, iterations: int) -> None:
+        """Take up to `iterations` steps of L-BFGS; stop when no step lowers the loss."""
+        for _ in range(iterations):
+            if not self._step():
+                return
+
+    def without(self, columns: list[int]) -> "Logistic":
+        """Return the fit without some columns; the bias absorbs the means of their rows."""
+        rest = copy(self)
+        rest._inputs = np.delete(self._inputs, columns, axis=0)
+        rest._pairs = [(np.delete(s, columns, axis=0), np.delete(y, columns, axis=0)) for s, y in self._pairs]
+        rows = np.delete(self.rows, columns, axis=0)
+        for column in columns:
+            rows[-1] += self.rows[column] * (exact_sum(self._inputs[column]) / self._labels.size)
+        rest._stand(_rounded(rows, _ROW_BITS))
+        return rest
+
+    def _stand(self, rows: Floats, evaluated: tuple[Floats, float] | None = None) -> None:
+        self.rows = rows
+        self.probability, self.loss = evaluated or self._evaluate(rows)
+        residual = _rounded(self.probability - self._member, self._residual_bits)
+        self._gradient = self._inputs @ residual.T
+        self._gradient[:-1] += RIDGE * rows[:-1]
+
+    def _evaluate(self, rows: Floats) -> tuple[Floats, float]:
+        probability, mean_loss = softmax_and_loss(rows.T @ self._inputs, self._labels, None)
+        return probability, mean_loss * self._labels.size + 0.5 * RIDGE * dot(rows[:-1], rows[:-1])
+
+    def _step(self) -> bool:
+        direction = self._direction()
+        slope = dot(direction, self._gradient)
+        length = 1.0 if self._pairs else 1.0 / self._labels.size
+        for _ in range(_MOST_HALVINGS):
+            rows = _rounded(self.rows + length * direction, _ROW_BITS)
+            evaluated = self._evaluate(rows)
+            if evaluated[1] < self.loss + _ENOUGH * length * slope:
+                before, gradient = self.rows, self._gradient
+                self._stand(rows, evaluated)
+                moved, turned = self.rows - before, self._gradient - gradient
+                if dot(moved, turned) > 0:
+                    self._pairs = [*self._pairs, (moved, turned)][-_MEMORY:]
+                return True
+            length *= 0.5
+        return False
+
+    def _direction(self) -> Floats:
+        """Return minus the gradient times the inverse Hessian estimated from past steps and gradient changes."""
+        q = self._gradient.copy()
+        pairs = [(s, y, dot(s, y)) for s, y in self._pairs]
+        pairs = [pair for pair in pairs if pair[2] > 0]
+        weights = []
+        for s, y, curvature in reversed(pairs):
+            weights.append(dot(s, q) / curvature)
+            q -= weights[-1] * y
+        if pairs:
+            q *= pairs[-1][2] / dot(pairs[-1][1], pairs[-1][1])
+        for (s, y, curvature), weight in zip(pairs, reversed(weights), strict=True):
+            q += (weight - dot(y, q) / curvature) * s
+        return -q
+
+
+def _rounded(values: Floats, bits: int) -> Floats:
+    """Round to the nearest multiples of 2^-bits."""
+    rounded: Floats = np.rint(values * 2.0**bits) * 2.0**-bits
+    return rounded
 
 
 def elimination_order(samples: Samples, ports: PortCosts | None = None) -> Columns:
@@ -174,6 +277,33 @@ def _halved(product: Floats) -> Floats:
     first = product[: len(product) - half].copy()
     first[:half] *= product[len(product) - half :]
     return first
+
+
+def joint_order(samples: Samples) -> Columns:
+    """Return the varying joints, most important first (the last one dropped), given all the switches of these rows.
+
+    JOINT_CANDIDATES joints have the smallest immediate increase of the loss; each is refitted for TRIAL_STEPS more
+    steps, and the one with the lowest loss is dropped, of equal ones the lowest number.
+    """
+    rows = sampled(samples, JOINT_ROWS)
+    levels = [thermometer(rows.codes[:, [joint]]) for joint in range(rows.codes.shape[1])]
+    left = [joint for joint, bits in enumerate(levels) if len(bits)]
+    if len(left) < 2:
+        return tuple(left)
+    fit = Logistic(np.concatenate([*(levels[joint] for joint in left), rows.switches.T]), rows.labels, rows.n_classes)
+    fit.improve(FIRST_STEPS)
+    gone: list[int] = []
+    while len(left) > 1:
+        ends = np.cumsum([0, *(len(levels[joint]) for joint in left)]).tolist()
+        without = [fit.without(list(range(*ends[place : place + 2]))) for place in range(len(left))]
+        likeliest = sorted(range(len(left)), key=lambda place: without[place].loss)[:JOINT_CANDIDATES]
+        for place in likeliest:
+            without[place].improve(TRIAL_STEPS)
+        worst = min(likeliest, key=lambda place: (without[place].loss, left[place]))
+        fit = without[worst]
+        fit.improve(STEPS - TRIAL_STEPS)
+        gone.append(left.pop(worst))
+    return (*left, *gone[::-1])
 
 
 MEMBER = (

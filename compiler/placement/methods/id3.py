@@ -9,95 +9,61 @@ is chosen: gain divided by the remaining cost. A switch on a port that is alread
 counts half if all ports take equally long. Of equal ones the cheaper wins, then the lowest number. The comparison is
 exact.
 
-Pruning is of weakest links: the decisions with the least gain are removed first, until few enough inputs are left
-(Breiman, Friedman, Olshen and Stone, Classification and Regression Trees, 1984, section 3.3). With R the risk of a node
-as a leaf, the weakest link is the decision t of the smallest
+Cost-complexity pruning removes weakest links: the decisions with the least gain go first, until few enough inputs are
+left (Breiman, Friedman, Olshen and Stone, Classification and Regression Trees, 1984, section 3.3). With R the risk of a
+node as a leaf, the entropy of its training rows, the weakest link is the decision t of the smallest
 
     g(t) = (R(t) - sum of R over the leaves below t) / (leaves below t - 1),
 
-and it becomes a leaf. The caller supplies the risk. Entropy of the training rows gives cost-complexity pruning. Errors
-on held-out rows give reduced-error pruning, since the links of g <= 0 are those that Quinlan's bottom-up procedure
-(1987) removes. Risks are integers, so g is compared exactly; of equal links the last in preorder is removed first,
-descendants before ancestors.
+and it becomes a leaf. Risks are integers, so g is compared exactly; of equal links the last in preorder is removed
+first, descendants before ancestors.
 """
 
-import collections
-from bisect import bisect_right
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
 from heapq import heapify, heappop, heappush
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...samples import Columns, Samples
 from ..gain import CellCounter, NodeCounts, best_per_cost
-from ..id3 import grow_id3
 from ..ports import PortCosts
-from ..tree import Tree
+from ..tree import Rows, Tree, grow_id3
 from .base import PAPERS, Chooser, Method, first_of
 
 # A decision's share of the entropy, in integer multiples of 2^-30 bits: far below the effect of one row.
 _BITS = 30
 
 
-@dataclass(frozen=True)
-class PruningPath:
-    """The pruning sequence of a tree: the first n of `order`, numbers of its nodes, become leaves, for n = 0 to all.
+def weakest_links(tree: Tree, brought: Sequence[int]) -> tuple[int, ...]:
+    """Return the numbers of the decisions that become leaves, in their order, until the root is one.
 
-    strengths  (links,) g of each at its removal, never descending
-    n_inputs   (links + 1,) the number of distinct inputs in the tree after the first n links are removed
+    `brought` is how much the decision at each node lowers the risk, 0 for a leaf.
     """
-
-    tree: Tree
-    order: tuple[int, ...]
-    strengths: tuple[Fraction, ...]
-    n_inputs: tuple[int, ...]
-
-    @cached_property
-    def n_useless(self) -> int:
-        """Number of links of g <= 0: their removal does not raise the risk."""
-        return bisect_right(self.strengths, 0)
-
-    def placement(self, most: float, least_links: int = 0) -> tuple[int, ...]:
-        """Return the inputs, in preorder of their nodes, of the largest tree on the path with at most `most` inputs and
-        with at least the first `least_links` links removed.
-        """
-        links = next(n for n in range(least_links, len(self.n_inputs)) if self.n_inputs[n] <= max(most, 0))
-        leaves = set(self.order[:links])
-        return tuple(dict.fromkeys(_labels(self.tree, leaves)))
-
-
-def weakest_links(tree: Tree, brought: Sequence[int]) -> PruningPath:
-    """Return the pruning path of `tree`, given how much the decision at each node lowers the risk (0 for a leaf)."""
     standing = [node.input is not None for node in tree.nodes]
     # The reduction by each node and those below it, and their links.
     total, links = list(brought), [max(len(node.values) - 1, 0) for node in tree.nodes]
     for number in range(len(tree.nodes) - 1, 0, -1):
         total[tree.parents[number]] += total[number]
         links[tree.parents[number]] += links[number]
-    labels = collections.Counter(node.input for node in tree.nodes if node.input is not None)
 
     def key(number: int) -> tuple[Fraction, int]:
         return Fraction(total[number], links[number]), -number
 
-    order, strengths, n_inputs = list[int](), list[Fraction](), [len(labels)]
+    order: list[int] = []
     waiting = [key(number) for number, remaining in enumerate(standing) if remaining]
     heapify(waiting)
     while waiting:
-        strength, number = weakest = heappop(waiting)
-        number = -number
+        weakest = heappop(waiting)
+        number = -weakest[1]
         if not standing[number] or weakest != key(number):
             continue  # removed, or pushed again since
         below = [number]
         while below:
             node = below.pop()
-            label = tree.nodes[node].input
-            if label is not None and standing[node]:
+            if standing[node]:
                 standing[node] = False
-                labels -= collections.Counter([label])
                 below += tree.children[node]
         above = tree.parents[number]
         while above >= 0:
@@ -106,9 +72,7 @@ def weakest_links(tree: Tree, brought: Sequence[int]) -> PruningPath:
             heappush(waiting, key(above))
             above = tree.parents[above]
         order.append(number)
-        strengths.append(strength)
-        n_inputs.append(len(labels))
-    return PruningPath(tree, tuple(order), tuple(strengths), tuple(n_inputs))
+    return tuple(order)
 
 
 def entropy_brought(tree: Tree) -> list[int]:
@@ -116,25 +80,13 @@ def entropy_brought(tree: Tree) -> list[int]:
     return [round(Fraction(node.gain) * node.size * 2**_BITS) for node in tree.nodes]
 
 
-def error_reduction(tree: Tree, X: NDArray[np.bool_], labels: NDArray[np.intp]) -> list[int]:
-    """Return by how many each node's decision lowers the errors on rows X (n, d), of class numbers `labels` (n,).
+def pruned(tree: Tree, order: Sequence[int]) -> Chooser:
+    """Return m -> the inputs of the largest tree with at most m inputs, after the first of `order` became leaves."""
 
-    X holds the tree's bits: every decision has a child for every value.
-    """
-    errors = [0] * len(tree.nodes)
-    spared = [0] * len(tree.nodes)
-    rows_of = {0: np.arange(len(X))}
-    for number, node in enumerate(tree.nodes):
-        rows = rows_of.pop(number)
-        errors[number] = int(np.count_nonzero(labels[rows] != node.majority))
-        if node.input is not None:
-            column = X[rows, node.input]
-            for value, child in zip(node.values, tree.children[number], strict=True):
-                rows_of[child] = rows[column == value]
-    for number, children in enumerate(tree.children):
-        if children:
-            spared[number] = errors[number] - sum(errors[child] for child in children)
-    return spared
+    def inputs(leaves: int) -> Columns:
+        return tuple(dict.fromkeys(_labels(tree, {*order[:leaves]})))
+
+    return lambda most: inputs(bisect_left(range(len(order)), -max(most, 0), key=lambda n: -len(inputs(n))))
 
 
 def _labels(tree: Tree, leaves: set[int]) -> Iterator[int]:
@@ -148,7 +100,6 @@ def _labels(tree: Tree, leaves: set[int]) -> Iterator[int]:
             waiting += reversed(tree.children[number])
 
 
-_HELD_OUT = 3
 # The paper's S, and larger ones, until almost nothing is left of the tree.
 _PRUNES = (0, 10, 13, 29, 62, 100, 150, 200, 300, 400, 600, 1000)
 
@@ -167,30 +118,7 @@ def _papers(samples: Samples, _: PortCosts | None) -> Chooser:
 def _cost_complexity(samples: Samples, _: PortCosts | None) -> Chooser:
     """Return m -> the inputs, at most m, of the tree after cost-complexity pruning by entropy of the rows."""
     tree = grow_id3(samples.switches, samples.labels)
-    return weakest_links(tree, entropy_brought(tree)).placement
-
-
-def _reduced_error(samples: Samples, _: PortCosts | None) -> Chooser:
-    """Return m -> the inputs, at most m, of a tree grown on two thirds of the rows and pruned by errors on the others.
-
-    Decisions that save no held-out error are always removed (Quinlan 1987); then the weakest links, until at most m
-    inputs are left.
-    """
-    held_out = every_third(samples.labels)
-    tree = grow_id3(samples.switches[~held_out], samples.labels[~held_out])
-    # Numbers of the tree's classes; each has rows in the growing part.
-    labels = np.searchsorted(np.array(tree.classes), samples.labels[held_out])
-    path = weakest_links(tree, error_reduction(tree, samples.switches[held_out], labels))
-    return lambda most: path.placement(most, path.n_useless)
-
-
-def every_third(labels: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the third, sixth ... row of each class."""
-    order = np.argsort(labels, kind="stable")
-    firsts = np.searchsorted(labels[order], labels[order])
-    chosen = np.zeros(len(labels), np.bool_)
-    chosen[order] = (np.arange(len(labels)) - firsts) % _HELD_OUT == _HELD_OUT - 1
-    return chosen
+    return pruned(tree, weakest_links(tree, entropy_brought(tree)))
 
 
 def cost_aware_order(samples: Samples, ports: PortCosts | None = None) -> Columns:
@@ -198,7 +126,7 @@ def cost_aware_order(samples: Samples, ports: PortCosts | None = None) -> Column
     ports = ports or PortCosts((0,) * samples.n_switches, (0.0,))
     bits, labels, n_classes = samples.switches, samples.labels, samples.n_classes
     counter = CellCounter(bits, labels, n_classes)
-    waiting: list[tuple[int, int, NDArray[np.intp]]] = [(-len(bits), 0, np.arange(len(bits)))]
+    waiting: list[tuple[int, int, Rows]] = [(-len(bits), 0, np.arange(len(bits)))]
     found: dict[int, None] = {}
     costs = ports.marginal_costs(found)
     made = 1
@@ -249,12 +177,5 @@ MEMBER = (
         ours=True,
         tried="unwired",
         rank=6,
-    ),
-    Method(
-        name="id3-rep",
-        help="ID3 pruned by its errors on every third row, held out while it grows (reduced-error pruning)",
-        learn=_reduced_error,
-        ours=True,
-        rank=7,
     ),
 )

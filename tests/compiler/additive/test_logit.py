@@ -11,9 +11,10 @@ from scipy.optimize import minimize
 from scipy.special import logsumexp
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, PENALTY, SMOOTHNESS, ColumnTables, fit_logit
-from thenar.compiler.boosting.boost import BoostingError
 from thenar.compiler.elementary import softmax
+from thenar.compiler.trainers.base import BoostingError
+from thenar.compiler.trainers.logit import PENALTY, SMOOTHNESS, ColumnTables, fit_logit
+from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -36,13 +37,11 @@ def numbers(tables: ColumnTables) -> bytes:
 @settings(max_examples=10, deadline=None)
 def test_it_is_scikit_learns_answer_on_the_expanded_design(seed: int, pulls: tuple[float, float]) -> None:
     X, labels = grasps(seed)
-    X = np.where(np.random.default_rng(seed).random(X.shape) < 0.1, np.nan, X)
-    X[:, :4] = np.nan_to_num(X[:, :4])
     penalty, smoothness = pulls
     tables = fit_logit(X, labels, 3, penalty=penalty, smoothness=smoothness, max_bins=5, tolerance=1e-11)
     parts, penalties = [np.ones((len(X), 1))], [np.array([[BIAS_SHARE * penalty]])]
     for x, edges in zip(X.T, tables.edges, strict=True):
-        bins = np.searchsorted(edges, x) + np.isnan(x)
+        bins = np.searchsorted(edges, x)
         if bins.max() < 2:
             parts.append((bins == 1)[:, np.newaxis])
             penalties.append(np.array([[penalty]]))
@@ -72,13 +71,10 @@ def test_lines_are_scikit_learns_answer_on_scaled_codes(seed: int, smoothness: f
     theirs.fit(design / np.sqrt(pulls), labels, weights)
     # A column is centred to the half of a 512th of its range, and so is what pulls its bias.
     np.testing.assert_allclose(tables.scores(X), (design / np.sqrt(pulls)) @ theirs.coef_.T, atol=2e-3)
-    # Beyond what was trained on a line is flat; a missing value adds the mean.
+    # Beyond what was trained on a line is flat.
     beyond = np.vstack([X[:1], X[:1]]).astype(float)
     beyond[0, 6:], beyond[1, 6:] = X[:, 6:].max(axis=0), 1e6
     assert np.ptp(tables.scores(beyond), axis=0).max() == 0
-    beyond[0, 6:], beyond[1, 6:] = np.nan, np.average(X[:, 6:], 0, weights)
-    missing, mean = tables.scores(beyond)
-    np.testing.assert_allclose(missing, mean, atol=1e-9)
 
 
 @given(SEEDS, st.booleans())
@@ -110,18 +106,6 @@ def test_counted_bits_and_frames_known_to_be_held_are_scipys_answer(seed: int, w
     theirs = minimize(loss, np.zeros(design.shape[1] * 3), jac=True, options={"gtol": 1e-9, "maxiter": 2000}).x
     # A count is centred to the half of a 512th of its range, as a line is.
     np.testing.assert_allclose(tables.scores(X), design @ theirs.reshape(-1, 3), atol=2e-3)
-
-
-@pytest.mark.parametrize("unit", [1, 1000, 2.0**-20])
-def test_missing_values_of_a_line_have_a_row_of_their_own(unit: float) -> None:
-    X = np.array([[0.0], [1.0], [2.0], [5.0], [np.nan], [np.nan]]) * unit
-    labels = np.array([0, 0, 1, 1, 2, 2])
-    tables = fit_logit(X, labels, 3, smoothness=0.01, penalty=0.1, linear=True)
-    assert list(tables.lines) == [0]
-    assert tables.scores(X).argmax(axis=1).tolist() == labels.tolist()
-    np.testing.assert_allclose(
-        tables.scores(X), fit_logit(X / unit, labels, 3, smoothness=0.01, penalty=0.1, linear=True).scores(X / unit)
-    )
 
 
 @given(SEEDS)
@@ -157,17 +141,6 @@ def test_a_class_without_rows_is_unlikely_and_finite() -> None:
     assert probability[3:].min() > 0
 
 
-def test_missing_values_have_a_row_of_their_own_or_add_the_mean() -> None:
-    X = np.array([[0.0], [0.0], [1.0], [1.0], [np.nan], [np.nan]])
-    labels = np.array([0, 0, 1, 1, 2, 2])
-    own = fit_logit(X, labels, 3, smoothness=0.0)
-    assert own.scores(X).argmax(axis=1).tolist() == labels.tolist()
-    x, weights = np.array([[0.0], [3.0], [5.0], [9.0]]), np.array([1.0, 2.0, 3.0, 1.0])
-    mean = fit_logit(x, np.array([0, 1, 0, 1]), 2, weights=weights)
-    np.testing.assert_allclose(mean.rows[0][4], weights @ mean.rows[0][:4] / 7, rtol=1e-12)
-    assert np.array_equal(mean.scores(np.array([[np.nan]]))[0], mean.bias + mean.rows[0][4])
-
-
 @pytest.mark.parametrize("linear", [False, True])
 def test_score_tables_add_what_the_columns_add(linear: bool) -> None:
     X, labels = grasps(3)
@@ -175,7 +148,7 @@ def test_score_tables_add_what_the_columns_add(linear: bool) -> None:
     found = fitted.score_tables(6).scores(X[:, :6].astype(bool), X[:, 6:].astype(np.uint16))
     np.testing.assert_allclose(found, fitted.scores(X), rtol=0, atol=1e-12)
     # Edges between numbers that are no codes, and below all codes.
-    odd = ColumnTables(np.zeros(2), (np.array([-3.5, 1.2, 1.7, 4.0]),), (np.arange(12.0).reshape(6, 2),))
+    odd = ColumnTables(np.zeros(2), (np.array([-3.5, 1.2, 1.7, 4.0]),), (np.arange(10.0).reshape(5, 2),))
     codes = np.arange(7, dtype=np.uint16)[:, np.newaxis]
     assert np.array_equal(odd.score_tables(0).scores(np.zeros((7, 0), bool), codes), odd.scores(codes))
 

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.linalg import block_diag
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, fit_logit
-from thenar.compiler.additive.pairs import fit_pairs
-from thenar.compiler.boosting.boost import BoostingError
-from thenar.compiler.trainers.base import TRAINERS
+from thenar.compiler.trainers.base import TRAINERS, BoostingError
+from thenar.compiler.trainers.logit import fit_logit
+from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE
+from thenar.compiler.trainers.pairs import fit_pairs
 from thenar.runtime.model.tables import ScoreTables
 
 SEEDS = st.integers(0, 2**32 - 1)

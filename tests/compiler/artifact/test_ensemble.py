@@ -5,7 +5,7 @@ import pytest
 
 from thenar.compiler.arrays import pack, unpack
 from thenar.compiler.artifact.ensemble import KIND, LINES, PAIRS, TABLES, ensemble_from_bytes, ensemble_to_bytes
-from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.boosting.boost import LARGEST_Z_MAX, SMALLEST_SHRINKAGE, BoostingError, boost
 from thenar.compiler.elementary import softmax, softmax_and_loss
+from thenar.compiler.trainers.base import BoostingError
+from thenar.compiler.trainers.logitboost import LARGEST_Z_MAX, SMALLEST_SHRINKAGE, boost
 from thenar.runtime.model.tables import winners
 
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.compiler.boosting.exactsums import on_grids
+from thenar.compiler.elementary import on_grids
 
 MAGNITUDES = st.floats(-1e12, 1e12) | st.floats(-1e-300, 1e-300) | st.just(0.0) | st.floats(-1.0, 1.0)
 ROWS = arrays(np.float64, st.tuples(st.integers(1, 3), st.integers(1, 40)), elements=MAGNITUDES)

@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.compiler.boosting import stumpfit
-from thenar.compiler.boosting.binning import bin_columns, midpoints
-from thenar.compiler.boosting.stumpfit import Targets, fit_stumps
+from thenar.compiler.trainers.binning import bin_columns, midpoints
+from thenar.compiler.trainers.stumps import Targets, fit_stumps
 
 NUMBERS = st.sampled_from([0.0, 1.0]) | st.integers(0, 6).map(float) | st.just(np.nan)
 Z_MAX = 3.0
@@ -40,7 +39,7 @@ def explained(X: np.ndarray, column: int, threshold: float, w: list[Fraction], r
 def test_no_other_stump_explains_more(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
     X, weights, responses = problem
     binned = bin_columns(X)
-    if not binned.groups or weights.max() < 1e-6:
+    if not binned.columns or weights.max() < 1e-6:
         return
     fitted = fit_stumps(binned, Targets(weights, responses), Z_MAX)
     w = [Fraction(float(v)) for v in weights[0]]
@@ -62,57 +61,11 @@ def test_no_other_stump_explains_more(problem: tuple[np.ndarray, np.ndarray, np.
         assert (int(fitted.columns[0]), float(fitted.thresholds[0])) == min(same)
 
 
-@st.composite
-def large_problems(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Inputs (n, d) of few and of many values, some missing; weights and responses (K, n) of very unlike sizes."""
-    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
-    n, d, K = draw(st.integers(2, 300)), draw(st.integers(1, 9)), draw(st.integers(1, 5))
-    X = rng.integers(0, rng.choice([2, 3, 20, 1000], size=d), size=(n, d)).astype(np.float64)
-    X[rng.random(X.shape) < draw(st.sampled_from([0.0, 0.2]))] = np.nan
-    weights = 10.0 ** rng.uniform(-draw(st.sampled_from([0, 3, 20, 310])), 0, size=(K, n))
-    weights[rng.random((K, n)) < 0.1] = 0.0
-    steps = draw(st.sampled_from([1, 2, 1000]))
-    ratios = (1 + (Z_MAX - 1) * rng.integers(0, steps, size=(K, n)) / steps) * rng.choice([-1.0, 1.0], size=(K, n))
-    ratios[0] = abs(ratios[0, 0])  # all splits tie
-    return X, weights, weights * ratios
-
-
-@given(large_problems())
-def test_what_is_not_looked_at_exactly_cannot_win(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
-    _is_looked_at_exactly(*problem)
-
-
-def _is_looked_at_exactly(X: np.ndarray, weights: np.ndarray, responses: np.ndarray) -> None:
-    """Hold the stumps against those of a fit that looks at every split exactly."""
-    binned, targets = bin_columns(X), Targets(weights, responses)
-    if not binned.groups:
-        return
-    quick = fit_stumps(binned, targets, Z_MAX)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stumpfit, "_slack", lambda *_: np.full(len(weights), np.inf))
-        whole = fit_stumps(binned, targets, Z_MAX)
-    assert np.array_equal(quick.columns, whole.columns)
-    assert np.array_equal(quick.thresholds, whole.thresholds)
-
-
-@pytest.mark.parametrize("decades", [9, 16, 20])
-def test_the_rough_search_never_prefers_splits_of_light_branches(decades: int) -> None:
-    """Sorted by weight, branches of next to nothing are many: divided by that, what they say looked like much."""
-    for seed in range(30):
-        random = np.random.default_rng(seed)
-        X = random.integers(0, [3, 5, 9, 20, 40], size=(40, 5)).astype(np.float64)
-        weights = 10.0 ** random.uniform(-decades, 0, size=(4, 40))
-        if seed % 2:
-            weights, X = np.sort(weights, axis=1), np.sort(X, axis=0) + random.integers(0, 2, X.shape)
-        ratios = random.uniform(1, Z_MAX, size=(4, 40)) * random.choice([-1.0, 1.0], size=(4, 40))
-        _is_looked_at_exactly(X, weights, weights * ratios)
-
-
 @given(problems())
 def test_values_are_weighted_means_within_the_clamp(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
     X, weights, responses = problem
     binned = bin_columns(X)
-    if not binned.groups or weights.max() < 1e-6:
+    if not binned.columns or weights.max() < 1e-6:
         return
     fitted = fit_stumps(binned, Targets(weights, responses), Z_MAX)
     assert (np.abs(fitted.values) <= Z_MAX).all()

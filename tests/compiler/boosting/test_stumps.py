@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.tables import TIE, winners
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.elementary import softmax
+from thenar.compiler.trainers.logitboost import boost
+from thenar.compiler.trainers.stumps import Stumps
 
 SETS = ("bin3", "bin14nom", "dupfeat", "missing", "twoclass", "separable", "rare", "paper14")
 PARTS = {"half/P_train": "train_idx", "half/P_test": "test_idx", "all/P": None}

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.boosting.classifier import LogitBoostClassifier
+from thenar.compiler.classifiers import LogitBoostClassifier
 from thenar.compiler.evaluation.folds import Fold, weka_folds
 
 # `missing` has nominal columns of three and four values, which a GraspSet cannot hold.

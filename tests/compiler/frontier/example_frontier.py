@@ -51,7 +51,7 @@ _POINTS: tuple[tuple[Any, ...], ...] = (
     ("both", 8, "elimination", 8, 150, 8, "mcp23017", 1000, 48.0, 330.0, "sequential", 0.978, 6400, 12900),
     ("both", 16, "elimination", 16, 200, 8, "as wired", 400, 118.0, 421.3, "sequential", 0.988, 7200, 15100),
     ("both", 33, "elimination", 33, 300, 12, "board", 1000, 330.0, 905.7, "dwell", 0.9915, 9800, 24600),
-    ("both", 12, "id3-rep", 0.25, 80, 6, "pca9555", 400, 122.0, 363.0, "single", 0.961, 5200, 10400),
+    ("both", 12, "id3-ccp", 0.25, 80, 6, "pca9555", 400, 122.0, 363.0, "single", 0.961, 5200, 10400),
 )  # fmt: skip
 
 # What each method recognises with so many switches.

@@ -14,7 +14,6 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.compiler.artifact.compile import compile_build
-from thenar.compiler.boosting.boost import boost
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.frontier import find, price
 from thenar.compiler.frontier.cache import stored
@@ -33,6 +32,7 @@ from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS
+from thenar.compiler.trainers.logitboost import boost
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.members import MemberError
 from thenar.runtime.model.quantise import quantise

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler.boosting.boost import boost
 from thenar.compiler.evaluation.choosing import choose_path
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.frontier.cache import question
@@ -15,11 +14,12 @@ from thenar.compiler.frontier.search import SHAPES, Search
 from thenar.compiler.frontier.survey import Cuts, FoldHits, fit_stages
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.elements import Element
-from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.placement.ports import PortCosts
+from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
+from thenar.compiler.trainers.logitboost import boost
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Recipe

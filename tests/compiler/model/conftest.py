@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.trainers.stumps import Stumps
 
 MakeStumps = Callable[..., Stumps]
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.boosting.stumps import Stumps, centred, spread
 from thenar.compiler.model.collapse import _contributions, _joint, collapse
+from thenar.compiler.trainers.stumps import Stumps, centred, spread
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.base import CoreTerm, Term
@@ -98,8 +98,8 @@ def test_contributions_at_one_threshold_are_added_in_the_order_of_the_rounds() -
     thresholds = np.array(random.integers(0, 3, (rounds, 2)) + 0.5, np.float64)
     stumps = Stumps(1, np.zeros((rounds, 2), np.int32), thresholds, random.normal(0, 1e3, (rounds, 2, 3)), 1.0)
     order = np.argsort(thresholds.ravel(), kind="mergesort")
-    sides = (_contributions(stumps, side)[order] for side in (0, 1))
-    by_threshold = _joint(np.floor(thresholds.ravel())[order], *sides)
+    left, right = (_contributions(stumps, side)[:, order] for side in (0, 1))
+    by_threshold = _joint(np.floor(thresholds.ravel())[order], left, right, np.tile([0, 1], rounds)[order], 2)
     assert collapse(stumps, 0).joint_rows[0].tobytes() == by_threshold[1].tobytes()
 
 

@@ -5,9 +5,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import Comparison, compare, float_slack
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.quantise import quantise, rounding_error
 from thenar.runtime.model.tables import ScoreTables, winners
 

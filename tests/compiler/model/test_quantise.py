@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import compare
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.integers import FINEST_SCALE, IntegerTables, tables_to_bytes
 from thenar.runtime.model.proof import Rounding
 from thenar.runtime.model.quantise import (

@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.model.collapse import collapse
-from thenar.compiler.model.substitutes import _lack, fit_lost
+from thenar.compiler.model.faults import _lack, fit_lost
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import quantise
 

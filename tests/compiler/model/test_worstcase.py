@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import float_slack
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.proof import Rounding, _Pairs
 from thenar.runtime.model.quantise import quantise, rounding_error

@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.placement.exact import compare, first_best, sign_of_log_sum
+from thenar.compiler.placement.gain import compare, first_best, sign_of_log_sum
 
 
 @given(st.integers(2, 10**6), st.integers(2, 10**6), st.integers(1, 10**6))

@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.compiler.placement.exact import Counts
-from thenar.compiler.placement.gain import NodeCounts, best_position, compare_scores, gain_bits
+from thenar.compiler.placement.gain import Counts, NodeCounts, best_position, compare_scores, gain_bits
 from thenar.stability.reference.information import compare_gains
 
 tables = arrays(np.int64, st.tuples(st.integers(1, 5), st.integers(2, 4)), elements=st.integers(0, 30))

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.placement.id3 import grow_id3
-from thenar.compiler.placement.inputs import PlacementError, check_bits, check_matrix
+from thenar.compiler.placement import PlacementError
+from thenar.compiler.placement.tree import check_bits, check_matrix, grow_id3
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.folds import trial_folds
-from thenar.compiler.placement.joints import joint_order, kept_joints
+from thenar.compiler.placement.methods.elimination import joint_order
+from thenar.compiler.placement.placement import kept_joints
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import Training
 

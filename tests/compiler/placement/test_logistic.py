@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.boosting.exactsums import dot
-from thenar.compiler.placement.logistic import RIDGE, Logistic
+from thenar.compiler.elementary import dot
+from thenar.compiler.placement.methods.elimination import RIDGE, Logistic
 
 Bits = npt.NDArray[np.bool_]
 Labels = npt.NDArray[np.intp]

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.placement.inputs import PlacementError
+from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.ports import PortCosts, port_costs, ports_of_whole_glove
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness

@@ -8,8 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.compiler import compile_build, verify_faults
-from thenar.compiler.placement.placement import choose
-from thenar.compiler.placement.robust import most_robust, spread
+from thenar.compiler.placement.placement import choose, most_robust, spread
 from thenar.compiler.samples import MASKED, Samples
 from thenar.compiler.trainers.base import Training
 from thenar.runtime.recipe import Recipe

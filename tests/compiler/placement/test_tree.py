@@ -1,7 +1,7 @@
 import pytest
 
 from thenar.compiler import grow_id3
-from thenar.compiler.placement.inputs import PlacementError
+from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.tree import Tree
 
 

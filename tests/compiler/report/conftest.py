@@ -14,7 +14,7 @@ from thenar.compiler.evaluation.study import StudyDesign, evaluate
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.hand import HandShape
 from thenar.compiler.model.compare import worst_case
-from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.report.content import ReportContent
 from thenar.drivers.cyberglove_protocol import SENSORS_18

@@ -12,7 +12,7 @@ from msgspec.structs import replace as replaced
 
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.hand import HandShape
-from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.report.content import ReportContent, hand_picture
 from thenar.compiler.report.frontier import frontier_view
 from thenar.compiler.report.sections import (

@@ -17,9 +17,9 @@ from thenar.compiler import (
     Trainer,
     compile_build,
 )
-from thenar.compiler.boosting.boost import SMALLEST_SHRINKAGE
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.trainers.base import Training
+from thenar.compiler.trainers.logitboost import SMALLEST_SHRINKAGE
+from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.errors import ThenarError
 from thenar.runtime.recipe import changed
 

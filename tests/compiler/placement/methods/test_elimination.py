@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.boosting.boost import boost
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.methods import elimination
 from thenar.compiler.placement.methods.elimination import (
@@ -19,6 +18,7 @@ from thenar.compiler.placement.methods.elimination import (
 )
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.samples import Columns, Samples
+from thenar.compiler.trainers.logitboost import boost
 
 Bits = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float64]

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.placement.cooccurrence import Cooccurrence
-from thenar.compiler.placement.inputs import PlacementError
-from thenar.compiler.placement.methods import filters
-from thenar.compiler.placement.methods.filters import cmim, most_informative, random_placement
+from thenar.compiler.placement import PlacementError
+from thenar.compiler.placement.gain import Cooccurrence
+from thenar.compiler.placement.methods import baselines
+from thenar.compiler.placement.methods.baselines import cmim, most_informative, random_placement
 
 Bits = npt.NDArray[np.bool_]
 Data = tuple[Bits, npt.NDArray[np.int64]]
@@ -94,7 +94,7 @@ class Rough(Cooccurrence):
 def test_rounding_within_its_bound_decides_nothing(drawn: Data, m: int) -> None:
     X, y = drawn
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(filters, "Cooccurrence", Rough)
+        patch.setattr(baselines, "Cooccurrence", Rough)
         rough = forward_cmim(X, y, m), top_mutual_information(X, y, m)
     assert rough == (forward_cmim(X, y, m), top_mutual_information(X, y, m))
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from thenar.compiler import grow_id3
 from thenar.compiler.placement.methods.base import METHODS
-from thenar.compiler.placement.methods.id3 import cost_aware_order, error_reduction, every_third, weakest_links
+from thenar.compiler.placement.methods.id3 import cost_aware_order
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.samples import Samples
 
@@ -39,7 +39,7 @@ def test_one_tree_answers_for_every_s_as_the_papers_pruned_tree_does(samples: Sa
 
 @given(learnings(), st.integers(0, 11))
 def test_no_more_switches_are_kept_than_asked_for(samples: Samples, most: int) -> None:
-    for name in ("id3-ccp", "id3-rep", "id3-cost"):
+    for name in ("id3-ccp", "id3-cost"):
         kept = METHODS[name].chooser(samples)(most)
         assert len(set(kept)) == len(kept) <= most
 
@@ -47,20 +47,6 @@ def test_no_more_switches_are_kept_than_asked_for(samples: Samples, most: int) -
 @given(learnings())
 def test_links_that_bring_nothing_cost_no_input_unless_asked_to(samples: Samples) -> None:
     assert METHODS["id3-ccp"].chooser(samples)(10) == grow_id3(samples.switches, samples.labels).inputs
-
-
-@given(learnings())
-def test_reduced_error_pruning_grows_on_two_thirds_and_prunes_on_the_rest(samples: Samples) -> None:
-    out = every_third(samples.labels)
-    tree = grow_id3(samples.switches[~out], samples.labels[~out])
-    numbers = np.array([tree.classes.index(label) for label in samples.labels[out].tolist()], dtype=np.intp)
-    path = weakest_links(tree, error_reduction(tree, samples.switches[out], numbers))
-    assert METHODS["id3-rep"].chooser(samples)(10) == path.placement(10, path.n_useless)
-
-
-def test_every_third_row_of_each_class_is_held_out() -> None:
-    labels = np.array([1, 0, 1, 1, 0, 0, 0, 2, 1, 1, 1])
-    assert np.flatnonzero(every_third(labels)).tolist() == [3, 5, 10]
 
 
 @st.composite

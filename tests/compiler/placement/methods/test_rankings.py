@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from thenar.compiler.placement.inputs import PlacementError
+from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.samples import Samples
 

@@ -1,20 +1,21 @@
 """Columns as bins between neighbouring values, and the sums of weights and responses left of every split.
 
 Columns of two values are processed several at a time: rows of the same values share a cell. A column of more values, or
-with missing ones, has a cell for each bin. One sparse product sums all cells; a running sum gives the splits of bins.
+with missing ones, has a cell for each bin. One sparse product sums all cells; a running sum gives the splits of bins. A
+dense product of switches would wait for the threads of BLAS, three times as long on a busy machine.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary import Floats
+
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
-
-Floats = NDArray[np.float64]
 
 # Elements of the sums over a batch of cells: 512 KiB of doubles stay in a processor's cache.
 _BATCH_ELEMENTS = 1 << 16
@@ -34,16 +35,29 @@ class SplitSums:
     is_split: NDArray[np.bool_]  # (c, B) some value lies above the bin
 
 
+@dataclass(frozen=True, slots=True)
+class BinnedColumn:
+    """A column that varies: the bin (n,) of each row, len(edges) + 1 for a missing value, and the `edges` of bins."""
+
+    bins: NDArray[np.bool_] | NDArray[np.int32]
+    edges: Floats
+
+    @property
+    def missing(self) -> NDArray[np.bool_]:
+        """Whether the value of each row (n,) is missing."""
+        absent: NDArray[np.bool_] = self.bins == len(self.edges) + 1
+        return absent
+
+
 class TwoValued:
     """Columns that take exactly two values and are never missing."""
 
-    def __init__(self, columns: NDArray[np.intp], low: NDArray[np.bool_], thresholds: Floats) -> None:
-        """`low` (c, n): the value is the lower one; `thresholds` (c,) between the two."""
+    def __init__(self, columns: NDArray[np.intp], high: NDArray[np.bool_]) -> None:
+        """`high` (c, n): the value is the higher one."""
         self.columns = columns
-        self._low = low
-        self._thresholds = thresholds
+        self._high = high
         # 2^bits cells per partition, and in total not many more than there are rows.
-        few = [bits for bits in range(2, _MOST_BITS + 1) if -(-len(low) // bits) << bits <= 2 * low.shape[1]]
+        few = [bits for bits in range(2, _MOST_BITS + 1) if -(-len(high) // bits) << bits <= 2 * high.shape[1]]
         self._bits = max(few, default=1)
         self._batches: list[csc_array] = []
 
@@ -51,84 +65,45 @@ class TwoValued:
         """Return the sums (c, R) of `by_row` (n, R) over the rows that have their lower value."""
         bits, summands = self._bits, by_row.shape[1]
         if not self._batches:
-            widths = [1 << bits] * -(-len(self._low) // bits)
+            widths = [1 << bits] * -(-len(self._high) // bits)
             self._batches = [_one_hot(self._cells(batch), width) for batch, width in _batches(widths, summands)]
         has_bit = (np.arange(1 << bits) >> np.arange(bits)[:, np.newaxis] & 1).astype(np.float64)
         sums = [has_bit @ (one_hot @ by_row).reshape(-1, 1 << bits, summands) for one_hot in self._batches]
-        return np.concatenate(sums).reshape(-1, summands)[: len(self._low)]
-
-    def goes_left(self, position: int, split: int) -> NDArray[np.bool_]:
-        """Return (n,) whether each row lies left of the only split of the column at `position` in this group."""
-        rows: NDArray[np.bool_] = self._low[position]
-        return rows
-
-    def is_missing(self, position: int) -> None:
-        """Return None: no value is missing here."""
-        return
-
-    def n_splits(self, position: int) -> int:
-        """Return 1, the number of splits."""
-        return 1
-
-    def threshold(self, position: int, split: int) -> float:
-        """Return the threshold between the two values of the column."""
-        return float(self._thresholds[position])
+        return np.concatenate(sums).reshape(-1, summands)[: len(self._high)]
 
     def _cells(self, batch: slice) -> Iterator[NDArray[np.int32]]:
         for start in range(batch.start * self._bits, batch.stop * self._bits, self._bits):
-            cells = np.zeros(self._low.shape[1], dtype=np.int32)
-            for bit, rows in enumerate(self._low[start : start + self._bits]):
-                cells |= rows.astype(np.int32) << bit
+            cells = np.zeros(self._high.shape[1], dtype=np.int32)
+            for bit, rows in enumerate(self._high[start : start + self._bits]):
+                cells |= (~rows).astype(np.int32) << bit
             yield cells
 
 
 class ManyValued:
     """Columns of three or more values, or with missing ones."""
 
-    def __init__(self, columns: list[int], bins: list[NDArray[np.int32]], edges: list[Floats]) -> None:
-        """`bins` (n,) per column, with the last bin number (len(edges) + 1) for missing values; `edges` are splits."""
-        self.columns = np.array(columns, dtype=np.intp)
-        self._bins = bins
-        self._edges = edges
+    def __init__(self, columns: dict[int, BinnedColumn]) -> None:
+        self.columns = np.array([*columns], dtype=np.intp)
+        self._binned = [*columns.values()]
         self._batches: list[tuple[slice, int, csc_array]] = []
 
     def sums(self, by_row: Floats) -> Iterator[SplitSums]:
         """Yield the sums of `by_row` (n, R), R even, a batch of columns at a time."""
         summands = by_row.shape[1]
         if not self._batches:
-            widths = [len(edges) + 2 for edges in self._edges]
+            widths = [len(column.edges) + 2 for column in self._binned]
             for batch, width in _batches(widths, summands):
-                cells = (
-                    np.where(bins > len(edges), np.int32(width - 1), bins)
-                    for bins, edges in zip(self._bins[batch], self._edges[batch], strict=True)
-                )
+                cells = (np.where(column.missing, np.int32(width - 1), column.bins) for column in self._binned[batch])
                 self._batches.append((batch, width, _one_hot(cells, width)))
         for batch, width, one_hot in self._batches:
             histogram = (one_hot @ by_row).reshape(-1, width, summands)
             # Two at a time, as complex numbers: numpy's cumsum processes one element after the other.
             left = np.cumsum(histogram[:, :-1].view(np.complex128), axis=1).view(np.float64)
-            splits = np.array([len(edges) for edges in self._edges[batch]])
+            splits = np.array([len(column.edges) for column in self._binned[batch]])
             is_split = np.arange(width - 1) < splits[:, np.newaxis]
             yield SplitSums(
                 self.columns[batch], np.ascontiguousarray(left.transpose(0, 2, 1)), histogram[:, -1], is_split
             )
-
-    def goes_left(self, position: int, split: int) -> NDArray[np.bool_]:
-        """Return (n,) whether each row lies left of a split of the column at `position` in this group."""
-        return self._bins[position] <= split
-
-    def is_missing(self, position: int) -> NDArray[np.bool_]:
-        """Return (n,) whether the column's value is missing."""
-        absent: NDArray[np.bool_] = self._bins[position] == len(self._edges[position]) + 1
-        return absent
-
-    def n_splits(self, position: int) -> int:
-        """Return the number of possible splits of the column at `position` in this group."""
-        return len(self._edges[position])
-
-    def threshold(self, position: int, split: int) -> float:
-        """Return the threshold of the split, between two neighbouring values."""
-        return float(self._edges[position][split])
 
 
 def _batches(widths: Sequence[int], n_summands: int) -> Iterator[tuple[slice, int]]:
@@ -160,11 +135,12 @@ def _one_hot(partitions: Iterator[NDArray[np.int32]], width: int) -> "csc_array"
 
 @dataclass(frozen=True, slots=True)
 class Binned:
-    """All columns of a training set that a stump can split on."""
+    """All columns of a training set that a stump can split on, by their numbers, and in two groups that are summed."""
 
     n_columns: int
-    groups: tuple[TwoValued | ManyValued, ...]
-    home: dict[int, tuple[TwoValued | ManyValued, int]]  # column -> its group and position there
+    columns: dict[int, BinnedColumn]
+    two: TwoValued
+    many: ManyValued
 
 
 def bin_columns(X: NDArray[np.generic], max_bins: int | None = None, weights: Floats | None = None) -> Binned:
@@ -174,46 +150,41 @@ def bin_columns(X: NDArray[np.generic], max_bins: int | None = None, weights: Fl
     Rows count with `weights` (n,), every sum of which must be exact.
     """
     two, rest = _two_valued(X)
-    binned = [(column, *_bin(np.asarray(X[:, column], dtype=np.float64), max_bins, weights)) for column in rest]
-    varying = [(column, bins, edges) for column, bins, edges in binned if edges.size]
-    # With few bins a column of many values may have only two.
-    two += [([column], [bins == 0], edges) for column, bins, edges in varying if bins.max() == 1]
-    many = [(column, bins, edges) for column, bins, edges in varying if bins.max() > 1]
-    groups: list[TwoValued | ManyValued] = []
-    if two:
-        columns, low, thresholds = map(np.concatenate, zip(*two, strict=True))
-        order = np.argsort(columns)
-        groups.append(TwoValued(columns[order], low[order], thresholds[order]))
-    if many:
-        groups.append(ManyValued(*map(list, zip(*many, strict=True))))
-    home = {column: (group, position) for group in groups for position, column in enumerate(group.columns.tolist())}
-    return Binned(X.shape[1], tuple(groups), home)
+    many: dict[int, BinnedColumn] = {}
+    for number in rest:
+        column = _bin(np.asarray(X[:, number], dtype=np.float64), max_bins, weights)
+        # With few bins a column of many values may have only two.
+        if column.edges.size and column.bins.max() == 1:
+            two[number] = BinnedColumn(column.bins > 0, column.edges)
+        elif column.edges.size:
+            many[number] = column
+    two = dict(sorted(two.items()))
+    high = np.array([column.bins for column in two.values()], dtype=np.bool_).reshape(len(two), len(X))
+    return Binned(X.shape[1], two | many, TwoValued(np.array([*two], dtype=np.intp), high), ManyValued(many))
 
 
-def _two_valued(X: NDArray[np.generic]) -> tuple[list[tuple[Any, Any, Floats]], list[int]]:
-    """Return the columns of two values and none missing, and the indices of columns of more; constant ones are omitted.
+def _two_valued(X: NDArray[np.generic]) -> tuple[dict[int, BinnedColumn], list[int]]:
+    """Return the columns of two values and none missing, and the numbers of columns of more; constant ones are omitted.
 
-    Most columns are switches: they are processed many at a time, without sorting. Each part of the first result holds
-    the arguments of `TwoValued`: columns (c,), low (c, n), thresholds (c,).
+    Most columns are switches: they are processed many at a time, without sorting.
     """
-    two: list[tuple[Any, Any, Floats]] = []
+    two: dict[int, BinnedColumn] = {}
     rest: list[int] = []
     step = max(1, _BLOCK_ELEMENTS // max(1, len(X)))
     for start in range(0, X.shape[1], step):
         numbers = np.asarray(X[:, start : start + step], dtype=np.float64)
         least, most = numbers.min(axis=0), numbers.max(axis=0)
-        is_low = numbers == least
-        few = (is_low | (numbers == most)).all(axis=0)
-        split = few & (least < most)
-        if split.any():
-            columns = start + np.flatnonzero(split)
-            two.append((columns, is_low.T[split], _between(least[split], most[split])))
+        is_high = numbers == most
+        few = (is_high | (numbers == least)).all(axis=0)
+        thresholds = _between(least, most)
+        for column in np.flatnonzero(few & (least < most)).tolist():
+            two[start + column] = BinnedColumn(is_high[:, column].copy(), thresholds[[column]])
         rest += (start + np.flatnonzero(~few)).tolist()
     return two, rest
 
 
-def _bin(numbers: Floats, max_bins: int | None, weights: Floats | None = None) -> tuple[NDArray[np.int32], Floats]:
-    """Return the bin (n,) of every number and the edges between bins; missing numbers get bin len(edges) + 1."""
+def _bin(numbers: Floats, max_bins: int | None, weights: Floats | None = None) -> BinnedColumn:
+    """Return the bins of a column (n,) of numbers, NaN for missing."""
     values, bins, counts = np.unique(numbers, return_inverse=True, return_counts=True)
     present = ~np.isnan(values)
     edges = midpoints(values[present])
@@ -222,7 +193,7 @@ def _bin(numbers: Floats, max_bins: int | None, weights: Floats | None = None) -
         kept = _even(heavy[present], max_bins)
         edges = edges[kept]
         bins = np.where(np.isnan(numbers), len(edges) + 1, np.searchsorted(kept, bins))
-    return bins.astype(np.int32), edges
+    return BinnedColumn(bins.astype(np.int32), edges)
 
 
 def _even(counts: NDArray[np.intp] | Floats, bins: int) -> NDArray[np.intp]:

@@ -1,4 +1,4 @@
-"""Additive classifiers as scikit-learn estimators, and LogitBoost on decision stumps as one of them."""
+"""Trainers as scikit-learn estimators: LogitBoost on decision stumps, and the additive multinomial logit."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -10,16 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 from thenar.drivers.extras import optional
 from thenar.runtime.model.tables import TIE, winners
 
-from ..elementary import softmax
-from .boost import BoostingError, boost, check_weights
+from .elementary import Floats, softmax
+from .trainers.base import BoostingError, check_weights
+from .trainers.logit import BINS, PENALTY, SMOOTHNESS, fit_logit
+from .trainers.logitboost import boost
+from .trainers.newton import TOLERANCE
 
 with optional():
     from sklearn.base import BaseEstimator, ClassifierMixin
     from sklearn.utils import check_array
     from sklearn.utils.multiclass import check_classification_targets
     from sklearn.utils.validation import check_is_fitted, validate_data
-
-Floats = NDArray[np.float64]
 
 
 class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[misc]
@@ -227,6 +228,85 @@ class LogitBoostClassifier(AdditiveClassifier):
 
     def _sums(self, inputs: NDArray[Any]) -> Floats:
         return self.stumps_.scores(inputs)
+
+
+class AdditiveLogitClassifier(AdditiveClassifier):
+    """Multinomial logistic regression on a table of scores for each input.
+
+    Inputs are bits, integer codes or floating-point numbers, X (n, d). An input of two values adds a row of scores at
+    the upper one; any other adds the row of its bin. The objective is convex, so the solution is unique. The trainer
+    `logit` fits the same model, and `compile` makes a build of a fitted classifier.
+
+    Parameters
+    ----------
+    penalty : float, default=0.5
+        Pull of scores towards zero: half of it times the sum of their squares is added to the loss. Bins have a
+        sixteenth of this pull, the bias a thousandth.
+    smoothness : float, default=2.0
+        Pull of neighbouring bins towards each other: half of it times the sum of squares of their differences is added.
+    max_bins : int, optional, default=16
+        The most bins per input (2 or more); they hold rows as evenly as possible. None: one for each value.
+    linear : bool, default=False
+        Inputs of more than two values add scores in proportion to them instead, between their minimum and maximum in
+        the training set; `smoothness` then pulls the contribution of one standard deviation.
+    tolerance : float, default=1e-7
+        No derivative of the loss is larger than this at the solution, relative to the total weight; at least 1e-12.
+    classes : sequence, optional
+        All labels, if y may lack some of them (a fold without a rare class). None: those in y.
+
+    Attributes
+    ----------
+    classes_ : ndarray, shape (K,)
+        The labels, in the order of the columns of scores and probabilities.
+    tables_ : ColumnTables
+        The rows of scores: `bias` (K,); for each column its `edges` and `rows`; and the `lines` of some columns.
+
+    Examples
+    --------
+    >>> from thenar.compiler import AdditiveLogitClassifier
+    >>> X, y = [[0, 10], [0, 200], [1, 30], [1, 220]], ["tip", "power", "tip", "power"]
+    >>> classifier = AdditiveLogitClassifier().fit(X, y)
+    >>> classifier.predict([[0, 20], [0, 215]]).tolist()
+    ['tip', 'power']
+    """
+
+    def __init__(
+        self,
+        penalty: float = PENALTY,
+        smoothness: float = SMOOTHNESS,
+        max_bins: int | None = BINS,
+        linear: bool = False,
+        tolerance: float = TOLERANCE,
+        classes: Sequence[Any] | None = None,
+    ) -> None:
+        self.penalty = penalty
+        self.smoothness = smoothness
+        self.max_bins = max_bins
+        self.linear = linear
+        self.tolerance = tolerance
+        self.classes = classes
+
+    def _learn(
+        self,
+        inputs: NDArray[Any],
+        labels: NDArray[np.intp],
+        weights: Floats | None,
+        progress: Callable[[int, int], None] | None,
+    ) -> None:
+        self.tables_ = fit_logit(
+            inputs,
+            labels,
+            len(self.classes_),
+            penalty=self.penalty,
+            smoothness=self.smoothness,
+            max_bins=self.max_bins,
+            linear=self.linear,
+            tolerance=self.tolerance,
+            weights=weights,
+        )
+
+    def _sums(self, inputs: NDArray[Any]) -> Floats:
+        return self.tables_.scores(inputs)
 
 
 def _kept_dtypes(X: ArrayLike) -> str | list[type]:

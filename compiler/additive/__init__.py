@@ -1,1 +1,0 @@
-"""The additive multinomial logit: all score tables fitted at once by convex optimisation."""
