@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from .artifact.verify import FaultCheck, Verification, verify, verify_faults
     from .boosting.boost import BoostingError
     from .boosting.classifier import LogitBoostClassifier
-    from .cluster import dask_cluster
     from .evaluation.folds import EvaluationError
     from .evaluation.study import Study, StudyDesign, evaluate
     from .firmware.targets import TARGETS
@@ -63,7 +62,6 @@ _HOMES = {
     ".artifact.verify": ("FaultCheck", "Verification", "verify", "verify_faults"),
     ".boosting.boost": ("BoostingError",),
     ".boosting.classifier": ("LogitBoostClassifier",),
-    ".cluster": ("dask_cluster",),
     ".evaluation.folds": ("EvaluationError",),
     ".evaluation.study": ("Study", "StudyDesign", "evaluate"),
     ".firmware.targets": ("TARGETS",),
@@ -119,7 +117,6 @@ __all__ = [
     "Verification",
     "compile",
     "compile_build",
-    "dask_cluster",
     "evaluate",
     "export_c",
     "find_frontier",

@@ -22,8 +22,7 @@ ALLOWED = {
     "compiler.pictures": ("runtime.errors",),
     "compiler.elementary": (),
     "compiler.text": (),
-    "compiler.cluster": ("drivers.errors",),
-    "compiler.workers": ("compiler.cluster",),
+    "compiler.workers": (),
     "compiler.hand": ("drivers.errors", "runtime.names"),
     "compiler.limits": ("runtime.model", "drivers.errors"),
     "compiler.publication": ("runtime.files", "drivers.errors"),
@@ -144,7 +143,7 @@ ALLOWED = {
     "cli": PACKAGES,
 }
 
-# Third-party packages of the extras `compiler`, `cluster` and `stability`, and of peers: a board has none.
+# Third-party packages of the extras `compiler` and `stability`, and of peers: a board has none.
 WORKSTATION_ONLY = {
     "sklearn",
     "scipy",
@@ -158,8 +157,6 @@ WORKSTATION_ONLY = {
     "python_calamine",
     "pyarrow",
     "h5py",
-    "dask",
-    "distributed",
     "pysensors",
 }
 

@@ -106,7 +106,7 @@ def find_frontier(
     stream : GraspSet, optional
         Other recordings of the same glove, to measure decision latency on; usually the test rows of the first fold.
     jobs : int
-        Worker processes, -1 for all cores. Within `thenar.compiler.dask_cluster`, its workers do the work.
+        Worker processes, -1 for all cores.
     report : callable, optional
         Called with the done and total steps; every round of work has the same number of them.
 

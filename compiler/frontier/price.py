@@ -39,7 +39,7 @@ class Equipment:
         return tuple(scan_times(names, wiring, self.overhead) for wiring in wirings)
 
 
-@stored(2, where="process")
+@stored(2, here=True)
 def calibrate(target: str) -> tuple[PythonCost | None, ReadingCost]:
     """Measure here, if the target requires it, the time of classifying in Python and the overhead of a transaction."""
     return ClassifyModel(target).python, overhead_of(target)
@@ -114,7 +114,7 @@ def tables_of(
         yield recipe, shaped.tables if lost else shaped.integers
 
 
-@stored(3, where="machine")
+@stored(3)
 def count_steps(content: bytes, model: ClassifyModel) -> float:
     """Compile the classifier of tables and run it; return the cycles of the slowest frame.
 
@@ -134,17 +134,14 @@ def steps_of(fit: PartFit) -> float:
     return float(run_counted(library, fit.target, slow_frames(library)).most)
 
 
-@stored(2, where="process")
+@stored(2, here=True)
 def time_here(contents: tuple[bytes, ...], yardstick: float) -> tuple[float, ...]:
     """Time the runtime on each of the tables, scaled by its yardstick; return microseconds."""
     return tuple(classify_us([tables_from_bytes(content) for content in contents], yardstick))
 
 
 def measured(contents: Sequence[bytes], model: ClassifyModel, cache: Cache) -> dict[bytes, PointTime]:
-    """Return the time of classifying with each of these tables, simulated or measured; none if that is not possible.
-
-    Simulators run on this machine even with a cluster, whose workers may have none.
-    """
+    """Return the time of classifying with each of these tables, simulated or measured; none if that is not possible."""
     several = tuple(dict.fromkeys(contents))
     if model.unmeasured:
         return {}
