@@ -1,5 +1,5 @@
-"""Work in other processes: independent tasks on all cores, with each result as soon as it is available; and a single
-background task.
+"""What this machine can do: independent tasks on all cores, with each result as soon as it is available; a single
+background task; and trainings that fit into its memory.
 """
 
 import os
@@ -12,12 +12,16 @@ from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any, Generic, TypeVar
 
+from thenar.drivers.errors import ThenarError
+
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 # More processes than four per core are certainly a mistake, and would slow the machine to a halt.
 MOST_JOBS = 4 * (os.cpu_count() or 1)
 
+# Numbers of (types, rows) arrays in a round of boosting, and of a training's columns with two values and with more.
+_BYTES_A_TYPE_AND_ROW, _BYTES_A_SWITCH_AND_ROW, _BYTES_A_JOINT_AND_ROW = 120, 10, 60
 _SAFE_PATH = "PYTHONSAFEPATH"
 # Rows times rounds of boosting: about a second's work.
 _LITTLE = 200_000
@@ -208,3 +212,14 @@ def _background(parent: int, there: Any, work: Callable[[Task], Result], task: T
     except Exception as fault:
         result = f"{type(fault).__name__}: {fault}", None  # type: ignore[assignment]
     there.send(result)
+
+
+def check_memory(rows: int, types: int, raises: type[ThenarError], switches: int = 0, joints: int = 0) -> None:
+    """Raise `raises` if training on `rows` rows needs more memory than this machine has."""
+    a_row = _BYTES_A_TYPE_AND_ROW * types + _BYTES_A_SWITCH_AND_ROW * switches + _BYTES_A_JOINT_AND_ROW * joints
+    needed, there = rows * a_row, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if needed > there:
+        raise raises(
+            f"training on {rows} rows of {types} grasp types needs some {needed / 1e9:.1f} GB of memory, this machine "
+            f"has {there / 1e9:.1f}: take fewer rows or columns"
+        )

@@ -30,7 +30,7 @@ from ..boosting.binning import bin_columns
 from ..boosting.boost import BoostingError, check_rows
 from ..boosting.exactsums import dot, exact_sum, on_one_grid
 from ..elementary import add_up, softmax_and_loss
-from ..limits import check_memory
+from ..workers import check_memory
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -20,7 +20,7 @@ from thenar.runtime.model.terms.grid import Grid
 
 from ..boosting.boost import BoostingError, check_rows
 from ..boosting.exactsums import exact_sum, on_one_grid
-from ..limits import check_memory
+from ..workers import check_memory
 from .logit import TOLERANCE, Column, Fit, column_edges, columns_of, count_of, sparse, spread_out, tables_of
 
 PAIRS, PAIR_BINS, PAIR_SMOOTHNESS = 4, 8, 0.5

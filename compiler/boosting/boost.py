@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from thenar.drivers.errors import ThenarError
 
 from ..elementary import add_exactly, softmax_and_loss
-from ..limits import check_memory
+from ..workers import check_memory
 from .binning import TwoValued, bin_columns
 from .stumpfit import Targets, fit_stumps
 from .stumps import Stumps, centred

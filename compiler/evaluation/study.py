@@ -9,16 +9,16 @@ import numpy as np
 from thenar.runtime.manifest import fit_name
 from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Recipe, changed
 
-from ..limits import check_memory, check_types
 from ..placement.constraints import Limits
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import Placer
 from ..placement.ports import PortCosts
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
-from ..samples import Samples
+from ..samples import Samples, check_types
 from ..text import counted
 from ..trainers.base import Training
+from ..workers import check_memory
 from .folds import EvaluationError
 from .learning import Learning, plan_learning
 from .permutation import Permuted, permuted

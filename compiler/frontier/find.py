@@ -20,14 +20,15 @@ from thenar.runtime.published import NONE
 from thenar.runtime.recipe import Recipe
 
 from ..evaluation.rates import Rate
-from ..limits import check_inputs, check_memory, check_types
 from ..placement.methods.base import METHODS, usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
+from ..recogniser import check_inputs
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
-from ..samples import Samples
+from ..samples import Samples, check_types
 from ..text import INDEPENDENT, sentence
+from ..workers import check_memory
 from .cache import Cache, Report, Store
 from .designs import Design, Latencies, best_designs, designs, lucks, points_of
 from .finalists import EvaluatedFinalist, choices_to_mark, evaluate_finalists, finalists, marks_of

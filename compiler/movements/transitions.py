@@ -3,10 +3,11 @@
 Nothing held between two grasps is skipped: PoS, nothing, PMF is a change from PoS to PMF.
 """
 
+from cmath import rect
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import cos, hypot, pi, sin
+from math import cos, pi
 from pathlib import Path
 
 import msgspec
@@ -17,9 +18,8 @@ from numpy.typing import NDArray
 from thenar.runtime.files import read_file
 
 from ..recordings.graspset import GraspSet
-from .scores import segments_of
+from .segments import segments_of
 from .streams import MovementError, streams_of
-from .timeline import Timeline
 
 # Rarer transitions are not admissible, and are drawn faintly.
 FREQUENT = 0.1
@@ -62,12 +62,6 @@ class Transitions:
         return cls.of(([names[one.state] for one in stream] for stream in streams), [names[one] for one in types])
 
     @classmethod
-    def of_timelines(cls, timelines: Sequence[Timeline]) -> "Transitions":
-        """Count the changes in segments found in streams of the same types."""
-        every = ([one.type for one in timeline.segments()] for timeline in timelines)
-        return cls.of(every, timelines[0].types if timelines else ())
-
-    @classmethod
     def load(cls, path: Path) -> "Transitions":
         """Load a file written by `save`. Raises MovementError that names the file, OSError."""
         try:
@@ -99,6 +93,8 @@ class Transitions:
 
 # The picture's side, the radius of the circle of types, and the radius of a type, reduced if there are many.
 SIZE, _CIRCLE, _LARGEST_DOT = 720, 262.0, 21.0
+# Places in the picture are complex numbers, y downwards.
+_MIDDLE = SIZE / 2 * (1 + 1j)
 Place = tuple[float, float]
 
 
@@ -118,25 +114,15 @@ class Graph:
 
 def graph_of(transitions: Transitions) -> Graph:
     """Return the graph as shapes, in a square of SIZE."""
-    types, every, shares, K = transitions.types, transitions.counts, transitions.probabilities, len(transitions.types)
+    types, counts, shares, K = transitions.types, transitions.counts, transitions.probabilities, len(transitions.types)
     dot = round(min(_LARGEST_DOT, 0.8 * pi * _CIRCLE / max(K, 1)), 1)
     angles = [2 * pi * number / K - pi / 2 for number in range(K)]
-    places = [(SIZE / 2 + _CIRCLE * cos(angle), SIZE / 2 + _CIRCLE * sin(angle)) for angle in angles]
+    places = [_MIDDLE + rect(_CIRCLE, angle) for angle in angles]
     nodes = []
-    for name, angle, (x, y), counts in zip(types, angles, places, every, strict=True):
-        reach = _CIRCLE + dot + 10
-        label = SIZE / 2 + reach * cos(angle), SIZE / 2 + reach * sin(angle) + 5
+    for name, angle, place, row in zip(types, angles, places, counts, strict=True):
+        label = _MIDDLE + rect(_CIRCLE + dot + 10, angle) + 5j
         anchor = "middle" if abs(cos(angle)) < 0.2 else "start" if cos(angle) > 0 else "end"
-        nodes.append(
-            (
-                name,
-                (round(x, 1), round(y, 1)),
-                (round(label[0], 1), round(label[1], 1)),
-                anchor,
-                f"{name}: followed {int(counts.sum())} times",
-            )
-        )
-    changes = [(float(shares[a, b]), a, b) for a, b in np.argwhere(every).tolist()]
+        nodes.append((name, _rounded(place), _rounded(label), anchor, f"{name}: followed {int(row.sum())} times"))
     edges = [
         _edge(
             places[a],
@@ -144,15 +130,15 @@ def graph_of(transitions: Transitions) -> Graph:
             angles[a],
             dot,
             share,
-            f"{types[a]} to {types[b]}: {every[a, b]} of {every[a].sum()} ({share:.0%})",
+            f"{types[a]} to {types[b]}: {counts[a, b]} of {counts[a].sum()} ({share:.0%})",
         )
-        for share, a, b in sorted(changes)
+        for share, a, b in sorted((float(shares[a, b]), a, b) for a, b in np.argwhere(counts).tolist())
     ]
     return Graph(tuple(nodes), tuple(edges), dot)
 
 
 def _edge(
-    start: Place, end: Place, angle: float, dot: float, share: float, words: str
+    start: complex, end: complex, angle: float, dot: float, share: float, words: str
 ) -> tuple[str, str, float, float, str]:
     """Return the arrow from one type to another, or a loop outside the circle.
 
@@ -161,32 +147,25 @@ def _edge(
     width, opacity = 1 + 6 * share, 0.12 if share < FREQUENT else min(1.0, 0.35 + share)
     if start == end:
         angle += 1.2  # past the name
-        x, y = start[0] + dot * cos(angle), start[1] + dot * sin(angle)
-        turned = [(x + 26 * cos(angle + turn), y + 26 * sin(angle + turn)) for turn in (-1.0, 1.0)]
-        points = [(x, y), *turned, (x, y)]
-        path = "M{} C{} {} {}".format(*map(_point, points))
+        first = start + rect(dot, angle)
+        path = "M{} C{} {} {}".format(*map(_point, (first, *(first + rect(26, angle + d) for d in (-1, 1)), first)))
         return path, "", round(width, 2), round(opacity, 2), words
-    middle = SIZE / 2
-    dx, dy = end[0] - start[0], end[1] - start[1]
     # To the right of the straight line, and towards the middle.
-    bend = (
-        (start[0] + end[0]) / 2 * 0.6 + middle * 0.4 - dy * 0.12,
-        (start[1] + end[1]) / 2 * 0.6 + middle * 0.4 + dx * 0.12,
-    )
-    first, last = _towards(start, bend, dot), _towards(end, bend, dot + 9)
-    ux, uy = (end[0] - bend[0]), (end[1] - bend[1])
-    length = hypot(ux, uy) or 1.0
-    ux, uy, half = ux / length, uy / length, 3 + width / 2
-    point = _towards(end, bend, dot)
-    tip = [point, (last[0] - uy * half, last[1] + ux * half), (last[0] + uy * half, last[1] - ux * half)]
-    path = f"M{_point(first)} Q{_point(bend)} {_point(last)}"
-    return path, " ".join(map(_point, tip)), round(width, 2), round(opacity, 2), words
+    bend = (start + end) / 2 * 0.6 + _MIDDLE * 0.4 + (end - start) * 0.12j
+    ahead = (end - bend) / (abs(end - bend) or 1.0)
+    last, side = _towards(end, bend, dot + 9), ahead * 1j * (3 + width / 2)
+    tip = " ".join(map(_point, (_towards(end, bend, dot), last + side, last - side)))
+    path = f"M{_point(_towards(start, bend, dot))} Q{_point(bend)} {_point(last)}"
+    return path, tip, round(width, 2), round(opacity, 2), words
 
 
-def _towards(place: Place, other: Place, far: float) -> Place:
-    length = hypot(other[0] - place[0], other[1] - place[1]) or 1.0
-    return (place[0] + far * (other[0] - place[0]) / length, place[1] + far * (other[1] - place[1]) / length)
+def _towards(place: complex, other: complex, far: float) -> complex:
+    return place + far * (other - place) / (abs(other - place) or 1.0)
 
 
-def _point(place: Place) -> str:
-    return f"{place[0]:.1f},{place[1]:.1f}"
+def _rounded(place: complex) -> tuple[float, float]:
+    return round(place.real, 1), round(place.imag, 1)
+
+
+def _point(place: complex) -> str:
+    return f"{place.real:.1f},{place.imag:.1f}"

@@ -14,10 +14,9 @@ from msgspec.structs import replace
 from thenar.runtime.recipe import Recipe, changed
 
 from ..elementary import LN_2
-from ..limits import check_types
+from ..facts import SensorCount
 from ..recordings.graspset import GraspSet
-from ..samples import Columns, Samples
-from ..sensors import SensorCount
+from ..samples import Columns, Samples, check_types
 from .constraints import Bound, Limits
 from .cooccurrence import Cooccurrence
 from .elements import Elements, bits_of, elements_of, names_of, ports_of

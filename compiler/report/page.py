@@ -5,10 +5,9 @@ from functools import lru_cache, partial
 
 from thenar.drivers.extras import optional
 
+from ..facts import SensorCount
 from ..movements.transitions import graph_of
-from ..pages import embedded, policy_hash, templates
-from ..pictures import colour_variables
-from ..sensors import SensorCount
+from ..pictures import colour_variables, embedded, policy_hash, templates
 from ..text import sentence
 from . import results, sections
 from .content import ReportContent
