@@ -14,8 +14,8 @@ from statistics import median
 
 import numpy as np
 
-from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.samples import select_inputs
 from thenar.runtime.build import Build
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.live.quarantine import SETTLED_US

@@ -26,7 +26,6 @@ from .parameters import (
     OneOf,
     OutputFile,
     OutputFolder,
-    dask_option,
     existing_file,
     jobs_option,
     keep_apart,
@@ -110,7 +109,6 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 @trainer_option(AUTO)
 @recipe_options("refuse", "folds", "seed", "by")
 @jobs_option()
-@dask_option
 @recipe_options("table_bits", "width")
 @click.option("--from", "from_frontier", type=existing_file, help="A frontier.json: build one of its points.")
 @click.option("--point", type=click.IntRange(1), help="Number of the point.  [default: the picked one]")

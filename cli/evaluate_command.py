@@ -25,7 +25,6 @@ from .parameters import (
     OutputFile,
     OutputFolder,
     comma_separated,
-    dask_option,
     existing_file,
     jobs_option,
     keep_apart,
@@ -99,7 +98,6 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
 )
 @recipe_options("seed")
 @jobs_option()
-@dask_option
 @click.option(
     "--baselines",
     type=method_list,

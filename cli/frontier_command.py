@@ -15,7 +15,6 @@ from .parameters import (
     Number,
     OneOf,
     OutputFolder,
-    dask_option,
     existing_file,
     existing_folder,
     jobs_option,
@@ -84,7 +83,6 @@ def _timed() -> tuple[str, ...]:
     help="Choose points by left-out subjects, or by trials of all subjects.  [default: subject, if several]",
 )
 @jobs_option()
-@dask_option
 @json_flag
 @click.pass_context
 def command(

@@ -9,8 +9,8 @@ from typing import Any
 
 from msgspec import to_builtins
 
-from thenar.compiler.artifact.drawn_hand import drawn_glove
 from thenar.compiler.evaluation.sofar import InterimAccuracy, recording_so_far
+from thenar.compiler.hand import drawn_glove
 from thenar.compiler.recordings.taxonomy import ANY, MOVEMENTS, Taxonomy
 from thenar.compiler.workers import BackgroundTask
 from thenar.drivers.closing import Closing

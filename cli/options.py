@@ -303,7 +303,7 @@ def hand_of(layout: Path | None) -> "HandShape":
         from thenar.simulator.handmaps.handmap import hand_map
 
         return hand_map()
-    from thenar.compiler.layouts import load_layout
+    from thenar.compiler.hand import load_layout
 
     return load_layout(layout)
 

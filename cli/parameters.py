@@ -178,26 +178,6 @@ def jobs_option(what: str = "Worker processes. The result does not depend on it.
     )
 
 
-def _work_there(context: click.Context, _: click.Parameter, address: str | None) -> None:
-    """Let the cluster at `address` do the work of the command."""
-    if address is None:
-        return
-    if not all(address.partition("://")):
-        raise click.BadParameter(f"{shortened(repr(address))} is not an address such as tcp://10.0.0.5:8786")
-    from thenar.compiler.cluster import dask_cluster
-
-    context.with_resource(dask_cluster(address))
-
-
-dask_option = click.option(
-    "--dask",
-    expose_value=False,
-    callback=_work_there,
-    metavar="ADDRESS",
-    help="Work on the cluster of this Dask scheduler, such as tcp://host:8786.",
-)
-
-
 def _token(_context: click.Context, _option: click.Parameter, wanted: bool) -> str | None:
     if not wanted:
         return None

@@ -70,7 +70,7 @@ def command(
         thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
         thenar place set.grasps --method elimination --keep 16 --keep-these thumb_distal_5 --apart-mm 8
     """
-    from thenar.compiler.artifact.training import rates_of_recipe
+    from thenar.compiler.artifact.training import fold_results, samples_of
     from thenar.compiler.placement.placement import place
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.recipe import Recipe, changed
@@ -83,7 +83,11 @@ def command(
     terms = terms_of(recipe, grasp_set, layout, glove)
     with progress(f"choosing switches by {recipe.placement}") as report:
         placement = place(grasp_set, recipe, **terms)
-        rates = rates_of_recipe(grasp_set, recipe, **terms, jobs=jobs, report=report) if recipe.folds else ()
+        tested = None
+        if recipe.folds:
+            samples = samples_of(grasp_set, recipe)
+            tested = fold_results(grasp_set, samples, recipe, **terms, jobs=jobs, report=report)
+    rates = () if tested is None else tested.rates
     document = placement.document() | ({"rates": rates} if rates else {})
     if draw is not None:
         from thenar.compiler.placement.drawing import draw_placement

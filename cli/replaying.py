@@ -78,7 +78,8 @@ def replay_set(
     """
     import msgspec
 
-    from thenar.compiler.artifact.replay import replayed, trained_on, trials_recognised
+    from thenar.compiler.artifact.training import trained_on
+    from thenar.compiler.artifact.verify import replayed, trials_recognised
     from thenar.compiler.recordings.graspset import GraspSet
 
     whole, found = GraspSet.load(replay), list[str]()

@@ -15,7 +15,7 @@ from .printing import echo, json_flag, out, progress, show, table, warning, writ
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from thenar.compiler.movements.timeline import FoundSegment
+    from thenar.compiler.artifact.timeline import FoundSegment
 
 _ENDINGS = (".csv", ".eaf", ".mcap")
 _SHOWN = 20
@@ -59,10 +59,7 @@ def command(
         thenar segment run.mcap -b build/ -o segments.eaf --lag-ms 150
         thenar segment movements.grasps -b build/ --picture timeline.svg --transitions graph.json
     """
-    from thenar.compiler.artifact.segments import segment
-    from thenar.compiler.movements.files import write
-    from thenar.compiler.movements.picture import draw
-    from thenar.compiler.movements.timeline import overlap_f1
+    from thenar.compiler.artifact.timeline import draw, overlap_f1, segment, write
     from thenar.compiler.movements.transitions import Transitions
     from thenar.runtime.files import write_atomically
 
@@ -72,7 +69,8 @@ def command(
     if picture is not None:
         write_picture(picture, partial(draw, found))
     if transitions is not None:
-        write_atomically(transitions, Transitions.of_timelines(found).to_json())
+        sequences = ([part.type for part in timeline.segments()] for timeline in found)
+        write_atomically(transitions, Transitions.of(sequences, found[0].types).to_json())
     if output is not None:
         write(output, found)
     segments = [one for timeline in found for one in timeline.segments()]

@@ -47,8 +47,7 @@ def command(
         thenar spec build/ --hand-length 182 --glove glove.toml -o spec/
         thenar spec build/ --layout layout.toml -o spec/
     """
-    from thenar.compiler.glove.files import check_output, files_of, write_spec
-    from thenar.compiler.glove.lists import expectations
+    from thenar.compiler.glove.files import check_output, expectations, files_of, write_spec
     from thenar.compiler.glove.spec import glove_spec
     from thenar.runtime.build import Build
 

@@ -44,8 +44,8 @@ def command(
         thenar teach demo1.mcap demo2.mcap demo3.mcap -b build/ -o task.json --preshape barrett_bh8
         thenar run build/ --glove glove.toml --task task.json
     """
-    from thenar.compiler.artifact.demonstrations import demonstrations as shown_in
-    from thenar.compiler.movements.teaching import Demonstration, behaviour_tree, task_json, taught
+    from thenar.compiler.artifact.teaching import Demonstration, behaviour_tree, task_json, taught
+    from thenar.compiler.artifact.teaching import demonstrations as shown_in
     from thenar.compiler.movements.transitions import Transitions
     from thenar.runtime import Build
     from thenar.runtime.files import write_atomically

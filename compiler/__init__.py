@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from .artifact.estimator import compile, export_c  # noqa: A004
     from .artifact.verify import FaultCheck, Verification, verify, verify_faults
     from .classifiers import AdditiveLogitClassifier, LogitBoostClassifier
-    from .cluster import dask_cluster
     from .evaluation.folds import EvaluationError
     from .evaluation.study import Study, StudyDesign, evaluate
     from .firmware.targets import TARGETS
@@ -59,7 +58,6 @@ _HOMES = {
     ".artifact.estimator": ("compile", "export_c"),
     ".artifact.verify": ("FaultCheck", "Verification", "verify", "verify_faults"),
     ".classifiers": ("AdditiveLogitClassifier", "LogitBoostClassifier"),
-    ".cluster": ("dask_cluster",),
     ".evaluation.folds": ("EvaluationError",),
     ".evaluation.study": ("Study", "StudyDesign", "evaluate"),
     ".firmware.targets": ("TARGETS",),
@@ -115,7 +113,6 @@ __all__ = [
     "Verification",
     "compile",
     "compile_build",
-    "dask_cluster",
     "evaluate",
     "export_c",
     "find_frontier",

@@ -1,8 +1,10 @@
-"""The facts of a build: one text for each, which the command line, the report and the spec print."""
+"""The facts of a build, one text for each, which the command line, the report and the spec print; and its sensors, as
+they are bought, counted.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
@@ -11,7 +13,6 @@ from thenar.runtime.scanning.propose import own_joints, propose_cyberglove
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us
 
-from .sensors import SensorCount
 from .text import INDEPENDENT, counted, listed, microseconds, percent
 
 Topic = Literal["kept", "inputs", "fit", "compared", "accuracy", "caution", "integers", "faults", "scan", "wiring"]
@@ -179,3 +180,39 @@ def _scan(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) -> 
         how = "by the vendor's formula" if glove.record_us is None else "as measured"
         us = microseconds(glove_us(glove, len(names)))
         yield Fact("scan", "CyberGlove", f"a record of {counted(len(names), 'sensor')} takes {us} us at best, {how}")
+
+
+@dataclass(frozen=True, slots=True)
+class SensorCount:
+    """How many sensors of each kind are kept, and how many there are to choose from.
+
+    switches, pads, joints  (kept, all)
+    levels                  thresholds of the kept pads: a placement may choose several of one pad
+    """
+
+    switches: tuple[int, int] = (0, 0)
+    pads: tuple[int, int] = (0, 0)
+    joints: tuple[int, int] = (0, 0)
+    levels: int = 0
+
+    @classmethod
+    def of_build(cls, manifest: Manifest) -> Self:
+        """Return the sensors that a build keeps."""
+        levels = [switch.source for switch in manifest.switches if switch.threshold is not None]
+        source = manifest.source
+        return cls(
+            switches=(len(manifest.switches) - len(levels), source.switches),
+            pads=(len(set(levels)), source.taxels),
+            joints=(len(manifest.joints), source.joints),
+            levels=len(levels),
+        )
+
+    def __str__(self) -> str:
+        """Return "3 of 8 switches, 6 of 24 pads (14 levels) and 5 of 5 joints", without kinds that the set lacks."""
+        levels = f" ({counted(self.levels, 'level')})" if self.levels else ""
+        kinds = (
+            (self.switches, "switch", "switches", ""),
+            (self.pads, "pad", "pads", levels),
+            (self.joints, "joint", "joints", ""),
+        )
+        return listed([f"{kept} of {counted(total, *names)}{more}" for (kept, total), *names, more in kinds if total])

@@ -1,19 +1,44 @@
-"""A hand laid flat, with its switches, for pictures, reports and specs.
+"""A hand laid flat, with its switches, for pictures, reports, specs and `hand.json`.
 
-The positions come from a hand map (simulator/handmaps) or from a user's layout, so nothing here depends on how hands
-are simulated.
+The positions come from a hand map (simulator/handmaps) or from a user's layout, a TOML file of a home-made glove, so
+nothing here depends on how hands are simulated.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.names import nearest
+from thenar.runtime.hand import (
+    GRID_RADIUS_MM,
+    DrawnSwitch,
+    DrawnTaxel,
+    HandDrawing,
+    Line,
+    Spot,
+    drawn_joints,
+    drawn_switches,
+    drawn_taxels,
+    grid_hand,
+    grid_places,
+)
+from thenar.runtime.manifest import Calibration, Manifest
+from thenar.runtime.names import fault, nearest, shortened
+from thenar.runtime.recording.session import Session
+from thenar.runtime.toml_source import read_source
+from thenar.runtime.toml_struct import check_finite, convert
 
 Floats = NDArray[np.float64]
+_LARGEST_DOT_MM, _SMALLEST_DOT_MM = 4.0, 0.5
+_WHOLE = "glove"  # the part of switches that are on no part
+Length = Annotated[float, Meta(ge=-10_000.0, le=10_000.0)]
+Place = tuple[Length, Length]
+_NEAREST_MM = 0.5  # points closer than this to the last one drawn are omitted
 
 
 class MapError(ThenarError, ValueError):
@@ -115,3 +140,149 @@ class HandShape:
                 raise MapError(f"the position of switch {strange!r} is unknown: say it with ``layout``")
             raise MapError(f"{strange!r} is no switch of the glove {self.glove}{nearest(strange, self.names)}")
         return np.array([number[place] for place in places], dtype=np.intp)
+
+
+class Places(Struct, frozen=True, forbid_unknown_fields=True):
+    """The content of `layout.toml`, in mm: x to the right, y up.
+
+    places       the middle of each switch, by the name of its column
+    parts        the parts of the glove, such as fingers, and the switches on each; the others are on "glove"
+    outline      points on the edge of the glove
+    part_number  of a switch to buy, and body_mm, its width; "" and 0 if open
+    """
+
+    places: dict[str, Place]
+    parts: dict[str, tuple[str, ...]] = {}
+    outline: tuple[Place, ...] = ()
+    part_number: str = ""
+    body_mm: Annotated[float, Meta(ge=0.0, le=100.0)] = 0.0
+
+
+def load_layout(path: Path) -> HandShape:
+    """Return the hand in a .toml file. Raises MapError, with the line."""
+    if path.suffix.lower() != ".toml":
+        raise MapError(f"{path.name}: a layout is a .toml file")
+    source = read_source(path, MapError)
+    tables = source.tables()
+    check_finite(source, (), tables)
+    layout = convert(source, (), tables, Places)
+    part_of: dict[str, str] = {}
+    for part, switches in layout.parts.items():
+        for name in switches:
+            if name not in layout.places:
+                raise source.error(("parts", part), f"{shortened(repr(name))} is not among the places")
+            if name in part_of:
+                raise source.error(("parts", part), f"{name!r} is on {part_of[name]!r} already: a switch has one part")
+            part_of[name] = part
+    for name in (*layout.places, *layout.parts, *filter(None, [layout.part_number])):
+        if reason := fault(name):
+            raise MapError(f"{path.name}: {shortened(repr(name))} {reason}")
+    if not layout.places:
+        raise MapError(f"{path.name} has no switch: give places to the names of the columns")
+    names, places = tuple(layout.places), np.array(list(layout.places.values()), np.float64)
+    parts = [part_of.get(name, _WHOLE) for name in names]
+    part_names = tuple(dict.fromkeys((*layout.parts, *parts)))
+    return HandShape(
+        glove=path.name,
+        length_mm=None,
+        names=names,
+        places=places,
+        radius_mm=_radius_mm(places, layout.body_mm),
+        part_names=part_names,
+        parts=np.array([part_names.index(part) for part in parts], np.intp),
+        sides=np.zeros(len(names), np.intp),
+        outline=np.array(layout.outline, np.float64).reshape(-1, 2),
+        digits=(),
+        strips=(),
+        creases=(),
+        labels=np.empty((0, 2)),
+        part_number=layout.part_number,
+        body_mm=layout.body_mm,
+    )
+
+
+def _radius_mm(places: np.ndarray, body_mm: float) -> float:
+    """Return the radius at which no two switches overlap, at most half of body_mm if that is given."""
+    gaps = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+    np.fill_diagonal(gaps, np.inf)
+    most = min(body_mm / 2 or _LARGEST_DOT_MM, 0.45 * float(gaps.min(initial=np.inf)))
+    return max(_SMALLEST_DOT_MM, most)
+
+
+def drawn_hand(
+    manifest: Manifest,
+    hand: HandShape | None,
+    switch_names: Sequence[str],
+    taxel_names: Sequence[str],
+    codes: NDArray[np.uint16],
+) -> HandDrawing:
+    """Return the drawing of a build on `hand`, with all recorded switches and taxels and the kept ones marked.
+
+    `codes` (n, j) are the codes of the build's joints in the training rows. Without a hand that has positions for the
+    switches, the kept ones are drawn in a grid.
+    """
+    ranges = None if not len(codes) else list(zip(codes.min(axis=0).tolist(), codes.max(axis=0).tolist(), strict=True))
+    if not manifest.switches or hand is None or not hand.knows([*switch_names, *taxel_names]):
+        return grid_hand(manifest, ranges)
+    return HandDrawing(
+        **_shape(hand),
+        switches=drawn_switches(manifest, _places(hand, switch_names)),
+        taxels=drawn_taxels(manifest, _places(hand, taxel_names)),
+        joints=drawn_joints(manifest.joints, ranges),
+    )
+
+
+def drawn_glove(session: Session, hand: HandShape) -> HandDrawing:
+    """Return the drawing of a recorded glove: every switch as the bit that it has in a frame.
+
+    Switches with the names of those on `hand` are drawn there, others in a grid. Calibrated sensors are in degrees,
+    others show their bytes.
+    """
+    names, n = (*session.switches, *session.taxels), len(session.switches)
+    fits = hand.fitted(names) is not None
+    places = _places(hand, names) if fits else grid_places(names)
+    lines = {} if session.calibration is None else {line.name: line for line in session.calibration.sensors}
+    joints = []
+    for number, name in enumerate(session.sensors):
+        line = lines.get(name)
+        ends = (1, 1.0, 255, 255.0) if line is None else (line.raw_a, line.value_a, line.raw_b, line.value_b)
+        joints.append(Calibration(number, name, "raw" if line is None else "deg", *ends))
+    return HandDrawing(
+        **(_shape(hand) if fits else {"view": "", "placed": False, "radius_mm": GRID_RADIUS_MM}),
+        switches=tuple(DrawnSwitch(name, *places[name], bit) for bit, name in enumerate(session.switches)),
+        # One level each: hand.js draws how far a taxel is pressed, and no frame has a bit for it.
+        taxels=tuple(DrawnTaxel(name, *places[name], ((0, n + at),)) for at, name in enumerate(session.taxels)),
+        joints=drawn_joints(joints),
+    )
+
+
+def _shape(hand: HandShape) -> dict[str, Any]:
+    """Return the fields of a drawing that show the hand."""
+    return {
+        "view": hand.view,
+        "placed": True,
+        "radius_mm": round(hand.radius_mm, 2),
+        "outline": _thinned(hand.outline),
+        "strips": tuple(map(_thinned, hand.strips)),
+        "creases": tuple(map(_thinned, hand.creases)),
+        "labels": tuple(Spot(name, x, y) for name, (x, y) in zip(hand.part_names, _rounded(hand.labels), strict=False)),
+    }
+
+
+def _places(hand: HandShape, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    return dict(zip(names, _rounded(hand.places[hand.numbers_of(names)]), strict=True))
+
+
+def _thinned(points: Floats) -> Line:
+    if not len(points):
+        return ()
+    drawn = [points[0]]
+    for point in points[1:-1]:
+        if np.hypot(*(point - drawn[-1])) >= _NEAREST_MM:
+            drawn.append(point)
+    return tuple(_rounded(np.array([*drawn, points[-1]])))
+
+
+def _rounded(points: Floats) -> list[tuple[float, float]]:
+    # Adding 0 turns a rounded -0 into 0.
+    return [(x, y) for x, y in (np.round(points, 1) + 0.0).tolist()]

@@ -1,5 +1,11 @@
-"""Common parts of pictures: one palette, names that are not parsed as formulas, equal bytes, optional matplotlib."""
+"""Common parts of pictures and pages.
 
+One palette; for pictures, names that are not parsed as formulas, equal bytes, optional matplotlib; for pages of one
+file, their templates, the data in their scripts, and the hashes that their policy allows.
+"""
+
+import base64
+import hashlib
 import io
 import warnings
 from collections.abc import Collection, Iterator, Mapping
@@ -10,10 +16,14 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING
 
-from thenar.drivers.extras import missing
+import msgspec
+
+from thenar.drivers.extras import missing, optional
 from thenar.runtime.errors import ThenarError
 
 if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg")
@@ -97,3 +107,32 @@ def rendered(figure: "Figure", kind: str) -> bytes:
     file = io.BytesIO()
     figure.savefig(file, format=kind, metadata={"Date": None} if kind == "svg" else {"Software": None})
     return file.getvalue()
+
+
+def templates(package: str, folder: str) -> "Environment":
+    """Return the environment of the templates in a package's folder."""
+    with optional():
+        from jinja2 import Environment, PackageLoader, StrictUndefined
+    return Environment(
+        loader=PackageLoader(package, folder),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+def embedded(data: object) -> "Markup":
+    """Return JSON for a script element: whatever a name contains, it begins or ends no tag and is no entity."""
+    from markupsafe import Markup
+
+    text = msgspec.json.encode(data).decode()
+    for letter in "<>&":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return Markup(text)
+
+
+def policy_hash(text: str) -> str:
+    """Return the SHA-256 by which a page's policy allows a script or a style."""
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

@@ -81,13 +81,14 @@ def publish_folder(files: Mapping[str, bytes], folder: Path, theirs: Theirs, rai
     """
     target, kept = check_folder(folder, theirs, raises)
     for path in kept:
-        if any(_in_the_way(path, made) for made in files):
+        if any(path == made or made.startswith(f"{path}/") or path.startswith(f"{made}/") for made in files):
             raise raises(f"{folder} holds {path}, which thenar has not written: move it, or name another folder")
     with _box(target, theirs) as box:
         try:
             _fill(box / _PART, files)
             _carry(kept, target, box / _PART)
-            _sync(box / _PART)
+            for name, _, _ in os.walk(box / _PART):
+                sync_folder(Path(name))
             (box / _PART).rename(box / _NEW)
             replaced = _put(box, target)
         except OSError as reason:
@@ -196,10 +197,6 @@ def _same(one: Path, other: Path) -> bool:
     return kind == stat.S_IFDIR or (kind == stat.S_IFREG and filecmp.cmp(one, other, shallow=False))
 
 
-def _in_the_way(path: str, made: str) -> bool:
-    return path == made or made.startswith(f"{path}/") or path.startswith(f"{made}/")
-
-
 def _fill(folder: Path, files: Mapping[str, bytes]) -> None:
     folder.mkdir()
     for path, data in files.items():
@@ -223,17 +220,8 @@ def _carry(paths: Collection[str], source: Path, folder: Path) -> None:
         except OSError:
             shutil.copy2(here, there, follow_symlinks=False)
             if not there.is_symlink():
-                _sync_file(there)
-
-
-def _sync_file(path: Path) -> None:
-    with path.open("rb") as file:
-        os.fsync(file.fileno())
-
-
-def _sync(folder: Path) -> None:
-    for name, _, _ in os.walk(folder):
-        sync_folder(Path(name))
+                with there.open("rb") as file:
+                    os.fsync(file.fileno())
 
 
 def _put(box: Path, target: Path) -> Path | None:

@@ -1,4 +1,4 @@
-"""Training samples: the rows of a training set, as plain arrays."""
+"""The rows of a set as plain arrays: samples to train on, and the inputs that a build reads."""
 
 from dataclasses import dataclass, field, replace
 
@@ -6,11 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.drivers.errors import ThenarError
+from thenar.runtime.manifest import Calibration, Manifest, Switch
+from thenar.runtime.model.integers import MAX_CLASSES
+from thenar.runtime.names import list_names, nearest
 from thenar.runtime.recipe import Inputs
 
 from .arrays import groups
-from .limits import check_types
-from .recordings.graspset import GraspSet
+from .artifact import CompileError
+from .recordings.graspset import GraspSet, Joint
+from .text import counted
 
 Columns = tuple[int, ...]
 
@@ -78,23 +82,19 @@ class Samples:
     silent: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
 
     def __post_init__(self) -> None:
-        if not self.trials.size:
-            object.__setattr__(self, "trials", np.arange(len(self.labels)))
-        if not self.subjects.size:
-            object.__setattr__(self, "subjects", np.zeros(len(self.labels), np.intp))
-        if not self.taxels.size:
-            object.__setattr__(self, "taxels", np.empty((len(self.labels), 0), np.uint16))
-        if not self.movements.size:
-            object.__setattr__(self, "movements", self.trials)
-        if not self.silent.size:
-            object.__setattr__(self, "silent", np.zeros(len(self.labels), np.bool_))
+        n = len(self.labels)
+        trials = self.trials if self.trials.size else np.arange(n)
+        usual = {"trials": trials, "subjects": np.zeros(n, np.intp), "taxels": np.empty((n, 0), np.uint16)}
+        for name, values in (usual | {"movements": trials, "silent": np.zeros(n, np.bool_)}).items():
+            if not getattr(self, name).size:
+                object.__setattr__(self, name, values)
         shapes = {"switches": "(n, s)", "codes": "(n, j)", "labels": "(n,)", "trials": "(n,)", "subjects": "(n,)"}
         shapes |= {"taxels": "(n, t)", "movements": "(n,)", "silent": "(n,)"}
         parts = {name: getattr(self, name) for name in shapes}
         rows = set(map(len, parts.values()))
         if len(rows) != 1 or any(parts[name].ndim != 1 + shape.count(" ") for name, shape in shapes.items()):
-            found = ", ".join(f"{name} {part.shape}" for name, part in parts.items())
-            raise SamplesError(f"{found} must be {', '.join(shapes.values())} of the same n rows")
+            sizes = ", ".join(f"{name} {part.shape}" for name, part in parts.items())
+            raise SamplesError(f"{sizes} must be {', '.join(shapes.values())} of the same n rows")
         if not rows.pop():
             raise SamplesError("there are no rows to train on: take a set with rows")
         if self.labels.min() < 0 or self.labels.max() >= self.n_classes:
@@ -104,13 +104,13 @@ class Samples:
     @classmethod
     def of(cls, grasp_set: GraspSet, inputs: Inputs = "both") -> "Samples":
         """Return all rows of a set, with the inputs that `inputs` selects, and the grasp types that occur."""
-        found, labels = np.unique(grasp_set.labels, return_inverse=True)
+        classes, labels = np.unique(grasp_set.labels, return_inverse=True)
         none, session = grasp_set.is_none, groups(grasp_set.subjects, grasp_set.sessions)
         return cls(
             switches=grasp_set.switches[:, : None if inputs != "joints" else 0],
             codes=grasp_set.codes[:, : None if inputs != "switches" else 0],
             labels=labels,
-            grasps=tuple(grasp_set.taxonomy.names[label] for label in found),
+            grasps=tuple(grasp_set.taxonomy.names[label] for label in classes),
             trials=grasp_set.trial_ids,
             subjects=np.unique(grasp_set.subjects, return_inverse=True)[1],
             taxels=grasp_set.taxels[:, : None if inputs != "joints" else 0],
@@ -156,17 +156,21 @@ class Samples:
         """Return the numbers of the rows to train on: no more with nothing held than with a grasp, and at most
         `most_frames` of a movement, evenly spaced. Frames of a movement resemble their neighbours.
         """
-        none, held = np.flatnonzero(self.is_none), np.flatnonzero(~self.is_none)
-        if len(none) > len(held):
-            none = none[np.arange(len(held)) * len(none) // max(1, len(held))]
-        rows = np.sort(np.concatenate([held, none]))
+        none, grasps = np.flatnonzero(self.is_none), np.flatnonzero(~self.is_none)
+        if len(none) > len(grasps):
+            none = none[np.arange(len(grasps)) * len(none) // max(1, len(grasps))]
+        rows = np.sort(np.concatenate([grasps, none]))
         if not self.has_none:
             return rows
         rows = rows[np.argsort(self.movements[rows], kind="stable")]
-        _, starts, own, counts = np.unique(
+        _, starts, movement, counts = np.unique(
             self.movements[rows], return_index=True, return_inverse=True, return_counts=True
         )
-        place, frames, most = np.arange(len(rows)) - starts[own], counts[own], np.minimum(counts, most_frames)[own]
+        place, frames, most = (
+            np.arange(len(rows)) - starts[movement],
+            counts[movement],
+            np.minimum(counts, most_frames)[movement],
+        )
         return np.sort(rows[(place + 1) * most // frames > place * most // frames])
 
     def rows(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> "Samples":
@@ -204,8 +208,8 @@ class Samples:
             lost, others = random.permutation(np.arange(n) % (s + j)), random.permutation(n)
             switches, codes, rows = self.switches.copy(), self.codes.copy(), np.arange(n)
             for values, places in ((switches, lost), (codes, lost - s)):
-                own = (places >= 0) & (places < values.shape[1])
-                values[rows[own], places[own]] = values[others[own], places[own]]
+                inside = (places >= 0) & (places < values.shape[1])
+                values[rows[inside], places[inside]] = values[others[inside], places[inside]]
             parts.append(replace(self, switches=switches, codes=codes))
         switches, codes = (np.concatenate([getattr(part, name) for part in parts]) for name in ("switches", "codes"))
         return replace(self.rows(np.arange(n * len(parts)) % n), switches=switches, codes=codes)
@@ -232,13 +236,75 @@ class Samples:
         return self.keeping(columns).inputs
 
 
+def check_types(types: int, raises: type[ThenarError]) -> None:
+    """Raise `raises` if the recordings hold more grasp types than a build can."""
+    if types > MAX_CLASSES:
+        raise raises(
+            f"the recordings hold {types} grasp types, a build has at most {MAX_CLASSES}: join types, or leave some out"
+        )
+
+
 def decided(predicted: NDArray[np.intp], trial: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the label (r, T) of most frames of each trial; of equally many, the lowest.
 
     predicted  (r, n) labels        trial  (n,) numbers of trials, 0 to T - 1, each with a frame
     """
-    labels, given = np.unique(predicted, return_inverse=True)
-    given = given.reshape(predicted.shape)
+    labels, numbers = np.unique(predicted, return_inverse=True)
+    numbers = numbers.reshape(predicted.shape)
     n_trials = int(trial.max()) + 1
-    counts = [np.bincount(trial * len(labels) + one, minlength=n_trials * len(labels)) for one in given]
-    return np.asarray(labels[np.reshape(counts, (len(given), n_trials, -1)).argmax(axis=2)])
+    counts = [np.bincount(trial * len(labels) + row, minlength=n_trials * len(labels)) for row in numbers]
+    return np.asarray(labels[np.reshape(counts, (len(numbers), n_trials, -1)).argmax(axis=2)])
+
+
+def select_inputs(grasp_set: GraspSet, manifest: Manifest) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
+    """Return the kept switches (n, s) and the joints' codes (n, j) of `grasp_set` in the build's order.
+
+    Raises CompileError naming the inputs that the recordings lack, or joints whose codes have another meaning there.
+    """
+    elements = {name: column for column, name in enumerate(grasp_set.element_names)}
+    recorded_joints = {name: column for column, name in enumerate(grasp_set.joint_names)}
+    sources = [*dict.fromkeys(switch.source for switch in manifest.switches)]
+    missing = [name for name in sources if name not in elements]
+    missing += [joint.name for joint in manifest.joints if joint.name not in recorded_joints]
+    if missing:
+        names = (*grasp_set.element_names, *grasp_set.joint_names)
+        raise CompileError(
+            f"the recordings lack {counted(len(missing), 'input')} of the build: {list_names(missing)}"
+            f"{nearest(missing[0], names)}; import their table again, with [rename] in the columns.toml for a column "
+            "that has another name"
+        )
+    switches = [elements[switch.source] for switch in manifest.switches]
+    joints = [recorded_joints[joint.name] for joint in manifest.joints]
+    for calibration, column in zip(manifest.joints, joints, strict=True):
+        _check_calibration("joint", calibration, grasp_set.joints[column])
+    bits = np.empty((len(grasp_set), len(switches)), np.bool_)
+    for place, (switch, column) in enumerate(zip(manifest.switches, switches, strict=True)):
+        bits[:, place] = _bits(grasp_set, switch, column)
+    return bits, grasp_set.codes[:, joints]
+
+
+def _bits(grasp_set: GraspSet, switch: Switch, column: int) -> NDArray[np.bool_]:
+    """Return the values (n,) of a kept switch, or of a kept level of a taxel."""
+    taxel = column - len(grasp_set.switch_names)
+    if (taxel < 0) != (switch.threshold is None):
+        here, built = ("a switch", "a taxel") if taxel < 0 else ("a taxel", "a switch")
+        raise CompileError(
+            f"{switch.source} is {here} here, but {built} in the build: import these recordings as the build's were"
+        )
+    if switch.threshold is None:
+        return grasp_set.switches[:, column]
+    _check_calibration("taxel", switch.threshold.taxel, grasp_set.taxel_columns[taxel])
+    return grasp_set.taxels[:, taxel] > switch.threshold.code
+
+
+def _check_calibration(kind: str, built: Calibration, recorded: Joint) -> None:
+    values = np.array([built.value_a, built.value_b])
+    meant = recorded.value([built.code_a, built.code_b])
+    same = np.isclose(meant, values, rtol=0, atol=abs(recorded.step) * 1e-6)
+    if recorded.unit != built.unit or not same.all():
+        point = int(same.argmin())
+        code = (built.code_a, built.code_b)[point]
+        raise CompileError(
+            f"{kind} {built.name} is coded differently here: code {code} is {meant[point]:g} {recorded.unit}, but "
+            f"{values[point]:g} {built.unit} in the build; import these recordings with the build's grid and origin"
+        )

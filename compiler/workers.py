@@ -1,11 +1,9 @@
-"""Work in other processes: independent tasks on all cores, with each result as soon as it is available; and a single
-background task.
+"""What this machine can do: independent tasks on all cores, with each result as soon as it is available; a single
+background task; and trainings that fit into its memory.
 """
 
 import os
-import select
 import signal
-import sys
 import threading
 import time
 import warnings
@@ -14,7 +12,7 @@ from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any, Generic, TypeVar
 
-from .cluster import cluster_address, on_cluster
+from thenar.drivers.errors import ThenarError
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -22,31 +20,25 @@ Result = TypeVar("Result")
 # More processes than four per core are certainly a mistake, and would slow the machine to a halt.
 MOST_JOBS = 4 * (os.cpu_count() or 1)
 
+# Numbers of (types, rows) arrays in a round of boosting, and of a training's columns with two values and with more.
+_BYTES_A_TYPE_AND_ROW, _BYTES_A_SWITCH_AND_ROW, _BYTES_A_JOINT_AND_ROW = 120, 10, 60
 _SAFE_PATH = "PYTHONSAFEPATH"
 # Rows times rounds of boosting: about a second's work.
 _LITTLE = 200_000
-# Polling interval on systems where a process cannot wait for a process that is not its child.
+# How often a worker checks whether its parent is still there.
 _LOOK_S = 0.5
 
 
-def in_workers(
-    work: Callable[[Task], Result], tasks: Iterable[Task], jobs: int, *, here: bool = False
-) -> Iterator[Result]:
+def in_workers(work: Callable[[Task], Result], tasks: Iterable[Task], jobs: int) -> Iterator[Result]:
     """Yield the results in the order of completion.
 
     jobs     worker processes, as joblib counts them: -1 for all cores, 1 for this process alone; no more than
              MOST_JOBS. A worker runs one thread.
-    here     even within `dask_cluster`, whose workers do the work otherwise, whatever `jobs`
 
     Workers end when this process does, however it ends.
 
-    Raises BrokenExecutor if a worker is killed or cannot start, ClusterError (a subclass) if the cluster cannot do
-    the work, and any exception of the work.
+    Raises BrokenExecutor if a worker is killed or cannot start, and any exception of the work.
     """
-    address = None if here else cluster_address()
-    if address is not None:
-        yield from on_cluster(work, tasks, address)
-        return
     if jobs == 1:
         yield from map(work, tasks)
         return
@@ -145,27 +137,18 @@ def _safe_paths() -> Iterator[None]:
 
 
 def _end_with_parent(parent: int) -> None:
-    """Let this worker end as soon as process `parent`, which started it, has ended.
+    """Let this worker end soon after process `parent`, which started it, has ended.
 
-    A thread waits for that. Linux could send a signal instead, but does so when the thread that started the worker
-    ends, and loky starts some in threads that end before the work does.
+    Linux could send a signal instead, but does so when the thread that started the worker ends, and loky starts some in
+    threads that end before the work does.
     """
-    threading.Thread(target=_end_after, args=(parent,), name="thenar parent", daemon=True).start()
 
+    def wait() -> None:
+        while os.getppid() == parent:
+            time.sleep(_LOOK_S)
+        os._exit(1)
 
-def _end_after(parent: int) -> None:
-    try:
-        if sys.platform == "linux":
-            ended = select.poll()
-            ended.register(os.pidfd_open(parent), select.POLLIN)
-            # By now the number may belong to another process.
-            if os.getppid() == parent:
-                ended.poll()
-    except OSError:  # no such process, or a kernel before 5.3
-        pass
-    while os.getppid() == parent:
-        time.sleep(_LOOK_S)
-    os._exit(1)
+    threading.Thread(target=wait, name="thenar parent", daemon=True).start()
 
 
 class BackgroundTask(Generic[Result]):
@@ -229,3 +212,14 @@ def _background(parent: int, there: Any, work: Callable[[Task], Result], task: T
     except Exception as fault:
         result = f"{type(fault).__name__}: {fault}", None  # type: ignore[assignment]
     there.send(result)
+
+
+def check_memory(rows: int, types: int, raises: type[ThenarError], switches: int = 0, joints: int = 0) -> None:
+    """Raise `raises` if training on `rows` rows needs more memory than this machine has."""
+    a_row = _BYTES_A_TYPE_AND_ROW * types + _BYTES_A_SWITCH_AND_ROW * switches + _BYTES_A_JOINT_AND_ROW * joints
+    needed, there = rows * a_row, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if needed > there:
+        raise raises(
+            f"training on {rows} rows of {types} grasp types needs some {needed / 1e9:.1f} GB of memory, this machine "
+            f"has {there / 1e9:.1f}: take fewer rows or columns"
+        )

@@ -11,7 +11,6 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
         *("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf", "clevercsv"),
         *("python_calamine", "pyarrow", "pandas", "h5py"),
     ),
-    "cluster": ("dask", "distributed"),
     "stability": ("mpmath",),
     "ros": ("cyclonedds",),
     "ws": ("websockets",),

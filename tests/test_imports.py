@@ -23,10 +23,8 @@ ALLOWED = {
     "compiler.pictures": ("runtime.errors",),
     "compiler.elementary": (),
     "compiler.text": (),
-    "compiler.cluster": ("drivers.errors",),
-    "compiler.workers": ("compiler.cluster",),
-    "compiler.hand": ("drivers.errors", "runtime.names"),
-    "compiler.limits": ("runtime.model", "drivers.errors"),
+    "compiler.workers": ("drivers.errors",),
+    "compiler.hand": ("drivers.errors", "runtime"),
     "compiler.publication": ("runtime.files", "drivers.errors"),
     "compiler.recordings": (
         "runtime",
@@ -37,19 +35,25 @@ ALLOWED = {
         "compiler.publication",
         "compiler.text",
     ),
-    "compiler.samples": ("runtime", "drivers.errors", "compiler.arrays", "compiler.limits", "compiler.recordings"),
+    "compiler.samples": (
+        "runtime",
+        "drivers.errors",
+        "compiler.arrays",
+        "compiler.artifact",
+        "compiler.recordings",
+        "compiler.text",
+    ),
     "compiler.placement": (
         "runtime",
         "drivers.cyberglove_protocol",
         "drivers.errors",
         "drivers.members",
         "compiler.elementary",
-        "compiler.limits",
+        "compiler.facts",
         "compiler.pictures",
         "compiler.placement",
         "compiler.recordings",
         "compiler.samples",
-        "compiler.sensors",
         "compiler.model",
         "compiler.text",
         "compiler.trainers",
@@ -81,7 +85,6 @@ ALLOWED = {
         "compiler.hand",
         "compiler.publication",
         "compiler.recordings.graspset",
-        "compiler.sensors",
         "compiler.text",
         "compiler.glove",
     ),
@@ -91,7 +94,6 @@ ALLOWED = {
         "compiler.recordings",
         "compiler.placement",
         "compiler.elementary",
-        "compiler.limits",
         "compiler.pictures",
         "compiler.samples",
         "compiler.model",
@@ -131,7 +133,7 @@ ALLOWED = {
     "cli": PACKAGES,
 }
 
-# Third-party packages of the extras `compiler`, `cluster` and `stability`, and of peers: a board has none.
+# Third-party packages of the extras `compiler` and `stability`, and of peers: a board has none.
 WORKSTATION_ONLY = {
     "sklearn",
     "scipy",
@@ -145,8 +147,6 @@ WORKSTATION_ONLY = {
     "python_calamine",
     "pyarrow",
     "h5py",
-    "dask",
-    "distributed",
     "pysensors",
 }
 

@@ -3,7 +3,6 @@
 import hashlib
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, get_args
@@ -13,20 +12,20 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
-from thenar.runtime.hand import HAND_NAME, HandDrawing, hand_from_bytes, hand_to_bytes
+from thenar.runtime.hand import HAND_NAME, hand_from_bytes, hand_to_bytes
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.system import unread_joints
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch, Threshold
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
-from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
+from thenar.runtime.model.integers import tables_to_bytes
 from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Recipe, TableBits, changed
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
-from ..hand import HandShape
-from ..model.compare import Comparison, compare
+from ..hand import HandShape, drawn_hand
+from ..model.compare import compare
 from ..model.faults import count_faults, groups_of, worst_faults
 from ..placement.constraints import Limits
 from ..placement.elements import Element, names_of
@@ -35,24 +34,21 @@ from ..placement.ports import PortCosts, ports_of_whole_glove
 from ..publication import check_folder, publish_folder, sweep
 from ..recogniser import Recogniser, predicted_classes
 from ..recordings.graspset import GraspSet, Joint
-from ..recordings.summary import check_trials
 from ..samples import Samples
-from ..trainers.base import SHARED, TRAINERS, Training
+from ..trainers.base import SHARED, TRAINERS, Report, Training
 from . import CompileError
-from .documents import REPORT_NAME, SPEC_FOLDER, TRY_NAME, BuildReport, Documents, Progress
-from .drawn_hand import drawn_hand
+from .documents import REPORT_NAME, SPEC_FOLDER, TRY_NAME, BuildReport, Documents
 from .ensemble import ensemble_to_bytes
-from .replay import stored_digests
 from .training import (
     Tested,
-    cross_validated,
     cuts_of,
     detection_of,
+    fold_results,
     groups_for,
     rates_of,
     samples_of,
-    scores_of,
     segments_for,
+    stored_digests,
 )
 from .verify_firmware import made_firmware
 
@@ -118,7 +114,7 @@ def compile_build(
     hand: HandShape | None = None,
     documents: Documents | None = None,
     jobs: int = -1,
-    progress: Progress | None = None,
+    progress: Report | None = None,
     **changes: Any,
 ) -> BuildReport:
     """Choose placement and fit, train, collapse, quantise, prove, and write `folder`, either completely or not at all.
@@ -174,24 +170,19 @@ def compile_build(
     10
     """
     target = check_target(Path(folder))
-    asked = _sound(changed(options or Recipe(), changes))
-    samples = samples_of(grasp_set, asked)
-    if asked.folds:
-        check_trials(grasp_set, CompileError)
-    cuts = cuts_of(grasp_set, asked)
-    steps = _Steps(progress, sum(len(cut.folds) for cut in cuts))
+    recipe = _sound(changed(options or Recipe(), changes))
+    samples = samples_of(grasp_set, recipe)
+    steps = _Steps(progress, sum(len(cut.folds) for cut in cuts_of(grasp_set, recipe)))
     ports = ports or ports_of_whole_glove(None, grasp_set.element_names, len(grasp_set.taxel_columns))
     hand = hand or (None if documents is None else documents.hand)
-    groups = groups_for(grasp_set, asked)
     glove = harness.cyberglove if isinstance(harness, Harness) else None
-    limits = Limits.of(asked, grasp_set, {} if hand is None else hand.by_name, glove)
+    limits = Limits.of(recipe, grasp_set, {} if hand is None else hand.by_name, glove)
+    groups = groups_for(grasp_set, recipe)
     recogniser = Recogniser.fit(
-        samples, asked, ports=ports, limits=limits, groups=groups, jobs=jobs, report=steps.trained
+        samples, recipe, ports=ports, limits=limits, groups=groups, jobs=jobs, report=steps.trained
     )
     made = BuildAssembly(grasp_set, recogniser, harness, hand)
-    tested = cross_validated(
-        samples, cuts, asked, partial(scores_of, samples, asked, ports, groups, limits), jobs, steps.tested
-    )
+    tested = fold_results(grasp_set, samples, recipe, ports=ports, limits=limits, jobs=jobs, report=steps.tested)
     return made.publish(target, tested, documents, jobs, progress)
 
 
@@ -205,27 +196,27 @@ def _sound(options: Recipe) -> Recipe:
         raise CompileError(f"refuse={options.refuse}: give a share of grasps of at least 0 and below {_MOST_REFUSED}")
     METHODS.named(options.placement).check_given(options.keep, options.prune)
     only, *others = Training.candidates(options)
-    trainer, given = options.trainer, {name: getattr(options, name) for name in SHARED} | options.settings
+    trainer, settings = options.trainer, {name: getattr(options, name) for name in SHARED} | options.settings
     if not others:
         # Nothing is left to choose. Recipe with rounds mean LogitBoost.
-        trainer, given = AUTO if only.trainer == PAPERS_TRAINER else only.trainer, dict(only.settings)
-    values = {name: float(value) if isinstance(value, int) else value for name, value in given.items()}
+        trainer, settings = AUTO if only.trainer == PAPERS_TRAINER else only.trainer, dict(only.settings)
+    values = {name: float(value) if isinstance(value, int) else value for name, value in settings.items()}
     # The first of several names is the default, and is not written.
-    usual = {each.name: each.default for each in TRAINERS[only.trainer].settings if each.names}
-    own: dict[str, Any] = {n: value for n, value in values.items() if value is not None and value != usual.get(n)}
-    shared = {name: own.pop(name, None) for name in SHARED}
+    usual = {setting.name: setting.default for setting in TRAINERS[only.trainer].settings if setting.names}
+    unusual: dict[str, Any] = {n: value for n, value in values.items() if value is not None and value != usual.get(n)}
+    shared = {name: unusual.pop(name, None) for name in SHARED}
     shared |= {name: int(shared[name]) for name in ("rounds", "max_bins") if shared[name] is not None}
     # msgspec omits a value that equals its default only if it is the same object.
     names = {"placement": sys.intern(options.placement), "trainer": sys.intern(trainer)}
-    usually = Recipe().refuse
-    refuse = usually if options.refuse == usually else float(options.refuse)
-    return replace(options, **shared, **names, settings=own, refuse=refuse)
+    usual_share = Recipe().refuse
+    refuse = usual_share if options.refuse == usual_share else float(options.refuse)
+    return replace(options, **shared, **names, settings=unusual, refuse=refuse)
 
 
 class _Steps:
     """Count the work done in training steps: one training on all rows, and one for each fold."""
 
-    def __init__(self, report: Progress | None, folds: int) -> None:
+    def __init__(self, report: Report | None, folds: int) -> None:
         self._report, self._folds, self._steps = report, folds, 1
 
     def trained(self, done: int, steps: int) -> None:
@@ -246,7 +237,7 @@ class BuildAssembly:
         self, grasp_set: GraspSet, recogniser: Recogniser, harness: Wired | None, hand: HandShape | None = None
     ) -> None:
         self.grasp_set, self.recogniser, self.hand = grasp_set, recogniser, hand
-        kept, self.integers = recogniser.read(recogniser.samples), recogniser.tables
+        self.kept, self.integers = recogniser.read(recogniser.samples), recogniser.tables
         names = names_of(grasp_set, recogniser.elements)
         self.harness = harness(names) if callable(harness) else harness
         self.scan, self.unread = None, ""
@@ -254,13 +245,13 @@ class BuildAssembly:
             self.scan = plan_scan(names, self.harness)
             joints = [grasp_set.joint_names[joint] for joint in recogniser.selection.joints]
             self.unread = unread_joints(self.harness, self.scan, joints)
-        self.comparison = compare(recogniser.model, self.integers, kept.switches, kept.codes)
+        self.comparison = compare(recogniser.model, self.integers, self.kept.switches, self.kept.codes)
         self._inputs = (*names, *(grasp_set.joint_names[joint] for joint in recogniser.selection.joints))
         sources = [grasp_set.element_names[element.column] for element in recogniser.elements]
         self._groups = groups_of(self.scan, sources, len(recogniser.selection.joints))
         groups = tuple(self._groups.values())
-        held = kept.without_none()
-        self.faults = count_faults(self.integers, held.switches, held.codes, held.labels, held.trials, groups)
+        grasps = self.kept.without_none()
+        self.faults = count_faults(self.integers, grasps.switches, grasps.codes, grasps.labels, grasps.trials, groups)
 
     def publish(
         self,
@@ -268,25 +259,32 @@ class BuildAssembly:
         tested: Tested | None,
         documents: Documents | None,
         jobs: int,
-        progress: Progress | None,
+        progress: Report | None,
     ) -> BuildReport:
         """Write the build as `target`, with the requested `documents`."""
+        from ..report.tryout import try_html
+
+        kept, names, n_switches = self.kept, self.grasp_set.element_names, len(self.grasp_set.switch_names)
         files = {TABLES_NAME: tables_to_bytes(self.integers), ENSEMBLE_NAME: ensemble_to_bytes(self.recogniser.model)}
         if self.scan is not None:
             files[SCAN_NAME] = scanmap_to_bytes(self.scan)
         undrawn = self._manifest(tested, files)
-        files[HAND_NAME] = hand_to_bytes(self._drawn(undrawn))
+        drawing = drawn_hand(undrawn, self.hand, names[:n_switches], names[n_switches:], kept.codes)
+        files[HAND_NAME] = hand_to_bytes(drawing)
         described = manifest_to_bytes(replace(undrawn, hand_sha256=_sha256(files[HAND_NAME])))
         manifest = manifest_from_bytes(described)
         firmware, note = made_firmware(manifest, self.integers)
-        if (page := self._page(manifest, files[TABLES_NAME], files[HAND_NAME])) is not None:
+        hand = hand_from_bytes(files[HAND_NAME], manifest)
+        page = try_html(manifest, files[TABLES_NAME], hand, (kept.switches, kept.codes, kept.labels))
+        if page is not None:
             files[TRY_NAME] = page
+        predicted = np.unique(self.comparison.deployed)
         report = BuildReport(
             folder=target,
             manifest=manifest,
             tables=self.integers,
             tables_bytes=len(files[TABLES_NAME]),
-            only_answer=self._only_answer(),
+            only_answer=kept.grasps[predicted[0]] if len(predicted) == 1 else None,
             firmware=note,
             scan=self.scan,
             harness=self.harness,
@@ -304,29 +302,12 @@ class BuildAssembly:
         publish(files | {MANIFEST_NAME: described}, target)
         return report
 
-    def _drawn(self, manifest: Manifest) -> HandDrawing:
-        taxels = len(self.grasp_set.switch_names)
-        names = self.grasp_set.element_names
-        codes = self.recogniser.read(self.recogniser.samples).codes
-        return drawn_hand(manifest, self.hand, names[:taxels], names[taxels:], codes)
-
-    def _page(self, manifest: Manifest, tables: bytes, hand: bytes) -> bytes | None:
-        from ..report.tryout import try_html
-
-        kept = self.recogniser.read(self.recogniser.samples)
-        rows = kept.switches, kept.codes, kept.labels
-        return try_html(manifest, tables, hand_from_bytes(hand, manifest), rows)
-
-    def _only_answer(self) -> str | None:
-        predicted = np.unique(self.comparison.deployed)
-        return self.recogniser.samples.grasps[predicted[0]] if len(predicted) == 1 else None
-
     def _manifest(self, tested: Tested | None, files: Mapping[str, bytes]) -> Manifest:
         """Return the content of `build.json`, not sealed yet; `files` maps the names of its neighbours to content."""
         digests = {name: _sha256(data) for name, data in files.items()}
         grasp_set, recogniser = self.grasp_set, self.recogniser
         options, samples, fitting = recogniser.recipe, recogniser.samples, recogniser.fitting
-        kept = recogniser.read(samples)
+        kept, comparison = self.kept, self.comparison
         deployed = predicted_classes(self.integers, recogniser.rejection, kept.switches, kept.codes)
         rates = rates_of("training", samples, deployed, options.seed)
         detection = detection_of("training", samples, deployed, options.seed)
@@ -362,7 +343,15 @@ class BuildAssembly:
                 for each, least, most, share in zip(switches, *closed_shares(kept), shares, strict=True)
             ),
             joints=tuple(_calibration(column, grasp_set.joints[column]) for column in recogniser.selection.joints),
-            proof=_proof(self.integers, self.comparison, options.width),
+            proof=Proof(
+                width=options.width,
+                scale=self.integers.scale,
+                bound=self.integers.bound,
+                error=comparison.integer_bound,
+                safe_margin=comparison.safe_margin,
+                covered=int(np.count_nonzero(comparison.covered)),
+                changed=len(comparison.changed),
+            ),
             rates=rates if tested is None else (*rates, *tested.rates),
             stopped_after=recogniser.stopped_after,
             zero_gain_nodes=recogniser.zero_gain_nodes,
@@ -409,15 +398,3 @@ def closed_shares(samples: Samples) -> tuple[NDArray[np.uint8], NDArray[np.uint8
 
 def _calibration(column: int, joint: Joint) -> Calibration:
     return Calibration(column, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
-
-
-def _proof(integers: IntegerTables, comparison: Comparison, width: int) -> Proof:
-    return Proof(
-        width=width,
-        scale=integers.scale,
-        bound=integers.bound,
-        error=comparison.integer_bound,
-        safe_margin=comparison.safe_margin,
-        covered=int(np.count_nonzero(comparison.covered)),
-        changed=len(comparison.changed),
-    )

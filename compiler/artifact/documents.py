@@ -1,6 +1,6 @@
 """The properties of a complete build, and the documents in its folder: its report and the spec of its glove."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,6 +21,7 @@ from ..model.compare import Comparison, worst_case
 from ..model.faults import FaultCounts
 from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
+from ..trainers.base import Report
 from ..workers import little
 from .training import USUAL_ROUNDS
 
@@ -33,8 +34,6 @@ REPORT_NAME, TRY_NAME, SPEC_FOLDER = "report.html", "try.html", "spec"
 _TRAININGS = 40  # roughly, for the paper's tables
 # Of more subjects there are no such tables: every pair of subjects is a cell.
 _MOST_SUBJECTS = 30
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -123,7 +122,7 @@ class Documents:
     frontier: "Frontier | None" = None
     point: int | None = None
 
-    def files(self, made: BuildReport, jobs: int = -1, progress: Progress | None = None) -> Mapping[str, bytes]:
+    def files(self, made: BuildReport, jobs: int = -1, progress: Report | None = None) -> Mapping[str, bytes]:
         """Return path in the build's folder -> content; `jobs` processes compute the paper's tables."""
         from ..glove.files import spec_files
 
@@ -134,7 +133,7 @@ class Documents:
             files |= {f"{SPEC_FOLDER}/{name}": content for name, content in spec.items()}
         return files
 
-    def _report(self, made: BuildReport, jobs: int, progress: Progress | None) -> bytes:
+    def _report(self, made: BuildReport, jobs: int, progress: Report | None) -> bytes:
         from ..report.content import ReportContent
         from ..report.page import report_html
 
@@ -175,22 +174,26 @@ def _transitions(grasp_set: GraspSet) -> "Transitions | None":
         return None
 
 
-def _study(made: BuildReport, jobs: int, progress: Progress | None) -> "tuple[Study | None, str]":
+def _study(made: BuildReport, jobs: int, progress: Report | None) -> "tuple[Study | None, str]":
     """Return the paper's tables, nested, once, with the build's folds, trainer and seed; or the reason why not.
 
     They are computed last, when nothing else can fail any more.
     """
     from ..evaluation.study import StudyDesign, evaluate
 
-    asked, fit = made.manifest.options, made.manifest.fit
+    options, fit = made.manifest.options, made.manifest.fit
     settings = {name: value for name, value in fit.settings.items() if value is not None}
-    if not asked.folds:
+    if not options.folds:
         return None, "The build was compiled without folds."
     if (subjects := len(np.unique(made.grasp_set.subjects))) > _MOST_SUBJECTS:
         return None, f"The paper's tables have a column for each subject: {subjects} are too many for a page."
     rounds = int(settings.pop("rounds", None) or USUAL_ROUNDS)
     recipe = Recipe(
-        trainer=fit.trainer, folds=asked.folds, seed=asked.seed, levels=asked.levels, keep_joints=asked.keep_joints
+        trainer=fit.trainer,
+        folds=options.folds,
+        seed=options.seed,
+        levels=options.levels,
+        keep_joints=options.keep_joints,
     )
     recipe = changed(recipe, {"rounds": rounds, **settings})
     try:

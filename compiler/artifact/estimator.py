@@ -28,12 +28,12 @@ from ..recogniser import Recogniser, Scores
 from ..recordings.graspset import GraspSet
 from ..recordings.summary import check_trials
 from ..samples import Columns, Samples
-from ..trainers.base import Model
+from ..trainers.base import Model, Report
 from ..trainers.logit import ColumnTables
 from ..trainers.stumps import Stumps
 from . import CompileError
 from .compile import BuildAssembly, Wired, check_target
-from .documents import BuildReport, Documents, Progress
+from .documents import BuildReport, Documents
 from .ensemble import model_fault
 from .training import cross_validated, cuts_of
 
@@ -102,7 +102,7 @@ def compile(  # noqa: A001
     harness: Wired | None = None,
     documents: Documents | None = None,
     jobs: int = -1,
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> BuildReport:
     """Write a fitted estimator as a build in `folder`, either completely or not at all.
 
@@ -169,12 +169,8 @@ def compile(  # noqa: A001
     selection = replace(selection, gains=gains)
     made = BuildAssembly(grasp_set, Recogniser(options, samples, selection, model), harness)
     test = partial(_scores_of, estimator, samples, options)
-    tested = cross_validated(samples, cuts, options, test, jobs, progress or _silent)
+    tested = cross_validated(samples, cuts, options, test, jobs, progress)
     return made.publish(target, tested, documents, jobs, progress)
-
-
-def _silent(_done: int, _total: int) -> None:
-    pass
 
 
 def _classifier(estimator: Any) -> Any:
@@ -205,8 +201,8 @@ def _columns(estimator: Any, X: NDArray[np.uint16]) -> Columns:
         return tuple(range(X.shape[1]))
     names = list(getattr(estimator, "feature_names_in_", [f"x{number}" for number in range(X.shape[1])]))
     try:
-        found = [str(name).rpartition("__")[2] for name in estimator[:-1].get_feature_names_out(names)]
-        columns = tuple(names.index(name) for name in found)
+        selected = [str(name).rpartition("__")[2] for name in estimator[:-1].get_feature_names_out(names)]
+        columns = tuple(names.index(name) for name in selected)
         same = np.array_equal(np.asarray(estimator[:-1].transform(X)), X[:, list(columns)])
     except (AttributeError, ValueError) as reason:
         raise CompileError(f"the steps before the classifier must select columns: {reason}") from None
@@ -221,10 +217,10 @@ def _labelled(samples: Samples, grasp_set: GraspSet, classes: NDArray[Any]) -> S
     names = [types[number] if numbered and 0 <= number < len(types) else str(number) for number in classes.tolist()]
     if samples.has_none and NONE in names[:-1]:
         raise CompileError(f"the estimator sorts {NONE!r} before {names[-1]!r}: fit it on grasp_set.labels instead")
-    lacking = sorted(set(samples.grasps) - set(names))
-    if lacking:
+    unknown = sorted(set(samples.grasps) - set(names))
+    if unknown:
         raise CompileError(
-            f"the estimator does not know {lacking[0]!r}: fit it with the names of all grasp types as labels"
+            f"the estimator does not know {unknown[0]!r}: fit it with the names of all grasp types as labels"
         )
     labels = np.array([names.index(samples.grasps[label]) for label in samples.labels], dtype=np.intp)
     return replace(samples, labels=labels, grasps=tuple(names))
@@ -263,10 +259,10 @@ def _placed_by(estimator: Any, options: Recipe) -> tuple[Recipe, tuple[float, ..
 
 def _trained_by(classifier: Any, options: Recipe) -> Recipe:
     if isinstance(classifier, AdditiveLogitClassifier):
-        own = {"penalty": float(classifier.penalty), "smoothness": float(classifier.smoothness)}
-        own |= {"linear": 1.0} if classifier.linear else {}
+        settings = {"penalty": float(classifier.penalty), "smoothness": float(classifier.smoothness)}
+        settings |= {"linear": 1.0} if classifier.linear else {}
         bins = classifier.max_bins or HIGHEST_CODE + 1
-        return structs.replace(options, trainer="logit", max_bins=bins, settings=own)
+        return structs.replace(options, trainer="logit", max_bins=bins, settings=settings)
     if not isinstance(classifier, LogitBoostClassifier):
         return structs.replace(options, trainer=type(classifier).__name__)
     return structs.replace(

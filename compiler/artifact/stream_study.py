@@ -25,15 +25,22 @@ from thenar.runtime.segmenting.model import SegmentModel
 
 from ..evaluation.folds import Fold, leave_groups_out, trial_folds
 from ..evaluation.rates import RecipeWords, student
-from ..movements.learning import LAG_TICKS, Counts, announced_live, live_states
-from ..movements.scores import OVERLAPS, SegmentScore, score_streams, segments_of
+from ..movements.segments import (
+    LAG_TICKS,
+    OVERLAPS,
+    Counts,
+    SegmentScore,
+    announced_live,
+    live_states,
+    score_streams,
+    segments_of,
+)
 from ..movements.streams import TICK_US, MovementError, movements_of, streams_of
 from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
 from ..samples import FRAMES, Samples
-from ..trainers.base import SHARED
+from ..trainers.base import SHARED, Report
 from ..workers import in_workers
-from .documents import Progress
 from .training import scores_of, segments_for
 
 Labels = NDArray[np.intp]
@@ -86,9 +93,7 @@ class StreamStudy(msgspec.Struct, frozen=True):
     rows: tuple[MethodRow, ...]
 
 
-def study_streams(
-    grasp_set: GraspSet, options: Recipe, jobs: int = -1, progress: Progress | None = None
-) -> StreamStudy:
+def study_streams(grasp_set: GraspSet, options: Recipe, jobs: int = -1, progress: Report | None = None) -> StreamStudy:
     """Evaluate segmentation on subjects that were left out.
 
     Parameters

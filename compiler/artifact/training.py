@@ -1,62 +1,65 @@
-"""The folds of `compile`: recognisers of the training rows, and their accuracies on the test rows."""
+"""The folds of `compile`: recognisers of the training rows, and their accuracies on the test rows; and which trials a
+build was trained on.
+"""
 
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import Detected, Of, Protocol, Recognised
+from thenar.runtime.manifest import Detected, Manifest, Of, Protocol, Recognised
 from thenar.runtime.recipe import By, Recipe
 from thenar.runtime.segmenting.model import SegmentModel
 
 from ..evaluation.folds import OF, Fold, groups_of, leave_groups_out, leave_one_out, trial_folds
 from ..evaluation.rates import UNITS, rated
-from ..limits import check_inputs, check_memory, check_types
-from ..movements.learning import learnt
+from ..movements.segments import learnt
 from ..movements.streams import TICK_US, MovementError, streams_of
 from ..placement.constraints import Limits
 from ..placement.ports import PortCosts
-from ..recogniser import Classes, Groups, Recogniser, Scores
+from ..recogniser import Classes, Groups, Recogniser, Scores, check_inputs
 from ..recordings.graspset import GraspSet
 from ..recordings.summary import check_trials
 from ..samples import Samples
 from ..trainers.base import Report, Training
-from ..workers import in_workers, little
+from ..workers import check_memory, in_workers, little
 from . import CompileError
 from .ensemble import MAX_STUMPS
+
+USUAL_ROUNDS = 100  # assumed amount of work where the fit is still to be chosen
+Test = Callable[[Fold], Scores]
+_DIGITS = 8  # of a digest of a trial
+# More would make build.json too large to load.
+_MOST_DIGESTS = 1 << 20
 
 
 def samples_of(grasp_set: GraspSet, options: Recipe) -> Samples:
     """Return the samples of `grasp_set` for the option `inputs`. Raises CompileError if nothing can be learned."""
-    wanted = options.inputs
     for kind, names in (("switches", grasp_set.element_names), ("joints", grasp_set.joint_names)):
-        if wanted == kind and not names:
+        if options.inputs == kind and not names:
             raise CompileError(f"the recordings have no {kind}: choose other inputs than {kind!r}")
     if (types := len(np.unique(grasp_set.labels[~grasp_set.is_none]))) < 2:
         raise CompileError(f"the recordings hold {types} grasp type(s): there is nothing to distinguish")
-    samples = Samples.of(grasp_set, wanted)
-    found = samples.n_classes
-    if options.keep_joints is not None and not samples.codes.shape[1]:
+    samples = Samples.of(grasp_set, options.inputs)
+    classes, joints = samples.n_classes, samples.codes.shape[1]
+    if options.keep_joints is not None and not joints:
         raise CompileError("the recordings have no joints to choose from: leave ``keep_joints`` out")
-    there = samples.codes.shape[1]
-    joints = min(options.keep_joints or there, there)
-    check_types(found, CompileError)
-    check_inputs(found, min(options.keep or 0, len(grasp_set.element_names)), joints, CompileError)
-    check_memory(len(samples.codes), found, CompileError)
-    rounds = max(int(each.settings.get("rounds") or 0) for each in Training.candidates(options))
-    if rounds * found > MAX_STUMPS:
+    elements, joints = min(options.keep or 0, len(grasp_set.element_names)), min(options.keep_joints or joints, joints)
+    check_inputs(classes, elements, joints, CompileError)
+    check_memory(len(samples.codes), classes, CompileError)
+    rounds = max(int(training.settings.get("rounds") or 0) for training in Training.candidates(options))
+    if rounds * classes > MAX_STUMPS:
         raise CompileError(
-            f"{rounds} rounds of {found} grasp types are {rounds * found} stumps; a build has at most {MAX_STUMPS}: "
-            "boost for fewer rounds"
+            f"{rounds} rounds of {classes} grasp types are {rounds * classes} stumps; a build has at most "
+            f"{MAX_STUMPS}: boost for fewer rounds"
         )
+    if options.folds:
+        check_trials(grasp_set, CompileError)
     return samples
-
-
-USUAL_ROUNDS = 100  # assumed amount of work where the fit is still to be chosen
-
-Test = Callable[[Fold], Scores]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +130,7 @@ def scores_of(
 
 
 def cross_validated(
-    samples: Samples, cuts: Sequence[Cut], options: Recipe, test: Test, jobs: int, report: Report
+    samples: Samples, cuts: Sequence[Cut], options: Recipe, test: Test, jobs: int, report: Report | None
 ) -> Tested | None:
     """Return the result of the folds, None without folds; `test` returns the scores of a fold's test rows.
 
@@ -142,41 +145,42 @@ def cross_validated(
     # Segments are learned from folds that know rows in which nothing is held, if there are any.
     scored = next((place for place, rows in enumerate(knows) if rows.all()), 0)
     tasks = ((place, fold, test) for place, fold in folds)
-    for done, (place, fold, found) in enumerate(
+    for done, (place, fold, fold_scores) in enumerate(
         in_workers(_done, tasks, little(len(folds) * len(samples.labels) * (options.rounds or USUAL_ROUNDS), jobs)), 1
     ):
-        predicted[place, fold.test] = found.argmax(axis=1)
+        predicted[place, fold.test] = fold_scores.argmax(axis=1)
         if place == scored:
-            scores[fold.test] = found[:, : samples.n_classes]
-        report(done, len(folds))
+            scores[fold.test] = fold_scores[:, : samples.n_classes]
+        if report is not None:
+            report(done, len(folds))
     refuses = not samples.has_none and bool((predicted == samples.n_classes).any())
     confusion = np.zeros((samples.n_classes + refuses,) * 2, dtype=np.intp)
     np.add.at(confusion, (samples.labels[knows[0]], predicted[0, knows[0]]), 1)
     measured, seed = list(zip(cuts, predicted, strict=True)), options.seed
-    rates = [rate for cut, own in measured for rate in rates_of("nested", samples, own, seed, cut)]
-    detection = [each for cut, own in measured for each in detection_of("nested", samples, own, seed, cut)]
+    rates = [rate for cut, classes in measured for rate in rates_of("nested", samples, classes, seed, cut)]
+    detection = [
+        detected for cut, classes in measured for detected in detection_of("nested", samples, classes, seed, cut)
+    ]
     return Tested(tuple(rates), tuple(detection), confusion, scores)
 
 
-def rates_of_recipe(
+def fold_results(
     grasp_set: GraspSet,
+    samples: Samples,
     recipe: Recipe,
     *,
     ports: PortCosts | None = None,
     limits: Limits | None = None,
     jobs: int = -1,
     report: Report | None = None,
-) -> tuple[Recognised, ...]:
-    """Return the accuracies that `compile_build` would measure, the headline first: in every fold, elements and joints
-    are chosen and a model is trained on the training rows alone.
+) -> Tested | None:
+    """Return the result of a recipe's folds, None without folds: in every fold, elements and joints are chosen and a
+    model is trained on the training rows alone. `samples` are those of `samples_of`.
 
     Raises CompileError or EvaluationError for recordings that do not allow it.
     """
-    samples = samples_of(grasp_set, recipe)
-    check_trials(grasp_set, CompileError)
     test = partial(scores_of, samples, recipe, ports, groups_for(grasp_set, recipe), limits)
-    tested = cross_validated(samples, cuts_of(grasp_set, recipe), recipe, test, jobs, report or (lambda *_: None))
-    return () if tested is None else tested.rates
+    return cross_validated(samples, cuts_of(grasp_set, recipe), recipe, test, jobs, report)
 
 
 def trained_with_rest(samples: Samples, cut: "Cut") -> NDArray[np.bool_]:
@@ -185,10 +189,10 @@ def trained_with_rest(samples: Samples, cut: "Cut") -> NDArray[np.bool_]:
     If none do, return all rows. When only one subject's whole movements were recorded, the fold that tests this subject
     has no such training rows.
     """
-    found = np.ones(len(samples.labels), bool)
+    mask = np.ones(len(samples.labels), bool)
     for fold in cut.folds if samples.has_none else ():
-        found[fold.test] = samples.is_none[fold.train].any()
-    return found
+        mask[fold.test] = samples.is_none[fold.train].any()
+    return mask
 
 
 def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, Scores]:
@@ -227,14 +231,14 @@ def detection_of(
     none = samples.is_none
     if not (none.any() or (predicted == samples.n_types).any()):
         return ()
-    said = (predicted == samples.n_types).astype(np.intp)
+    detected = (predicted == samples.n_types).astype(np.intp)
     knows = np.ones(len(none), bool) if cut is None else trained_with_rest(samples, cut)
-    held, empty = (
-        {rate.unit: rate for rate in _rates(protocol, samples, said, none.astype(np.intp), rows & knows, seed, cut)}
+    grasps, empty = (
+        {rate.unit: rate for rate in _rates(protocol, samples, detected, none.astype(np.intp), rows & knows, seed, cut)}
         for rows in (~none, none)
     )
-    units = [unit for unit in UNITS if unit in held or unit in empty]
-    return tuple(Detected(held.get(unit, held["trials"]), empty.get(unit, empty.get("trials"))) for unit in units)
+    units = [unit for unit in UNITS if unit in grasps or unit in empty]
+    return tuple(Detected(grasps.get(unit, grasps["trials"]), empty.get(unit, empty.get("trials"))) for unit in units)
 
 
 def _rates(
@@ -251,7 +255,7 @@ def _rates(
     if not rows.any():
         return ()
     groups = None if cut.groups is None else cut.groups[rows]
-    found = rated(predicted[rows], truth[rows], samples.trials[rows], of=cut.of, groups=groups)
+    rates = rated(predicted[rows], truth[rows], samples.trials[rows], of=cut.of, groups=groups)
     return tuple(
         Recognised(
             protocol=protocol,
@@ -265,6 +269,43 @@ def _rates(
             low=round(rate.low, 6),
             high=round(rate.high, 6),
         )
-        for rate in found
+        for rate in rates
         if rate is not None
     )
+
+
+def _digests(grasp_set: GraspSet) -> list[str]:
+    """Return a digest of each trial: of its grasp type, the names of all columns, and its different frames.
+
+    Names of subjects and objects and numbers of trials do not count: `merge` and a new import may change them.
+    """
+    names = (*grasp_set.switch_names, *grasp_set.joint_names, *grasp_set.taxel_names)
+    order = sorted(range(len(names)), key=names.__getitem__)
+    head = msgspec.json.encode([names[column] for column in order])
+    values = np.hstack([grasp_set.switches, grasp_set.codes, grasp_set.taxels])[:, order].astype("<u2")
+    trials = grasp_set.trial_ids
+    rows = np.argsort(trials, kind="stable")
+    frames = np.split(rows, np.flatnonzero(np.diff(trials[rows])) + 1) if len(rows) else []
+    digests = []
+    for places in frames:
+        parts = (
+            head,
+            str(grasp_set.grasps[places[0]]).encode(),
+            *sorted({frame.tobytes() for frame in values[places]}),
+        )
+        digests.append(hashlib.sha256(b"".join(parts)).hexdigest()[:_DIGITS])
+    return digests
+
+
+def stored_digests(grasp_set: GraspSet) -> str:
+    """Return the digests of a training set for `Origin.trials`."""
+    return "".join(sorted(set(_digests(grasp_set)))[:_MOST_DIGESTS])
+
+
+def trained_on(manifest: Manifest, grasp_set: GraspSet) -> NDArray[np.bool_]:
+    """Return which trials (T,) of a set the build was trained on: those with the same frames as a training trial."""
+    source, digests = manifest.source, _digests(grasp_set)
+    if grasp_set.fingerprint() == source.fingerprint:
+        return np.ones(len(digests), bool)
+    stored = {source.trials[at : at + _DIGITS] for at in range(0, len(source.trials), _DIGITS)}
+    return np.array([digest in stored for digest in digests], bool)

@@ -1,29 +1,29 @@
 """`verify`: compare what is deployed with what was trained, on every recorded row and in the worst frame."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, Build, read_member
 from thenar.runtime.errors import BuildError
 from thenar.runtime.manifest import Faults, Unit
+from thenar.runtime.published import LiveGrasp
 
 from ..evaluation.rates import rated
-from ..model.compare import Comparison, WorstCase, compare, worst_case
+from ..model.compare import WorstCase, compare, worst_case
 from ..model.faults import count_faults, groups_of, worst_faults
 from ..recogniser import predicted_classes
 from ..recordings.graspset import GraspSet
-from ..trainers.base import Model
+from ..samples import decided, select_inputs
+from ..trainers.base import Model, Report
 from ..trainers.stumps import Stumps
 from . import CompileError
-from .documents import Progress
 from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault
-from .replay import trained_on
-from .verify_firmware import FirmwareVerification, select_inputs, verify_firmware
+from .training import trained_on
+from .verify_firmware import FirmwareVerification, verify_firmware
 
 
 class ChangedRow(Struct, frozen=True):
@@ -99,7 +99,7 @@ def verify(
     folder: str | Path,
     grasp_set: GraspSet,
     firmware: Sequence[str] = (),
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> Verification:
     """Compare a build's model, float tables and integer tables on every row of recordings, and over all frames.
 
@@ -137,23 +137,21 @@ def verify(
     True
     """
     build = _build_for(folder, grasp_set)
-    found = _verified(build, _load_ensemble(Path(folder), build), grasp_set, progress)
-    if not firmware:
-        return found
-    tried = verify_firmware(folder, grasp_set, firmware, progress)
-    return replace(found, firmware=tried, holds=found.holds and tried.holds)
-
-
-def _verified(build: Build, model: Model, grasp_set: GraspSet, progress: Progress | None) -> Verification:
-    """Compare the model, its float tables and the integers of a build, without firmware."""
+    model = _load_ensemble(Path(folder), build)
     bits, codes = select_inputs(grasp_set, build.manifest)
     comparison = compare(model, build.tables, bits, codes, progress)
     names = [switch.name for switch in build.manifest.switches]
     worst = worst_case(model, build.tables, comparison, build.grasps, names)
     grasps, empty = np.array(build.grasps), grasp_set.is_none
     predicted = predicted_classes(build.tables, build.manifest.rejection, bits, codes)
-    says = build.none if build.rejector is None else len(grasps)
+    number = build.none if build.rejector is None else len(grasps)
+    nothing_held = None
+    if number is not None:
+        detected = predicted == number
+        counts = map(np.count_nonzero, (~empty, detected & ~empty, empty, detected & empty))
+        nothing_held = NothingHeld(*map(int, counts))
     seen = trained_on(build.manifest, grasp_set)
+    compiled = verify_firmware(folder, grasp_set, firmware, progress) if firmware else None
     return Verification(
         rows=len(grasp_set),
         trials=len(seen),
@@ -168,15 +166,20 @@ def _verified(build: Build, model: Model, grasp_set: GraspSet, progress: Progres
         covered_changed=int(np.count_nonzero(comparison.covered[comparison.changed])),
         recognised=_recognised(comparison.trained, predicted, grasps, grasp_set),
         worst=worst,
-        changed=_changed(comparison, grasps, grasp_set),
-        holds=comparison.holds and worst.holds,
-        nothing_held=None if says is None else _nothing_held(predicted == says, empty),
+        changed=tuple(
+            ChangedRow(
+                row=int(row),
+                recorded=str(grasp_set.grasps[row]),
+                ensemble=str(grasps[comparison.trained[row]]),
+                integers=str(grasps[comparison.deployed[row]]),
+                margin=float(comparison.margins[row]),
+            )
+            for row in comparison.changed
+        ),
+        holds=comparison.holds and worst.holds and (compiled is None or compiled.holds),
+        nothing_held=nothing_held,
+        firmware=compiled,
     )
-
-
-def _nothing_held(said: NDArray[np.bool_], empty: NDArray[np.bool_]) -> NothingHeld:
-    counts = (~empty, said & ~empty, empty, said & empty)
-    return NothingHeld(*(int(np.count_nonzero(each)) for each in counts))
 
 
 def _build_for(folder: str | Path, grasp_set: GraspSet) -> Build:
@@ -201,7 +204,7 @@ class FaultCheck(Struct, frozen=True):
     inputs: tuple[InputFaults, ...]
 
 
-def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Progress | None = None) -> FaultCheck:
+def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Report | None = None) -> FaultCheck:
     """Simulate every fault of an input, and of the build's ports, chips and boards, on every row of recordings.
 
     Parameters
@@ -239,16 +242,16 @@ def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Progress | 
     bits, codes = select_inputs(grasp_set, manifest)
     groups = groups_of(build.scan, [switch.source for switch in manifest.switches], build.tables.n_joints)
     labels = _labels(np.array(build.grasps), grasp_set)
-    found = count_faults(build.tables, bits, codes, labels, grasp_set.trial_ids, tuple(groups.values()), progress)
+    counts = count_faults(build.tables, bits, codes, labels, grasp_set.trial_ids, tuple(groups.values()), progress)
     names = [*(each.name for each in manifest.switches), *(each.name for each in manifest.joints)]
     stuck = (
-        min(zip(*each, strict=True), key=lambda one: one[0]) for each in zip(found.stuck, found.values, strict=True)
+        min(zip(*each, strict=True), key=lambda one: one[0]) for each in zip(counts.stuck, counts.values, strict=True)
     )
     return FaultCheck(
-        worst_faults(found, names, groups),
+        worst_faults(counts, names, groups),
         tuple(
             InputFaults(name, lost, left, value)
-            for name, lost, (left, value) in zip(names, found.lost, stuck, strict=True)
+            for name, lost, (left, value) in zip(names, counts.lost, stuck, strict=True)
         ),
     )
 
@@ -287,14 +290,31 @@ def _recognised(
     )
 
 
-def _changed(comparison: Comparison, grasps: NDArray[np.str_], grasp_set: GraspSet) -> tuple[ChangedRow, ...]:
-    return tuple(
-        ChangedRow(
-            row=int(row),
-            recorded=str(grasp_set.grasps[row]),
-            ensemble=str(grasps[comparison.trained[row]]),
-            integers=str(grasps[comparison.deployed[row]]),
-            margin=float(comparison.margins[row]),
+def replayed(build: Build, grasp_set: GraspSet, period_us: int) -> Iterator[LiveGrasp]:
+    """Yield the prediction for each row. Both clocks begin with the set.
+
+    Raises CompileError if the set lacks inputs of the build.
+    """
+    bits, codes = select_inputs(grasp_set, build.manifest)
+    for row, (switches, joints) in enumerate(zip(bits, codes, strict=True)):
+        prediction = build.recognise(switches, joints)
+        yield LiveGrasp(
+            time_us=row * period_us,
+            unix_us=row * period_us,
+            number=row,
+            grasp=prediction.grasp,
+            candidate=prediction.grasp,
+            probability=prediction.probability,
+            margin=prediction.margin,
+            health="degraded" if prediction.degraded else "ok",
+            switch_age_us=None,
+            glove_age_us=None,
+            latency_us=0,
         )
-        for row in comparison.changed
-    )
+
+
+def trials_recognised(grasp_set: GraspSet, rows: Sequence[str]) -> NDArray[np.bool_]:
+    """Return which trials (T,) the majority of their frames predicts correctly, by each row's prediction."""
+    _, first, trial = np.unique(grasp_set.trial_ids, return_index=True, return_inverse=True)
+    names, predicted = np.unique(rows, return_inverse=True)
+    return np.asarray(names[decided(predicted[np.newaxis], trial)[0]] == grasp_set.grasps[first])

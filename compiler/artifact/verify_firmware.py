@@ -3,7 +3,7 @@
 Also check whether a build's firmware is the firmware that thenar would generate for it today.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import compress, product
 from pathlib import Path
@@ -14,76 +14,20 @@ from numpy.typing import NDArray
 
 from thenar.runtime.build import Build
 from thenar.runtime.files import read_file
-from thenar.runtime.manifest import Calibration, Manifest, Switch
+from thenar.runtime.manifest import Manifest
 from thenar.runtime.model.integers import IntegerTables
-from thenar.runtime.names import list_names, nearest
 from thenar.runtime.scores import LANE_OFFSET
 
 from ..firmware import FirmwareError
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library
 from ..firmware.costs import PartFit, features, fit_for, smallest_fit
 from ..firmware.generate import LARGEST
-from ..firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames, states_of
+from ..firmware.probes import Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames, states_of
 from ..firmware.targets import TARGETS
 from ..firmware.targets import kinds as every_kind
-from ..recordings.graspset import GraspSet, Joint
-from ..text import counted
-from . import CompileError
-
-
-def select_inputs(grasp_set: GraspSet, manifest: Manifest) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
-    """Return the kept switches (n, s) and the joints' codes (n, j) of `grasp_set` in the build's order.
-
-    Raises CompileError naming the inputs that the recordings lack, or joints whose codes have another meaning there.
-    """
-    there = {name: column for column, name in enumerate(grasp_set.element_names)}
-    measured = {name: column for column, name in enumerate(grasp_set.joint_names)}
-    wanted = [*dict.fromkeys(switch.source for switch in manifest.switches)]
-    missing = [name for name in wanted if name not in there]
-    missing += [joint.name for joint in manifest.joints if joint.name not in measured]
-    if missing:
-        names = (*grasp_set.element_names, *grasp_set.joint_names)
-        raise CompileError(
-            f"the recordings lack {counted(len(missing), 'input')} of the build: {list_names(missing)}"
-            f"{nearest(missing[0], names)}; import their table again, with [rename] in the columns.toml for a column "
-            "that has another name"
-        )
-    switches = [there[switch.source] for switch in manifest.switches]
-    joints = [measured[joint.name] for joint in manifest.joints]
-    for calibration, column in zip(manifest.joints, joints, strict=True):
-        _check_calibration("joint", calibration, grasp_set.joints[column])
-    bits = np.empty((len(grasp_set), len(switches)), np.bool_)
-    for place, (switch, column) in enumerate(zip(manifest.switches, switches, strict=True)):
-        bits[:, place] = _bits(grasp_set, switch, column)
-    return bits, grasp_set.codes[:, joints]
-
-
-def _bits(grasp_set: GraspSet, switch: Switch, column: int) -> NDArray[np.bool_]:
-    """Return the values (n,) of a kept switch, or of a kept level of a taxel."""
-    taxel = column - len(grasp_set.switch_names)
-    if (taxel < 0) != (switch.threshold is None):
-        here, built = ("a switch", "a taxel") if taxel < 0 else ("a taxel", "a switch")
-        raise CompileError(
-            f"{switch.source} is {here} here, but {built} in the build: import these recordings as the build's were"
-        )
-    if switch.threshold is None:
-        return grasp_set.switches[:, column]
-    _check_calibration("taxel", switch.threshold.taxel, grasp_set.taxel_columns[taxel])
-    return grasp_set.taxels[:, taxel] > switch.threshold.code
-
-
-def _check_calibration(kind: str, built: Calibration, recorded: Joint) -> None:
-    values = np.array([built.value_a, built.value_b])
-    meant = recorded.value([built.code_a, built.code_b])
-    same = np.isclose(meant, values, rtol=0, atol=abs(recorded.step) * 1e-6)
-    if recorded.unit != built.unit or not same.all():
-        point = int(same.argmin())
-        code = (built.code_a, built.code_b)[point]
-        raise CompileError(
-            f"{kind} {built.name} is coded differently here: code {code} is {meant[point]:g} {recorded.unit}, but "
-            f"{values[point]:g} {built.unit} in the build; import these recordings with the build's grid and origin"
-        )
-
+from ..recordings.graspset import GraspSet
+from ..samples import select_inputs
+from ..trainers.base import Report
 
 RANDOM_FRAMES = 10_000
 _SEED = 1
@@ -184,25 +128,29 @@ class FirmwareTrial:
 
     def check(self, fit: PartFit, *, missing: bool = False) -> TargetCheck:
         """Compile the classifier with layout `fit` and compare its results with Python's. Raises FirmwareError."""
-        found = self._run(fit, lost=self._lost if missing else None)
+        layout, target = fit.layout, fit.target
+        files = target.sources(Library(LIBRARY_NAME, self._build.manifest, layout))
+        frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
+        found = target.run(files, LIBRARY_NAME, layout, frames, lost=self._lost if missing else None)
         scores = self._scores_without if missing else self._scores
         # On an AVR only classify() is timed; decide(), which rejects, runs on the frames with missing inputs.
-        bare = fit.target.avr and not missing
+        bare = target.avr and not missing
         classes = scores.argmax(axis=1) if bare else self._classes(scores, missing=missing)
         wrong = (found.scores != scores).any(axis=1) | (found.classes != classes)
         if (said := _said(found)) is not None:
             expected = self._said(found, missing=missing)
             wrong |= (said != expected).any(axis=1)
+        pairs = None if found.names is None else zip(found.names, self._build.grasps, strict=True)
         return TargetCheck(
-            part=fit.target.part,
-            layout=features(fit.layout),
+            part=target.part,
+            layout=features(layout),
             missing=missing,
             shares=said is not None,
             frames=len(wrong),
             differing=int(np.count_nonzero(wrong)),
             states=found.states is not None,
             first=self._difference(int(wrong.argmax()), found, missing=missing) if wrong.any() else None,
-            misnamed=self._misnamed(found),
+            misnamed=None if pairs is None else sum(name != grasp for name, grasp in pairs),
             worst=None if found.cost is None else int(found.cost.max()),
             unit=found.unit,
             stack=found.stack,
@@ -230,39 +178,26 @@ class FirmwareTrial:
         best, second = np.sort(scores, axis=1)[:, :-3:-1].T
         softmax = self._build.softmax
         shares = [softmax.probabilities(own)[n % len(own)] for n, own in enumerate(scores.tolist())]
-        states = [] if found.states is None else [self._states(scores, missing=missing)]
+        states = []
+        if found.states is not None:
+            model = self._build.manifest.segments
+            assert model is not None
+            states = [states_of(model, scores, self._classes(scores, missing=missing) == scores.shape[1])]
         return np.stack([best - second, shares, *states], axis=1).astype(np.int64)
-
-    def _states(self, scores: NDArray[np.int64], *, missing: bool) -> NDArray[np.uint16]:
-        """Return the state of the decoder of segments at each frame (n,), of a build that has learnt segments."""
-        model = self._build.manifest.segments
-        assert model is not None
-        return states_of(model, scores, self._classes(scores, missing=missing) == scores.shape[1])
-
-    def _misnamed(self, found: Predictions) -> int | None:
-        if found.names is None:
-            return None
-        return sum(name != grasp for name, grasp in zip(found.names, self._build.grasps, strict=True))
-
-    def _run(self, fit: PartFit, *, lost: Lost | None) -> Predictions:
-        layout, target = fit.layout, fit.target
-        files = target.sources(Library(LIBRARY_NAME, self._build.manifest, layout))
-        frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
-        return target.run(files, LIBRARY_NAME, layout, frames, lost=lost)
 
     def _difference(self, frame: int, found: Predictions, *, missing: bool) -> Difference:
         scores = self._scores_without if missing else self._scores
         described = self._build.manifest
         inputs = [*(switch.name for switch in described.switches), *(joint.name for joint in described.joints)]
         build, bits, codes = self._build, self._frames.bits[frame], self._frames.codes[frame]
-        said = _said(found)
+        said, number = _said(found), int(found.classes[frame])
         return Difference(
             frame=self._name(frame),
             closed=tuple(switch.name for switch, bit in zip(build.manifest.switches, bits, strict=True) if bit),
             codes=tuple(codes.tolist()),
             grasp=build.grasps[int(scores[frame].argmax())],
             scores=tuple(scores[frame].tolist()),
-            compiled_grasp=self._grasp(int(found.classes[frame])),
+            compiled_grasp=build.grasps[number] if number < len(build.grasps) else f"type {number}, which is unknown",
             compiled_scores=tuple(found.scores[frame].tolist()),
             said=() if said is None else tuple(self._said(found, missing=missing)[frame].tolist()),
             compiled_said=() if said is None else tuple(said[frame].tolist()),
@@ -275,9 +210,6 @@ class FirmwareTrial:
                 return f"{name} {frame}"
             frame -= len(lot)
         raise IndexError(frame)
-
-    def _grasp(self, number: int) -> str:
-        return self._build.grasps[number] if number < len(self._build.grasps) else f"type {number}, which is unknown"
 
 
 def _said(found: Predictions) -> NDArray[np.int64] | None:
@@ -318,7 +250,7 @@ def verify_firmware(
     folder: str | Path,
     grasp_set: GraspSet,
     kinds: Sequence[str],
-    progress: Callable[[int, int], None] | None = None,
+    progress: Report | None = None,
 ) -> FirmwareVerification:
     """Compile the classifier for `kinds` and compare it with Python: every row, extreme frames, 10,000 random frames.
 
@@ -331,8 +263,11 @@ def verify_firmware(
     if unknown := [kind for kind in kinds if kind not in every_kind()]:
         raise FirmwareError(f"no simulator runs firmware for {unknown[0]!r}: choose from {', '.join(every_kind())}")
     build = Build.load(folder)
-    fits = [_fit(build, kind) for kind in every_kind() if kind in kinds]
-    for fit in fits:
+    fits = []
+    for kind in (kind for kind in every_kind() if kind in kinds):
+        first, *more = (target for target in TARGETS.values() if target.kind == kind)
+        # The smallest part of the kind that fits.
+        fits.append(fit := smallest_fit(build.tables, kind=kind) if more else fit_for(first, build.tables))
         if lack := fit.target.missing():
             raise FirmwareError(f"firmware for {fit.target.part} cannot be run here: {lack}")
     bits, codes = select_inputs(grasp_set, build.manifest)
@@ -351,9 +286,3 @@ def verify_firmware(
         checks=tuple(checks),
         outdated=outdated_firmware(Path(folder), build),
     )
-
-
-def _fit(build: Build, kind: str) -> PartFit:
-    """Return the smallest part of a kind that fits, with its layout."""
-    first, *more = (target for target in TARGETS.values() if target.kind == kind)
-    return smallest_fit(build.tables, kind=kind) if more else fit_for(first, build.tables)

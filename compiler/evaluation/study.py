@@ -12,16 +12,15 @@ import numpy as np
 from thenar.runtime.manifest import Of, Unit
 from thenar.runtime.recipe import PAPERS_TRAINER, Recipe, changed
 
-from ..limits import check_memory, check_types
 from ..pictures import painting
 from ..placement.constraints import Limits
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.ports import PortCosts
 from ..recordings.graspset import GraspSet
 from ..recordings.summary import check_trials
-from ..samples import Samples
+from ..samples import Samples, check_types
 from ..text import counted
-from ..workers import in_workers
+from ..workers import check_memory, in_workers
 from .choosing import InputChoices
 from .folds import (
     NESTED,

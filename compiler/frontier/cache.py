@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from hashlib import blake2b
 from inspect import signature
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_type_hints
+from typing import Any, TypeVar, get_type_hints
 
 import msgspec
 import numpy as np
@@ -24,9 +24,6 @@ _SQLITE = b"SQLite format 3\0"
 # Marks the files of stores among those of SQLite.
 _APPLICATION = int.from_bytes(b"then")
 
-# Where a function runs: on the cluster, if there is one; in workers on this machine, whose tools it uses; in this very
-# process, because it measures this machine, whose name is then part of the cache key.
-Place = Literal["cluster", "machine", "process"]
 Report = Callable[[int, int], None]
 # Steps of the progress of one round.
 ROUND = 100
@@ -38,19 +35,19 @@ class StoreError(ThenarError, OSError):
     """A store that cannot be opened or written to, is in use by another run, or is another kind of file."""
 
 
-# The version of each stored function, and where it may run.
-_STORED: dict[Callable[..., Any], tuple[int, Place]] = {}
+# The version of each stored function, and whether it runs in this very process; the machine is then part of the key.
+_STORED: dict[Callable[..., Any], tuple[int, bool]] = {}
 
 
-def stored(version: int, *, where: Place = "cluster") -> Callable[[F], F]:
+def stored(version: int, *, here: bool = False) -> Callable[[F], F]:
     """Return a decorator of functions whose results a `Cache` stores.
 
     Parameters
     ----------
     version : int
         Raise it when the function's results change.
-    where : {"cluster", "machine", "process"}
-        The farthest place where it may run.
+    here : bool
+        Whether it runs in this very process, not in workers, since it measures this machine.
 
     Notes
     -----
@@ -59,7 +56,7 @@ def stored(version: int, *, where: Place = "cluster") -> Callable[[F], F]:
     """
 
     def register(function: F) -> F:
-        _STORED[function] = version, where
+        _STORED[function] = version, here
         return function
 
     return register
@@ -77,10 +74,10 @@ def question(function: Callable[..., Any], args: Sequence[Any], digests: dict[in
             return digests.get(id(value)) or digests.setdefault(id(value), _digest(value))
         return value.identity  # of a class that supports caching; AttributeError for all others
 
-    version, where = _STORED[function]
+    version, here = _STORED[function]
     bound = signature(function).bind(*args)
     bound.apply_defaults()
-    machine = platform.node() if where == "process" else ""
+    machine = platform.node() if here else ""
     asked = (f"{function.__module__}.{function.__qualname__}", version, machine, bound.arguments)
     return msgspec.json.encode(asked, enc_hook=plain, order="deterministic")
 
@@ -209,15 +206,15 @@ class Cache:
             self._tell(1, 1)
             return []
         kind: type[R] = get_type_hints(function)["return"]
-        where, digests = _STORED[function][1], dict[int, str]()
+        here, digests = _STORED[function][1], dict[int, str]()
         questions = [question(function, args, digests) for args in calls]
         asked = dict(zip(questions, calls, strict=True))
         found = {key: known for key in asked if (known := self._store.get(key, kind)) is not None}
         todo = [key for key in asked if key not in found]
         self._tell(len(found), len(asked))
         tasks = ((number, function, asked[key]) for number, key in enumerate(todo))
-        jobs = 1 if where == "process" else self._jobs
-        for number, result in in_workers(_computed, tasks, jobs, here=where != "cluster"):
+        jobs = 1 if here else self._jobs
+        for number, result in in_workers(_computed, tasks, jobs):
             key = todo[number]
             self._store.put(key, result)
             # Decode it as a later run would: a new result must not differ from a stored one.

@@ -20,14 +20,15 @@ from thenar.runtime.published import NONE
 from thenar.runtime.recipe import Recipe
 
 from ..evaluation.rates import Rate
-from ..limits import check_inputs, check_memory, check_types
 from ..placement.methods.base import METHODS, usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
+from ..recogniser import check_inputs
 from ..recordings.graspset import GraspSet
 from ..recordings.summary import check_trials
-from ..samples import Samples
+from ..samples import Samples, check_types
 from ..text import INDEPENDENT, sentence
+from ..workers import check_memory
 from .cache import Cache, Report, Store
 from .designs import Design, Latencies, best_designs, designs, lucks, points_of
 from .finalists import (
@@ -114,7 +115,7 @@ def find_frontier(
     stream : GraspSet, optional
         Other recordings of the same glove, to measure decision latency on; usually the test rows of the first fold.
     jobs : int
-        Worker processes, -1 for all cores. Within `thenar.compiler.dask_cluster`, its workers do the work.
+        Worker processes, -1 for all cores.
     report : callable, optional
         Called with the done and total steps; every round of work has the same number of them.
 

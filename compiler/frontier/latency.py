@@ -22,7 +22,7 @@ from thenar.runtime.segmenting.live import LiveSegments
 from thenar.runtime.segmenting.model import SegmentModel
 
 from ..evaluation.folds import Rows, leave_groups_out, trial_folds
-from ..movements.learning import learnt
+from ..movements.segments import learnt
 from ..movements.streams import TICK_US, MovementError, Stream, Times, streams_of
 from ..placement.placement import InputSelection
 from ..recordings.graspset import GraspSet

@@ -153,7 +153,7 @@ def fitting(tables: IntegerTables, part: Target) -> PartFit | None:
         return None
 
 
-@stored(1, where="process")
+@stored(1, here=True)
 def fit_here() -> PythonCost:
     """Time tables of many shapes on this machine and fit them by least relative squares, no weight below 0.
 
@@ -324,7 +324,7 @@ def tables_of(
         yield recipe, shaped.tables if lost else shaped.integers
 
 
-@stored(3, where="machine")
+@stored(3)
 def count_steps(content: bytes, model: ClassifyModel) -> float:
     """Compile the classifier of tables and run it; return the cycles of the slowest of the frames that should take
     longest and of extreme ones. Raises FirmwareError.
@@ -336,17 +336,14 @@ def count_steps(content: bytes, model: ClassifyModel) -> float:
     return float(run_counted(library, fit.target, slow_frames(library)).most)
 
 
-@stored(2, where="process")
+@stored(2, here=True)
 def time_here(contents: tuple[bytes, ...], yardstick: float) -> tuple[float, ...]:
     """Time the runtime on each of the tables, scaled by its yardstick; return microseconds."""
     return tuple(classify_us([tables_from_bytes(content) for content in contents], yardstick))
 
 
 def measured(contents: Sequence[bytes], model: ClassifyModel, cache: Cache) -> dict[bytes, PointTime]:
-    """Return the time of classifying with each of these tables, simulated or measured; none if that is not possible.
-
-    Simulators run on this machine even with a cluster, whose workers may have none.
-    """
+    """Return the time of classifying with each of these tables, simulated or measured; none if that is not possible."""
     several = tuple(dict.fromkeys(contents))
     if model.unmeasured:
         return {}

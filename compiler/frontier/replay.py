@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..movements.scores import Span
+from ..movements.segments import Span
 from ..movements.streams import (
     LEAST_FRAMES,
     Bits,

@@ -9,7 +9,7 @@ from thenar.runtime.names import printable, taxel_and_code
 from thenar.runtime.recipe import PAPERS_TRAINER
 
 from ..evaluation.rates import Rate
-from ..sensors import SensorCount
+from ..facts import SensorCount
 from ..text import cells, counted, duration, interval, listed, percent
 from .points import Frontier, FrontierPoint, PointSetting, PointTime, ReferencePoint
 

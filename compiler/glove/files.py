@@ -1,15 +1,11 @@
 """The files of a spec, for cutting, sewing, soldering and running the reduced glove, and their folder."""
 
+import csv
 import io
-import os
 import uuid
-import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from importlib import import_module
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from textwrap import fill
 
 import msgspec
 
@@ -20,146 +16,146 @@ from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..hand import HandShape
 from ..publication import check_folder, entries, publish_folder
-from .circuit import Circuit, Component, ComponentKind
-from .lists import materials_csv, readme_of, sensors_csv, wiring_csv
-from .pattern import LAYERS, Circle, Pattern, PatternLine, Shape, Text
-from .spec import GloveSpec, SpecError, glove_spec
+from ..text import cells, sentence
+from .circuit import BillLine, Circuit, Component, ComponentKind
+from .layout import CONTACT_MM, counted_sensors
+from .pattern import dxf_of, svg_of
+from .spec import GloveSpec, SpecError, SpecSummary, glove_spec
 
-if TYPE_CHECKING:
-    from ezdxf.layouts.layout import Modelspace
-
-_SVG_NAMESPACE = "http://www.w3.org/2000/svg"
-_INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-_SVG_COLOURS = {
-    "outline": "#000",
-    "strips": "#06c",
-    "creases": "#aaa",
-    "holes": "#d00",
-    "names": "#333",
-    "scale": "#000",
-}
-_STROKE_MM = 0.2
-# The height of capitals in Helvetica and similar fonts, as a share of the font size.
-_CAPITALS = 0.72
-# AutoCAD's colour numbers: black or white, blue, grey, red.
-_DXF_COLOURS = {"outline": 7, "strips": 5, "creases": 8, "holes": 1, "names": 8, "scale": 7}
-
-
-def svg_of(pattern: Pattern) -> bytes:
-    """Return the SVG: one user unit is one millimetre, and drawing programs show each group as a layer."""
-    page, shapes = pattern
-    root = ET.Element(
-        "svg",
-        {
-            "xmlns": _SVG_NAMESPACE,
-            "xmlns:inkscape": _INKSCAPE,
-            "width": f"{page.width_mm:g}mm",
-            "height": f"{page.height_mm:g}mm",
-            "viewBox": f"0 0 {page.width_mm:g} {page.height_mm:g}",
-            "font-family": "Helvetica, Arial, sans-serif",
-        },
-    )
-    for layer in LAYERS:
-        group = ET.SubElement(root, "g", _layer(layer))
-        for shape in shapes:
-            if shape.layer == layer:
-                _add_to_svg(group, shape, page.height_mm)
-    ET.indent(root, " ")
-    return b'<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(root, encoding="unicode").encode() + b"\n"
-
-
-def _layer(name: str) -> dict[str, str]:
-    colour = _SVG_COLOURS[name]
-    paint = {"fill": colour} if name == "names" else {"fill": "none", "stroke": colour, "stroke-width": f"{_STROKE_MM}"}
-    return {"id": name, "inkscape:groupmode": "layer", "inkscape:label": name, **paint}
-
-
-def _add_to_svg(group: ET.Element, shape: Shape, height_mm: float) -> None:
-    match shape:
-        case PatternLine(points=points, closed=closed):
-            places = " ".join(f"{x:.3f},{height_mm - y:.3f}" for x, y in points)
-            ET.SubElement(group, "polygon" if closed else "polyline", {"points": places})
-        case Circle(x=x, y=y, radius=radius):
-            ET.SubElement(group, "circle", {"cx": f"{x:.3f}", "cy": f"{height_mm - y:.3f}", "r": f"{radius:g}"})
-        case Text():
-            _add_text(group, shape, height_mm)
-
-
-def _add_text(group: ET.Element, text: Text, height_mm: float) -> None:
-    baseline = text.y - text.height / 2 if text.centred else text.y
-    attributes = {
-        "x": f"{text.x:.3f}",
-        "y": f"{height_mm - baseline:.3f}",
-        "font-size": f"{text.height / _CAPITALS:.3f}",
-    }
-    if text.centred:
-        attributes["text-anchor"] = "middle"
-    ET.SubElement(group, "text", attributes).text = text.text
-
-
-def dxf_of(pattern: Pattern) -> bytes:
-    """Return the DXF (AutoCAD 2000, millimetres), which cutters and CAD programs read."""
-    _load_ezdxf()
-    from ezdxf.filemanagement import new
-    from ezdxf.units import MM
-
-    text = io.StringIO()
-    with _undated():
-        document = new("R2000", units=MM)
-        for layer in LAYERS:
-            document.layers.add(layer, color=_DXF_COLOURS[layer])
-        space = document.modelspace()
-        for shape in pattern[1]:
-            _add_to_dxf(space, shape)
-        document.write(text)
-    return text.getvalue().encode(document.output_encoding, "dxfreplace")
-
-
-def _load_ezdxf() -> None:
-    """Import ezdxf, which then reads settings and a list of fonts in the user's home, also where that is unreadable."""
-    try:
-        import_module("ezdxf")
-    except OSError:
-        before = dict(os.environ)
-        with TemporaryDirectory() as empty:
-            os.environ.update(HOME=empty, XDG_CONFIG_HOME=empty, XDG_CACHE_HOME=empty)
-            try:
-                import_module("ezdxf")
-            finally:
-                os.environ.clear()
-                os.environ.update(before)
-
-
-def _add_to_dxf(space: "Modelspace", shape: Shape) -> None:
-    from ezdxf.enums import TextEntityAlignment
-
-    on_layer = {"layer": shape.layer}
-    match shape:
-        case PatternLine(points=points, closed=closed):
-            space.add_lwpolyline(points.tolist(), close=closed, dxfattribs=on_layer)
-        case Circle(x=x, y=y, radius=radius):
-            space.add_circle((x, y), radius, dxfattribs=on_layer)
-        case Text(x=x, y=y, height=height, text=text, centred=centred):
-            where = TextEntityAlignment.MIDDLE_CENTER if centred else TextEntityAlignment.LEFT
-            space.add_text(text, height=height, dxfattribs=on_layer).set_placement((x, y), align=where)
-
-
-@contextmanager
-def _undated() -> Iterator[None]:
-    """Keep dates and random identifiers out of the output of ezdxf."""
-    from ezdxf._options import options
-
-    before = options.write_fixed_meta_data_for_testing
-    options.write_fixed_meta_data_for_testing = True
-    try:
-        yield
-    finally:
-        options.write_fixed_meta_data_for_testing = before
-
-
+Row = Sequence[object]
+_WIDTH = 100
+# Topics of facts that say what to expect of the glove.
+_EXPECTED = ("scan", "accuracy", "caution", "faults")
+# Of the netlist.
 _VERSION = "E"
 # An arbitrary constant: identifiers must only be the same whenever the same component is written.
 _NAMESPACE = uuid.UUID("5e1f3c0a-7f7a-5d0b-9a53-4d6f0b7c2e61")
+
+
+def sensors_csv(summary: SpecSummary) -> bytes:
+    """Return the wired sensors with their positions on the hand and their readers."""
+    pins = {
+        switch: (reader, pin)
+        for reader in summary.readers
+        for switch, pin in zip(reader.switches, reader.pins, strict=True)
+    }
+    return _csv(
+        ("sensor", "kind", "name", "part", "side", "x_mm", "y_mm", "read_by", "place", "pin"),
+        (
+            (s.ref, s.kind, s.name, s.part, s.side, s.x_mm, s.y_mm, reader.ref, reader.place, pin)
+            for s in summary.sensors
+            for reader, pin in (pins[s.number],)
+        ),
+    )
+
+
+def wiring_csv(summary: SpecSummary) -> bytes:
+    """Return every wire from the sensors to the connectors at the wrist, and on to its reader."""
+    return _csv(
+        ("bundle", "connector", "pin", "colour", "length_mm", "sensors", "contact", "net", "read_by", "input"),
+        (
+            (
+                *(w.bundle, w.connector, w.pin, w.colour, w.length_mm),
+                " ".join(summary.sensors[number - 1].ref for number in w.switches),
+                *(1 if w.unit else 2, w.net, w.unit, w.input),
+            )
+            for w in summary.wires
+        ),
+    )
+
+
+def materials_csv(materials: Sequence[BillLine]) -> bytes:
+    """Return the bill of materials."""
+    return _csv(
+        ("quantity", "unit", "what", "part_number", "maker", "footprint", "designators", "confirmed", "note"),
+        (
+            (
+                *(f"{m.quantity:g}", m.unit, m.what, m.part, m.maker, m.footprint, " ".join(m.designators)),
+                *("yes" if m.sure else "no", m.note),
+            )
+            for m in materials
+        ),
+    )
+
+
+def _csv(header: Sequence[str], rows: Iterable[Row]) -> bytes:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(map(cells, rows))
+    return text.getvalue().encode()
+
+
+def readme_of(spec: GloveSpec) -> str:
+    """Return the text of README.txt."""
+    summary = spec.summary
+    parts = [f"{summary.glove}: a glove with {summary.kept}", *_building(summary)]
+    parts += ["What to expect", *expectations(spec)]
+    doubts = [f"{m.part or m.what}: {m.note}" for m in summary.materials if not m.sure]
+    parts += ["Please note", *_advice(summary), *summary.remarks, *doubts]
+    headings = {parts[0], "To cut and sew", "To wire", "To solder", "To run", "What to expect", "Please note"}
+    laid_out = (f"{part}\n{'-' * len(part)}\n" if part in headings else fill(part, _WIDTH) + "\n" for part in parts)
+    return "\n".join(laid_out)
+
+
+def expectations(spec: GloveSpec) -> Iterator[str]:
+    """Yield sentences on times and accuracy."""
+    return (sentence(str(fact)) for fact in spec.facts if fact.topic in _EXPECTED)
+
+
+def _building(summary: SpecSummary) -> Iterator[str]:
+    if summary.print_on:
+        yield "To cut and sew"
+        yield from _cutting(summary)
+    yield "To wire"
+    yield (
+        "wiring.csv: a bundle of wires for each digit, and in it a wire for contact 1 of every sensor and a common "
+        "return for contact 2, from sensor to sensor. Colours count the wires of a bundle; marks distinguish a "
+        "colour's second use from its first. Lengths are estimates: the straight distance to the wrist and a "
+        "quarter more."
+    )
+    yield "To solder"
+    yield (
+        "bom.csv: what to buy. glove.net: the circuit for the board at the wrist; in KiCad's board editor, File, "
+        "Import, Netlist. The sensors are in it with their connections and are left off the board. A part number "
+        "is given only where it is known. The sensors of joints are in bom.csv alone."
+    )
+    for reader in summary.readers:
+        yield f"{reader.ref}: {reader.place}, {counted_sensors([summary.sensors[n - 1] for n in reader.switches])}."
+    yield "To run"
+    yield (
+        "glove.toml: the wiring as thenar run, record, emulate and doctor read it. Device files and ports are the "
+        "lines to check. thenar doctor measures what the computer adds to each transaction. spec.json: all of this for "
+        "machines."
+    )
+
+
+def _cutting(summary: SpecSummary) -> Iterator[str]:
+    printed = f"at 1:1 in millimetres, for {summary.print_on}. Print without scaling and measure the bar of 50 mm."
+    if summary.hand_length_mm is None:
+        yield (
+            f"cutting.svg and cutting.dxf are the glove of your layout, {printed} Layers: outline, holes (one for each "
+            "sensor), names, scale."
+        )
+        yield "sensors.csv: every wired sensor with its position, as in your layout, and its pin."
+        return
+    yield (
+        f"cutting.svg and cutting.dxf are the right hand of {summary.hand_length_mm:g} mm length laid flat, the palm "
+        f"up, {printed} For a left hand, mirror it. Layers: outline, strips (the sides of the digits, unfolded), "
+        f"creases, holes ({CONTACT_MM} mm, where the sensor meets the hand), names, scale."
+    )
+    yield (
+        "The pattern is a map: lengths along the digits are true; the digits are spread and the palm is broader "
+        "than the hand, to leave room for the strips. Fit the cloth to the hand, and place the sensors by the "
+        "creases of the joints."
+    )
+    yield "sensors.csv: every wired sensor with its position, measured from the middle of the wrist, and its pin."
+
+
+def _advice(summary: SpecSummary) -> Iterator[str]:
+    yield "Supply all chips and pull-ups with the voltage of the host's bus: 3.3 V on a Raspberry Pi."
+    if any(sensor.kind == "switch" for sensor in summary.sensors):
+        yield "A contact bounces for up to 3 ms when it closes and 8 ms when it opens: thenar debounces."
 
 
 def netlist_of(circuit: Circuit, title: str) -> bytes:

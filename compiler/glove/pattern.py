@@ -4,14 +4,23 @@ Page coordinates: x to the right, y up, from the lower left corner. The page is 
 SVG and DXF are written from the same shapes.
 """
 
+import io
+import os
+import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib import import_module
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..hand import HandShape
 from .layout import PlacedSensor, hole_mm
+
+if TYPE_CHECKING:
+    from ezdxf.layouts.layout import Modelspace
 
 # The margin that most printers leave white.
 MARGIN_MM = 5.0
@@ -23,6 +32,21 @@ SCALE_BAR_MM = 50.0
 _TITLE_MM, _TEXT_MM, _ROW_MM, _COLUMN_MM = 3.5, 2.0, 3.2, 48.0
 _BAR_ROOM_MM, _GAP_MM = 14.0, 4.0
 _TICK_MM = 2.0
+_SVG_NAMESPACE = "http://www.w3.org/2000/svg"
+_INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
+_SVG_COLOURS = {
+    "outline": "#000",
+    "strips": "#06c",
+    "creases": "#aaa",
+    "holes": "#d00",
+    "names": "#333",
+    "scale": "#000",
+}
+_STROKE_MM = 0.2
+# The height of capitals in Helvetica and similar fonts, as a share of the font size.
+_CAPITALS = 0.72
+# AutoCAD's colour numbers: black or white, blue, grey, red.
+_DXF_COLOURS = {"outline": 7, "strips": 5, "creases": 8, "holes": 1, "names": 8, "scale": 7}
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,3 +167,106 @@ def _legend(switches: Sequence[PlacedSensor], rows: int, left: float) -> Iterato
         column, row = divmod(place, rows)
         x, y = left + column * _COLUMN_MM, MARGIN_MM + (rows - 1 - row) * _ROW_MM
         yield Text("names", x, y, _TEXT_MM, f"{switch.number}  {switch.name}")
+
+
+def svg_of(pattern: Pattern) -> bytes:
+    """Return the SVG: one user unit is one millimetre, and drawing programs show each group as a layer."""
+    page, shapes = pattern
+    root = ET.Element(
+        "svg",
+        {
+            "xmlns": _SVG_NAMESPACE,
+            "xmlns:inkscape": _INKSCAPE,
+            "width": f"{page.width_mm:g}mm",
+            "height": f"{page.height_mm:g}mm",
+            "viewBox": f"0 0 {page.width_mm:g} {page.height_mm:g}",
+            "font-family": "Helvetica, Arial, sans-serif",
+        },
+    )
+    for layer in LAYERS:
+        colour = _SVG_COLOURS[layer]
+        lines = {"fill": "none", "stroke": colour, "stroke-width": f"{_STROKE_MM}"}
+        paint = {"fill": colour} if layer == "names" else lines
+        attributes = {"id": layer, "inkscape:groupmode": "layer", "inkscape:label": layer, **paint}
+        group = ET.SubElement(root, "g", attributes)
+        for shape in shapes:
+            if shape.layer == layer:
+                _add_to_svg(group, shape, page.height_mm)
+    ET.indent(root, " ")
+    return b'<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(root, encoding="unicode").encode() + b"\n"
+
+
+def _add_to_svg(group: ET.Element, shape: Shape, height_mm: float) -> None:
+    match shape:
+        case PatternLine(points=points, closed=closed):
+            places = " ".join(f"{x:.3f},{height_mm - y:.3f}" for x, y in points)
+            ET.SubElement(group, "polygon" if closed else "polyline", {"points": places})
+        case Circle(x=x, y=y, radius=radius):
+            ET.SubElement(group, "circle", {"cx": f"{x:.3f}", "cy": f"{height_mm - y:.3f}", "r": f"{radius:g}"})
+        case Text():
+            _add_text(group, shape, height_mm)
+
+
+def _add_text(group: ET.Element, text: Text, height_mm: float) -> None:
+    baseline = text.y - text.height / 2 if text.centred else text.y
+    attributes = {
+        "x": f"{text.x:.3f}",
+        "y": f"{height_mm - baseline:.3f}",
+        "font-size": f"{text.height / _CAPITALS:.3f}",
+    }
+    if text.centred:
+        attributes["text-anchor"] = "middle"
+    ET.SubElement(group, "text", attributes).text = text.text
+
+
+def dxf_of(pattern: Pattern) -> bytes:
+    """Return the DXF (AutoCAD 2000, millimetres), which cutters and CAD programs read."""
+    _load_ezdxf()
+    from ezdxf._options import options
+    from ezdxf.filemanagement import new
+    from ezdxf.units import MM
+
+    text = io.StringIO()
+    dated = options.write_fixed_meta_data_for_testing
+    # Keep dates and random identifiers out of the file.
+    options.write_fixed_meta_data_for_testing = True
+    try:
+        document = new("R2000", units=MM)
+        for layer in LAYERS:
+            document.layers.add(layer, color=_DXF_COLOURS[layer])
+        space = document.modelspace()
+        for shape in pattern[1]:
+            _add_to_dxf(space, shape)
+        document.write(text)
+    finally:
+        options.write_fixed_meta_data_for_testing = dated
+    return text.getvalue().encode(document.output_encoding, "dxfreplace")
+
+
+def _load_ezdxf() -> None:
+    """Import ezdxf, which then reads settings and a list of fonts in the user's home, also where that is unreadable."""
+    try:
+        import_module("ezdxf")
+    except OSError:
+        before = dict(os.environ)
+        with TemporaryDirectory() as empty:
+            os.environ.update(HOME=empty, XDG_CONFIG_HOME=empty, XDG_CACHE_HOME=empty)
+            try:
+                import_module("ezdxf")
+            finally:
+                os.environ.clear()
+                os.environ.update(before)
+
+
+def _add_to_dxf(space: "Modelspace", shape: Shape) -> None:
+    from ezdxf.enums import TextEntityAlignment
+
+    on_layer = {"layer": shape.layer}
+    match shape:
+        case PatternLine(points=points, closed=closed):
+            space.add_lwpolyline(points.tolist(), close=closed, dxfattribs=on_layer)
+        case Circle(x=x, y=y, radius=radius):
+            space.add_circle((x, y), radius, dxfattribs=on_layer)
+        case Text(x=x, y=y, height=height, text=text, centred=centred):
+            where = TextEntityAlignment.MIDDLE_CENTER if centred else TextEntityAlignment.LEFT
+            space.add_text(text, height=height, dxfattribs=on_layer).set_placement((x, y), align=where)

@@ -17,9 +17,8 @@ from thenar.runtime.scanning.propose import own_joints, propose_cyberglove, prop
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us
 
-from ..facts import Fact, facts
+from ..facts import Fact, SensorCount, facts
 from ..hand import HandShape
-from ..sensors import SensorCount
 from .circuit import BillLine, Circuit, bill_of, bill_of_joints, glove_circuit
 from .layout import (
     GloveWire,
@@ -141,9 +140,9 @@ def glove_spec(
     if not manifest.switches:
         raise SpecError("the build keeps no switch, so there is no glove to build: compile it with ``inputs`` both")
     wired = _harness(manifest, scan, harness)
-    asked = [switch.name for switch in manifest.switches]
-    read = whole_scan(wired, asked) if scan is None else scan
-    names = elements_of(wired, asked)
+    kept_names = [switch.name for switch in manifest.switches]
+    read = whole_scan(wired, kept_names) if scan is None else scan
+    names = elements_of(wired, kept_names)
     known = hand if hand is not None and hand.knows(names) else None
     soldered = as_soldered(wired)
     ends = ends_of(soldered, names)
@@ -181,9 +180,9 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) 
         return propose_harness(names, cyberglove=propose_cyberglove([joint.name for joint in manifest.joints]))
     if scan is not None:
         check_harness(scan, harness, names)
-    if lacking := unwired(harness, names):
+    if missing := unwired(harness, names):
         raise HarnessError(
-            f"harness {harness.name!r} has no pin or column for {list_names(lacking)}, which the build keeps: "
+            f"harness {harness.name!r} has no pin or column for {list_names(missing)}, which the build keeps: "
             "add what is missing to its file"
         )
     # Calibrations become bare file names: the files belong next to the spec's glove.toml.

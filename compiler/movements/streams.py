@@ -105,13 +105,12 @@ def frames_are_dense(grasp_set: GraspSet) -> bool:
 
 def _differences(array: Bits | Codes, runs: list[Rows]) -> tuple[float, float]:
     """Return the difference of neighbouring rows (n, c), and of rows half a run apart; means over the runs."""
-    near = sum(_difference(array[run], 1) for run in runs)
-    return near, sum(_difference(array[run], len(run) // 2) for run in runs)
-
-
-def _difference(run: Bits | Codes, lag: int) -> float:
-    values = run.astype(np.int32)
-    return float(np.abs(values[lag:] - values[:-lag]).mean())
+    near = far = 0.0
+    for run in runs:
+        values, half = array[run].astype(np.int32), len(run) // 2
+        near += float(np.abs(values[1:] - values[:-1]).mean())
+        far += float(np.abs(values[half:] - values[:-half]).mean())
+    return near, far
 
 
 def holds_of(grasp_set: GraspSet, movements: Movements) -> tuple[Rows, Rows]:

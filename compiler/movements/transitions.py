@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from thenar.runtime.files import read_file
 
 from ..recordings.graspset import GraspSet
-from .scores import segments_of
+from .segments import segments_of
 from .streams import MovementError, streams_of
-from .timeline import Timeline
 
 # Rarer transitions are not admissible.
 FREQUENT = 0.1
@@ -59,12 +58,6 @@ class Transitions:
         types = sorted(set(labels[~grasp_set.is_none].tolist()))
         streams = [segments_of(labels[stream.rows], len(names)) for stream in streams_of(grasp_set)]
         return cls.of(([names[one.state] for one in stream] for stream in streams), [names[one] for one in types])
-
-    @classmethod
-    def of_timelines(cls, timelines: Sequence[Timeline]) -> "Transitions":
-        """Count the changes in segments found in streams of the same types."""
-        every = ([one.type for one in timeline.segments()] for timeline in timelines)
-        return cls.of(every, timelines[0].types if timelines else ())
 
     @classmethod
     def load(cls, path: Path) -> "Transitions":

@@ -15,11 +15,10 @@ from thenar.runtime.model.quantise import quantise
 from thenar.runtime.recipe import Recipe, changed
 
 from ..elementary import LN_2
-from ..limits import check_types
+from ..facts import SensorCount
 from ..model.faults import count_faults
 from ..recordings.graspset import GraspSet
-from ..samples import Columns, Samples
-from ..sensors import SensorCount
+from ..samples import Columns, Samples, check_types
 from ..trainers.logit import fit_logit
 from . import PlacementError
 from .constraints import Bound, Limits

@@ -5,9 +5,8 @@ from functools import lru_cache, partial
 
 from thenar.drivers.extras import optional
 
-from ..pages import embedded, policy_hash, templates
-from ..pictures import colour_variables
-from ..sensors import SensorCount
+from ..facts import SensorCount
+from ..pictures import colour_variables, embedded, policy_hash, templates
 from ..text import sentence
 from . import sections
 from .content import HandPicture, ReportContent, hand_picture

@@ -15,8 +15,8 @@ from thenar.runtime.hand import HandDrawing
 from thenar.runtime.manifest import Calibration, Manifest, Threshold
 from thenar.runtime.rejection import none_leads
 
-from ..pages import embedded, policy_hash, templates
-from ..sensors import SensorCount
+from ..facts import SensorCount
+from ..pictures import embedded, policy_hash, templates
 
 with optional():
     from jinja2 import Environment

@@ -13,7 +13,7 @@ from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.model.terms.line import Line
 
 from ..elementary import Floats, on_one_grid
-from ..limits import check_memory
+from ..workers import check_memory
 from .base import BoostingError, Report, Setting, Trainer, check_rows
 from .newton import TOLERANCE, Column, Fit, Ruler, columns_of
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..elementary import Floats, add_exactly, softmax_and_loss
-from ..limits import check_memory
+from ..workers import check_memory
 from .base import BoostingError, Number, Report, Setting, Trainer, check_rows
 from .binning import bin_columns
 from .stumps import Stumps, Targets, centred, fit_stumps

@@ -19,7 +19,7 @@ from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid
 
 from ..elementary import Floats, exact_sum, on_one_grid
-from ..limits import check_memory
+from ..workers import check_memory
 from .base import BoostingError, Report, Setting, Trainer, check_rows
 from .binning import BinnedColumn, bin_columns
 from .logit import BINS, count_of, of_none, spread_out, tables_of

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.ensemble import ensemble_from_bytes
-from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler.samples import select_inputs
 from thenar.runtime.build import ENSEMBLE_NAME, Build
 from thenar.runtime.model.tables import ScoreTables
 

@@ -13,7 +13,6 @@ Captured = pytest.CaptureFixture[str]
         (("--methods", "nonsense"), "there is no method 'nonsense'"),
         (("--budget-us", "5", "--rate", "0.5"), "give one of them"),
         (("--rate", "1.5"), "1.5 is not in the range"),
-        (("--dask", "nowhere"), "'nowhere' is not an address such as tcp://"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_sentence(

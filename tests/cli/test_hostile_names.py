@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from thenar.cli import run
-from thenar.compiler.layouts import load_layout
+from thenar.compiler.hand import load_layout
 from thenar.compiler.recordings.columns import read_columns
 from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build

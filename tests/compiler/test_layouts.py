@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.hand import HandShape, MapError
-from thenar.compiler.layouts import load_layout
+from thenar.compiler.hand import HandShape, MapError, load_layout
 
 
 def load(folder: Path, text: str, name: str = "layout.toml") -> HandShape:

@@ -13,13 +13,14 @@ from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.study import Study, StudyDesign, evaluate
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.limits import check_inputs, check_memory
 from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.placement import place
+from thenar.compiler.recogniser import check_inputs
 from thenar.compiler.samples import Samples, SamplesError
 from thenar.compiler.trainers.base import BoostingError
 from thenar.compiler.trainers.logitboost import boost
+from thenar.compiler.workers import check_memory
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.recipe import Recipe
 

@@ -164,7 +164,6 @@ def test_what_is_wrong_with_work_aside_is_told(work: Any, said: str) -> None:
 
 
 def slept(number: int) -> None:
-
     time.sleep(number)
 
 

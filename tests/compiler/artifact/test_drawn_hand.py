@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.hand import HandShape
-from thenar.compiler.layouts import load_layout
+from thenar.compiler.hand import HandShape, load_layout
 from thenar.compiler.recordings.graspset import Joint
 from thenar.runtime.hand import HandDrawing, load_hand
 from thenar.runtime.manifest import Manifest

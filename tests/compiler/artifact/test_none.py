@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from thenar.compiler import Build, GraspSet, compile_build, verify
 from thenar.compiler.artifact import CompileError
 from thenar.compiler.artifact.training import cuts_of, samples_of
-from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.evaluation.choosing import inner_folds
 from thenar.compiler.recogniser import Recogniser
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.merging import merge
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.samples import FRAMES as SAMPLED
-from thenar.compiler.samples import Samples
+from thenar.compiler.samples import Samples, select_inputs
 from thenar.runtime.manifest import Rejection
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.rejection import refused

@@ -8,11 +8,11 @@ import pytest
 from thenar.compiler import compile_build
 from thenar.compiler.artifact.training import samples_of
 from thenar.compiler.artifact.verify import verify
-from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.recogniser import Recogniser
 from thenar.compiler.recordings.importer import import_file
+from thenar.compiler.samples import select_inputs
 from thenar.runtime import Build
 from thenar.runtime.manifest import Of
 from thenar.runtime.model.quantise import quantise

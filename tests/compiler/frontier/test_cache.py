@@ -12,9 +12,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from distributed import LocalCluster
 
-from thenar.compiler.cluster import ClusterError, dask_cluster
 from thenar.compiler.frontier.cache import Cache, Store, StoreError, question, stored
 
 
@@ -163,8 +161,8 @@ def silent(_done: int, _total: int) -> None:
     pass
 
 
-def asked(path: Path, calls: list[tuple[int, Notes]], jobs: int = 1, cluster: str | None = None) -> list[Found]:
-    with Store(path, "set") as store, dask_cluster(cluster):
+def asked(path: Path, calls: list[tuple[int, Notes]], jobs: int = 1) -> list[Found]:
+    with Store(path, "set") as store:
         return Cache(store, silent, jobs=jobs).ask(squared, calls)
 
 
@@ -176,18 +174,6 @@ def found_of(numbers: list[int] | range) -> list[Found]:
 def test_answers_are_computed_once_and_come_in_call_order(tmp_path: Path, jobs: int) -> None:
     assert asked(tmp_path / "store", calls_in(tmp_path, [3, 1, 3, 2]), jobs) == found_of([3, 1, 3, 2])
     assert done_in(tmp_path) == [1, 2, 3]
-
-
-def test_a_cluster_finds_the_same_answers(tmp_path: Path) -> None:
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as cluster:
-        there = asked(tmp_path / "cluster", calls_in(tmp_path, range(9)), cluster=cluster.scheduler_address)
-    assert asked(tmp_path / "here", calls_in(tmp_path, range(9))) == there
-    assert done_in(tmp_path) == sorted(2 * [*range(9)])
-
-
-def test_work_for_a_cluster_is_not_done_here(tmp_path: Path) -> None:
-    with pytest.raises(ClusterError, match="no Dask scheduler replies"):
-        asked(tmp_path / "store", calls_in(tmp_path, [1]), cluster="")
 
 
 def test_stored_answers_are_reused_and_read_back_equal(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from thenar.compiler.frontier.latency import POLICIES, decided_on, latency
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.replay import Replay
-from thenar.compiler.movements.scores import Span
+from thenar.compiler.movements.segments import Span
 from thenar.compiler.movements.streams import Stream
 from thenar.runtime.build import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.cluster import dask_cluster
 from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.price import ClassifyModel, measured, random_tables
 from thenar.runtime.model.integers import tables_to_bytes
@@ -17,7 +16,7 @@ CONTENT = tables_to_bytes(TABLES)
 @pytest.mark.slow
 def test_on_a_host_the_runtime_is_timed_once(tmp_path: Path) -> None:
     model = ClassifyModel("host", python=(5.0, 0.1, 0.5, 0.1, 0.01, 0.01, 10.0))
-    with Store(tmp_path / "store", "here") as store, dask_cluster("nowhere:1"):
+    with Store(tmp_path / "store", "here") as store:
         cache = Cache(store, lambda *_: None, jobs=1)
         timed = measured([CONTENT, CONTENT], model, cache)
         known = len(store)

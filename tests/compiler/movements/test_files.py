@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from thenar.compiler.movements.files import COLUMNS, TOPIC, WRITERS, write
-from thenar.compiler.movements.timeline import Timeline, probabilities
+from thenar.compiler.artifact.timeline import TOPIC, WRITERS, FoundSegment, Timeline, probabilities, write
 
 TYPES = ("pinch", "=hook")
 
@@ -25,7 +24,7 @@ def test_a_table_has_a_row_a_segment(tmp_path: Path) -> None:
     write(tmp_path / "s.csv", [timeline(), timeline("B", "2")])
     with (tmp_path / "s.csv").open(newline="") as file:
         rows = list(csv.reader(file))
-    assert tuple(rows[0]) == COLUMNS
+    assert tuple(rows[0]) == FoundSegment.__struct_fields__
     assert rows[1] == ["2.020000", "2.050000", "pinch", "0.4000", "A", "1"]
     # A type that a spreadsheet would compute is text.
     assert rows[2] == ["2.060000", "2.080000", "'=hook", "0.7500", "A", "1"]
@@ -75,7 +74,7 @@ def test_mcap_annotations_are_read_by_the_library(tmp_path: Path) -> None:
     assert schema is not None
     known = json.loads(schema.data)
     one = json.loads(message.data)
-    assert set(known["properties"]) == set(one) == set(COLUMNS)
+    assert set(known["properties"]) == set(one) == set(FoundSegment.__struct_fields__)
     assert (one["type"], message.log_time) == ("pinch", 2_020_000_000)
 
 

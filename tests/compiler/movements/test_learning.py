@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from thenar.compiler.movements.learning import Counts, learnt, live_states, model_of
-from thenar.compiler.movements.scores import score
+from thenar.compiler.movements.segments import Counts, learnt, live_states, model_of, score
 from thenar.compiler.movements.streams import streams_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.segmenting.decoder import decode, emissions

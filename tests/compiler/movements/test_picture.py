@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
-from thenar.compiler.movements import picture
+from thenar.compiler.artifact import timeline as timelines
+from thenar.compiler.artifact.timeline import Timeline
 from thenar.compiler.movements.streams import MovementError
-from thenar.compiler.movements.timeline import Timeline
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,8 +32,8 @@ def test_names_lie_within_their_segments_and_the_axes_are_named(monkeypatch: pyt
         drawn.append(figure)
         return b""
 
-    monkeypatch.setattr(picture, "rendered", keep)
-    picture.draw([timeline(), replace(timeline(), subject="B", truth=None)], "png")
+    monkeypatch.setattr(timelines, "rendered", keep)
+    timelines.draw([timeline(), replace(timeline(), subject="B", truth=None)], "png")
     figure = drawn[0]
     figure.canvas.draw()
     assert figure.axes[-1].get_xlabel() == "time in s"
@@ -52,7 +52,7 @@ def test_names_lie_within_their_segments_and_the_axes_are_named(monkeypatch: pyt
 
 
 def test_equal_timelines_are_equal_bytes() -> None:
-    one, other = (picture.draw([timeline(600)], "svg") for _ in range(2))
+    one, other = (timelines.draw([timeline(600)], "svg") for _ in range(2))
     assert one == other
     assert re.search(rb"<svg", one)
 
@@ -60,4 +60,4 @@ def test_equal_timelines_are_equal_bytes() -> None:
 def test_of_nothing_there_is_no_picture() -> None:
     nothing = replace(timeline(), states=np.zeros(0, np.intp), truth=None)
     with pytest.raises(MovementError, match="no frame"):
-        picture.draw([nothing], "svg")
+        timelines.draw([nothing], "svg")

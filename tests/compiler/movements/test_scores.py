@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.movements.scores import OVERLAPS, SegmentScore, levenshtein, score, segments_of
+from thenar.compiler.movements.segments import OVERLAPS, SegmentScore, levenshtein, score, segments_of
 
 NONE = 3
 STATES = st.lists(st.integers(0, NONE), min_size=1, max_size=40)

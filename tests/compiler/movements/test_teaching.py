@@ -12,17 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.artifact.compile import compile_build
-from thenar.compiler.artifact.demonstrations import demonstrations
-from thenar.compiler.movements.scores import levenshtein
-from thenar.compiler.movements.streams import MovementError
-from thenar.compiler.movements.teaching import (
+from thenar.compiler.artifact.teaching import (
     DemonstratedGrasp,
     Demonstration,
     aligned,
     behaviour_tree,
+    demonstrations,
     task_json,
     taught,
 )
+from thenar.compiler.movements.segments import levenshtein
+from thenar.compiler.movements.streams import MovementError
 from thenar.compiler.movements.transitions import Transitions
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime import Build

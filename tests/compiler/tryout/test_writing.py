@@ -12,8 +12,7 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact.documents import Documents
-from thenar.compiler.pages import embedded
-from thenar.compiler.pictures import PALETTE
+from thenar.compiler.pictures import PALETTE, embedded
 from thenar.compiler.report import tryout
 from thenar.compiler.report.tryout import MOST_BYTES, sample, scoped
 

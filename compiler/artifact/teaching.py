@@ -1,4 +1,5 @@
-"""Find the consensus of several demonstrations, as a task and as a behaviour tree.
+"""Demonstrations of a task, which are the grasps that a build segments in recordings, and their consensus as a task and
+as a behaviour tree.
 
 The demonstrations' sequences of types are aligned one after another: first the one with the smallest distance to all
 others (the centre of a star), then the others by their distance from it. Dynamic programming places each into the
@@ -7,26 +8,36 @@ type and a gap, count 1 (edit distance). A column is a step if most demonstratio
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain
+from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from thenar.runtime.build import Build
+from thenar.runtime.live.replay import recognised
+from thenar.runtime.policy import Policy
 from thenar.runtime.preshape.selector import PreshapeTable
 from thenar.runtime.task import Task, TaskStep
 
-from .scores import levenshtein
-from .streams import MovementError
-from .transitions import Transitions
+from ..movements.segments import levenshtein, segments_of
+from ..movements.streams import MovementError, streams_of
+from ..movements.transitions import Transitions
+from ..recordings.graspset import GraspSet
+from ..samples import select_inputs
+from .timeline import MCAP, Timeline, segment
 
 # Holding a grasp this much longer than the longest demonstration is a deviation.
 LIMIT = 2.0
 Column = tuple[int | None, ...]
+Codes = tuple[NDArray[np.int64], NDArray[np.uint16]]
+# Of the action Grasp.
+_PORTS = ("grasp", "preshape", "joints", "median_s", "limit_s")
 
 
 class DemonstratedGrasp(NamedTuple):
@@ -203,9 +214,6 @@ def task_json(task: Task) -> bytes:
     return text + b"\n"
 
 
-_PORTS = ("grasp", "preshape", "joints", "median_s", "limit_s")
-
-
 def behaviour_tree(task: Task) -> bytes:
     """Return the task as a tree of BehaviorTree.CPP 4: a Sequence of actions Grasp, with the ports _PORTS.
 
@@ -225,3 +233,56 @@ def behaviour_tree(task: Task) -> bytes:
     ElementTree.indent(root)
     tree_text: bytes = ElementTree.tostring(root, "utf-8")
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tree_text + b"\n"
+
+
+def demonstrations(folder: Path, recordings: Sequence[Path]) -> Iterator[Demonstration]:
+    """Yield a demonstration for each recording (.mcap) of the build's inputs and for each stream of whole movements.
+
+    Whole movements come from sets (.grasps). Raises MovementError where a demonstration shows no grasp, and whatever
+    `segment` raises.
+    """
+    build = Build.load(folder)
+    for path in recordings:
+        timelines = segment(folder, path, Policy().lag_us)
+        if path.suffix.lower() == MCAP:
+            # A gap in the readings splits a run into several timelines.
+            yield _shown(build, path.name, timelines, [_codes_of_run(build, path)] * len(timelines))
+            continue
+        grasp_set = GraspSet.load(path)
+        _, codes = select_inputs(grasp_set, build.manifest)
+        tick_us = build.manifest.segmenting.tick_us
+        for number, (timeline, stream) in enumerate(zip(timelines, streams_of(grasp_set, tick_us), strict=True), 1):
+            times = stream.start_us + tick_us * np.arange(len(stream.rows))
+            name = path.name if len(timelines) == 1 else f"{path.name} {number} ({timeline.name})"
+            yield _shown(build, name, [timeline], [(times, codes[stream.rows])])
+
+
+def _codes_of_run(build: Build, path: Path) -> Codes:
+    """Return the times at which the joints were read in a run, on the clock of its timelines, and their codes."""
+    readings = [(moment.grasp.unix_us, moment.codes) for moment in recognised(build, path) if moment.codes is not None]
+    codes = np.array([codes for _, codes in readings], np.uint16).reshape(len(readings), len(build.manifest.joints))
+    return np.array([time_us for time_us, _ in readings], np.int64), codes
+
+
+def _shown(build: Build, name: str, timelines: Sequence[Timeline], read: Sequence[Codes]) -> Demonstration:
+    grasps = []
+    for timeline, (times, codes) in zip(timelines, read, strict=True):
+        for one in segments_of(timeline.states, len(timeline.types)):
+            start, end = (timeline.start_us + tick * timeline.tick_us for tick in (one.start, one.end))
+            own = codes[(times >= start) & (times < end)]
+            grasps.append(DemonstratedGrasp(timeline.types[one.state], (end - start) / 1e6, _values(build, own)))
+    if not grasps:
+        raise MovementError(f"{name} shows no grasp: look at it with thenar segment, or leave it out")
+    return Demonstration(name, tuple(grasps))
+
+
+def _values(build: Build, codes: NDArray[np.uint16]) -> tuple[float, ...]:
+    """Return the median of each joint (n, j), in its unit; an empty tuple if there are no rows."""
+    return (
+        tuple(
+            joint.value_a + (code - joint.code_a) * (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a)
+            for code, joint in zip(np.median(codes, axis=0).tolist(), build.manifest.joints, strict=True)
+        )
+        if len(codes)
+        else ()
+    )
