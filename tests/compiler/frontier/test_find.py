@@ -52,7 +52,7 @@ def _short_streams() -> Iterator[None]:
     """Let latencies be those of 30 grasps, and this machine be timed once: how long either takes is no matter here."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(find, "replay_of", partial(replay_of, grasps=30))
-        patched.setattr(price, "fit_here", stored(1, where="process")(cache(fit_here)))
+        patched.setattr(price, "fit_here", stored(1, here=True)(cache(fit_here)))
         yield
 
 
