@@ -226,7 +226,7 @@ def is_running(pid: int) -> bool:
 def all_end(pids: list[int], within_s: float) -> bool:
     deadline = time.monotonic() + within_s
     while any(map(is_running, pids)) and time.monotonic() < deadline:
-        os.sched_yield()
+        time.sleep(0.002)
     return not any(map(is_running, pids))
 
 

@@ -191,6 +191,8 @@ def test_names_beyond_ascii_are_said_in_any_locale(command: str, place: Path) ->
     (place / "größe ☃.grasps").write_bytes((place / "set.grasps").read_bytes())
     arguments, options = (text.replace("set.grasps", "größe").split() for text in LINES[command])
     words = [word.replace("größe", "größe ☃.grasps") for word in (*options, *arguments)]
+    if command == "frontier":  # nothing is left to choose, which takes long and says nothing
+        words += ["--trainer", "logitboost", "--shrinkage", "1", "--max-bins", "256", "--ties", "first"]
     environment = {**os.environ, "LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
     done = subprocess.run(
         [sys.executable, "-m", "thenar.cli", command, *words], capture_output=True, env=environment, check=False

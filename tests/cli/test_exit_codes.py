@@ -3,6 +3,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -104,7 +105,7 @@ def _interrupt(command: list[str], ready: Path) -> "subprocess.CompletedProcess[
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         while not ready.exists():
             assert process.poll() is None
-            os.sched_yield()
+            time.sleep(0.002)
         process.send_signal(signal.SIGINT)
         stdout, stderr = process.communicate(timeout=60)
     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)

@@ -1,9 +1,9 @@
 import json
-import os
 import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -144,7 +144,7 @@ def test_ctrl_c_exits_with_130_and_leaves_nothing(folder: Path, tmp_path: Path) 
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         while not ready.exists():
             assert process.poll() is None
-            os.sched_yield()
+            time.sleep(0.002)
         process.send_signal(signal.SIGINT)
         stdout, stderr = process.communicate(timeout=60)
     assert (process.returncode, stdout, stderr.strip()) == (130, "", "thenar: interrupted")

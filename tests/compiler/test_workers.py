@@ -92,7 +92,7 @@ def runs(process: int) -> bool:
 def wait_until(limit_s: float, condition: Any) -> bool:
     end = time.monotonic() + limit_s
     while not condition() and time.monotonic() < end:
-        os.sched_yield()
+        time.sleep(0.002)
     return bool(condition())
 
 

@@ -6,13 +6,16 @@ calibration gives to the bytes that were shown.
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Condition
 from time import monotonic
+from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 import thenar.simulator.scenes
 from thenar.compiler import compile_build
@@ -23,6 +26,7 @@ from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.published import UNKNOWN, LiveGrasp
 from thenar.simulator import load_scene, simulate
+from thenar.simulator.playing.bench import Bench
 from thenar.simulator.playing.performance import Performance, of_scene
 
 # From showing a frame until it is all that the devices have sent: 10 ms of debounce, 2 to 9 ms on the wires, and what
@@ -282,6 +286,19 @@ class Scene:
 def oldest_us(grasp: LiveGrasp) -> int:
     """Return when the older of the inputs was read."""
     return grasp.time_us - max(grasp.switch_age_us or 0, grasp.glove_age_us or 0)
+
+
+def on_bench(stack: ExitStack, scene: Scene, harness: Harness, folder: Path, **how: Any) -> tuple[Bench, Harness]:
+    """Put up the devices of a harness, on which the scene's rows are shown; return them, and their harness with the
+    calibration of who plays.
+    """
+    performance, path = scene.truth.performance, folder / "calibration.toml"
+    bench = stack.enter_context(Bench(harness, performance.switch_names, folder, **how))
+    scene._show, wired = bench.show, bench.harness
+    path.write_text(performance.calibration.to_toml())
+    if wired.cyberglove is not None:
+        wired = replace(wired, cyberglove=replace(wired.cyberglove, calibration=str(path)))
+    return bench, wired
 
 
 @pytest.fixture(scope="session")

@@ -182,14 +182,6 @@ def test_it_is_written_as_it_is_returned(first: tuple[Request, Frontier]) -> Non
     assert frontier_from_bytes((request["output"] / "frontier.json").read_bytes()) == found
 
 
-def test_running_again_finds_everything_in_the_store(first: tuple[Request, Frontier]) -> None:
-    request, found = first
-    before = (request["output"] / "store.sqlite").read_bytes()
-    again = found_of(request)
-    assert (request["output"] / "store.sqlite").read_bytes() == before
-    assert again.points == found.points
-
-
 def test_without_a_folder_nothing_is_kept(tmp_path: Path, make_set: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert found_of(asked(tmp_path, make_set(), output=None, methods=("id3",), baselines=())).points
@@ -348,6 +340,7 @@ def test_builds_of_points_with_some_joints_read_these_joints(tmp_path: Path, mak
         assert set(point.joints) <= {joint.name for joint in grasp_set.joints}
         if n:
             assert point.transfer.us == pytest.approx(250 * n + (n + 3) * 10e6 / 115_200)
+            assert point.transfer.how == "formula"
     assert {each.keep_joints for each in found.tried} == {None, 2, 3, 4}
     chosen = picked(tmp_path / "out" / "frontier.json", fewer[0].number, grasp_set)
     options: dict[str, Any] = dict(chosen.options)

@@ -20,7 +20,8 @@ from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.sinks.jsonl import GraspLine, HealthLine, Line
-from thenar.simulator.playing.bench import Bench
+
+from ..conftest import on_bench
 
 _line = msgspec.json.Decoder(Line)
 ENDING_S = 20.0
@@ -94,16 +95,8 @@ class Run:
     """A bench of emulated devices, the scene on it, and clients that run on it, one at a time."""
 
     def __init__(self, stack: ExitStack, scene: Any, harness: Harness, folder: Path, build: Path, adapter: Any) -> None:
-        self._stack, self._folder, self.build = stack, folder, build
-        performance = scene.truth.performance
-        self.bench = stack.enter_context(Bench(harness, performance.switch_names, folder, adapter=adapter))
-        self.scene = scene
-        scene._show = self.bench.show
-        (folder / "calibration.toml").write_text(performance.calibration.to_toml())
-        wired = self.bench.harness
-        if wired.cyberglove is not None:
-            glove = msgspec.structs.replace(wired.cyberglove, calibration="calibration.toml")
-            wired = msgspec.structs.replace(wired, cyberglove=glove)
+        self._stack, self._folder, self.build, self.scene = stack, folder, build, scene
+        self.bench, wired = on_bench(stack, scene, harness, folder, adapter=adapter)
         (folder / "glove.toml").write_text(harness_to_toml(wired))
 
     def start(self, *options: object, glove: Path | None = None, after: Path | None = None) -> Client:

@@ -54,17 +54,6 @@ def _as_recorded(line: Any) -> LiveGrasp:
     return LiveGrasp(**{name: getattr(line, name) for name in LiveGrasp.__struct_fields__})
 
 
-@pytest.mark.parametrize("adapter", ["bcm2835", "designware", "i2c-gpio"])
-def test_every_adapter_gives_the_same_answers(run: MakeRun, adapter: str) -> None:
-    running = run("both", "glove", "bus", adapter=adapter)
-    client, scene = running.start(), running.scene
-    for row in (0, 4, 9, 13, 20):
-        scene.show(row)
-        scene.settled(row)
-    assert client.end() == 0
-    assert scene.check() > 0
-
-
 def test_chips_and_ports_without_a_kept_switch_are_never_touched(run: MakeRun) -> None:
     running = run("both", "glove", "bus")
     client, scene = running.start(), running.scene

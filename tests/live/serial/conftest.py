@@ -8,7 +8,6 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-import msgspec
 import pytest
 
 from thenar.runtime import Glove
@@ -16,7 +15,8 @@ from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.sources import DeviceState
 from thenar.runtime.policy import Policy
-from thenar.simulator.playing.bench import Bench
+
+from ..conftest import on_bench
 
 # The answer is the candidate of each frame.
 FRANK = Policy(lead=0.0, dwell_us=0)
@@ -35,19 +35,12 @@ class Run:
         damage: Callable[[bytes], bytes] | None,
         unplugged: int | None,
     ) -> None:
-        performance = scene.truth.performance
-        self.bench = stack.enter_context(Bench(harness, performance.switch_names, folder))
         self.scene = scene
-        scene._show = self.bench.show
+        self.bench, wired = on_bench(stack, scene, harness, folder)
         for line in self.bench.lines:
             line.damage = damage
         if unplugged is not None:
             self.bench.lines[unplugged].unplug()
-        wired = self.bench.harness
-        if wired.cyberglove is not None:
-            (folder / "calibration.toml").write_text(performance.calibration.to_toml())
-            glove = msgspec.structs.replace(wired.cyberglove, calibration=str(folder / "calibration.toml"))
-            wired = msgspec.structs.replace(wired, cyberglove=glove)
         self.glove = stack.enter_context(Glove(scene.truth.build, wired, policy=FRANK, record=record))
         self.system, self.sources, self.recorder = self.glove.system, self.glove.sources, self.glove.recorder
         # The report that came with the first grasp that rests on all devices.

@@ -27,18 +27,6 @@ def test_an_unplugged_port_is_missed_and_found_again(run: MakeRun, outage: Outag
     assert running.device({"cyberglove": "stream", "stream": "cyberglove"}[kind]).opened == 1
 
 
-def test_a_missing_record_is_late_for_the_grace_then_lost(run: MakeRun) -> None:
-    running = run("both", "glove", "board")
-    grasps, joints = running.scene.grasps, running.scene.truth.joint_names
-    running.scene.well(0)
-    gone_us = running.now_us()
-    running.bench.lines[0].unplug()
-    lost = grasps.wait(lambda grasp: grasp.lost == joints, gone_us)
-    late = [grasp for grasp in grasps.since(gone_us) if grasp.health == "degraded" and not grasp.lost]
-    assert late
-    assert all(2 * running.periods_us()[0] < grasp.glove_age_us <= 60_000 < lost.glove_age_us for grasp in late)
-
-
 def test_without_any_port_nothing_is_claimed_and_both_come_back(run: MakeRun, outage: Outage) -> None:
     running = run("both", "glove", "board")
     glove, board = running.bench.lines

@@ -8,7 +8,6 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-import msgspec
 import pytest
 from selenium import webdriver
 from selenium.webdriver.common.by import By
@@ -19,7 +18,8 @@ from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.policy import Policy
 from thenar.runtime.web.live import LivePage
-from thenar.simulator.playing.bench import Bench
+
+from ..conftest import on_bench
 
 PATIENCE_S = 30
 # The answer is the candidate of each frame.
@@ -100,15 +100,8 @@ class Run:
     """What runs, the scene that it looks at, and its page."""
 
     def __init__(self, stack: ExitStack, scene: Any, harness: Harness, folder: Path, build: Path) -> None:
-        performance = scene.truth.performance
         self.scene, self.recordings = scene, folder / "recordings"
-        self.bench = stack.enter_context(Bench(harness, performance.switch_names, folder))
-        scene._show = self.bench.show
-        (folder / "calibration.toml").write_text(performance.calibration.to_toml())
-        wired = self.bench.harness
-        if wired.cyberglove is not None:
-            glove = msgspec.structs.replace(wired.cyberglove, calibration=str(folder / "calibration.toml"))
-            wired = msgspec.structs.replace(wired, cyberglove=glove)
+        self.bench, wired = on_bench(stack, scene, harness, folder)
         self.stream, self.build = f"unix:{folder}/stream", build
         sinks = [f"{self.stream}?detail"]
         self.glove = Glove(scene.truth.build, wired, policy=FRANK, recordable=True, sinks=sinks, status=True)
