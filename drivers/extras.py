@@ -9,7 +9,7 @@ from .errors import ThenarError
 EXTRAS: Mapping[str, tuple[str, ...]] = {
     "compiler": (
         *("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf", "clevercsv"),
-        *("python_calamine", "pyarrow", "pandas", "h5py"),
+        *("python_calamine", "pyarrow", "pandas", "h5py", "mcap"),
     ),
     "stability": ("mpmath",),
     "ros": ("cyclonedds",),

@@ -65,9 +65,9 @@ ALLOWED = {
         "drivers.errors",
         "drivers.members",
         "compiler.elementary",
-        "compiler.limits",
         "compiler.samples",
         "compiler.trainers",
+        "compiler.workers",
     ),
     "compiler.firmware": (
         "runtime",

@@ -141,14 +141,10 @@ class Rate:
         if unit == "trials":
             guesses, truth, clusters = decided(guesses, trial), truth[first], clusters[first]
         hits = guesses == truth
-        correct, sizes = hits.sum(axis=1), np.bincount(clusters)
+        correct, sizes = tuple(hits.sum(axis=1).tolist()), np.bincount(clusters)
         recognised = np.bincount(clusters, weights=hits.sum(axis=0)).astype(np.intp)
-        mean = int(correct.sum()) / hits.size
-        ends = [mean, *clustered(recognised.tolist(), sizes.tolist(), alike, len(hits))]
-        if len(correct) > repeats_a_draw:
-            ends += student([fmean(draw) / len(truth) for draw in correct.reshape(-1, repeats_a_draw).tolist()])
-        low, high = max(0.0, min(ends)), min(1.0, max(ends))
-        return cls(of, unit, tuple(correct.tolist()), len(truth), len(sizes), mean, low, high)
+        bounds = clustered(recognised.tolist(), sizes.tolist(), alike, len(hits))
+        return cls._around(of, unit, correct, len(truth), len(sizes), bounds, repeats_a_draw)
 
     @classmethod
     def counted(cls, correct: tuple[int, ...], total: int, *, of: Of, repeats_a_draw: int = 1) -> Self:
@@ -158,9 +154,27 @@ class Rate:
         """
         if not correct or total < 1 or not all(0 <= count <= total for count in correct):
             raise ValueError(f"{correct} correct of {total} trials do not give a rate")
-        trials = np.arange(total)
-        hits = trials < np.array(correct)[:, np.newaxis]
-        return cls.predicted(hits, np.ones_like(trials), trials, of=of, repeats_a_draw=repeats_a_draw)
+        wilson = _wilson(sum(correct) / (len(correct) * total), total, _Z)
+        return cls._around(of, "trials", correct, total, total, wilson, repeats_a_draw)
+
+    @classmethod
+    def _around(
+        cls,
+        of: Of,
+        unit: Unit,
+        correct: tuple[int, ...],
+        total: int,
+        over: int,
+        bounds: tuple[float, float],
+        repeats_a_draw: int,
+    ) -> Self:
+        """Return the rate whose interval contains `bounds`, Student's interval over the draws, and the mean."""
+        mean = sum(correct) / (len(correct) * total)
+        ends = [mean, *bounds]
+        starts = range(0, len(correct), repeats_a_draw)
+        if len(starts) > 1:
+            ends += student([fmean(correct[i : i + repeats_a_draw]) / total for i in starts])
+        return cls(of, unit, correct, total, over, mean, max(0.0, min(ends)), min(1.0, max(ends)))
 
     @property
     def what(self) -> str:

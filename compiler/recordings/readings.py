@@ -119,7 +119,9 @@ def _micros(what: str, columns: ColumnRoles, time: NDArray[np.float64], notes: l
 def nothing_held(columns: ColumnRoles, labels: NDArray[np.str_]) -> NDArray[np.bool_]:
     """Return which rows (n,) have a label that means, in general or by `columns`, that nothing is held."""
     types = next(iter(columns.taxonomy.values())) if isinstance(columns.taxonomy, dict) else columns.taxonomy
-    meant = {*map(plain, columns.parts("none")), *((NONE,) if isinstance(types, str) or NONE not in types else ())}
+    meant = {*map(plain, columns.parts("none"))}
+    if isinstance(types, str) or NONE not in map(plain, types):
+        meant.add(NONE)
     found, where = np.unique(labels, return_inverse=True)
     aliases = dict(zip(found.tolist(), found.tolist(), strict=True)) | columns.labels
     none = [not meant.isdisjoint(map(plain, (label, aliases[label]))) for label in found.tolist()]

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from thenar.compiler import ColumnRoles, GraspSet, Joint, from_dataframe, to_dataframe
 from thenar.compiler.recordings import ColumnsError, RecordingError, TableError
 from thenar.compiler.recordings.columns import JointColumns
+from thenar.compiler.recordings.taxonomy import own
 
 
 @pytest.mark.filterwarnings("ignore:.*may be clocks:UserWarning")  # a joint may be called T
@@ -24,6 +25,12 @@ def test_a_set_comes_back_from_its_frame(
     frame = to_dataframe(grasp_set, codes)
     assert from_dataframe(frame).fingerprint() == grasp_set.fingerprint()
     assert len(frame) == len(grasp_set)
+
+
+@pytest.mark.parametrize("types", [("none", "a"), ("NONE", "a"), ("None",)])
+def test_a_type_that_is_spelt_like_none_stays_a_type(small: GraspSet, types: tuple[str, ...]) -> None:
+    named = replace(small, taxonomy=own(types), grasps=np.full(len(small), types[0]))
+    assert from_dataframe(to_dataframe(named)).fingerprint() == named.fingerprint()
 
 
 def test_a_frame_has_the_documented_columns_and_types(small: GraspSet) -> None:
