@@ -244,8 +244,11 @@ def _described(bus: EmulatedBus) -> dict[str, Any]:
 
 
 def _spi_described(chip: EmulatedSpi) -> dict[str, Any]:
-    model = None if chip.kind is None else _place_of(SPI_CHIPS.named(chip.kind).model)
-    return {"device": chip.device, "chips": [{"model": model}]}
+    if chip.kind is None:
+        return {"device": chip.device, "chips": [{"model": None}]}
+    kind = SPI_CHIPS.named(chip.kind)
+    numbers = {"channels": len(kind.pins), "bits": kind.bits}
+    return {"device": chip.device, "chips": [{"model": _place_of(kind.model), **numbers}]}
 
 
 def _model(kind: str) -> tuple[str, str, str]:

@@ -269,7 +269,8 @@ def _node(
     """Return a bus, or, without an adapter, an SPI device; no chip there is a chip without a model."""
     if not adapter:
         (chip,) = chips
-        return SpiNode(testbed, device, None if chip["model"] is None else _model(*chip["model"])())
+        place = chip.pop("model")
+        return SpiNode(testbed, device, None if place is None else _model(*place)(**chip))
     stations = [Station(_model(*chip.pop("model")), **chip) for chip in chips]
     return I2cNode(testbed, device, Adapter(Wire(stations, clock_hz), adapter), paced)
 

@@ -5,7 +5,6 @@ This file and every chip's file need only the standard library: the system's Pyt
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ...i2c.chips.base import ChipPackage, Reading
 
@@ -30,10 +29,13 @@ class Transfer(Reading):
 
 
 class SpiModel(ABC):
-    """A converter on an emulated device: `levels` holds the code at each channel, 16 bits each, the first lowest."""
+    """A converter on an emulated device, with its chip's number of channels and bits of a code.
 
-    def __init__(self) -> None:
-        self.levels = 0
+    levels  the code at each channel, 16 bits each, the first lowest
+    """
+
+    def __init__(self, channels: int, bits: int) -> None:
+        self.channels, self.bits, self.levels = channels, bits, 0
 
     @abstractmethod
     def transfer(self, sent: bytes) -> bytes:
@@ -56,14 +58,14 @@ class SpiChip(ABC):
     model     the class that emulates it
     """
 
-    name: ClassVar[str]
-    rank: ClassVar[int] = 0
-    clock_hz: ClassVar[int]
-    most_hz: ClassVar[int]
-    pins: ClassVar[tuple[str, ...]]
-    bits: ClassVar[int]
-    package: ClassVar[ChipPackage]
-    model: ClassVar[type[SpiModel]]
+    name: str
+    rank: int = 0
+    clock_hz: int
+    most_hz: int
+    pins: tuple[str, ...]
+    bits: int
+    package: ChipPackage
+    model: type[SpiModel]
 
     @abstractmethod
     def sent(self, channel: int) -> bytes:

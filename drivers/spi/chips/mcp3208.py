@@ -1,19 +1,19 @@
-"""Microchip MCP3208 and MCP3204: eight or four channels of 12 bits, converted during the transfer (DS21298)."""
-
-from typing import ClassVar
+"""Microchip MCP3208, MCP3204, MCP3008 and MCP3004: eight or four channels of 12 or 10 bits, converted during the
+transfer (DS21298, DS21295).
+"""
 
 from ...i2c.chips.base import ChipPackage
 from .base import SpiChip, SpiModel
 
-_SOIC16 = "Package_SO:SOIC-16_3.9x9.9mm_P1.27mm"
-_SOIC14 = "Package_SO:SOIC-14_3.9x8.7mm_P1.27mm"
-_START_AND_SINGLE = 0x06
+_FOOTPRINTS = {8: "Package_SO:SOIC-16_3.9x9.9mm_P1.27mm", 4: "Package_SO:SOIC-14_3.9x8.7mm_P1.27mm"}
+_START_AND_SINGLE = 0b11000
 
 
-class Mcp3208Model(SpiModel):
-    """A start bit, single-ended or not, three bits of a channel, a bit's rest, a null bit, and twelve of the code."""
+class McpModel(SpiModel):
+    """A start bit, single-ended or not, three bits of a channel, a bit's rest, a null bit, and those of the code.
 
-    channels, bits = 8, 12
+    With four channels the first bit of a channel number is ignored.
+    """
 
     def transfer(self, sent: bytes) -> bytes:
         """Return the bytes received while `sent` goes out: zeros, the code, and zeros again."""
@@ -28,54 +28,35 @@ class Mcp3208Model(SpiModel):
         return (min(self.at(channel), (1 << self.bits) - 1) << end).to_bytes(len(sent), "big")
 
 
-class Mcp3204Model(Mcp3208Model):
-    """Four channels: the first bit of a channel number is ignored."""
+class McpConverter(SpiChip):
+    """Channels CH0 and on against ground. SCLK up to `clock_hz` at 2.7 V, `most_hz` at 5 V."""
 
-    channels = 4
+    model = McpModel
 
-
-class Mcp3208(SpiChip):
-    """Channels CH0 to CH7 against ground. SCLK up to 1 MHz at 2.7 V, 2 MHz at 5 V."""
-
-    name = "mcp3208"
-    rank = 1
-    clock_hz, most_hz = 1_000_000, 2_000_000
-    pins = tuple(f"CH{channel}" for channel in range(8))
-    bits = 12
-    model: ClassVar[type[SpiModel]] = Mcp3208Model
-    package = ChipPackage(
-        part="MCP3208-CI/SL",
-        maker="Microchip",
-        symbol="MCP3208",
-        footprint=_SOIC16,
-        pins=(*(f"CH{n}" for n in range(8)), "DGND", "CS", "DIN", "DOUT", "CLK", "AGND", "VREF", "VDD"),
-        sure=False,
-        note="compare symbol and footprint before ordering",
-        library="Analog_ADC",
-    )
+    def __init__(self, name: str, rank: int, channels: int, bits: int, clock_hz: int, most_hz: int, part: str) -> None:
+        """`part` is the part number of the small-outline package."""
+        self.name, self.rank, self.bits, self.clock_hz, self.most_hz = name, rank, bits, clock_hz, most_hz
+        self.pins = tuple(f"CH{channel}" for channel in range(channels))
+        unconnected = () if channels == 8 else ("NC", "NC")
+        self.package = ChipPackage(
+            part=part,
+            maker="Microchip",
+            symbol=name.upper(),
+            footprint=_FOOTPRINTS[channels],
+            pins=(*self.pins, *unconnected, "DGND", "CS", "DIN", "DOUT", "CLK", "AGND", "VREF", "VDD"),
+            sure=False,
+            note="compare symbol and footprint before ordering",
+            library="Analog_ADC",
+        )
 
     def sent(self, channel: int) -> bytes:
         """Return the bytes that convert a channel: the code ends with the last of them."""
-        return bytes((_START_AND_SINGLE | channel >> 2, (channel & 3) << 6, 0))
+        return ((_START_AND_SINGLE | channel) << self.bits + 2).to_bytes(3, "big")
 
 
-class Mcp3204(Mcp3208):
-    """Channels CH0 to CH3."""
-
-    name = "mcp3204"
-    rank = 2
-    pins = tuple(f"CH{channel}" for channel in range(4))
-    model = Mcp3204Model
-    package = ChipPackage(
-        part="MCP3204-CI/SL",
-        maker="Microchip",
-        symbol="MCP3204",
-        footprint=_SOIC14,
-        pins=(*(f"CH{n}" for n in range(4)), "NC", "NC", "DGND", "CS", "DIN", "DOUT", "CLK", "AGND", "VREF", "VDD"),
-        sure=False,
-        note="compare symbol and footprint before ordering",
-        library="Analog_ADC",
-    )
-
-
-MEMBER = Mcp3208(), Mcp3204()
+MEMBER = (
+    McpConverter("mcp3208", 1, 8, 12, 1_000_000, 2_000_000, "MCP3208-CI/SL"),
+    McpConverter("mcp3204", 2, 4, 12, 1_000_000, 2_000_000, "MCP3204-CI/SL"),
+    McpConverter("mcp3008", 3, 8, 10, 1_350_000, 3_600_000, "MCP3008-I/SL"),
+    McpConverter("mcp3004", 4, 4, 10, 1_350_000, 3_600_000, "MCP3004-I/SL"),
+)

@@ -44,7 +44,7 @@ for line in sys.stdin:
 @given(code=st.integers(0, 0xFFFF), channel=st.integers(0, 7))
 def test_every_channel_is_read_and_no_other_shows(kind: str, code: int, channel: int) -> None:
     chip = SPI_CHIPS[kind]
-    model = chip.model()
+    model = chip.model(len(chip.pins), chip.bits)
     model.levels = code << 16 * (channel % len(chip.pins))
     wanted = [min(code, chip.highest) if number == channel % len(chip.pins) else 0 for number in range(len(chip.pins))]
     assert [chip.code(model.transfer(each.command)) for each in chip.readings] == wanted
@@ -69,7 +69,7 @@ def test_a_line_that_nobody_drives_low_is_no_code(kind: str) -> None:
 @given(sent=st.binary(max_size=6))
 def test_any_bytes_are_answered_by_as_many(sent: bytes) -> None:
     for chip in SPI_CHIPS.values():
-        model = chip.model()
+        model = chip.model(len(chip.pins), chip.bits)
         model.levels = (1 << 128) - 1
         assert len(model.transfer(sent)) == len(sent)
 
