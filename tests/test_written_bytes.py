@@ -104,7 +104,8 @@ def glove_for(set_of: Callable[[str], Path]) -> Callable[[str], Path]:
     def proposed(name: str) -> Path:
         grasp_set, path = GraspSet.load(set_of(name)), set_of(name).with_name("glove.toml")
         joints = propose_cyberglove(grasp_set.joint_names)
-        glove = propose_harness(place(grasp_set).names, name="glove", cyberglove=joints)
+        names = place(grasp_set).names if grasp_set.element_names else ()
+        glove = propose_harness(names, name="glove", cyberglove=joints)
         path.write_text(harness_to_toml(glove))
         return path
 
