@@ -331,7 +331,7 @@ def test_an_emulated_sender_is_recognised_by_every_way_and_replays_alike(
     (tmp_path / "mine.toml").write_text(STREAM.format(port=port, joints="{ j0 = [0, 127.5], j1 = [127.5, 0] }"))
     out, log, recording = tmp_path / "out.jsonl", tmp_path / "log.jsonl", tmp_path / "run.mcap"
     command = [sys.executable, "-m", "thenar.cli", "run", build_folder, "--glove", "{glove}"]
-    command += ["--frames", "150", "--sink", f"jsonl:{out}", "--record", recording]
+    command += ["--frames", "150", "--sink", f"jsonl:{out}?every", "--record", recording]
     done = thenar(
         "emulate", set_file, "--glove", tmp_path / "mine.toml", "--dir", tmp_path / "emulated",
         "--period-ms", "150", "--repeat", "--log", log, "--", *command,
@@ -360,7 +360,7 @@ def test_a_board_printing_kept_elements_only_is_recognised_and_recorded(
     with PtyLine(port) as line, BoardSender(line.send, switches, joints, 100) as board:
         board.show(dict.fromkeys(joints, 64.0))
         run = ("run", folder, "--glove", tmp_path / "glove.toml", "--frames", 300, "--record", recording)
-        done = thenar(*run, "--status")
+        done = thenar(*run, "--status", "--sink", "jsonl:-?every")
     assert done.returncode == 0, done.stderr
     found = [line for line in map(json.loads, done.stdout.splitlines()) if line["kind"] == "grasp"]
     # Its columns are named once a second.
@@ -398,7 +398,7 @@ def test_a_broken_sender_spoils_no_answer_and_is_counted(thenar: Thenar, build_f
         sender = Thread(target=send)
         sender.start()
         command = ["run", build_folder, "--glove", tmp_path / "mine.toml", "--frames", "150", "--status"]
-        finished = thenar(*command, "--sink", f"jsonl:{out}")
+        finished = thenar(*command, "--sink", f"jsonl:{out}?every")
         done.set()
         sender.join()
     assert finished.returncode == 0, finished.stderr
@@ -433,7 +433,9 @@ def test_a_second_board_on_the_port_and_impossible_clocks_change_no_answer(
 
         thread = Thread(target=send)
         thread.start()
-        finished = thenar("run", build_folder, "--glove", path, "--frames", "200", "--status", "--sink", f"jsonl:{out}")
+        finished = thenar(
+            "run", build_folder, "--glove", path, "--frames", "200", "--status", "--sink", f"jsonl:{out}?every"
+        )
         done.set()
         thread.join()
     assert finished.returncode == 0, finished.stderr
@@ -469,7 +471,7 @@ def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(thenar: Then
     command = [sys.executable, "-m", "thenar.cli", "run", build, "--glove", "{glove}", "--frames", "100"]
     done = thenar(
         "emulate", tmp_path / "set.grasps", "--glove", tmp_path / "mine.toml", "--dir", tmp_path / "emulated",
-        "--period-ms", "150", "--repeat", "--log", log, "--", *command, "--sink", f"jsonl:{out}",
+        "--period-ms", "150", "--repeat", "--log", log, "--", *command, "--sink", f"jsonl:{out}?every",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert right(log, out) == 1.0

@@ -157,7 +157,7 @@ def test_a_stdout_that_nobody_reads_holds_nothing_up(run: MakeRun, tmp_path: Pat
     running, path = run("both", "glove", "board"), tmp_path / "run.mcap"
     glove = tmp_path / "glove.toml"
     command = [sys.executable, "-m", "thenar.cli", "run", str(running.build), "--glove", str(glove)]
-    command += ["--record", str(path), "--frames", "1500"]
+    command += ["--record", str(path), "--frames", "1500", "--sink", "jsonl:-?every"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as client:
         assert client.wait(60.0) == 0
         assert client.stderr is not None
