@@ -292,7 +292,7 @@ def _draw_points(axes: "Axes", points: Sequence[tuple[float, FrontierPoint]], be
 
 
 def _draw_numbers(axes: "Axes", points: Iterable[tuple[float, FrontierPoint]]) -> None:
-    """Write the number of each point beside it, unless it would lie on the number of one before it."""
+    """Write the number of each point next to it, unless it would lie on the number of one before it."""
     figure = axes.get_figure(root=True)
     assert figure is not None
     written: list[tuple[float, float]] = []

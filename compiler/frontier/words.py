@@ -18,7 +18,7 @@ _SPARED = 0.005  # rates within half a point count as equal
 
 
 def inputs_of(frontier: Frontier, point: FrontierPoint) -> str:
-    """Return what a point reads: "33 of 160 switches and 16 of 16 joints", "6 of 24 pads (14 levels)"."""
+    """Return the inputs of a point: "33 of 160 switches and 16 of 16 joints", "6 of 24 pads (14 levels)"."""
     setting = point.setting
     taxels = [level[0] for name in point.switches if setting.levels is not None and (level := taxel_and_code(name))]
     switches, kept, inputs = len(point.switches) - len(taxels), len(set(taxels)), setting.inputs
