@@ -14,7 +14,7 @@ from msgspec.structs import asdict, replace
 
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import HealthReport, LiveGrasp
-from thenar.runtime.sinks import GraspLine, HeaderLine, HealthLine, JointAngles, JsonLines, Line, open_sink
+from thenar.runtime.sinks import GraspLine, HeaderLine, HealthLine, JointAngles, JsonLines, open_sink
 from thenar.runtime.sinks.jsonl import encode, encode_health
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
@@ -54,11 +54,15 @@ def test_a_header_names_the_joints_before_their_angles(
             late.connect(path)
         sink.publish(make_grasp(number), None, angle)
     sink.close()
-    lines = [typed_json.decode(line, type=Line) for line in (file.getvalue() or read_all(reader)).splitlines()]
+    written = file.getvalue() or read_all(reader)
+    lines = [typed_json.decode(line, type=GraspLine | HeaderLine) for line in written.splitlines()]
     kinds = [line.joints if isinstance(line, HeaderLine) else line.angles for line in lines]
     assert kinds == [None, ("a", "b"), (0.1235, -1.0), (0.1235, -1.0), ("c",), (2.0,)]
     if kind == "unix":
-        assert [typed_json.decode(line, type=Line) for line in read_all(late).splitlines()] == [lines[1], *lines[3:]]
+        assert [typed_json.decode(line, type=GraspLine | HeaderLine) for line in read_all(late).splitlines()] == [
+            lines[1],
+            *lines[3:],
+        ]
     reader.close()
     late.close()
 
