@@ -140,19 +140,18 @@ def find_frontier(
     samples = _samples(grasp_set.without_none())
     # Levels of one taxel share its conversion.
     wired = harness is not None or bool(grasp_set.taxel_columns)
-    search, lacking = _installed(search or Search(methods=usual(ours=True, wired=wired)))
+    search = search or Search(methods=usual(ours=True, wired=wired))
+    missing = [name for name in search.baselines if not METHODS[name].installed]
+    lacking = [f"{name} was left out: it needs {METHODS[name].install}, which is not installed" for name in missing]
+    search = replace(search, baselines=tuple(name for name in search.baselines if name not in missing))
     cuts = Cuts.of(samples, search)
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     created = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
         cache = Cache(store, report or (lambda _done, _total: None), _ROUNDS, jobs=jobs)
         with _remove_created_on_error(created, store):
-            records = records_of(
-                grasp_set.joint_names,
-                joint_us,
-                None if harness is None else harness.cyberglove,
-                masked=not is_avr(target),
-            )
+            glove = None if harness is None else harness.cyberglove
+            records = records_of(grasp_set.joint_names, joint_us, glove, masked=not is_avr(target))
             switches, taxels = bool(grasp_set.switch_names), bool(grasp_set.taxel_columns)
             options = wirings(harness, target, switches=switches or not taxels, taxels=taxels)
             equipment = equipment_for(target, options, cache, records)
@@ -193,14 +192,6 @@ def _samples(grasp_set: GraspSet) -> Samples:
     check_memory(len(grasp_set), n_types, FrontierError)
     check_trials(grasp_set, FrontierError)
     return Samples.of(grasp_set)
-
-
-def _installed(search: Search) -> tuple[Search, tuple[str, ...]]:
-    """Return the search without baselines that are not installed, and a sentence on each of these."""
-    missing = [name for name in search.baselines if not METHODS[name].installed]
-    there = tuple(name for name in search.baselines if name not in missing)
-    said = (f"{name} was left out: it needs {METHODS[name].install}, which is not installed" for name in missing)
-    return replace(search, baselines=there), tuple(said)
 
 
 @contextmanager
