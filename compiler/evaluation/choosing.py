@@ -72,10 +72,6 @@ def rank_joints(samples: Samples, rows: Rows, elements: Elements) -> Columns:
     return joint_order(bits_of(samples.rows(rows), elements))
 
 
-def _here(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
-    return [function(*args) for args in calls]
-
-
 @dataclass(frozen=True, eq=False)
 class InputChoices:
     """The elements and joints that recipes choose from rows of samples, such as a fold's training rows: once from each.
@@ -87,7 +83,7 @@ class InputChoices:
     samples: Samples
     ports: PortCosts | None = None
     limits: Limits | None = None
-    ask: Ask = _here
+    ask: Ask = lambda function, calls: [function(*args) for args in calls]
     _available: dict[tuple[int | None, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
     _elements: dict[tuple[Recipe, float, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
     _orders: dict[tuple[Elements, bytes], Columns] = field(default_factory=dict, init=False, repr=False)

@@ -34,8 +34,8 @@ _DASHES: "tuple[Dash, ...]" = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 
 # Ids of a point's marker and of the ring around the featured one, in SVG.
 POINT_ID, RING_ID = "point-", "featured"
 
-_WIDTH, _HEIGHT = 9.0, 5.4  # inches
-_LEFT, _RIGHT, _BOTTOM, _TOP = 0.72, 0.18, 0.58, 0.72  # inches around the axes
+_WIDTH, _HEIGHT = 9.0, 7.0  # inches
+_LEFT, _RIGHT, _BOTTOM, _TOP = 0.72, 0.18, 2.18, 0.72  # inches around the axes; the key is below them
 _SIZE, _MARK_SIZE, _TRIED_SIZE = 34.0, 52.0, 9.0  # square points
 _NUMBER = (13.0, 9.0)  # width and height of a number, in points of 1/72 inch
 _LOWEST = 1.0  # microseconds or switches: a logarithmic axis has no 0, and nothing takes less
@@ -149,7 +149,7 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
         named = _named(shorten(mark_name(mark, frontier)), said(x), mark.rate)
         axes.scatter([x], [mark.rate.mean], s=_MARK_SIZE, zorder=4.5, label=named, **look)
     spoken_of = featured(frontier)
-    _draw_numbers(axes, sorted(points, key=lambda place: place[1] is not spoken_of))
+    _draw_numbers(axes, sorted(points, key=lambda place: place[1] is not spoken_of), marks)
     for x, point in points:
         if point is spoken_of:
             ring: dict[str, Any] = {"facecolor": "none", "edgecolor": _PICKED, "lw": 1.6, "zorder": 5}
@@ -157,7 +157,8 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
             axes.scatter([x], [point.rate.mean], s=4.5 * _SIZE, gid=RING_ID, **ring)
             axes.scatter([], [], s=2 * _SIZE, label=named, **ring)
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="best", fontsize=FONT - 1, edgecolor=_PALE, labelspacing=0.35)
+        place = _LEFT / _WIDTH, (_BOTTOM - 0.5) / _HEIGHT
+        figure.legend(loc="upper left", bbox_to_anchor=place, ncols=2, frameon=False, labelspacing=0.35)
     return figure
 
 
@@ -291,14 +292,20 @@ def _draw_points(axes: "Axes", points: Sequence[tuple[float, FrontierPoint]], be
         axes.scatter([], [], s=_SIZE, facecolor=_WHITE, edgecolor=_GREY, lw=1.2, label="not the best here")
 
 
-def _draw_numbers(axes: "Axes", points: Iterable[tuple[float, FrontierPoint]]) -> None:
-    """Write the number of each point next to it, unless it would lie on the number of one before it."""
+def _draw_numbers(
+    axes: "Axes", points: Iterable[tuple[float, FrontierPoint]], marks: Iterable[tuple[float, ReferencePoint]]
+) -> None:
+    """Write the number of each point next to it, unless it would lie on the number of one before it, or on a mark."""
     figure = axes.get_figure(root=True)
     assert figure is not None
+    (width, height), unit = _NUMBER, 72 / figure.dpi
     written: list[tuple[float, float]] = []
+    ends = [((x, mark.rate.low), (x, mark.rate.high)) for x, mark in marks]
+    lines = [axes.transData.transform(line) * unit for line in ends]
     for x, point in points:
-        right, up = axes.transData.transform((x, point.rate.mean)) * (72 / figure.dpi)
-        if all(abs(right - left) > _NUMBER[0] or abs(up - low) > _NUMBER[1] for left, low in written):
+        right, up = axes.transData.transform((x, point.rate.mean)) * unit
+        crossed = any(0 < left - right < width + 2 and low - height < up < high for (left, low), (_, high) in lines)
+        if not crossed and all(abs(right - left) > width or abs(up - low) > height for left, low in written):
             written.append((right, up))
             style: dict[str, Any] = {"textcoords": "offset points", "fontsize": FONT - 1, "color": _INK, "zorder": 6}
             axes.annotate(f"{point.number}", (x, point.rate.mean), (4, 3), **style)

@@ -24,8 +24,7 @@ def _texts(figure: Figure) -> list[str]:
 
 
 def _key(figure: Figure) -> list[str]:
-    legend = figure.axes[0].get_legend()
-    return [] if legend is None else [text.get_text() for text in legend.get_texts()]
+    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
 
 def _is_shown(point: FrontierPoint, name: str) -> bool:
