@@ -1,6 +1,6 @@
-"""The bytes of those kinds of MCAP records that a recording has (MCAP specification, section Records).
+"""The bytes of the kinds of MCAP records that a recording has (MCAP specification, section Records).
 
-The `mcap` package writes and reads them too, but brings compressors of 30 MB, which no recording uses.
+The `mcap` package knows them, too. But it needs compressors of 30 MB, which no recording uses.
 """
 
 from collections.abc import Mapping

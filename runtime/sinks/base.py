@@ -157,7 +157,7 @@ class SinkKind:
 SINKS = Members("sink", SinkKind, "thenar.runtime.sinks", "thenar.sinks")
 
 
-# Options of all kinds. With a rate, a grasp is sent when it changes, and so often while it does not.
+# Options of all kinds. With a rate, a grasp is sent when it changes, and HZ times a second while it does not.
 PACES = "?every, ?rate=HZ or ?on=change"
 _FASTEST_HZ = 1000
 
@@ -183,18 +183,21 @@ def open_sink(where: str, *, wait: bool = False) -> Sink:
             f"{shortened(repr(where))}: after the question mark only {known}{' and ' * bool(known)}one of {PACES} can "
             "follow, separated by &"
         )
-    pace = _pace(where, "every" if wait else "", kind.rate) if not paces else _pace(where, paces.pop(), kind.rate)
+    usual = None if wait or kind.rate is None else PublishPace(kind.rate)
+    pace = _pace(where, *paces) if paces else usual
     sink = kind.open(SinkPlace(where, place, frozenset(options - paces), wait))
     sink.pace = pace
     return sink
 
 
-def _pace(where: str, option: str, usual: int | None) -> "PublishPace | None":
-    """Return the pace of an option, "" for the usual one; None: every grasp is sent."""
-    if option == "every" or (not option and usual is None):
+def _pace(where: str, option: str) -> "PublishPace | None":
+    """Return the pace of an option; None: every grasp is sent."""
+    if option == "every":
         return None
-    rate = option.removeprefix("rate=") if option.startswith("rate=") else "0" if option else str(usual)
-    if not re.fullmatch("[0-9]{1,9}", rate) or not (option == "on=change" or 1 <= int(rate) <= _FASTEST_HZ):
+    if option == "on=change":
+        return PublishPace(0)
+    rate = option.removeprefix("rate=")
+    if not re.fullmatch("[0-9]{1,9}", rate) or not 1 <= int(rate) <= _FASTEST_HZ:
         raise SettingError(
             f"{where}: a rate of {shortened(repr(rate))} is not possible: use 1 to {_FASTEST_HZ} a second"
         )

@@ -4,8 +4,8 @@
     /thenar/scores    score and probability of every grasp type, with `grasp`
     /thenar/switches  names of the switches that are closed or lost, with `grasp`
     /thenar/joints    angles of calibrated joints in rad, and the codes that are scored, with `grasp`
-    /thenar/preshape  the preshape, on change and once a second
-    /thenar/task      if a task is followed: its step, on change and once a second
+    /thenar/preshape  the preshape, on change, and once a second with a grasp
+    /thenar/task      if a task is followed: its step, in the same way
     /thenar/health    once a second, if requested: the glove's health
 
 A grasp comes on change and 50 times a second, unless the sink's options set another pace. A message has the time of its

@@ -20,7 +20,7 @@ SHORTEST_US = 10_000
 
 
 class Pace:
-    """Lets a device be read at most `rate_hz` times a second: what is read faster only has to be stored and sent."""
+    """Limits the readings of a device to `rate_hz` a second."""
 
     def __init__(self, rate_hz: float) -> None:
         self._period_s, self._due_s = 1.0 / rate_hz, 0.0
@@ -33,7 +33,7 @@ class Pace:
         if left_s > timeout_s:
             return False
         now_s, next_s = time.monotonic(), self._due_s + self._period_s
-        # A reading that was late is not made up for.
+        # No reading makes up for a late one.
         self._due_s = next_s if next_s > now_s else now_s + self._period_s
         return True
 

@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, compile_build, evaluate
+from thenar.compiler.evaluation.choosing import InputChoices
 from thenar.compiler.evaluation.folds import populations_of
 from thenar.compiler.evaluation.plan import FoldFit, predictions
 from thenar.compiler.placement.elements import Element, Elements, bits_of, elements_of, names_of
+from thenar.compiler.placement.placement import select
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import Training
+from thenar.runtime.recipe import Recipe
 
 Make = Callable[..., GraspSet]
 TRAINING = {"": (Training("logitboost", {"rounds": 6}),)}
@@ -50,6 +53,24 @@ def test_a_fold_is_predicted_by_the_levels_of_its_training_rows(padded: GraspSet
         found = predictions(Samples.of(padded), FoldFit(fold, elements, (0,), population.grasps), TRAINING)
         plain = Samples.of(plain_by(padded, elements))
         assert np.array_equal(found, predictions(plain, FoldFit(fold, same, (0,), population.grasps), TRAINING))
+
+
+def test_choices_made_together_are_those_of_each_recipe_alone(padded: GraspSet) -> None:
+    samples = Samples.of(padded)
+    recipes = [
+        Recipe(placement=placement, levels=levels, inputs=inputs, keep=keep, prune=prune)
+        for placement, keep, prune in (("id3", None, 0), ("id3", None, 6), ("elimination", 3, 0), ("elimination", 5, 0))
+        for levels in (1, 3)
+        for inputs in ("switches", "both")
+    ]
+    several = [np.arange(96), np.arange(0, 96, 2), np.arange(48)]
+    together = InputChoices(samples)
+    together.choose(recipes, several)
+    chosen = [together.elements(recipe, rows) for recipe in recipes for rows in several]
+    given = {"both": samples, "switches": samples.with_joints(())}
+    alone = [select(given[recipe.inputs].rows(rows), recipe).kept for recipe in recipes for rows in several]
+    assert chosen == alone
+    assert len(set(chosen)) > 12
 
 
 def test_evaluate_and_compile_agree_on_the_selected_switches_and_joints(padded: GraspSet, tmp_path: Path) -> None:

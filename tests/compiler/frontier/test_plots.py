@@ -5,6 +5,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from thenar.compiler.frontier.plots import PICTURES, POINT_ID, pictures
@@ -56,6 +57,22 @@ def test_every_point_and_mark_is_named(examples: Any, name: str) -> None:
         # A mark has no latency.
         assert sum(mark.name in text for text in _key(figure)) == (name != "latency")
     assert any(text.startswith(f"point {frontier.picked}: ") for text in _key(figure))
+
+
+@pytest.mark.parametrize("factor", [1.01, 1.03, 1.05, 1.08, 1.12])
+def test_no_number_lies_on_a_mark(examples: Any, factor: float) -> None:
+    frontier = examples.example_frontier()
+    marks = [
+        msgspec.structs.replace(frontier.marks[0], name=f"mark {point.number}", frame_us=factor * point.frame.us)
+        for point in frontier.points
+    ]
+    figure = _drawn(msgspec.structs.replace(frontier, marks=tuple(marks)), "frontier")
+    renderer, axes = FigureCanvasAgg(figure).get_renderer(), figure.axes[0]
+    for box in (text.get_window_extent(renderer) for text in axes.texts):
+        for mark in marks:
+            ends = ((mark.frame_us, mark.rate.low), (mark.frame_us, mark.rate.high))
+            (x, low), (_, high) = axes.transData.transform(ends)
+            assert not (box.x0 < x < box.x1 and box.y0 < high and low < box.y1)
 
 
 def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:

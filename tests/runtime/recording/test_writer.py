@@ -69,7 +69,9 @@ def test_the_mcap_library_reads_it_by_its_summary_and_checks_its_checksums(recor
             "/thenar/recognition": 2,
             "/thenar/trials": 2,
         }
-        assert summary.statistics.message_count == 12
+        numbers = summary.statistics
+        assert (numbers.message_count, numbers.schema_count, numbers.channel_count) == (12, 2, 5)
+        assert (numbers.metadata_count, numbers.attachment_count, numbers.chunk_count) == (1, 0, 0)
         [metadata] = reader.iter_metadata()
         assert metadata.name == "thenar"
         assert metadata.metadata["harness"] == 'name = "bänk"\n'

@@ -1,6 +1,7 @@
 """Sinks by name."""
 
 import json
+import socket
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,7 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
-from thenar.runtime.published import Health, LiveGrasp
+from thenar.runtime.preshape import Preshape
+from thenar.runtime.published import Health, HealthReport, LiveGrasp
 from thenar.runtime.sinks import Fanout, JsonLines, SocketLines, open_sink
 from thenar.runtime.sinks.base import PublishPace
 
@@ -63,6 +65,24 @@ def test_lines_come_on_change_and_at_the_rate(
     numbers = [json.loads(line)["number"] for line in (tmp_path / "lines").read_bytes().splitlines()]
     due = range(0, 2000, 2000 // rate) if rate else (0,)
     assert numbers == sorted({*due, 507, 509})
+
+
+def test_a_new_preshape_is_a_change(make_grasp: Callable[..., LiveGrasp], preshape: Preshape, tmp_path: Path) -> None:
+    fanout, other = Fanout([open_sink(f"jsonl:{tmp_path}/lines?on=change")]), replace(preshape, name="other")
+    for number, shape in enumerate([None, preshape, preshape, other]):
+        fanout.publish(make_grasp(number), shape, None)
+    fanout.close()
+    numbers = [json.loads(line)["number"] for line in (tmp_path / "lines").read_bytes().splitlines()]
+    assert numbers == [0, 1, 3]
+
+
+def test_who_connects_while_nothing_changes_gets_the_next_report(health: HealthReport, tmp_path: Path) -> None:
+    fanout = Fanout([open_sink(f"unix:{tmp_path}/socket?on=change")])
+    with socket.socket(socket.AF_UNIX) as reader:
+        reader.connect(f"{tmp_path}/socket")
+        fanout.health(health)
+        fanout.close()
+        assert json.loads(reader.recv(10_000))["kind"] == "health"
 
 
 def test_a_clock_that_begins_again_is_a_moment_to_publish() -> None:

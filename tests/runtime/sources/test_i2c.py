@@ -10,6 +10,7 @@ from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, Harness
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources import i2c as module
+from thenar.runtime.sources.base import slowest_us
 from thenar.runtime.sources.i2c import I2cDevice
 
 MakeBuild = Callable[..., Build]
@@ -59,14 +60,17 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
     return bench
 
 
-def device(debounce: Debounce, rate_hz: float = 200.0) -> I2cDevice:
+def harness(debounce: Debounce, rate_hz: float) -> Harness:
     chips = tuple(
         ChipWiring(kind="pcf8574", address=0x20 + chip, pins={f"P{pin}": NAMES[3 * chip + pin] for pin in range(3)})
         for chip in range(2)
     )
     bus = BusWiring(device="/dev/i2c-1", rate_hz=rate_hz, chips=chips)
-    harness = Harness(name="two", buses=(bus,), debounce=debounce)
-    return I2cDevice(harness, 0, whole_scan(harness, NAMES))
+    return Harness(name="two", buses=(bus,), debounce=debounce)
+
+
+def device(debounce: Debounce, rate_hz: float = 200.0) -> I2cDevice:
+    return I2cDevice(harness(debounce, rate_hz), 0, SCAN)
 
 
 def frame(of: I2cDevice) -> SwitchFrame:
@@ -77,6 +81,7 @@ def frame(of: I2cDevice) -> SwitchFrame:
 
 
 OFF = Debounce(enabled=False)
+SCAN = whole_scan(harness(OFF, 200.0), NAMES)
 
 
 def test_a_pin_that_is_pulled_down_is_a_closed_switch(bench: Bench) -> None:
@@ -98,6 +103,13 @@ def test_a_bus_is_scanned_at_its_rate(bench: Bench, rate_hz: float, scans: int) 
     while bench.now < began_us + 100_000:
         read += made.read(0.1) is not None
     assert read == scans
+
+
+@pytest.mark.parametrize(("rate_hz", "period_us"), [(200.0, 10_000), (50.0, 20_000), (0.5, 2_000_000)])
+def test_a_slow_bus_is_expected_at_its_rate(bench: Bench, rate_hz: float, period_us: int) -> None:
+    made = device(OFF, rate_hz)
+    assert (made.period_us, made.longest_us) == (period_us, 2 * period_us)
+    assert slowest_us(harness(OFF, rate_hz), SCAN, "switches") == period_us
 
 
 def test_a_late_scan_is_not_made_up_for(bench: Bench) -> None:
