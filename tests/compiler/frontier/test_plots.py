@@ -67,7 +67,7 @@ def test_no_number_lies_on_a_mark(examples: Any, factor: float) -> None:
         for point in frontier.points
     ]
     figure = _drawn(msgspec.structs.replace(frontier, marks=tuple(marks)), "frontier")
-    renderer, axes = FigureCanvasAgg(figure).get_renderer(), figure.axes[0]
+    renderer, axes = FigureCanvasAgg(figure).get_renderer(), figure.axes[0]  # type: ignore[no-untyped-call]
     for box in (text.get_window_extent(renderer) for text in axes.texts):
         for mark in marks:
             ends = ((mark.frame_us, mark.rate.low), (mark.frame_us, mark.rate.high))
