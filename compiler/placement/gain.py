@@ -240,18 +240,11 @@ def best_per_cost(node: NodeCounts, costs: Counts) -> int | None:
 
     costs (d,) are integers > 0. Of equal switches the cheapest wins, then the lowest number.
     """
-    scores, varies = _scores(node)
-    varying = np.flatnonzero(varies)
+    varying = np.flatnonzero(_scores(node)[1])
     if not len(varying):
         return None
-    n, classes = int(node.totals.sum()), len(node.totals)
-    own = float(n_log_n(np.array(n)) - n_log_n(node.totals).sum())
-    gains = (scores[varying] + own) / costs[varying]
-    # Two values: 3 (K + 1) terms, whose absolute values are f(n) in sum over the classes, values, both, and rows.
-    slack = error_bound(n, 3 * (classes + 1), 4) / costs[varying]
-    close = varying[gains + slack >= (gains - slack).max()]
-    close = close[np.lexsort((close, costs[close]))]
-    return int(close[first_of_most_gain(node.tables(close), costs[close])])
+    varying = varying[np.lexsort((varying, costs[varying]))]
+    return int(varying[first_of_most_gain(node.tables(varying), costs[varying])])
 
 
 def first_of_most_gain(tables: Counts, costs: Counts | None = None) -> int:
@@ -261,7 +254,12 @@ def first_of_most_gain(tables: Counts, costs: Counts | None = None) -> int:
     """
     plus = np.column_stack([tables.reshape(len(tables), -1), tables.sum(axis=(1, 2))])
     minus = np.column_stack([tables.sum(axis=1), tables.sum(axis=2)])
-    return first_best(plus, minus, costs)
+    prices = np.ones(len(tables), np.int64) if costs is None else costs
+    gains = (n_log_n(plus).sum(axis=1) - n_log_n(minus).sum(axis=1)) / prices
+    # The absolute values of the terms are f(n) in sum over the cells, classes, values, and rows.
+    slack = error_bound(int(plus.max()), plus.shape[1] + minus.shape[1], 4) / prices
+    close = np.flatnonzero(gains + slack >= (gains - slack).max())
+    return int(close[first_best(plus[close], minus[close], None if costs is None else costs[close])])
 
 
 def _scores(node: NodeCounts) -> tuple[Floats, NDArray[np.bool_]]:
