@@ -39,6 +39,7 @@ _ENOUGH = 1e-4  # of the slope, for Armijo's rule
 _ROUNDING = 2.0**-50  # of the loss, per entry of the rows: a smaller increase may be a rounding error
 _MARKS = 512.0  # marks per unit of a line, whose column spans one or two units
 _NO_CHANCE = 800.0  # below all scores: exp is exactly 0 there
+_MOST_CELLS = 128  # of several columns together
 _UNSOLVED = 0.3  # of the gradient that a step may leave
 
 
@@ -98,12 +99,6 @@ class Column:
         """The number of its rows."""
         return math.prod(self.cells) if self.cells else int(self.bins.max()) + 1 - self.first
 
-    def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
-        """Return the frames, rows and values of the column's entries in the design, each (entries,)."""
-        values = (self.bins >= self.first).astype(np.float64) if self.line is None else self.line.steps
-        frames = np.flatnonzero(values)
-        return frames, self.bins[frames] - self.first, values[frames]
-
     def pulls(self, penalty: float, smoothness: float) -> Floats:
         """Return the pull (rows,) on each row."""
         pulls = np.full(self.n_rows, penalty if self.first else BIN_SHARE * penalty)
@@ -161,25 +156,20 @@ class Fit:
         self._member = (labels[:, np.newaxis] == np.arange(n_classes)).astype(np.float64)
         self._total = float(n if weights is None else weights.sum())
         self._grids: list[tuple[int, int, tuple[int, int], float]] = []
-        frames, rows, values = [np.arange(n)], [np.zeros(n, np.intp)], [np.ones(n)]
         pull, joined, start = [np.array([BIAS_SHARE * penalty])], [np.zeros(0, np.intp)], 1
         for column in columns:
-            own_frames, own_rows, own_values = column.entries()
-            frames.append(own_frames)
-            rows.append(start + own_rows)
-            values.append(own_values)
             pull.append(column.pulls(penalty, smoothness))
             if column.cells:
                 self._grids.append((start, start + column.n_rows, column.cells, column.smoothness))
             elif column.first == 0:
                 joined.append(np.arange(start, start + len(column.edges)))
             start += column.n_rows
-        self._design = sparse(np.concatenate(values), np.concatenate(frames), np.concatenate(rows), (n, start))
-        self._by_row = self._design.T.tocsr()
-        self._squares = self._by_row * self._by_row
+        self._cells, self._shared = _factors([Column(np.zeros(0), np.zeros(n, np.intp), 0), *columns])
+        self._by_cell, self._by_row = self._cells.T.tocsr(), self._shared.T.tocsr()
         # Bounds on the sums over a frame's values and over a row's values, in units of which they are multiples.
         marks = _MARKS if any(column.line for column in columns) else 1.0
-        self._across, self._down = (float(abs(each).sum(axis=1).max()) * marks for each in (self._design, self._by_row))
+        self._across = float((abs(self._cells) @ self._shared.sum(axis=1)).max()) * marks
+        self._down = float((self._by_row @ abs(self._by_cell).sum(axis=1)).max()) * marks
         self._pull = np.concatenate(pull)[:, np.newaxis]
         self._joint = np.zeros((start - 1, 1))
         self._joint[np.concatenate(joined)] = smoothness
@@ -211,7 +201,7 @@ class Fit:
     def _at(self, rows: Floats) -> _Point:
         # Put the point on the grid, so that its loss is that of its rows to the last digits.
         rows = on_one_grid(rows, self._across)
-        scores = self._design @ rows
+        scores = self._cells @ (self._shared @ rows)
         if self._known is not None:
             scores[self._known, -1] = scores.min() - _NO_CHANCE
         shares, mean = softmax_and_loss(np.ascontiguousarray(scores.T), self._labels, self._weights)
@@ -242,22 +232,24 @@ class Fit:
         """Return the weighted sums (r, K) of `values` (n, K), which are overwritten, over the frames of each row."""
         if self._weights is not None:
             values *= self._weights[:, np.newaxis]
-        summed: Floats = self._by_row @ on_one_grid(values, self._down)
+        summed: Floats = self._by_row @ (self._by_cell @ on_one_grid(values, self._down))
         return summed
 
     def _bent(self, rows: Floats, probability: Floats) -> Floats:
         """Return the product (r, K) of the Hessian at these probabilities with rows (r, K)."""
-        moved = self._design @ on_one_grid(rows, self._across)
+        moved = self._cells @ (self._shared @ on_one_grid(rows, self._across))
         moved *= probability
         moved = on_one_grid(moved, moved.shape[1])
-        moved -= probability * moved.sum(axis=1, keepdims=True)
+        # Exact, and three times as fast as sum().
+        moved -= probability * np.einsum("ij->i", moved)[:, np.newaxis]
         return self._over_frames(moved) + self._held(rows)
 
     def _direction(self, point: _Point, unsolved: float) -> Floats:
         """Return V with H V = -gradient up to `unsolved`, by conjugate gradients preconditioned with H's diagonal."""
         p = point.probability
         spread = p * (1.0 - p) if self._weights is None else p * (1.0 - p) * self._weights[:, np.newaxis]
-        diagonal = self._squares @ on_one_grid(spread, self._down * _MARKS) + self._stiffness
+        squares = self._by_cell * self._by_cell
+        diagonal = self._by_row @ (squares @ on_one_grid(spread, self._down * _MARKS)) + self._stiffness
         found, rest = np.zeros_like(point.rows), -point.gradient
         near = rest / diagonal
         along, size = near, dot(rest, near)
@@ -283,6 +275,43 @@ class Fit:
                 break
             length *= 0.5
         return there
+
+
+def _factors(columns: Sequence[Column]) -> tuple["csr_array", "csr_array"]:
+    """Return matrices (n, cells) and (cells, r), whose product, the design (n, r), has many more entries.
+
+    Frames with the same bins in several neighbouring columns share a cell of these columns; a line has one cell.
+    """
+    groups: list[tuple[NDArray[np.intp], list[int]]] = []
+    for number, column in enumerate(columns):
+        if groups and column.line is None and columns[groups[-1][1][0]].line is None:
+            cell = _numbered(groups[-1][0] * (int(column.bins.max()) + 1) + column.bins)
+            if cell.max() < _MOST_CELLS:
+                groups[-1] = cell, [*groups[-1][1], number]
+                continue
+        groups.append((_numbered(column.bins), [number]))
+    starts = np.cumsum([0, *(column.n_rows for column in columns)])
+    places, values, inside, rows, used = [], [], [], [], 0
+    for cell, numbers in groups:
+        line, frame = columns[numbers[0]].line, np.unique(cell, return_index=True)[1]
+        places.append(used + cell)
+        values.append(np.ones(len(cell)) if line is None else line.steps)
+        for number in numbers:
+            at = columns[number].bins[frame] - columns[number].first
+            inside.append(used + np.flatnonzero(at >= 0))
+            rows.append(starts[number] + at[at >= 0])
+        used += len(frame)
+    frames = np.tile(np.arange(len(cell)), len(groups))
+    cells = sparse(np.concatenate(values), frames, np.concatenate(places), (len(cell), used))
+    counted = np.concatenate(inside)
+    return cells, sparse(np.ones(len(counted)), counted, np.concatenate(rows), (used, int(starts[-1])))
+
+
+def _numbered(values: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the number of each of the values (n,) >= 0 among those that occur."""
+    occurs = np.zeros(int(values.max()) + 1, np.bool_)
+    occurs[values] = True
+    return (np.cumsum(occurs) - 1)[values]
 
 
 def sparse(values: Floats, frames: NDArray[np.intp], rows: NDArray[np.intp], shape: tuple[int, int]) -> "csr_array":
