@@ -27,6 +27,9 @@ _LN2_LOW = 1.9082149292705877e-10
 _EXP_UNDERFLOW = -746.0
 # Elements that are processed in one block: 256 KiB of doubles fit a processor's cache.
 _CACHED = 1 << 15
+# glibc returns freed memory above twice the largest array ever freed to the system, and faults it in again, which takes
+# longer than the arithmetic. Free an array close to 32 MiB, the largest that it respects; its pages are never touched.
+np.empty(31 << 20, np.uint8)
 _EXP_TERMS = tuple(1.0 / math.factorial(n) for n in range(13, 1, -1))
 _LOG_TERMS = tuple(2.0 / n for n in range(23, 1, -2))
 _SQRT_HALF = 0.7071067811865476
@@ -58,9 +61,10 @@ _FINEST = 1000
 
 def exp(x: Floats) -> Floats:
     """Return e^x for x <= 709, any shape; below -746 the result is exactly 0."""
-    x = np.maximum(x, _EXP_UNDERFLOW)
-    power = np.rint(x * _INVERSE_LN2)
-    rest = (x - power * _LN2_HIGH) - power * _LN2_LOW
+    rest = np.maximum(x, _EXP_UNDERFLOW)
+    power = np.rint(rest * _INVERSE_LN2)
+    rest -= power * _LN2_HIGH
+    rest -= power * _LN2_LOW
     series = np.full_like(rest, _EXP_TERMS[0])
     for term in _EXP_TERMS[1:]:
         series *= rest
@@ -117,8 +121,12 @@ def add_exactly(total: Floats, carry: Floats, term: Floats) -> tuple[Floats, Flo
 
 def softmax(scores: Floats) -> Floats:
     """Return P (K, n), each column summing to 1 within K roundings, for scores (K, n)."""
-    shares = exp(scores - scores.max(axis=0))
-    shares /= add_up(shares)
+    shares = np.empty(scores.shape)
+    step = max(64, _CACHED // len(scores))
+    for start in range(0, scores.shape[1], step):
+        block = scores[:, start : start + step]
+        block = exp(block - block.max(axis=0))
+        np.divide(block, add_up(block), out=shares[:, start : start + step])
     return shares
 
 
@@ -186,12 +194,13 @@ class OnGrid:
         """Return the sums (3, K) over the rows left of, right of and missing in a split; members are 0 or 1, (K, n).
 
         Sums are in units of 2^-base, base (K,), of the class's own grid, so that numbers near the smallest doubles keep
-        their bits. The right sum is a difference, and still exact: all three are integer units.
+        their bits. The right sum is a difference, and still exact: all three are integer units. With numbers of several
+        kinds, (R K, n), the members are the same for each, and so (3, R K) and base (R K,).
         """
-        in_left = np.einsum("kn,kn->k", self.units, left)
-        in_missing = np.zeros_like(in_left) if missing is None else np.einsum("kn,kn->k", self.units, missing)
-        branches = np.array([in_left, self.units.sum(axis=1) - in_left - in_missing, in_missing])
-        sums: Floats = np.ldexp(branches, base - self.exponents)
+        units, total = self.units.reshape(-1, *left.shape), self.units.sum(axis=1)
+        in_left = np.einsum("rkn,kn->rk", units, left).ravel()
+        in_missing = np.zeros_like(total) if missing is None else np.einsum("rkn,kn->rk", units, missing).ravel()
+        sums: Floats = np.ldexp(np.array([in_left, total - in_left - in_missing, in_missing]), base - self.exponents)
         return sums
 
 

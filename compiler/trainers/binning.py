@@ -31,7 +31,7 @@ class SplitSums:
 
     columns: NDArray[np.intp]  # (c,) ascending
     left: Floats  # (c, R, B) rows with a value in a bin or below it
-    missing: Floats  # (c, R)
+    missing: Floats | None  # (c, R); None: no value is missing
     is_split: NDArray[np.bool_]  # (c, B) some value lies above the bin
 
 
@@ -41,6 +41,7 @@ class BinnedColumn:
 
     bins: NDArray[np.bool_] | NDArray[np.int32]
     edges: Floats
+    lacks: bool = False  # some values are missing
 
     @property
     def missing(self) -> NDArray[np.bool_]:
@@ -85,25 +86,24 @@ class ManyValued:
     def __init__(self, columns: dict[int, BinnedColumn]) -> None:
         self.columns = np.array([*columns], dtype=np.intp)
         self._binned = [*columns.values()]
-        self._batches: list[tuple[slice, int, csc_array]] = []
+        self._batches: list[tuple[slice, NDArray[np.bool_], bool, csc_array]] = []
 
     def sums(self, by_row: Floats) -> Iterator[SplitSums]:
         """Yield the sums of `by_row` (n, R), R even, a batch of columns at a time."""
         summands = by_row.shape[1]
         if not self._batches:
-            widths = [len(column.edges) + 2 for column in self._binned]
-            for batch, width in _batches(widths, summands):
-                cells = (np.where(column.missing, np.int32(width - 1), column.bins) for column in self._binned[batch])
-                self._batches.append((batch, width, _one_hot(cells, width)))
-        for batch, width, one_hot in self._batches:
-            histogram = (one_hot @ by_row).reshape(-1, width, summands)
+            for batch, width in _batches([len(column.edges) + 2 for column in self._binned], summands):
+                binned = self._binned[batch]
+                cells = (np.where(column.missing, np.int32(width - 1), column.bins) for column in binned)
+                is_split = np.arange(width - 2) < np.array([[len(column.edges)] for column in binned])
+                lacks = any(column.lacks for column in binned)
+                self._batches.append((batch, is_split, lacks, _one_hot(cells, width)))
+        for batch, is_split, lacks, one_hot in self._batches:
+            histogram = (one_hot @ by_row).reshape(len(is_split), -1, summands)
             # Two at a time, as complex numbers: numpy's cumsum processes one element after the other.
-            left = np.cumsum(histogram[:, :-1].view(np.complex128), axis=1).view(np.float64)
-            splits = np.array([len(column.edges) for column in self._binned[batch]])
-            is_split = np.arange(width - 1) < splits[:, np.newaxis]
-            yield SplitSums(
-                self.columns[batch], np.ascontiguousarray(left.transpose(0, 2, 1)), histogram[:, -1], is_split
-            )
+            left = np.cumsum(histogram[:, :-2].view(np.complex128), axis=1).view(np.float64)
+            missing = histogram[:, -1] if lacks else None
+            yield SplitSums(self.columns[batch], np.ascontiguousarray(left.transpose(0, 2, 1)), missing, is_split)
 
 
 def _batches(widths: Sequence[int], n_summands: int) -> Iterator[tuple[slice, int]]:
@@ -193,7 +193,7 @@ def _bin(numbers: Floats, max_bins: int | None, weights: Floats | None = None) -
         kept = _even(heavy[present], max_bins)
         edges = edges[kept]
         bins = np.where(np.isnan(numbers), len(edges) + 1, np.searchsorted(kept, bins))
-    return BinnedColumn(bins.astype(np.int32), edges)
+    return BinnedColumn(bins.astype(np.int32), edges, not present.all())
 
 
 def _even(counts: NDArray[np.intp] | Floats, bins: int) -> NDArray[np.intp]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary import Floats, add_exactly, softmax_and_loss
+from ..elementary import Floats, add_exactly, softmax, softmax_and_loss
 from ..workers import check_memory
 from .base import BoostingError, Number, Report, Setting, Trainer, check_rows
 from .binning import bin_columns
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 # Ties are counted on a grid whose units grow with the square of z_max: far above this, all stumps would tie.
 LARGEST_Z_MAX = 100.0
-# Close to 32 MiB, the largest value that glibc respects.
-_LARGE_BYTES = 31 << 20
 TIES = ("first", "least-used")
 # Far below this, all scores of a hundred rounds would lie within the tolerance of a tie (tables.TIE).
 SMALLEST_SHRINKAGE = 1e-6
@@ -42,6 +40,7 @@ def boost(
     max_bins: int | None = None,
     ties: str = "first",
     on_round: Callable[[int, int], None] | None = None,
+    with_losses: bool = True,
 ) -> tuple[Stumps, tuple[float, ...]]:
     """Train `rounds` rounds on X (n, d) numbers (NaN: missing), labels (n,) in 0..n_classes-1, weights (n,) >= 0.
 
@@ -51,7 +50,7 @@ def boost(
     that the fewest stumps have used so far ("least-used"). `on_round(done, rounds)` is called after every round.
 
     Return the ensemble, and the losses before the first round and after every round: the mean of -ln P(true class).
-    Raises BoostingError.
+    They take a sixth of the time; without `with_losses`, they are computed for a tolerance only. Raises BoostingError.
     """
     _check_options(rounds, shrinkage, z_max, tolerance, max_bins, ties)
     check_rows(X, labels, n_classes, weights)
@@ -60,12 +59,18 @@ def boost(
         weights = np.ldexp(weights, -np.frexp(weights.max())[1])
     binned = bin_columns(X, max_bins)
     check_memory(len(X), n_classes, BoostingError, len(binned.two.columns), len(binned.many.columns))
-    # glibc returns freed memory above twice the largest array ever freed to the system, and faults it in again.
-    np.empty(_LARGE_BYTES, dtype=np.uint8)
     member = labels == np.arange(n_classes)[:, np.newaxis]
     scores = carry = np.zeros((n_classes, len(X)))
-    probability, loss = softmax_and_loss(scores, labels, weights)
-    losses = [loss]
+    losses: list[float] = []
+
+    def shares(scores: Floats) -> Floats:
+        if not with_losses and tolerance is None:
+            return softmax(scores)
+        probability, loss = softmax_and_loss(scores, labels, weights)
+        losses.append(loss)
+        return probability
+
+    probability = shares(scores)
     used = np.zeros(X.shape[1], dtype=np.int64) if ties == "least-used" else None
     fitted: list[tuple[NDArray[np.int32], Floats, Floats]] = []
     stopped = False
@@ -75,8 +80,7 @@ def boost(
         # Drop the outputs: with a million rows they would take a hundred megabytes a round.
         fitted.append((stumps.columns, stumps.thresholds, stumps.values))
         scores, carry = add_exactly(scores, carry, centred(stumps.outputs, shrinkage))
-        probability, loss = softmax_and_loss(scores + carry, labels, weights)
-        losses.append(loss)
+        probability = shares(scores + carry)
         stopped = tolerance is not None and abs(losses[-2] - losses[-1]) < tolerance
         if on_round is not None:
             on_round(len(fitted), rounds)
@@ -88,11 +92,13 @@ def weights_and_responses(
 ) -> tuple[Floats, Floats]:
     """Return w and w z (K, n) for P (K, n): z = 1/P or -1/(1 - P) within +-z_max, w z = Y - P."""
     complement = 1.0 - probability
-    own = np.where(member, probability, complement)
-    other = np.where(member, complement, probability)  # |Y - P|
-    sizes = other if row_weights is None else other * row_weights
+    responses = np.where(member, complement, -probability)
+    if row_weights is not None:
+        responses *= row_weights
     # |z| = min(1/own, z_max), so w = |Y - P| / |z| = |Y - P| * max(own, 1/z_max): no division, hence none by zero.
-    return sizes * np.maximum(own, 1.0 / z_max), np.where(member, sizes, -sizes)
+    weights = np.maximum(np.where(member, probability, complement), 1.0 / z_max)
+    weights *= np.abs(responses)
+    return weights, responses
 
 
 def _stack(
@@ -156,7 +162,8 @@ class LogitBoost(Trainer):
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> Stumps:
         """Return the ensemble. Raises BoostingError for settings that make no sense."""
-        return boost(samples.inputs, samples.labels, samples.n_classes, **settings, on_round=report)[0]
+        given = {**settings, "on_round": report, "with_losses": False}
+        return boost(samples.inputs, samples.labels, samples.n_classes, **given)[0]
 
     def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> tuple[Stumps, ...]:
         """Return the ensembles of the first rounds, cut from the longest training."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary import Floats, add_exactly, add_up, on_grids
+from ..elementary import Floats, OnGrid, add_exactly, add_up, on_grids
 from .binning import Binned, SplitSums
 
 # A branch with less than this share of its class's weight counts as empty. This is at most 2^13 of the 2^50 to 2^51
@@ -85,7 +85,10 @@ def centred(outputs: Floats, shrinkage: float) -> Floats:
     """
     k = len(outputs)
     g = outputs * shrinkage
-    return (g - add_up(g) / k) * (k - 1) / k
+    g -= add_up(g) / k
+    g *= k - 1
+    g /= k
+    return g
 
 
 def spread(outputs: Floats, n_classes: int, shrinkage: float) -> tuple[Floats, Floats]:
@@ -102,20 +105,19 @@ class Targets:
 
     def __init__(self, weights: Floats, responses: Floats) -> None:
         """Put both on grids: coarse ones to compare stumps, and the remainders on fine ones for branch values."""
-        self.weights, self._fine_weights = on_grids(weights)
-        self.responses, self._fine_responses = on_grids(responses)
+        K = len(weights)
+        self.both, self._fine = on_grids(np.concatenate([weights, responses]))
+        self.weights = OnGrid(self.both.units[:K], self.both.exponents[:K])
+        self.responses = OnGrid(self.both.units[K:], self.both.exponents[K:])
 
     def branch_sums(self, left: Floats, missing: Floats | None) -> tuple[Floats, Floats]:
         """Return sum w and sum w z (3, K) over the rows left, right and missing, in grid units of the weights.
 
         Each is within two roundings of the exact value on the grids.
         """
-        base = self.weights.exponents
-        weight, response = (
-            coarse.branch_sums(left, missing, base) + fine.branch_sums(left, missing, base)
-            for coarse, fine in ((self.weights, self._fine_weights), (self.responses, self._fine_responses))
-        )
-        return weight, response
+        base = np.tile(self.weights.exponents, 2)
+        sums = self.both.branch_sums(left, missing, base) + self._fine.branch_sums(left, missing, base)
+        return sums[:, : len(left)], sums[:, len(left) :]
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,9 +137,9 @@ def fit_stumps(binned: Binned, targets: Targets, z_max: float, used: NDArray[np.
     """
     columns, splits = _best_splits(binned, targets, _tie_bound(targets, z_max), used)
     chosen = [(binned.columns[column], split) for column, split in zip(columns.tolist(), splits.tolist(), strict=True)]
-    left = np.array([column.bins <= split for column, split in chosen])
-    absent = np.array([column.missing for column, _ in chosen])
-    missing = absent if absent.any() else None
+    # A column of two values has bits for bins, and one split.
+    left = np.array([~column.bins if column.bins.dtype == bool else column.bins <= split for column, split in chosen])
+    missing = np.array([column.missing for column, _ in chosen]) if any(column.lacks for column, _ in chosen) else None
     values = _branch_values(targets, left, missing, z_max)
     outputs = np.where(left, values[:, :1], values[:, 1:2])
     if missing is not None:
@@ -170,10 +172,8 @@ def _best_splits(
     binned: Binned, targets: Targets, tie_bound: Floats, used: NDArray[np.int64] | None
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the column and split (K,) that explain most, for each class; ties go to the lowest."""
-    n_classes, n = targets.weights.units.shape
-    by_row = np.empty((n, 2 * n_classes))
-    by_row[:, :n_classes], by_row[:, n_classes:] = targets.weights.units.T, targets.responses.units.T
-    totals = by_row.sum(axis=0)
+    n_classes = len(tie_bound)
+    by_row, totals = np.ascontiguousarray(targets.both.units.T), targets.both.units.sum(axis=1)
     # Nothing is explained for a class without weight, where at most some responses have not underflown.
     least = np.where(totals[:n_classes] > 0, totals[:n_classes] * EMPTY_SHARE, np.inf)
     explained = np.full((binned.n_columns, n_classes), -np.inf)
@@ -207,11 +207,13 @@ def _explained(sums: SplitSums, totals: Floats, least: Floats) -> Floats:
     """Return (c, K, B) what the splits of some columns explain; -inf where there is no split."""
     K = least.size
     right = totals[:, np.newaxis] - sums.left
-    right -= sums.missing[..., np.newaxis]
+    if sums.missing is not None:
+        right -= sums.missing[..., np.newaxis]
     lightest = least[:, np.newaxis]
     parts = _share(sums.left[:, :K], sums.left[:, K:], lightest)
     parts += _share(right[:, :K], right[:, K:], lightest)
-    parts += _shares(sums.missing, least)[..., np.newaxis]
+    if sums.missing is not None:
+        parts += _shares(sums.missing, least)[..., np.newaxis]
     np.copyto(parts, -np.inf, where=~sums.is_split[:, np.newaxis])
     return parts
 

@@ -41,7 +41,8 @@ def sums_of(binned: Binned, summands: np.ndarray) -> Iterator[tuple[int, np.ndar
             yield column, sums[np.newaxis], np.zeros(summands.shape[1])
     for batch in binned.many.sums(summands):
         for at, column in enumerate(batch.columns.tolist()):
-            yield column, batch.left[at].T[batch.is_split[at]], batch.missing[at]
+            missing = np.zeros(summands.shape[1]) if batch.missing is None else batch.missing[at]
+            yield column, batch.left[at].T[batch.is_split[at]], missing
 
 
 @given(MATRICES)
