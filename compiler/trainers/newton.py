@@ -17,6 +17,8 @@ mark in place of bits.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import blake2b
+from pickle import dumps
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -126,6 +128,11 @@ def columns_of(
     return columns
 
 
+# The last minima, by the digests of their fits: trainers share fits, and rejection repeats those of inner folds.
+MINIMA: dict[bytes, Floats] = {}
+_MOST_MINIMA = 64
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Point:
     """Rows W (r, K), with their probabilities (n, K), loss and gradient (r, K)."""
@@ -180,10 +187,25 @@ class Fit:
             self._stiffness[first:last] += between * np.add.outer(*neighbours).reshape(-1, 1)
 
     def minimum(self, tolerance: float, near: Floats | None = None) -> Floats:
-        """Return the rows at which no derivative exceeds `tolerance` times the total weight of the frames.
+        """Return the rows at which no derivative exceeds `tolerance` times the total weight of the frames, read-only.
 
         near  starting values for the first of the rows
         """
+        asked = self._digest(tolerance, near)
+        if asked not in MINIMA:
+            if len(MINIMA) == _MOST_MINIMA:
+                del MINIMA[next(iter(MINIMA))]
+            MINIMA[asked] = self._searched(tolerance, near)
+            MINIMA[asked].setflags(write=False)
+        return MINIMA[asked]
+
+    def _digest(self, *given: object) -> bytes:
+        """Return a digest of all that the minimum depends on."""
+        design = [part for each in (self._cells, self._shared) for part in (each.data, each.indices, each.indptr)]
+        targets = self._labels, self._member.shape, self._weights, self._known
+        return blake2b(dumps((design, targets, self._pull, self._joint, self._grids, given))).digest()
+
+    def _searched(self, tolerance: float, near: Floats | None) -> Floats:
         rows = np.zeros((len(self._pull), self._member.shape[1]))
         if near is not None:
             rows[: len(near)] = near

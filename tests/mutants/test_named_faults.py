@@ -28,15 +28,15 @@ FAULTS = (
     Fault(
         "the working response has the other sign",
         "compiler/trainers/logitboost.py",
-        "np.where(member, sizes, -sizes)",
-        "np.where(member, -sizes, sizes)",
+        "np.where(member, complement, -probability)",
+        "np.where(member, -complement, probability)",
         "tests/compiler/boosting/test_boost.py",
     ),
     Fault(
         "working responses are not clamped",
         "compiler/trainers/logitboost.py",
-        "sizes * np.maximum(own, 1.0 / z_max)",
-        "sizes * own",
+        "np.maximum(np.where(member, probability, complement), 1.0 / z_max)",
+        "np.where(member, probability, complement)",
         "tests/stability/test_catalogue.py::test_a_case_holds_quickly[targets]",
     ),
     Fault(
@@ -70,8 +70,8 @@ FAULTS = (
     Fault(
         "the centring factor (K - 1)/K is missing",
         "compiler/trainers/stumps.py",
-        "(g - add_up(g) / k) * (k - 1) / k",
-        "g - add_up(g) / k",
+        "g *= k - 1\n    g /= k",
+        "",
         "tests/stability/test_catalogue.py::test_a_case_holds_quickly[scoretables]",
     ),
     Fault(
