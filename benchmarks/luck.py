@@ -19,13 +19,13 @@ import numpy as np
 
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.cache import Cache, Store
-from thenar.compiler.frontier.designs import best_designs, corrected, designs, lucks
-from thenar.compiler.frontier.finalists import evaluate_finalists, finalists, screen
+from thenar.compiler.frontier.designs import best_designs, designs_of, lucks
+from thenar.compiler.frontier.finalists import evaluate_finalists, screen, select_finalists
 from thenar.compiler.frontier.points import By
-from thenar.compiler.frontier.price import Equipment, equipment_for
+from thenar.compiler.frontier.price import ClassifyModel, Equipment
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, Survey
-from thenar.compiler.frontier.wirings import wirings
+from thenar.compiler.frontier.wirings import overhead_of, wirings
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.merging import merge
 from thenar.compiler.samples import Samples
@@ -88,24 +88,23 @@ def played(asked: tuple[int, GraspSet | None, Equipment]) -> Case:
         asking = Cache(store, lambda _done, _all: None, jobs=1)
         survey = Survey(grasp_set, SCENE, samples, None, search, cuts, equipment, asking)
         screened, _ = screen(survey)
-        closes = evaluate_finalists(survey, finalists(screened, [], search.finalists))
-    several = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
-    fronts = best_designs(several)
-    luck = lucks(fronts, several, screened, cuts, seed)
+        finalists = evaluate_finalists(survey, select_finalists(screened, [], search.finalists))
+    designs = [design for finalist in finalists for design in designs_of(finalist)]
+    luck = lucks(designs, screened, survey)
+    by_time, _ = best_designs(designs)
     fresh = recorded(seed, more=MORE) if others is None else others
-    best = [design for design in fronts[0] if design.frame.us <= BUDGET_US or design is fronts[0][0]][-1]
+    best = [design for design in by_time if design.frame.us <= BUDGET_US or design is by_time[0]][-1]
     tables = tables_from_bytes(best.tables.content)
-    columns = [element.column for element in best.close.screened.elements]
+    columns = [element.column for element in best.finalist.screened.elements]
     predicted = tables.scores(fresh.switches[:, columns], fresh.codes[:, : tables.n_joints]).argmax(axis=1)
     truth = np.array([samples.grasps.index(grasp) for grasp in fresh.grasps.tolist()])
     lucky = luck[best.judged]
-    return Case(corrected(best.judged.rate, lucky), lucky, float((predicted == truth).mean()))
+    return Case(best.judged.rate.corrected(lucky), lucky, float((predicted == truth).mean()))
 
 
 def cases(seeds: Iterable[int], by: By, jobs: int) -> list[Case]:
     """Return the cases of these seeds, in any order."""
-    with tempfile.TemporaryDirectory() as folder, Store(Path(folder) / "store", "") as store:
-        equipment = equipment_for(TARGET, wirings(None, TARGET), Cache(store, lambda _done, _all: None, jobs=1))
+    equipment = Equipment(ClassifyModel(TARGET), wirings(None, TARGET), overhead_of(TARGET))
     others = strangers() if by == "new subject" else None
     asked = [(seed, others, equipment) for seed in seeds]
     found: list[Case] = []

@@ -170,7 +170,7 @@ def print_frontier(frontier: "Frontier") -> None:
     grid = table(("point", elements, *_WORDS, *numbers), ("point", elements, *numbers), title)
     for point in frontier.points:
         setting = point.setting
-        trained = setting.rounds if words.is_usual(setting) else words.training_of(setting)
+        trained = setting.rounds if setting.usual else words.training_of(setting)
         grid.add_row(
             *(str(point.number), str(len(point.switches)), setting.inputs, words.way_of(setting)),
             *(f"{trained}, {setting.width}", words.wiring_of(setting), setting.decision),

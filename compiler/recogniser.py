@@ -245,17 +245,17 @@ def _check_model(model: Model, kept: Samples, training: Training) -> None:
         raise CompileError(f"trainer {training.trainer!r} returned an invalid model that {fault}: fix the trainer")
 
 
-def check_inputs(types: int, switches: int, joints: int, raises: type[ThenarError]) -> None:
+def check_inputs(n_classes: int, elements: int, joints: int, raises: type[ThenarError]) -> None:
     """Raise `raises` if no build has room for these numbers of switches and joints."""
-    if switches > MAX_SWITCHES:
-        raise raises(f"{switches} switches, a build has at most {MAX_SWITCHES}: keep fewer")
+    if elements > MAX_SWITCHES:
+        raise raises(f"{elements} switches, a build has at most {MAX_SWITCHES}: keep fewer")
     if joints > MAX_JOINTS:
         raise raises(f"{joints} joints, a build has at most {MAX_JOINTS}: import fewer, or use switches alone")
-    least = payload_bytes(types, switches, [0] * joints)
+    least = payload_bytes(n_classes, elements, [0] * joints)
     if least > MAX_BYTES:
         raise raises(
-            f"tables of {types} grasp types, {switches} switches and {joints} joints need {least} bytes at least, a "
-            f"build has at most {MAX_BYTES}: keep fewer switches"
+            f"tables of {n_classes} grasp types, {elements} switches and {joints} joints need {least} bytes at least, "
+            f"a build has at most {MAX_BYTES}: keep fewer switches"
         )
 
 

@@ -214,12 +214,12 @@ def _background(parent: int, there: Any, work: Callable[[Task], Result], task: T
     there.send(result)
 
 
-def check_memory(rows: int, types: int, raises: type[ThenarError], switches: int = 0, joints: int = 0) -> None:
+def check_memory(rows: int, n_classes: int, raises: type[ThenarError], switches: int = 0, joints: int = 0) -> None:
     """Raise `raises` if training on `rows` rows needs more memory than this machine has."""
-    a_row = _BYTES_A_TYPE_AND_ROW * types + _BYTES_A_SWITCH_AND_ROW * switches + _BYTES_A_JOINT_AND_ROW * joints
+    a_row = _BYTES_A_TYPE_AND_ROW * n_classes + _BYTES_A_SWITCH_AND_ROW * switches + _BYTES_A_JOINT_AND_ROW * joints
     needed, there = rows * a_row, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed > there:
         raise raises(
-            f"training on {rows} rows of {types} grasp types needs some {needed / 1e9:.1f} GB of memory, this machine "
-            f"has {there / 1e9:.1f}: take fewer rows or columns"
+            f"training on {rows} rows of {n_classes} grasp types needs some {needed / 1e9:.1f} GB of memory, this "
+            f"machine has {there / 1e9:.1f}: take fewer rows or columns"
         )

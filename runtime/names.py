@@ -30,7 +30,7 @@ def nearest(name: str, names: Sequence[str]) -> str:
     near = difflib.get_close_matches(name[:LONGEST_SHOWN], names[:MOST_COMPARED], n=3, cutoff=0.5)
     if near:
         return f" (did you mean {' or '.join(map(repr, near))}?)"
-    return f" (there are: {list_names([shortened(known) for known in names[:SHOWN]], len(names))})"
+    return f" (there are: {list_names([*map(shortened, names[:SHOWN])], len(names))})"
 
 
 def list_names(names: Sequence[str], count: int | None = None) -> str:
@@ -48,7 +48,7 @@ def level_name(taxel: str, code: int) -> str:
     return f"{taxel}>{code}"
 
 
-def taxel_and_code(level: str) -> tuple[str, int] | None:
+def taxel_and_code(name: str) -> tuple[str, int] | None:
     """Return the taxel and the code in the name of a level, as made by `level_name`, or None for other names."""
-    taxel, _, code = level.rpartition(">")
+    taxel, _, code = name.rpartition(">")
     return (taxel, int(code)) if taxel and code.isascii() and code.isdecimal() and len(code) <= _CODE_DIGITS else None

@@ -45,16 +45,16 @@ def samples_of(grasp_set: GraspSet, options: Recipe) -> Samples:
     if (types := len(np.unique(grasp_set.labels[~grasp_set.is_none]))) < 2:
         raise CompileError(f"the recordings hold {types} grasp type(s): there is nothing to distinguish")
     samples = Samples.of(grasp_set, options.inputs)
-    classes, joints = samples.n_classes, samples.codes.shape[1]
+    joints = samples.codes.shape[1]
     if options.keep_joints is not None and not joints:
         raise CompileError("the recordings have no joints to choose from: leave ``keep_joints`` out")
     elements, joints = min(options.keep or 0, len(grasp_set.element_names)), min(options.keep_joints or joints, joints)
-    check_inputs(classes, elements, joints, CompileError)
-    check_memory(len(samples.codes), classes, CompileError)
+    check_inputs(samples.n_classes, elements, joints, CompileError)
+    check_memory(len(samples.codes), samples.n_classes, CompileError)
     rounds = max(int(training.settings.get("rounds") or 0) for training in Training.candidates(options))
-    if rounds * classes > MAX_STUMPS:
+    if (stumps := rounds * samples.n_classes) > MAX_STUMPS:
         raise CompileError(
-            f"{rounds} rounds of {classes} grasp types are {rounds * classes} stumps; a build has at most "
+            f"{rounds} rounds of {samples.n_classes} grasp types are {stumps} stumps; a build has at most "
             f"{MAX_STUMPS}: boost for fewer rounds"
         )
     if options.folds:
@@ -96,9 +96,9 @@ def cuts_of(grasp_set: GraspSet, options: Recipe) -> tuple[Cut, ...]:
     if by == "session":
         for subject in np.unique(grasp_set.subjects).tolist():
             leave_one_out(grasp_set.sessions[grasp_set.subjects == subject], f"session of subject {subject}")
-    names = groups_of(grasp_set, by)
-    assert names is not None
-    return (Cut(OF[by], tuple(leave_groups_out(names, by)), names), pooled)
+    groups = groups_of(grasp_set, by)
+    assert groups is not None
+    return (Cut(OF[by], tuple(leave_groups_out(groups, by)), groups), pooled)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,7 +139,7 @@ def cross_validated(
     if not cuts:
         return None
     folds = [(place, fold) for place, cut in enumerate(cuts) for fold in cut.folds]
-    predicted = np.empty((len(cuts), len(samples.labels)), np.intp)
+    classes = np.empty((len(cuts), len(samples.labels)), np.intp)
     scores = np.empty((len(samples.labels), samples.n_classes))
     knows = [trained_with_rest(samples, cut) for cut in cuts]
     # Segments are learned from folds that know rows in which nothing is held, if there are any.
@@ -148,19 +148,18 @@ def cross_validated(
     for done, (place, fold, fold_scores) in enumerate(
         in_workers(_done, tasks, little(len(folds) * len(samples.labels) * (options.rounds or USUAL_ROUNDS), jobs)), 1
     ):
-        predicted[place, fold.test] = fold_scores.argmax(axis=1)
+        classes[place, fold.test] = fold_scores.argmax(axis=1)
         if place == scored:
             scores[fold.test] = fold_scores[:, : samples.n_classes]
         if report is not None:
             report(done, len(folds))
-    refuses = not samples.has_none and bool((predicted == samples.n_classes).any())
+    refuses = not samples.has_none and bool((classes == samples.n_classes).any())
     confusion = np.zeros((samples.n_classes + refuses,) * 2, dtype=np.intp)
-    np.add.at(confusion, (samples.labels[knows[0]], predicted[0, knows[0]]), 1)
-    measured, seed = list(zip(cuts, predicted, strict=True)), options.seed
-    rates = [rate for cut, classes in measured for rate in rates_of("nested", samples, classes, seed, cut)]
-    detection = [
-        detected for cut, classes in measured for detected in detection_of("nested", samples, classes, seed, cut)
-    ]
+    np.add.at(confusion, (samples.labels[knows[0]], classes[0, knows[0]]), 1)
+    rates, detection = list[Recognised](), list[Detected]()
+    for cut, predicted in zip(cuts, classes, strict=True):
+        rates += rates_of("nested", samples, predicted, options.seed, cut)
+        detection += detection_of("nested", samples, predicted, options.seed, cut)
     return Tested(tuple(rates), tuple(detection), confusion, scores)
 
 
@@ -231,10 +230,13 @@ def detection_of(
     none = samples.is_none
     if not (none.any() or (predicted == samples.n_types).any()):
         return ()
-    detected = (predicted == samples.n_types).astype(np.intp)
+    predicted = (predicted == samples.n_types).astype(np.intp)
     knows = np.ones(len(none), bool) if cut is None else trained_with_rest(samples, cut)
     grasps, empty = (
-        {rate.unit: rate for rate in _rates(protocol, samples, detected, none.astype(np.intp), rows & knows, seed, cut)}
+        {
+            rate.unit: rate
+            for rate in _rates(protocol, samples, predicted, none.astype(np.intp), rows & knows, seed, cut)
+        }
         for rows in (~none, none)
     )
     units = [unit for unit in UNITS if unit in grasps or unit in empty]
@@ -245,7 +247,7 @@ def _rates(
     protocol: Protocol,
     samples: Samples,
     predicted: Classes,
-    truth: Classes,
+    labels: Classes,
     rows: NDArray[np.bool_],
     seed: int,
     cut: Cut | None,
@@ -255,7 +257,7 @@ def _rates(
     if not rows.any():
         return ()
     groups = None if cut.groups is None else cut.groups[rows]
-    rates = rated(predicted[rows], truth[rows], samples.trials[rows], of=cut.of, groups=groups)
+    rates = rated(predicted[rows], labels[rows], samples.trials[rows], of=cut.of, groups=groups)
     return tuple(
         Recognised(
             protocol=protocol,

@@ -80,12 +80,12 @@ def weka_folds(labels: ArrayLike, n_folds: int, seed: int) -> list[Fold]:
     A class with fewer rows than folds is missing from some test parts, as in Weka. Raises EvaluationError for fewer
     than two folds, or fewer rows than folds.
     """
-    values = np.asarray(labels).tolist()
-    check_cut(len(values), n_folds, "rows")
+    labels = np.asarray(labels)
+    check_cut(len(labels), n_folds, "rows")
     random = JavaRandom(seed)
-    order = list(range(len(values)))
+    order = list(range(len(labels)))
     random.shuffle(order)
-    grouped = _grouped(order, values)
+    grouped = _grouped(order, labels.tolist())
     order = [row for start in range(n_folds) for row in grouped[start::n_folds]]
     return [_cut(order, n_folds, fold, random) for fold in range(n_folds)]
 
@@ -98,8 +98,8 @@ def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed:
     grasp, since rows without one have the highest label. Raises EvaluationError as `weka_folds` does.
     """
     _, first, number = np.unique(trials, return_index=True, return_inverse=True)
-    values = np.asarray(labels)[first]
-    np.minimum.at(values, number, labels)
+    smallest = np.asarray(labels)[first]
+    np.minimum.at(smallest, number, labels)
     order = np.argsort(first)
     number = np.argsort(order)[number]
     rows, starts = np.argsort(number, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(number))])
@@ -108,7 +108,8 @@ def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed:
     def expanded(chosen: Rows) -> Rows:
         return np.concatenate([rows[starts[trial] : starts[trial + 1]] for trial in chosen.tolist()])
 
-    folds = weka_folds(values[order], n_folds, seed)
+    labels = smallest[order]
+    folds = weka_folds(labels, n_folds, seed)
     return [Fold(expanded(fold.train), expanded(fold.test), fold.name) for fold in folds]
 
 
@@ -144,15 +145,15 @@ def _cut(order: list[int], n_folds: int, fold: int, random: JavaRandom) -> Fold:
     return Fold(np.array(order, dtype=np.intp), np.array(test, dtype=np.intp), str(fold + 1))
 
 
-def leave_one_out(groups: NDArray[np.str_], what: str) -> list[Fold]:
+def leave_one_out(groups: NDArray[np.str_], by: str) -> list[Fold]:
     """Return one fold for each name in groups (n,): test on its rows, train on all others; in the order of names.
 
-    `what` is the word for a group ("subject", "object"). Raises EvaluationError if there is only one.
+    `by` is the word for a group ("subject", "object"). Raises EvaluationError if there is only one.
     """
     names = np.unique(groups).tolist()
     if len(names) < 2:
         raise EvaluationError(
-            f"leaving one {what} out needs two or more; all {len(groups)} rows are of {what} {', '.join(names)!r}"
+            f"leaving one {by} out needs two or more; all {len(groups)} rows are of {by} {', '.join(names)!r}"
         )
     return [_fold(groups == name, name) for name in names]
 
@@ -161,11 +162,12 @@ def leave_one_out(groups: NDArray[np.str_], what: str) -> list[Fold]:
 _MOST_GROUPS = 10
 
 
-def leave_groups_out(names: NDArray[np.generic], what: str, n_folds: int = _MOST_GROUPS) -> list[Fold]:
-    """Return the folds of `leave_one_out`; for more than `n_folds` names in names (n,), that many of several names."""
-    several, number = np.unique(names, return_inverse=True)
-    groups = names if len(several) <= n_folds else number % n_folds
-    return leave_one_out(groups.astype(np.str_), what)
+def leave_groups_out(groups: NDArray[np.generic], by: str, n_folds: int = _MOST_GROUPS) -> list[Fold]:
+    """Return the folds of `leave_one_out`; for more than `n_folds` names in groups (n,), that many of several names."""
+    names, number = np.unique(groups, return_inverse=True)
+    if len(names) > n_folds:
+        groups = number % n_folds
+    return leave_one_out(groups.astype(np.str_), by)
 
 
 def block_folds(trials: NDArray[np.int64], n_folds: int) -> list[Fold]:
@@ -263,13 +265,13 @@ def populations_of(
     return tuple(several)
 
 
-def groups_of(grasp_set: GraspSet, scheme: Scheme) -> NDArray[np.str_] | None:
+def groups_of(grasp_set: GraspSet, by: Scheme) -> NDArray[np.str_] | None:
     """Return the group (n,) that each row is left out with, None if that is its trial; sessions are per subject."""
-    if scheme == "session":
+    if by == "session":
         return np.char.add(np.char.add(grasp_set.subjects, "\n"), grasp_set.sessions)
-    if scheme == "object":
+    if by == "object":
         return grasp_set.objects
-    return grasp_set.subjects if scheme == "subject" else None
+    return grasp_set.subjects if by == "subject" else None
 
 
 ProtocolName = Literal["paper", "nested"]

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,14 +10,14 @@ from msgspec.structs import replace as changed_to
 
 from thenar.runtime.recipe import Recipe
 
-from ..evaluation.rates import Draws, Rate
+from ..evaluation.rates import Draws
 from ..trainers.base import TRAINERS, Training
 from .finalists import EvaluatedFinalist, Screened
 from .latency import POLICIES
 from .points import DecisionKind, FrontierPoint, Latency, PointSetting, PointTime, front
 from .price import Classified, PricedTables
 from .search import placement_of
-from .survey import Cuts, Survey, TrialAccuracy
+from .survey import Survey, TrialAccuracy
 from .wirings import NO_TIME, ScanTimes
 
 
@@ -29,7 +29,7 @@ class Design:
     measured  time of classifying, simulated or measured; None: the model's estimate
     """
 
-    close: EvaluatedFinalist
+    finalist: EvaluatedFinalist
     tables: PricedTables
     classified: Classified
     wired: ScanTimes | None
@@ -39,7 +39,7 @@ class Design:
     @property
     def judged(self) -> TrialAccuracy:
         """The evaluation of these tables by which points are chosen."""
-        return self.close.tables[self.tables.recipe]
+        return self.finalist.tables[self.tables.recipe]
 
     @property
     def rate(self) -> float:
@@ -49,7 +49,7 @@ class Design:
     @property
     def n_switches(self) -> int:
         """The number of switches that are read."""
-        return len(self.close.screened.elements)
+        return len(self.finalist.screened.elements)
 
     @property
     def scan(self) -> PointTime:
@@ -70,32 +70,26 @@ class Design:
 Latencies = Mapping[tuple[Design, DecisionKind], Latency]
 
 
-def designs(close: EvaluatedFinalist, read: PointTime = NO_TIME) -> Iterator[Design]:
+def designs_of(finalist: EvaluatedFinalist, read: PointTime = NO_TIME) -> Iterator[Design]:
     """Yield all designs of a finalist, whose joints take `read`."""
-    for tables in close.priced:
+    for tables in finalist.priced:
         if tables.classified is not None:
-            scans = tables.scans if close.screened.elements else (None, *tables.scans)
-            yield from (Design(close, tables, tables.classified, scan, read) for scan in scans)
+            scans = tables.scans if finalist.screened.elements else (None, *tables.scans)
+            yield from (Design(finalist, tables, tables.classified, scan, read) for scan in scans)
 
 
-def best_designs(several: Sequence[Design]) -> tuple[list[Design], list[Design]]:
+def best_designs(designs: Sequence[Design]) -> tuple[list[Design], list[Design]]:
     """Return the designs on the front of accuracy against frame time, and those against the number of switches.
 
     Of equal designs, take the one with fewer chips, then fewer ports, less reading and less flash.
     """
-    several = sorted(several, key=_effort)
-    by_time = front(several, lambda design: design.frame.us, lambda design: design.rate)
-    several.sort(key=lambda design: design.frame.us)
-    return by_time, front(several, lambda design: design.n_switches, lambda design: design.rate)
+    designs = sorted(designs, key=_effort)
+    by_time = front(designs, lambda design: design.frame.us, lambda design: design.rate)
+    designs.sort(key=lambda design: design.frame.us)
+    return by_time, front(designs, lambda design: design.n_switches, lambda design: design.rate)
 
 
-def lucks(
-    fronts: tuple[Sequence[Design], Sequence[Design]],
-    several: Sequence[Design],
-    screened: Sequence[Screened],
-    cuts: Cuts,
-    seed: int,
-) -> dict[TrialAccuracy, float]:
+def lucks(designs: Sequence[Design], screened: Sequence[Screened], survey: Survey) -> dict[TrialAccuracy, float]:
     """Return the optimism of the accuracies of tables on the fronts of frame time and of the number of switches.
 
     A point is the best of everything cheaper than the next point of its front: tables of finalists, and placements that
@@ -103,25 +97,26 @@ def lucks(
     """
     # Not all tables were priced: those of the same shape take nearly the same time.
     quickest = dict[tuple[EvaluatedFinalist, Recipe], float]()
-    for design in several:
+    for design in designs:
         recipe = changed_to(design.tables.recipe, rounds=None)
-        quickest[design.close, recipe] = min(design.frame.us, quickest.get((design.close, recipe), np.inf))
-    closes = list(dict.fromkeys(design.close for design in several))
-    chosen = {close.screened.choice for close in closes}
+        quickest[design.finalist, recipe] = min(design.frame.us, quickest.get((design.finalist, recipe), np.inf))
+    finalists = list(dict.fromkeys(design.finalist for design in designs))
+    chosen = {finalist.screened.recipe for finalist in finalists}
     picked_from = [
-        (judged, us, len(close.screened.elements))
-        for close in closes
-        for recipe, judged in close.tables.items()
-        if (us := quickest.get((close, changed_to(recipe, rounds=None)))) is not None
+        (judged, us, len(finalist.screened.elements))
+        for finalist in finalists
+        for recipe, judged in finalist.tables.items()
+        if (us := quickest.get((finalist, changed_to(recipe, rounds=None)))) is not None
     ]
-    picked_from += [(one.judged, one.frame_us, len(one.elements)) for one in screened if one.choice not in chosen]
+    picked_from += [(one.judged, one.frame_us, len(one.elements)) for one in screened if one.recipe not in chosen]
     judged, *costs = zip(*picked_from, strict=True)
     most = max(each.repeats for each in judged)
     hits = np.array([each.hits * (most // each.repeats) for each in judged])
-    draws = Draws.of(hits, cuts.people if cuts.by == "new subject" else np.arange(hits.shape[1]), seed)
+    units = survey.cuts.people if survey.cuts.by == "new subject" else np.arange(hits.shape[1])
+    draws = Draws.of(hits, units, survey.search.seed)
     found: dict[TrialAccuracy, float] = {}
     prices: tuple[Callable[[Design], float], ...] = (lambda design: design.frame.us, lambda design: design.n_switches)
-    for best, price, cost in zip(fronts, prices, costs, strict=True):
+    for best, price, cost in zip(best_designs(designs), prices, costs, strict=True):
         beyond = [price(design) for design in best[1:]]
         for design, luck in zip(best, draws.luck(np.array(cost), [*beyond, np.inf]), strict=True):
             # As a share: the draws count hits in all repeats.
@@ -135,25 +130,24 @@ def _effort(design: Design) -> tuple[float, ...]:
 
 
 def points_of(
-    several: Sequence[Design], latencies: Latencies, luck: Mapping[TrialAccuracy, float], survey: Survey
+    designs: Sequence[Design], latencies: Latencies, luck: Mapping[TrialAccuracy, float], survey: Survey
 ) -> tuple[FrontierPoint, ...]:
     """Return the points on a front, numbered from the fastest frame on; `luck` is subtracted from each rate."""
-    fronts = _fronts(several, latencies)
-    ordered = sorted(several, key=lambda design: (design.frame.us, design.n_switches))
+    fronts = _fronts(designs, latencies)
+    ordered = sorted(designs, key=lambda design: (design.frame.us, design.n_switches))
     found = [(design, kind) for design in ordered for kind in POLICIES if fronts[design, kind]]
     points = []
     for number, (design, kind) in enumerate(found, 1):
-        wired, close, recipe = design.wired, design.close, design.tables.recipe
-        choice = close.screened.choice
+        wired, finalist, recipe = design.wired, design.finalist, design.finalist.screened.recipe
         points.append(
             FrontierPoint(
                 number=number,
-                setting=_setting(design, kind, survey.training(choice)),
-                switches=survey.names(choice),
-                rate=corrected(design.judged.rate, luck[design.judged]),
+                setting=_setting(design, kind, survey.training(recipe)),
+                switches=survey.names(recipe),
+                rate=design.judged.rate.corrected(luck[design.judged]),
                 luck=luck[design.judged],
-                frames=close.frames.get(recipe),
-                other_rate=close.other.get(recipe),
+                frames=finalist.frames.get(design.tables.recipe),
+                other_rate=finalist.other.get(design.tables.recipe),
                 scan=design.scan,
                 transfer=design.transfer,
                 classify=design.classify,
@@ -164,29 +158,22 @@ def points_of(
                 ports=0 if wired is None else wired.ports,
                 chips=0 if wired is None else wired.chips,
                 fronts=fronts[design, kind],
-                joints=survey.some_joints(choice),
+                joints=survey.some_joints(recipe),
             )
         )
     return tuple(points)
 
 
-def _fronts(several: Sequence[Design], latencies: Latencies) -> dict[tuple[Design, DecisionKind], tuple[str, ...]]:
+def _fronts(designs: Sequence[Design], latencies: Latencies) -> dict[tuple[Design, DecisionKind], tuple[str, ...]]:
     found: dict[tuple[Design, DecisionKind], tuple[str, ...]] = dict.fromkeys(latencies, ())
-    for name, best in zip(("frame", "switches"), best_designs(several), strict=True):
+    for name, best in zip(("frame", "switches"), best_designs(designs), strict=True):
         for design in best:
             found[design, "single"] += (name,)
     for kind in POLICIES:
-        waiting = ((latencies[design, kind].mean_us, design) for design in several)
+        waiting = ((latencies[design, kind].mean_us, design) for design in designs)
         for _, design in front(list(waiting), lambda pair: pair[0], lambda pair: pair[1].rate):
             found[design, kind] += ("latency",)
     return found
-
-
-def corrected(rate: Rate, luck: float) -> Rate:
-    """Return the rate of a selected point, corrected for selection. The upper end of its interval stays: the optimism
-    is an estimate, and models trained on all rows do a little better than those of the folds.
-    """
-    return replace(rate, mean=max(rate.mean - luck, 0.0), low=max(rate.low - luck, 0.0))
 
 
 def _setting(design: Design, kind: DecisionKind, training: Training) -> PointSetting:

@@ -1,4 +1,4 @@
-"""From choices to finalists: screen every placement, select those worth full evaluation, and evaluate all their rounds
+"""From recipes to finalists: screen every placement, select those worth full evaluation, and evaluate all their rounds
 and tables in all folds.
 """
 
@@ -19,7 +19,7 @@ from ..placement.methods.base import BEST, METHODS, PAPERS
 from .points import STEP, By, Curve, ReferencePoint, front
 from .price import PricedTables
 from .search import CURVE_SIZES, JOINTS, SHAPES, Search, placed, tabled
-from .survey import Cuts, FoldHits, Survey, TrialAccuracy
+from .survey import FoldHits, Survey, TrialAccuracy
 
 # The inputs that need a placement; without joints, only the second.
 ALL_INPUTS: tuple[Inputs, ...] = ("both", "switches")
@@ -38,9 +38,9 @@ _DEEPER = 0.002
 
 @dataclass(frozen=True, slots=True)
 class Screened:
-    """A choice after screening: its elements when chosen from all rows, its rate, its frame time (us)."""
+    """A recipe after screening: its elements when chosen from all rows, its rate, its frame time (us)."""
 
-    choice: Recipe
+    recipe: Recipe
     elements: Elements
     judged: TrialAccuracy
     frame_us: float
@@ -55,7 +55,7 @@ class Screened:
 class EvaluatedFinalist:
     """A finalist: its evaluation after every stage (by the ensemble) and with each of the tables; with the same tables,
     its accuracy on single frames (none: a trial has one), and on trials in the other folds (none: only one subject);
-    the costs of the tables worth building. The tables are those of recipes.
+    the costs of the tables worth building. The tables are those of recipes with rounds and a shape.
     """
 
     screened: Screened
@@ -69,88 +69,91 @@ class EvaluatedFinalist:
 def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     """Train every placement once, on the folds of one repeat, and price it in the fastest of its wirings.
 
-    Return the accuracy and frame time of every choice that can be built, with the first trainer; and the curves of all
+    Return the accuracy and frame time of every recipe that can be built, with the first trainer; and the curves of all
     methods, including the baselines.
     """
     search, cuts, trainer = survey.search, survey.cuts, survey.search.trainers[0]
     sizes = {levels: survey.size(levels) for levels in survey.levels}
-    n_elements, kinds = sizes[survey.levels[-1]], ALL_INPUTS if survey.inputs.n_joints else ALL_INPUTS[1:]
-    choices = [
+    most, kinds = sizes[survey.levels[-1]], ALL_INPUTS if survey.inputs.n_joints else ALL_INPUTS[1:]
+    recipes = [
         placed(method, number, trainer, inputs, levels)
-        for inputs in (kinds if n_elements else ())
-        for levels, size in sizes.items()
+        for inputs in (kinds if most else ())
+        for levels, n_elements in sizes.items()
         for method in search.methods
-        for number in METHODS[method].ladder(size)
+        for number in METHODS[method].ladder(n_elements)
     ]
     baselines = [
         placed(method, number, trainer, "switches", survey.levels[-1])
         for method in search.baselines
         for number in CURVE_SIZES
-        if number <= n_elements
+        if number <= most
     ]
-    survey.choose(choices, (cuts.everything, *cuts.screening))
+    survey.choose(recipes, (cuts.everything, *cuts.screening))
+    # Baselines are chosen within the folds only, and tune nothing.
     survey.choose(baselines, cuts.screening)
     # Drop placements that keep nothing. Joints alone need no placement.
-    choices = [choice for choice in choices if survey.elements(choice)]
-    choices += [Recipe(trainer=trainer, inputs="joints")] if survey.inputs.n_joints else []
-    rates = _rates(survey, choices, baselines)
-    methods = dict.fromkeys([*search.methods, *search.baselines]) if n_elements else ()
-    return _screened(survey, choices, rates), tuple(_curve(survey, method, rates) for method in methods)
+    recipes = [recipe for recipe in recipes if survey.elements(recipe)]
+    recipes += [Recipe(trainer=trainer, inputs="joints")] if survey.inputs.n_joints else []
+    survey.tune(recipes, (cuts.everything, *cuts.screening))
+    rates = _rates(survey, [*recipes, *baselines])
+    methods = dict.fromkeys([*search.methods, *search.baselines]) if most else ()
+    return _screened(survey, recipes, rates), tuple(_curve(survey, method, rates) for method in methods)
 
 
 def screen_fewer(survey: Survey, screened: Sequence[Screened]) -> tuple[Screened, ...]:
-    """Return the same choices, screened with fewer joints, if joints take time."""
+    """Return the same recipes, screened with fewer joints, if joints take time."""
     # Joints that take no time are all read.
     most = survey.inputs.n_joints if survey.equipment.records.each_us else 0
     numbers = [number for number in JOINTS if number < most]
-    choices = [changed_to(one.choice, keep_joints=number) for one in screened for number in numbers]
-    survey.choose_joints(choices, (survey.cuts.everything, *survey.cuts.screening))
-    return _screened(survey, choices, _rates(survey, choices))
+    recipes = [changed_to(one.recipe, keep_joints=number) for one in screened for number in numbers]
+    survey.choose_joints(recipes, (survey.cuts.everything, *survey.cuts.screening))
+    survey.tune(recipes, (survey.cuts.everything, *survey.cuts.screening))
+    return _screened(survey, recipes, _rates(survey, recipes))
 
 
 def screen_others(survey: Survey, screened: Sequence[Screened]) -> tuple[Screened, ...]:
-    """Return the same choices, screened with each of the other trainers."""
-    choices = [changed_to(one.choice, trainer=name) for name in survey.search.trainers[1:] for one in screened]
-    return _screened(survey, choices, _rates(survey, choices))
+    """Return the same recipes, screened with each of the other trainers."""
+    recipes = [changed_to(one.recipe, trainer=name) for name in survey.search.trainers[1:] for one in screened]
+    survey.tune(recipes, (survey.cuts.everything, *survey.cuts.screening))
+    return _screened(survey, recipes, _rates(survey, recipes))
 
 
-def _rates(survey: Survey, choices: Sequence[Recipe], baselines: Sequence[Recipe] = ()) -> dict[Recipe, TrialAccuracy]:
-    """Return the rates of choices and baselines; baselines choose within the folds only and tune nothing."""
-    cuts, several = survey.cuts, [*choices, *baselines]
-    survey.tune(choices, (cuts.everything, *cuts.screening))
+def _rates(survey: Survey, recipes: Sequence[Recipe]) -> dict[Recipe, TrialAccuracy]:
+    """Return the rates of recipes that were tuned before, after the rounds of screening."""
+    cuts = survey.cuts
     rounds = {name: survey.search.alone(name).screened for name in survey.search.trainers}
-    fits = survey.fit(several, cuts.screening, lambda choice: ((rounds[choice.trainer],), ()))
+    fits = survey.fit(recipes, cuts.screening, lambda recipe: ((rounds[recipe.trainer],), ()))
     return {
-        choice: cuts.judged(cuts.by, {fold: fits[choice, fold].stages[-1] for fold in cuts.screening})
-        for choice in several
+        recipe: cuts.judged(cuts.by, {fold: fits[recipe, fold].stages[-1] for fold in cuts.screening})
+        for recipe in recipes
     }
 
 
-def _screened(survey: Survey, choices: Sequence[Recipe], rates: Mapping[Recipe, TrialAccuracy]) -> tuple[Screened, ...]:
-    """Return the choices that can be built."""
+def _screened(survey: Survey, recipes: Sequence[Recipe], rates: Mapping[Recipe, TrialAccuracy]) -> tuple[Screened, ...]:
+    """Return the recipes that can be built."""
     most = len(survey.samples.labels)
     rows = np.linspace(0, most - 1, min(_FEW_ROWS, most)).astype(np.intp)
-    prices = survey.prices({choice: (tabled(choice, _ROUNDS),) for choice in choices}, rows)
+    prices = survey.prices({recipe: (tabled(recipe, _ROUNDS),) for recipe in recipes}, rows)
     screened = []
-    for choice, (priced,) in prices.items():
-        us = priced.fastest_us(survey.transfer(choice).us)
-        if us is not None and (priced.scans or choice.inputs == "joints"):
-            screened.append(Screened(choice, survey.elements(choice), rates[choice], us))
+    for recipe, (priced,) in prices.items():
+        us = priced.fastest_us(survey.transfer(recipe).us)
+        if us is not None and (priced.scans or recipe.inputs == "joints"):
+            screened.append(Screened(recipe, survey.elements(recipe), rates[recipe], us))
     return tuple(screened)
 
 
 def _curve(survey: Survey, method: str, rates: Mapping[Recipe, TrialAccuracy]) -> Curve:
     """Return a method's rates by the mean number of switches that it kept in the folds, switches alone."""
     folds, points = survey.cuts.screening, {}
-    for choice, judged in rates.items():
-        if (choice.placement, choice.inputs, choice.levels) == (method, "switches", survey.levels[-1]):
-            points[sum(len(survey.elements(choice, fold)) for fold in folds) / len(folds)] = judged.rate
+    for recipe, judged in rates.items():
+        if (recipe.placement, recipe.inputs, recipe.levels) == (method, "switches", survey.levels[-1]):
+            points[sum(len(survey.elements(recipe, fold)) for fold in folds) / len(folds)] = judged.rate
     sizes = tuple(sorted(points))
     return Curve(method, METHODS[method].help, METHODS[method].ours, sizes, tuple(points[size] for size in sizes))
 
 
-def finalists(screened: Sequence[Screened], choices: Collection[Recipe], number: int) -> tuple[Screened, ...]:
-    """Return at most `number` of `screened`, in their order, plus those of certain choices.
+def select_finalists(screened: Sequence[Screened], recipes: Collection[Recipe], number: int) -> tuple[Screened, ...]:
+    """Return at most `number` of `screened`, in their order, plus those of certain recipes.
 
     They are on a front of accuracy against frame time or, among the same inputs, against the number of switches, and
     are distributed evenly among the kinds of inputs. Of each kind, take the best, then the smallest that ties with it,
@@ -158,22 +161,19 @@ def finalists(screened: Sequence[Screened], choices: Collection[Recipe], number:
     and switches count once; those with less than three quarters of the best accuracy are dropped.
     """
     enough = _USEFUL * max((one.mean for one in screened), default=0.0)
-    pool = _fronts([one for one in _different(screened) if one.mean >= enough])
-    queues = [_spread([one for one in pool if one.choice.inputs == kind]) for kind in _kinds(pool)]
+    best = _fronts([one for one in _different(screened) if one.mean >= enough])
+    kinds = dict.fromkeys(one.recipe.inputs for one in best)
+    queues = [_spread([one for one in best if one.recipe.inputs == kind]) for kind in kinds]
     turns = [one for turn in zip_longest(*queues) for one in turn if one is not None]
-    chosen = {id(one) for one in turns[:number]} | {id(one) for one in screened if one.choice in choices}
+    chosen = {id(one) for one in turns[:number]} | {id(one) for one in screened if one.recipe in recipes}
     return tuple(one for one in screened if id(one) in chosen)
 
 
-def _kinds(screened: Sequence[Screened]) -> list[Inputs]:
-    return list(dict.fromkeys(one.choice.inputs for one in screened))
-
-
 def _fronts(screened: Sequence[Screened]) -> list[Screened]:
-    """Return the choices on a front, in its order."""
+    """Return the recipes on a front, in its order."""
     best = front(screened, lambda one: one.frame_us, lambda one: one.mean, _STEP)
-    for kind in _kinds(screened):
-        pool = [one for one in screened if one.choice.inputs == kind]
+    for kind in dict.fromkeys(one.recipe.inputs for one in screened):
+        pool = [one for one in screened if one.recipe.inputs == kind]
         best += front(pool, lambda one: len(one.elements), lambda one: one.mean, _STEP)
     known = {id(one) for one in best}
     return [one for one in screened if id(one) in known]
@@ -201,7 +201,7 @@ def _different(screened: Sequence[Screened]) -> list[Screened]:
     """Return the first of those that keep the same inputs."""
     first = {}
     for one in reversed(screened):
-        rest = changed_to(one.choice, placement=PAPERS, keep=None, prune=0)
+        rest = changed_to(one.recipe, placement=PAPERS, keep=None, prune=0)
         first[rest, *sorted(one.elements)] = one
     return list(first.values())[::-1]
 
@@ -212,36 +212,37 @@ def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[Eval
     All are trained to the last round in the folds of the first repeat. In the others, those that gain nothing by more
     rounds than the paper's hundred are trained for these alone.
     """
-    cuts, choices = survey.cuts, [one.choice for one in chosen]
-    searches = {choice: survey.search.alone(choice.trainer) for choice in choices}
-    survey.choose(choices, cuts.others)
-    survey.choose_joints(choices, cuts.others)
-    survey.tune(choices, cuts.others)
-    fits = survey.fit(choices, cuts.screening, lambda choice: (searches[choice].stages, searches[choice].tabled))
+    recipes = [one.recipe for one in chosen]
+    searches = {recipe: survey.search.alone(recipe.trainer) for recipe in recipes}
+    survey.choose(recipes, survey.cuts.others)
+    survey.choose_joints(recipes, survey.cuts.others)
+    survey.tune(recipes, survey.cuts.others)
+    fits = survey.fit(recipes, survey.cuts.screening, lambda recipe: (searches[recipe].stages, searches[recipe].tabled))
     depths = {
-        choice: depth_of(search, [fits[choice, fold] for fold in cuts.screening], len(cuts.trials))
-        for choice, search in searches.items()
+        recipe: depth_of(search, [fits[recipe, fold] for fold in survey.cuts.screening], len(survey.cuts.trials))
+        for recipe, search in searches.items()
     }
-    fits |= survey.fit(choices, cuts.others, lambda choice: (depths[choice].stages, depths[choice].tabled))
-    judged = {
-        choice: _judged(cuts, choice, search, {fold: fits[choice, fold] for fold in (*cuts.screening, *cuts.others)})
-        for choice, search in depths.items()
-    }
-    recipes = {
-        choice: tuple(dict.fromkeys([*worthwhile(judged[choice][1]), papers_tables(choice, search)]))
-        for choice, search in searches.items()
-    }
-    prices = survey.prices(recipes, cuts.everything.train, lost=True)
-    return tuple(EvaluatedFinalist(one, *judged[one.choice], prices[one.choice]) for one in chosen)
+    fits |= survey.fit(recipes, survey.cuts.others, lambda recipe: (depths[recipe].stages, depths[recipe].tabled))
+    finalists, tables = [], {}
+    for one in chosen:
+        of_folds = {fold: fit for (recipe, fold), fit in fits.items() if recipe == one.recipe}
+        finalist = _evaluated(survey, one, depths[one.recipe], of_folds)
+        papers = papers_tables(one.recipe, searches[one.recipe])
+        tables[one.recipe] = tuple(dict.fromkeys([*worthwhile(finalist.tables), papers]))
+        finalists.append(finalist)
+    prices = survey.prices(tables, survey.cuts.everything.train, lost=True)
+    return tuple(replace(finalist, priced=prices[finalist.screened.recipe]) for finalist in finalists)
 
 
-def choices_to_mark(n_elements: int, n_joints: int, trainer: str, levels: int | None = None) -> dict[Recipe, str]:
-    """Return the choices to mark, with their names: the paper's placement and all switches, alone and with the joints;
-    with `levels` levels of each taxel.
+def recipes_to_mark(survey: Survey) -> dict[Recipe, str]:
+    """Return the recipes to mark, with their names: the paper's placement and all switches, alone and with the joints;
+    with the most levels of each taxel.
     """
+    trainer, levels = survey.search.trainers[0], survey.levels[-1]
+    n_elements = survey.size(levels)
     # Keeping all switches is the same by any method.
     marked = ((PAPERS, _PAPERS, f"paper, S = {_PAPERS}"), (BEST, n_elements, f"all of {n_elements}"))
-    kinds: dict[Inputs, str] = {"switches": "", "both": ", joints"} if n_joints else {"switches": ""}
+    kinds: dict[Inputs, str] = {"switches": "", "both": ", joints"} if survey.inputs.n_joints else {"switches": ""}
     return {
         placed(method, number, trainer, inputs, levels): f"{name}{joints}"
         for inputs, joints in kinds.items()
@@ -251,24 +252,24 @@ def choices_to_mark(n_elements: int, n_joints: int, trainer: str, levels: int | 
 
 
 def marks_of(
-    choices: Mapping[Recipe, str], closes: Sequence[EvaluatedFinalist], survey: Survey
+    recipes: Mapping[Recipe, str], finalists: Sequence[EvaluatedFinalist], survey: Survey
 ) -> tuple[ReferencePoint, ...]:
-    """Return the marks of those choices that were fully evaluated, with the paper's rounds."""
+    """Return the marks of those recipes that were fully evaluated, with the paper's rounds."""
     marks = []
-    for close in closes:
-        choice, size = close.screened.choice, len(close.screened.elements)
-        if choice in choices:
-            recipe = papers_tables(choice, survey.search)
-            priced = next(tables for tables in close.priced if tables.recipe == recipe)
-            us = priced.fastest_us(survey.transfer(choice).us)
+    for finalist in finalists:
+        recipe, size = finalist.screened.recipe, len(finalist.screened.elements)
+        if recipe in recipes:
+            full = papers_tables(recipe, survey.search)
+            priced = next(tables for tables in finalist.priced if tables.recipe == full)
+            us = priced.fastest_us(survey.transfer(recipe).us)
             if us is not None:
-                marks.append(ReferencePoint(choices[choice], size, close.tables[recipe].rate, us))
+                marks.append(ReferencePoint(recipes[recipe], size, finalist.tables[full].rate, us))
     return tuple(marks)
 
 
-def papers_tables(choice: Recipe, search: Search) -> Recipe:
-    """Return the recipe of a choice with tables like the paper's: of its hundred rounds, at the required width."""
-    return tabled(choice, papers_depth(search).tabled[-1])
+def papers_tables(recipe: Recipe, search: Search) -> Recipe:
+    """Return a recipe with tables like the paper's: of its hundred rounds, at the required width."""
+    return tabled(recipe, papers_depth(search).tabled[-1])
 
 
 def papers_depth(search: Search) -> Search:
@@ -299,22 +300,19 @@ def worthwhile(tables: Mapping[Recipe, TrialAccuracy]) -> tuple[Recipe, ...]:
     return tuple(fewest)
 
 
-def _judged(
-    cuts: Cuts, choice: Recipe, search: Search, fits: Mapping[Fold, FoldHits]
-) -> tuple[dict[int, Rate], dict[Recipe, TrialAccuracy], dict[Recipe, Rate], dict[Recipe, Rate]]:
-    """Return the rates of an EvaluatedFinalist: after every stage; with each of the tables, by trials and frames; and
-    with them in the other folds.
-    """
+def _evaluated(survey: Survey, screened: Screened, search: Search, fits: Mapping[Fold, FoldHits]) -> EvaluatedFinalist:
+    """Return a finalist by its fits in all folds, trained for the stages of a search; nothing is priced yet."""
+    cuts = survey.cuts
     places = {
-        tabled(choice, rounds, shape): (row, column)
+        tabled(screened.recipe, rounds, shape): (row, column)
         for row, rounds in enumerate(search.tabled)
         for column, shape in enumerate(SHAPES)
     }
 
     def tables(by: By) -> dict[Recipe, TrialAccuracy]:
         return {
-            recipe: cuts.judged(by, {fold: fit.tables[row][column] for fold, fit in fits.items()})
-            for recipe, (row, column) in places.items()
+            full: cuts.judged(by, {fold: fit.tables[row][column] for fold, fit in fits.items()})
+            for full, (row, column) in places.items()
         }
 
     stages = {
@@ -322,8 +320,8 @@ def _judged(
         for number, stage in enumerate(search.stages)
     }
     frames = {
-        recipe: cuts.judged(cuts.by, {fold: fit.frames[row][column] for fold, fit in fits.items()}, "frames").rate
-        for recipe, (row, column) in (places.items() if len(cuts.people) < len(cuts.trials) else ())
+        full: cuts.judged(cuts.by, {fold: fit.frames[row][column] for fold, fit in fits.items()}, "frames").rate
+        for full, (row, column) in (places.items() if len(cuts.people) < len(cuts.trials) else ())
     }
-    other = {} if cuts.other is None else {recipe: judged.rate for recipe, judged in tables(cuts.other).items()}
-    return stages, tables(cuts.by), frames, other
+    other = {} if cuts.other is None else {full: judged.rate for full, judged in tables(cuts.other).items()}
+    return EvaluatedFinalist(screened, stages, tables(cuts.by), frames, other, priced=())

@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from msgspec.structs import replace as changed_to
 
 from thenar.runtime.build import Build
 from thenar.runtime.errors import BuildError, HarnessError
@@ -30,26 +31,25 @@ from ..samples import Samples, check_types
 from ..text import INDEPENDENT, sentence
 from ..workers import check_memory
 from .cache import Cache, Report, Store
-from .designs import Design, Latencies, best_designs, designs, lucks, points_of
+from .designs import Design, Latencies, best_designs, designs_of, lucks, points_of
 from .finalists import (
     EvaluatedFinalist,
     Screened,
-    choices_to_mark,
     evaluate_finalists,
-    finalists,
     marks_of,
+    recipes_to_mark,
     screen,
     screen_fewer,
     screen_others,
+    select_finalists,
 )
 from .latency import POLICIES, latencies, movements_of
 from .plots import PICTURES, pictures
-from .points import SCHEMA, Frontier, FrontierError, FrontierPoint, ReferencePoint, Tried, frontier_to_bytes
-from .price import Equipment, equipment_for, measured
+from .points import SCHEMA, Frontier, FrontierError, ReferencePoint, Tried, frontier_to_bytes
+from .price import equipment_for
 from .replay import Replay, replay_of
 from .search import TAXEL_LEVELS, Search, placement_of
 from .survey import Cuts, Survey
-from .wirings import is_avr, records_of, wirings
 from .words import csv_bytes
 
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.sqlite"
@@ -139,8 +139,7 @@ def find_frontier(
     """
     samples = _samples(grasp_set.without_none())
     # Levels of one taxel share its conversion.
-    wired = harness is not None or bool(grasp_set.taxel_columns)
-    search = search or Search(methods=usual(ours=True, wired=wired))
+    search = search or Search(methods=usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns)))
     missing = [name for name in search.baselines if not METHODS[name].installed]
     lacking = [f"{name} was left out: it needs {METHODS[name].install}, which is not installed" for name in missing]
     search = replace(search, baselines=tuple(name for name in search.baselines if name not in missing))
@@ -150,16 +149,20 @@ def find_frontier(
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
         cache = Cache(store, report or (lambda _done, _total: None), _ROUNDS, jobs=jobs)
         with _remove_created_on_error(created, store):
-            glove = None if harness is None else harness.cyberglove
-            records = records_of(grasp_set.joint_names, joint_us, glove, masked=not is_avr(target))
-            switches, taxels = bool(grasp_set.switch_names), bool(grasp_set.taxel_columns)
-            options = wirings(harness, target, switches=switches or not taxels, taxels=taxels)
-            equipment = equipment_for(target, options, cache, records)
+            equipment = equipment_for(grasp_set, harness, target, cache, joint_us)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
             replay = _replay(survey, stream)
-            marks = () if build is None else (own_build(build, grasp_set, equipment),)
-        untimed = (_UNTIMED.format(list_names(grasp_set.joint_names)),) if records.how == "unknown" else ()
-        frontier = _found(survey, replay, (budget_us, rate), marks, (*untimed, *lacking))
+            marks = () if build is None else (own_build(build, survey),)
+        if equipment.records.how == "unknown":
+            lacking.insert(0, _UNTIMED.format(list_names(grasp_set.joint_names)))
+        frontier = _found(survey, replay)
+        frontier = changed_to(
+            frontier,
+            marks=(*frontier.marks, *marks),
+            skipped=(*lacking, *frontier.skipped),
+            picked=_picked(frontier, budget_us, rate),
+            wanted=_in_words(budget_us, rate),
+        )
         if output is not None:
             # The store moves into the new folder as the same file, and stays locked meanwhile.
             store.finish()
@@ -242,13 +245,14 @@ def _replay(survey: Survey, stream: GraspSet | None) -> Replay:
     return replay_of(stream, labels, seed=seed)
 
 
-def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> ReferencePoint:
+def own_build(folder: Path, survey: Survey) -> ReferencePoint:
     """Return the user's build as a mark: its recorded rate, and its frame in the fastest wiring for its switches.
 
     Raises FrontierError if it has no rate, or is not for these recordings or this equipment.
     """
     build = Build.load(folder)
     manifest = build.manifest
+    grasp_set, equipment = survey.grasp_set, survey.equipment
     names = [switch.name for switch in manifest.switches]
     # Comparable with the frontier's rates.
     pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
@@ -272,35 +276,31 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Refere
     return ReferencePoint(f"build {folder.name}", len(names), rate, frame_us)
 
 
-def _found(
-    survey: Survey,
-    replay: Replay,
-    goal: tuple[float | None, float | None],
-    marks: tuple[ReferencePoint, ...],
-    lacking: tuple[str, ...],
-) -> Frontier:
-    search, equipment, levels = survey.search, survey.equipment, survey.levels[-1]
-    n_switches, n_elements = survey.samples.n_switches, survey.size(levels)
+def _found(survey: Survey, replay: Replay) -> Frontier:
+    """Return the frontier of a survey, without a picked point; latencies are measured on the replay."""
+    search, equipment, n_switches = survey.search, survey.equipment, survey.samples.n_switches
     screened, curves = screen(survey)
     if not screened:
         raise FrontierError(
             f"no placement that was tried can be built for {equipment.model.target}: name other ``methods`` or "
             "another ``target``"
         )
-    pool = [one for one in screened if one.choice.inputs != "switches"]
-    fewer = screen_fewer(survey, finalists(pool, (), _FEWER))
-    others = screen_others(survey, finalists(screened, (), _WIDER * search.finalists))
+    fewer = screen_fewer(
+        survey, select_finalists([one for one in screened if one.recipe.inputs != "switches"], (), _FEWER)
+    )
+    others = screen_others(survey, select_finalists(screened, (), _WIDER * search.finalists))
     screened += (*fewer, *others)
-    choices = choices_to_mark(n_elements, survey.inputs.n_joints, search.trainers[0], levels)
-    closes = evaluate_finalists(survey, finalists(screened, choices, search.finalists))
-    several = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
-    by_time, by_switches = best_designs(several)
-    best = list(dict.fromkeys([*by_time, *by_switches]))
-    times = measured([design.tables.content for design in best], equipment.model, survey.cache)
-    kept = [replace(design, measured=times.get(design.tables.content)) for design in best]
-    luck = lucks((by_time, by_switches), several, screened, survey.cuts, search.seed)
-    points = points_of(kept, _latencies(survey, replay, kept), luck, survey)
-    tried = _tried(screened, closes, search)
+    recipes = recipes_to_mark(survey)
+    finalists = evaluate_finalists(survey, select_finalists(screened, recipes, search.finalists))
+    designs = [
+        design for finalist in finalists for design in designs_of(finalist, survey.transfer(finalist.screened.recipe))
+    ]
+    tried = _tried(screened, finalists, search)
+    combinations = len(POLICIES) * len(designs) + len(tried)
+    luck = lucks(designs, screened, survey)
+    designs = list(dict.fromkeys(design for front in best_designs(designs) for design in front))
+    times = survey.measured(design.tables.content for design in designs)
+    designs = [replace(design, measured=times.get(design.tables.content)) for design in designs]
     claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
     model = equipment.model
     notes = filter(None, (model.unmeasured, model.note, equipment.overhead.what, equipment.records.what))
@@ -315,27 +315,25 @@ def _found(
         by=survey.cuts.by,
         n_switches=n_switches,
         n_taxels=len(survey.grasp_set.taxel_columns),
-        n_levels=n_elements - n_switches,
+        n_levels=survey.size(survey.levels[-1]) - n_switches,
         n_joints=survey.inputs.n_joints,
         grasps=survey.samples.grasps,
         target=model.target,
         machine=model.machine,
         folds=search.folds,
         repeats=len(survey.cuts.repeats),
-        combinations=len(POLICIES) * len(several) + len(tried),
-        points=points,
+        combinations=combinations,
+        points=points_of(designs, _latencies(survey, replay, designs), luck, survey),
         tried=tried,
         curves=curves,
-        marks=(*marks_of(choices, closes, survey), *marks),
-        skipped=(*lacking, *claimed, *notes, replay.what),
-        picked=_picked(points, *goal),
-        wanted=_in_words(*goal),
+        marks=marks_of(recipes, finalists, survey),
+        skipped=(*claimed, *notes, replay.what),
     )
 
 
-def _picked(points: Sequence[FrontierPoint], budget_us: float | None, rate: float | None) -> int | None:
+def _picked(frontier: Frontier, budget_us: float | None, rate: float | None) -> int | None:
     """Return the number of the selected point: the best within a time, or the fastest of an accuracy; None: none."""
-    single = [point for point in points if point.setting.decision == "single"]
+    single = [point for point in frontier.points if point.setting.decision == "single"]
     if budget_us is not None:
         quick = [point for point in single if point.frame.us <= budget_us]
         # By the rates that points were chosen by, for which their luck was estimated.
@@ -353,26 +351,26 @@ def _in_words(budget_us: float | None, rate: float | None) -> str:
     return "" if rate is None else f"the fastest that recognises {100 * rate:g} %"
 
 
-def _latencies(survey: Survey, replay: Replay, kept: Sequence[Design]) -> Latencies:
+def _latencies(survey: Survey, replay: Replay, designs: Sequence[Design]) -> Latencies:
     """Return the latency of every design with every decision, by tables trained on rows outside the
     replay of held-out rows.
     """
     fold, seed, grouped = survey.cuts.screening[0], survey.search.seed, dict[Recipe, list[Design]]()
     movements = movements_of(survey.grasp_set, fold.train)
-    for design in kept:
-        grouped.setdefault(design.close.screened.choice, []).append(design)
+    for design in designs:
+        grouped.setdefault(design.finalist.screened.recipe, []).append(design)
     calls = [
         (
             survey.samples,
             fold.train,
-            survey.selection(choice, fold),
+            survey.selection(recipe, fold),
             replay,
             tuple((design.tables.recipe, design.frame.us) for design in alike),
-            survey.training(choice, fold),
+            survey.training(recipe, fold),
             movements,
             seed,
         )
-        for choice, alike in grouped.items()
+        for recipe, alike in grouped.items()
     ]
     return {
         (design, kind): latency
@@ -382,23 +380,23 @@ def _latencies(survey: Survey, replay: Replay, kept: Sequence[Design]) -> Latenc
     }
 
 
-def _tried(screened: Sequence[Screened], closes: Sequence[EvaluatedFinalist], search: Search) -> tuple[Tried, ...]:
+def _tried(screened: Sequence[Screened], finalists: Sequence[EvaluatedFinalist], search: Search) -> tuple[Tried, ...]:
     """Return everything that was screened, and the finalists after every stage of their training."""
     searches = {name: search.alone(name) for name in search.trainers}
-    first = [(one, searches[one.choice.trainer].screened, one.judged.rate) for one in screened]
-    then = [(close.screened, rounds, rate) for close in closes for rounds, rate in close.stages.items()]
+    first = [(one, searches[one.recipe.trainer].screened, one.judged.rate) for one in screened]
+    then = [(finalist.screened, rounds, rate) for finalist in finalists for rounds, rate in finalist.stages.items()]
     return tuple(
         Tried(
-            placement=placement_of(one.choice),
-            inputs=one.choice.inputs,
+            placement=placement_of(one.recipe),
+            inputs=one.recipe.inputs,
             n_switches=len(one.elements),
-            rounds=rounds if searches[one.choice.trainer].staged else None,
+            rounds=rounds if searches[one.recipe.trainer].staged else None,
             rate=rate,
             frame_us=one.frame_us,
             # msgspec omits a name that equals the default only if it is the very same string.
-            trainer=sys.intern(one.choice.trainer),
-            keep_joints=one.choice.keep_joints,
-            levels=one.choice.levels,
+            trainer=sys.intern(one.recipe.trainer),
+            keep_joints=one.recipe.keep_joints,
+            levels=one.recipe.levels,
         )
         for one, rounds, rate in (*first, *then)
     )

@@ -7,6 +7,7 @@ import msgspec
 from msgspec import Meta, Struct, field
 
 from thenar.drivers.errors import ThenarError
+from thenar.runtime.manifest import in_words
 from thenar.runtime.names import fault, shortened
 from thenar.runtime.recipe import PAPERS_TRAINER, Given, Inputs, Name, TableBits
 
@@ -77,6 +78,16 @@ class PointSetting(Struct, frozen=True, forbid_unknown_fields=True, omit_default
     settings: dict[Name, Given] = {}
     keep_joints: Annotated[int, Meta(ge=1, le=2**16)] | None = None
     levels: Annotated[int, Meta(ge=1, le=65535)] | None = None
+
+    @property
+    def usual(self) -> bool:
+        """Whether rounds and bins fully describe the training."""
+        return self.trainer == PAPERS_TRAINER and not self.settings
+
+    @property
+    def settings_in_words(self) -> list[str]:
+        """The settings of the trainer: ["joint-bins 5"]."""
+        return [in_words(name, value) for name, value in self.settings.items()]
 
 
 class Latency(Struct, frozen=True, forbid_unknown_fields=True):

@@ -16,6 +16,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.model.integers import IntegerTables, tables_from_bytes, tables_to_bytes
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.scores import Scorer
@@ -29,11 +30,22 @@ from ..firmware.targets import TARGETS, Target, timed
 from ..firmware.words import numbered
 from ..placement.placement import InputSelection
 from ..recogniser import Recogniser
+from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..trainers.base import Training
 from .cache import Cache, stored
-from .points import FrontierError, How, PointTime
-from .wirings import NO_RECORDS, ReadingCost, ScanTimes, WiringOption, overhead_of, scan_times
+from .points import FrontierError, How
+from .wirings import (
+    NO_RECORDS,
+    ReadingCost,
+    ScanTimes,
+    WiringOption,
+    is_avr,
+    overhead_of,
+    records_of,
+    scan_times,
+    wirings,
+)
 
 # Python's time on a Raspberry Pi 4 relative to here: a guess, and "here" is any machine.
 PI_FACTOR = 4.0
@@ -255,9 +267,18 @@ class Equipment:
 
 
 def equipment_for(
-    target: str, options: tuple[WiringOption, ...], cache: Cache, records: ReadingCost = NO_RECORDS
+    grasp_set: GraspSet, harness: Harness | None, target: str, cache: Cache, joint_us: float | None = None
 ) -> Equipment:
-    """Return the hardware options for `target`; where it classifies in Python, that is timed here once."""
+    """Return the hardware options for `target` and the inputs of a set: those of the harness, and of a new glove.
+
+    joint_us  time of reading all joints, None if unknown
+
+    Where the target classifies in Python, that is timed here once.
+    """
+    glove = None if harness is None else harness.cyberglove
+    records = records_of(grasp_set.joint_names, joint_us, glove, masked=not is_avr(target))
+    switches, taxels = bool(grasp_set.switch_names), bool(grasp_set.taxel_columns)
+    options = wirings(harness, target, switches=switches or not taxels, taxels=taxels)
     in_python = target not in TARGETS or TARGETS[target].clock_hz is None
     costs = cache.ask(fit_here, [()] if in_python else [])
     return Equipment(ClassifyModel(target, python=costs[0] if costs else None), options, overhead_of(target), records)
@@ -340,17 +361,3 @@ def count_steps(content: bytes, model: ClassifyModel) -> float:
 def time_here(contents: tuple[bytes, ...], yardstick: float) -> tuple[float, ...]:
     """Time the runtime on each of the tables, scaled by its yardstick; return microseconds."""
     return tuple(classify_us([tables_from_bytes(content) for content in contents], yardstick))
-
-
-def measured(contents: Sequence[bytes], model: ClassifyModel, cache: Cache) -> dict[bytes, PointTime]:
-    """Return the time of classifying with each of these tables, simulated or measured; none if that is not possible."""
-    several = tuple(dict.fromkeys(contents))
-    if model.unmeasured:
-        return {}
-    if model.python is None:
-        steps = cache.ask(count_steps, [(content, model) for content in several])
-        times = [PointTime(model.us(round(each)), "simulated") for each in steps]
-    else:
-        (us,) = cache.ask(time_here, [(several, model.python[-1])])
-        times = [PointTime(each, "measured") for each in us]
-    return dict(zip(several, times, strict=True))

@@ -196,8 +196,14 @@ def _legs(
 ) -> Iterator[tuple[Codes, Codes, Times]]:
     """Yield the transition from each grasp to the next: contacts, codes and times of its states, the last its hold."""
     contact, pose, leaves_us = rest, opened, 0
+    # Of each record on the way: the share of the path that is behind the hand, and how far it opens.
+    time = np.arange(TRAVEL_US // RECORD_US + 1)[:, np.newaxis] / (TRAVEL_US // RECORD_US)
+    cubed, left = time * time * time, 1.0 - time
+    behind = cubed * (10.0 - time * (15.0 - 6.0 * time))
+    opening = _OPENING * _BUMP * cubed * cubed * left * left * left
     for row in rows:
-        path, travels_us = _path(pose, codes[row].astype(np.float64), opened), leaves_us + RELEASE_US
+        straight, travels_us = pose + (codes[row] - pose) * behind, leaves_us + RELEASE_US
+        path = np.rint(straight + (opened - straight) * opening).astype(np.uint16)
         opens_us = np.where(contact != rest, leaves_us + random.integers(0, RELEASE_US, len(rest)), -_NEVER)
         grips_us = travels_us + TRAVEL_US + random.integers(0, GRIP_US, len(rest))
         closes_us = np.where(contacts[row] != rest, grips_us, _NEVER)
@@ -209,12 +215,3 @@ def _legs(
         yield shown, path[np.clip((at_us - travels_us) // RECORD_US, 0, len(path) - 1)], at_us
         contact, pose = contacts[row], codes[row].astype(np.float64)
         leaves_us = int(at_us[-1]) + int(random.integers(*HOLD_US))
-
-
-def _path(pose: NDArray[np.float64], target: NDArray[np.float64], opened: NDArray[np.float64]) -> Codes:
-    """Return the codes (TRAVEL_US / RECORD_US + 1, j) along the path from a pose to another, including both."""
-    t = np.arange(TRAVEL_US // RECORD_US + 1)[:, np.newaxis] / (TRAVEL_US // RECORD_US)
-    cubed, rest = t * t * t, 1.0 - t
-    straight = pose + (target - pose) * (cubed * (10.0 - t * (15.0 - 6.0 * t)))
-    bent = straight + (opened - straight) * (_OPENING * _BUMP * cubed * cubed * rest * rest * rest)
-    return np.rint(bent).astype(np.uint16)

@@ -32,8 +32,8 @@ TABLED = (10, 30, 100)
 
 def placed(method: str, number: int, trainer: str, inputs: Inputs, levels: int | None = None) -> Recipe:
     """Return the candidate whose elements a method chooses, given its number, and the levels of a taxel."""
-    changes = {"keep" if METHODS[method].by_number else "prune": number}
-    return changed(Recipe(placement=method, trainer=trainer, inputs=inputs, levels=levels), changes)
+    recipe = Recipe(placement=method, trainer=trainer, inputs=inputs, levels=levels)
+    return changed_to(recipe, keep=number) if METHODS[method].by_number else changed_to(recipe, prune=number)
 
 
 def placement_of(recipe: Recipe) -> PlacementChoice:

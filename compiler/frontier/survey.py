@@ -26,7 +26,7 @@ from ..samples import Columns, Samples, decided
 from ..trainers.base import Training
 from .cache import Cache, stored
 from .points import By, PointTime
-from .price import Equipment, PricedTables, price
+from .price import Equipment, PricedTables, count_steps, price, time_here
 from .search import SHAPES, TAXEL_LEVELS, Search
 
 # Settings are selected on the placement whose number of switches is nearest to the paper's.
@@ -154,7 +154,7 @@ class Survey:
 
     @cached_property
     def inputs(self) -> InputChoices:
-        """The elements and joints that choices keep."""
+        """The elements and joints that recipes keep."""
         return InputChoices(self.samples, self.ports, ask=self.cache.ask)
 
     @property
@@ -166,57 +166,57 @@ class Survey:
         """Return how many elements there are to choose from in all rows."""
         return len(self.inputs.available(self.cuts.everything.train, levels))
 
-    def elements(self, choice: Recipe, fold: Fold | None = None) -> Elements:
-        """Return the elements that a choice keeps by the training rows of `fold`, or by all rows."""
-        return self.inputs.elements(choice, (fold or self.cuts.everything).train)
+    def elements(self, recipe: Recipe, fold: Fold | None = None) -> Elements:
+        """Return the elements that a recipe keeps by the training rows of `fold`, or by all rows."""
+        return self.inputs.elements(recipe, (fold or self.cuts.everything).train)
 
-    def joints(self, choice: Recipe, fold: Fold | None = None) -> Columns:
-        """Return the joints of a choice, ascending, by the training rows of `fold`, or by all rows."""
-        if choice.inputs == "switches":
+    def joints(self, recipe: Recipe, fold: Fold | None = None) -> Columns:
+        """Return the joints of a recipe, ascending, by the training rows of `fold`, or by all rows."""
+        if recipe.inputs == "switches":
             return ()
         rows = (fold or self.cuts.everything).train
-        return self.inputs.joints(self.elements(choice, fold), rows, choice.keep_joints)
+        return self.inputs.joints(self.elements(recipe, fold), rows, recipe.keep_joints)
 
-    def selection(self, choice: Recipe, fold: Fold | None = None) -> InputSelection:
-        """Return the inputs that a choice keeps by the training rows of `fold`, or by all rows."""
-        return InputSelection.of(self.elements(choice, fold), self.joints(choice, fold))
+    def selection(self, recipe: Recipe, fold: Fold | None = None) -> InputSelection:
+        """Return the inputs that a recipe keeps by the training rows of `fold`, or by all rows."""
+        return InputSelection.of(self.elements(recipe, fold), self.joints(recipe, fold))
 
-    def names(self, choice: Recipe) -> tuple[str, ...]:
-        """Return the names of the elements that a choice keeps by all rows."""
-        return names_of(self.grasp_set, self.elements(choice))
+    def names(self, recipe: Recipe) -> tuple[str, ...]:
+        """Return the names of the elements that a recipe keeps by all rows."""
+        return names_of(self.grasp_set, self.elements(recipe))
 
-    def transfer(self, choice: Recipe) -> PointTime:
-        """Return the time of reading the joints of a choice."""
-        return self.equipment.records.of(len(self.joints(choice)))
+    def transfer(self, recipe: Recipe) -> PointTime:
+        """Return the time of reading the joints of a recipe."""
+        return self.equipment.records.of(len(self.joints(recipe)))
 
-    def some_joints(self, choice: Recipe) -> tuple[str, ...]:
-        """Return the names of the joints of a choice from all rows, if not all are kept."""
+    def some_joints(self, recipe: Recipe) -> tuple[str, ...]:
+        """Return the names of the joints of a recipe from all rows, if not all are kept."""
         names = self.grasp_set.joint_names
-        return () if choice.keep_joints is None else tuple(names[joint] for joint in self.joints(choice))
+        return () if recipe.keep_joints is None else tuple(names[joint] for joint in self.joints(recipe))
 
-    def training(self, choice: Recipe, fold: Fold | None = None) -> Training:
-        """Return the training of a choice on the training rows of a fold, or on all rows; call `tune` first."""
-        place = choice.trainer, choice.inputs, fold or self.cuts.everything
-        return self._trainings.get(place) or self.search.alone(choice.trainer).candidates[0]
+    def training(self, recipe: Recipe, fold: Fold | None = None) -> Training:
+        """Return the training of a recipe on the training rows of a fold, or on all rows; call `tune` first."""
+        place = recipe.trainer, recipe.inputs, fold or self.cuts.everything
+        return self._trainings.get(place) or self.search.alone(recipe.trainer).candidates[0]
 
-    def choose(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
-        """Choose the switches and levels of all choices from the training rows of these folds."""
-        self.inputs.choose(choices, [fold.train for fold in folds])
+    def choose(self, recipes: Iterable[Recipe], folds: Sequence[Fold]) -> None:
+        """Choose the switches and levels of all recipes from the training rows of these folds."""
+        self.inputs.choose(recipes, [fold.train for fold in folds])
 
-    def choose_joints(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
-        """Rank the joints, given the switches, for choices that keep only some, by the training rows of these folds."""
-        some = [choice for choice in choices if choice.keep_joints is not None]
-        places = dict.fromkeys((self.elements(choice, fold), fold) for choice in some for fold in folds)
+    def choose_joints(self, recipes: Iterable[Recipe], folds: Sequence[Fold]) -> None:
+        """Rank the joints, given the switches, for recipes that keep only some, by the training rows of these folds."""
+        some = [recipe for recipe in recipes if recipe.keep_joints is not None]
+        places = dict.fromkeys((self.elements(recipe, fold), fold) for recipe in some for fold in folds)
         self.inputs.rank([(elements, fold.train) for elements, fold in places])
 
-    def tune(self, choices: Iterable[Recipe], folds: Sequence[Fold]) -> None:
+    def tune(self, recipes: Iterable[Recipe], folds: Sequence[Fold]) -> None:
         """Select the open settings of each trainer and kind of inputs on the training rows of these folds, as `compile`
-        does: once, by the choice of the most typical size.
+        does: once, by the recipe of the most typical size.
         """
         alike: dict[tuple[str, Inputs], list[Recipe]] = {}
-        for choice in choices:
-            if len(self.search.alone(choice.trainer).candidates) > 1:
-                alike.setdefault((choice.trainer, choice.inputs), []).append(choice)
+        for recipe in recipes:
+            if len(self.search.alone(recipe.trainer).candidates) > 1:
+                alike.setdefault((recipe.trainer, recipe.inputs), []).append(recipe)
         typical = {
             key: changed_to(min(several, key=lambda one: abs(len(self.elements(one)) - _TYPICAL)), keep_joints=None)
             for key, several in alike.items()
@@ -225,53 +225,66 @@ class Survey:
             (*key, fold): (
                 self.samples,
                 fold.train,
-                self.selection(choice, fold),
-                self.search.alone(choice.trainer).candidates,
+                self.selection(recipe, fold),
+                self.search.alone(recipe.trainer).candidates,
                 self.search.seed,
                 self.cuts.by == "new subject",
             )
-            for key, choice in typical.items()
+            for key, recipe in typical.items()
             for fold in folds
         }
         for place, fitting in self._ask(choose_settings, calls).items():
             self._trainings[place] = Training.chosen(fitting)
 
     def fit(
-        self, choices: Sequence[Recipe], folds: Sequence[Fold], depth: Callable[[Recipe], Depth]
+        self, recipes: Sequence[Recipe], folds: Sequence[Fold], depth: Callable[[Recipe], Depth]
     ) -> dict[tuple[Recipe, Fold], FoldHits]:
-        """Return the hits of every choice in every fold, trained to its `depth`."""
+        """Return the hits of every recipe in every fold, trained to its `depth`."""
         calls = {
-            (choice, fold): (
+            (recipe, fold): (
                 self.samples,
                 fold,
-                self.selection(choice, fold),
-                *depth(choice),
-                SHAPES if depth(choice)[1] else (),
-                self.training(choice, fold),
+                self.selection(recipe, fold),
+                *depth(recipe),
+                SHAPES if depth(recipe)[1] else (),
+                self.training(recipe, fold),
             )
-            for choice in choices
+            for recipe in recipes
             for fold in folds
         }
         return self._ask(fit_stages, calls)
 
     def prices(
-        self, recipes: Mapping[Recipe, tuple[Recipe, ...]], rows: Rows, *, lost: bool = False
+        self, tables: Mapping[Recipe, tuple[Recipe, ...]], rows: Rows, *, lost: bool = False
     ) -> dict[Recipe, tuple[PricedTables, ...]]:
-        """Return the prices of choices trained on these rows, each with the tables of several recipes; see `price`."""
+        """Return the prices of recipes trained on these rows, each with several tables; see `price`."""
         calls = {
-            choice: (
+            recipe: (
                 self.samples,
-                self.names(choice),
+                self.names(recipe),
                 rows,
-                self.selection(choice),
-                tables,
-                self.training(choice),
+                self.selection(recipe),
+                several,
+                self.training(recipe),
                 self.equipment,
                 lost,
             )
-            for choice, tables in recipes.items()
+            for recipe, several in tables.items()
         }
         return self._ask(price, calls)
+
+    def measured(self, contents: Iterable[bytes]) -> dict[bytes, PointTime]:
+        """Return the time of classifying with each of these tables.bin, simulated or measured; none if impossible."""
+        model, several = self.equipment.model, tuple(dict.fromkeys(contents))
+        if model.unmeasured:
+            return {}
+        if model.python is None:
+            steps = self.cache.ask(count_steps, [(content, model) for content in several])
+            times = [PointTime(model.us(round(count)), "simulated") for count in steps]
+        else:
+            (times_us,) = self.cache.ask(time_here, [(several, model.python[-1])])
+            times = [PointTime(us, "measured") for us in times_us]
+        return dict(zip(several, times, strict=True))
 
     def _ask(self, function: Callable[..., R], calls: Mapping[K, tuple[Any, ...]]) -> dict[K, R]:
         """Return the result of a stored function for each tuple of arguments."""

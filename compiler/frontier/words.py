@@ -4,7 +4,6 @@ import csv
 import io
 from collections.abc import Callable, Iterable
 
-from thenar.runtime.manifest import in_words
 from thenar.runtime.names import printable, taxel_and_code
 from thenar.runtime.recipe import PAPERS_TRAINER
 
@@ -60,21 +59,12 @@ def training_of(setting: PointSetting) -> str:
     """Return the training in words, without the paper's trainer: "100 rounds", "naive-bayes, joint-bins 5"."""
     name = () if setting.trainer == PAPERS_TRAINER else (setting.trainer,)
     rounds = () if setting.rounds is None else (counted(setting.rounds, "round"),)
-    return ", ".join((*name, *rounds, *_settings(setting)))
+    return ", ".join((*name, *rounds, *setting.settings_in_words))
 
 
 def trainer_of(setting: PointSetting) -> str:
     """Return trainer and settings, including the paper's trainer: "logitboost, 100 rounds"."""
     return f"{setting.trainer}, {training_of(setting)}" if setting.trainer == PAPERS_TRAINER else training_of(setting)
-
-
-def is_usual(setting: PointSetting) -> bool:
-    """Return whether rounds and bins fully describe the training."""
-    return setting.trainer == PAPERS_TRAINER and not setting.settings
-
-
-def _settings(setting: PointSetting) -> list[str]:
-    return [in_words(name, value) for name, value in setting.settings.items()]
 
 
 def wiring_of(setting: PointSetting) -> str:
@@ -171,9 +161,9 @@ def csv_bytes(frontier: Frontier) -> bytes:
     file = io.StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
     rows = [_cells(point) for point in frontier.points]
-    if not all(is_usual(point.setting) for point in frontier.points):
+    if not all(point.setting.usual for point in frontier.points):
         for row, point in zip(rows, frontier.points, strict=True):
-            row.update(trainer=point.setting.trainer, settings=_list(_settings(point.setting)))
+            row.update(trainer=point.setting.trainer, settings=_list(point.setting.settings_in_words))
     writer.writerows(list(row) for row in rows[:1])
     writer.writerows(cells(row.values()) for row in rows)
     return file.getvalue().encode()

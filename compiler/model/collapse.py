@@ -37,13 +37,12 @@ def collapse(model: Model, n_switches: int) -> ScoreTables:
     thresholds, joint_rows = [], []
     for column in range(stumps.n_inputs):
         mine = np.flatnonzero(columns == column)
-        sides = left[:, mine], right[:, mine]
         if column < n_switches:
-            opened, closed = (np.where(floors[mine] >= value, *sides) for value in (0, 1))
+            opened, closed = (np.where(floors[mine] >= value, left[:, mine], right[:, mine]) for value in (0, 1))
             bias += _sums(opened, classes[mine], stumps.n_classes, [len(mine)])[0].sum(axis=0)
             switch_rows[column] = _sums(closed - opened, classes[mine], stumps.n_classes, [len(mine)])[0].sum(axis=0)
         else:
-            steps, rows = _joint(floors[mine], *sides, classes[mine], stumps.n_classes)
+            steps, rows = _joint(floors[mine], left[:, mine], right[:, mine], classes[mine], stumps.n_classes)
             thresholds.append(steps)
             joint_rows.append(rows)
     return ScoreTables.of(bias, switch_rows, thresholds, joint_rows)
@@ -78,10 +77,10 @@ def _joint(
     order = np.argsort(floors, kind="stable")
     steps = np.unique(floors[(floors >= 0) & (floors < HIGHEST_CODE)])
     # The smallest code of each bin represents all of its codes: no threshold lies between them.
-    passed = np.searchsorted(floors[order], np.append(0.0, steps + 1)).tolist()
-    back, remaining = order[::-1], [len(order) - n for n in reversed(passed)]
-    from_right = _sums(right[:, order], classes[order], n_classes, passed)
-    from_left = _sums(left[:, back], classes[back], n_classes, remaining)[::-1]
+    stops = np.searchsorted(floors[order], np.append(0.0, steps + 1)).tolist()
+    from_right = _sums(right[:, order], classes[order], n_classes, stops)
+    back = order[::-1]
+    from_left = _sums(left[:, back], classes[back], n_classes, [len(order) - stop for stop in reversed(stops)])[::-1]
     high, low = add_exactly(from_right[:, 0], from_right[:, 1], from_left[:, 0])
     return steps.astype(np.uint16), high + (low + from_left[:, 1])
 
@@ -92,9 +91,9 @@ def _sums(contributions: Floats, classes: NDArray[np.intp], n_classes: int, stop
     sums, done = [], 0
     for stop in stops:
         for stump in range(done, stop):
-            row = np.full(n_classes, contributions[1, stump])
-            row[classes[stump]] = contributions[0, stump]
-            total, carry = add_exactly(total, carry, row)
+            term = np.full(n_classes, contributions[1, stump])
+            term[classes[stump]] = contributions[0, stump]
+            total, carry = add_exactly(total, carry, term)
         sums.append((total, carry))
         done = stop
     return np.array(sums)

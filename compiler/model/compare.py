@@ -133,7 +133,7 @@ def compare(
 ) -> Comparison:
     """Run kept switches (n, s) and codes (n, j) through all three; the integers frame by frame, as deployed."""
     tables = collapse(model, bits.shape[1])
-    by_model = model.scores(bits, codes)
+    scores = model.scores(bits, codes)
     by_tables = tables.scores(bits, codes)
     scorer, by_integers = Scorer(integers), np.empty((len(bits), integers.n_classes), np.int64)
     for row, (switches, joints) in enumerate(zip(bits, codes, strict=True)):
@@ -141,19 +141,19 @@ def compare(
         if report is not None and row % 1000 == 999:
             report(row + 1, len(bits))
     by_integers -= LANE_OFFSET
-    deployed = as_deployed(tables, integers.grid)
-    steps = deployed.scores(bits, codes) * integers.scale
+    tables = as_deployed(tables, integers.grid)
+    steps = tables.scores(bits, codes) * integers.scale
     best_two = np.sort(steps, axis=1)[:, -2:]
     margins = best_two[:, 1] - best_two[:, 0]
-    error, slack = rounding_error(deployed, integers.scale, integers.grid), float_slack(deployed, integers.scale)
+    error, slack = rounding_error(tables, integers.scale, integers.grid), float_slack(tables, integers.scale)
     return Comparison(
-        collapse_difference=float(np.abs(by_model - by_tables).max()),
+        collapse_difference=float(np.abs(scores - by_tables).max()),
         collapse_bound=COLLAPSE_TOLERANCE * model.magnitude,
         integer_difference=float(np.abs(steps - by_integers).max()),
         integer_bound=error,
         slack=slack,
         safe_margin=2 * error,
-        trained=winners(by_model),
+        trained=winners(scores),
         deployed=by_integers.argmax(axis=1),
         margins=margins,
         covered=margins > 2 * (error + slack),

@@ -5,6 +5,7 @@ another in the recording. It takes two rows: a row alone is a separate trial, as
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,9 +63,14 @@ class Movements:
     def inside(self) -> Bits:
         """Whether each row of the set (n,) is part of a movement."""
         mask = np.zeros(len(self.rows), np.bool_)
-        for first, beyond in zip(self.first.tolist(), self.beyond.tolist(), strict=True):
-            mask[self.rows[first:beyond]] = True
+        for run in self.runs:
+            mask[run] = True
         return mask
+
+    @property
+    def runs(self) -> list[Rows]:
+        """The rows of each movement (m,), in the order of time."""
+        return [self.rows[a:b] for a, b in zip(self.first.tolist(), self.beyond.tolist(), strict=True)]
 
     def counts(self, mask: Bits) -> Rows:
         """Return how many rows of each movement (m,) are set in `mask` (n,)."""
@@ -97,20 +103,15 @@ def frames_are_dense(grasp_set: GraspSet) -> bool:
     movements = movements.pick(movements.sizes >= LEAST_FRAMES)
     if 2 * movements.sizes.sum() <= len(grasp_set):
         return False
-    runs = [movements.rows[a:b] for a, b in zip(movements.first.tolist(), movements.beyond.tolist(), strict=True)]
-    arrays = (grasp_set.switches, grasp_set.codes, grasp_set.taxels)
-    differences = [_differences(array, runs) for array in arrays if array.shape[1]]
+    differences = []
+    for array in (grasp_set.switches, grasp_set.codes, grasp_set.taxels):
+        near = far = 0.0
+        for run in movements.runs if array.shape[1] else ():
+            values, half = array[run].astype(np.int32), len(run) // 2
+            near += float(np.abs(values[1:] - values[:-1]).mean())
+            far += float(np.abs(values[half:] - values[:-half]).mean())
+        differences.append((near, far))
     return any(far for _, far in differences) and all(near <= _ALIKE * far for near, far in differences)
-
-
-def _differences(array: Bits | Codes, runs: list[Rows]) -> tuple[float, float]:
-    """Return the difference of neighbouring rows (n, c), and of rows half a run apart; means over the runs."""
-    near = far = 0.0
-    for run in runs:
-        values, half = array[run].astype(np.int32), len(run) // 2
-        near += float(np.abs(values[1:] - values[:-1]).mean())
-        far += float(np.abs(values[half:] - values[:-half]).mean())
-    return near, far
 
 
 def holds_of(grasp_set: GraspSet, movements: Movements) -> tuple[Rows, Rows]:
@@ -120,13 +121,12 @@ def holds_of(grasp_set: GraspSet, movements: Movements) -> tuple[Rows, Rows]:
     for nothing held, `hold_of` decides. A taxel is closed if it is pressed beyond the threshold with most information
     about the grasp type.
     """
-    runs = [movements.rows[a:b] for a, b in zip(movements.first.tolist(), movements.beyond.tolist(), strict=True)]
     none = grasp_set.is_none
     if none.any():
-        holds = [_longest(~none[run]) for run in runs]
+        holds = [_longest(~none[run]) for run in movements.runs]
     else:
-        closed = _closed(grasp_set)
-        holds = [hold_of(closed[run], grasp_set.codes[run]) for run in runs]
+        switches = _closed(grasp_set)
+        holds = [hold_of(switches[run], grasp_set.codes[run]) for run in movements.runs]
     complete, released = np.array(holds, np.intp).reshape(-1, 2).T
     return complete, released
 
@@ -156,9 +156,9 @@ def _closed(grasp_set: GraspSet) -> Bits:
     return bits
 
 
-def _longest(mask: Bits) -> tuple[int, int]:
+def _longest(complete: Bits) -> tuple[int, int]:
     """Return the longest stretch of True (F,), short gaps bridged; of several the first."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], complete, [False]]).astype(np.int8)))
     starts, stops = edges[::2], edges[1::2]
     apart = np.flatnonzero(starts[1:] - stops[:-1] > _BRIDGED)
     starts, stops = starts[np.concatenate([[0], apart + 1])], stops[np.concatenate([apart, [len(stops) - 1]])]
@@ -216,10 +216,10 @@ def streams_of(grasp_set: GraspSet, tick_us: int = TICK_US) -> tuple[Stream, ...
         recording = np.flatnonzero((owner == number) & inside)
         if not len(recording):
             continue
-        times = grasp_set.times_us[recording] if grasp_set.times_us.size else TICK_US * np.arange(len(recording))
+        times_us = grasp_set.times_us[recording] if grasp_set.times_us.size else TICK_US * np.arange(len(recording))
         subject, session = str(grasp_set.subjects[recording[0]]), str(grasp_set.sessions[recording[0]])
         before = -1
-        for start_us, ticks in newest(times, tick_us, movements[recording]):
+        for start_us, ticks in newest(times_us, tick_us, movements[recording]):
             rows, at_us = recording[ticks], start_us + tick_us * np.arange(len(ticks) + 1)
             continued = bool(before >= 0 and trials[before] == trials[rows[0]] and not none[before])
             streams.append(Stream(rows, at_us[:-1], int(at_us[-1]), subject, session, continued))
@@ -241,9 +241,9 @@ def newest(times_us: Times, tick_us: int, movements: Rows | None = None) -> list
     begins, stretches = np.append(0, np.flatnonzero(changes) + 1), []
     later, step = begins[1:], steps[begins[1:] - 1]
     restarts = (step < -JITTER_US) & (times_us[later] < times_us[(begins[:-1] + later) // 2])
-    cuts = later[restarts | (np.abs(step) > PAUSE_US)]
-    for first, part in zip([0, *cuts.tolist()], np.split(times_us, cuts), strict=True):
-        rising = _rising(part)
+    cuts = later[restarts | (np.abs(step) > PAUSE_US)].tolist()
+    for first, beyond in pairwise([0, *cuts, len(times_us)]):
+        rising = _rising(times_us[first:beyond])
         ticks = np.arange(int(rising[0]), int(rising[-1]) + 1, tick_us)
         stretches.append((int(rising[0]), first + np.searchsorted(rising, ticks, side="right") - 1))
     return stretches

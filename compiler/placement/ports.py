@@ -1,6 +1,6 @@
 """Costs of reading switches, port by port, on the glove that grasps are recorded with."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import fsum
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.scanning.plan import Costs, Unit, ports_in, unwired
+from thenar.runtime.scanning.plan import Costs, unwired
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import glove_us
@@ -98,13 +98,10 @@ def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
     switch is not wired.
     """
     scan = whole_scan(harness, names)
-    costs = Costs(scan.ports, harness)
-    us = [0.0] * len(scan.ports)
-    for unit in costs.units:
-        for place, share_us in _shares(unit, costs):
-            us[place] += share_us
+    ports = scan.ports
+    us = [ns / 1000 for ns in Costs(ports, harness).shares()]
     port_of: dict[int, int] = {}
-    for number, port in enumerate(scan.ports):
+    for number, port in enumerate(ports):
         port_of |= dict.fromkeys(port.elements, number)
     for stream, read in zip(harness.streams, scan.streams, strict=True):
         port_of |= {pair[-1]: len(us) for pair in (*read.switches, *read.levels)}
@@ -115,13 +112,3 @@ def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
             f"harness {harness.name!r} has no pin or column for {lacking!r}: add it to its file, or leave ``glove`` out"
         )
     return PortCosts(tuple(port_of[number] for number in range(len(names))), tuple(us))
-
-
-def _shares(unit: Unit, costs: Costs) -> Iterator[tuple[int, float]]:
-    """Yield each port of a unit with its own time and its share of the unit's common time."""
-    ports = ports_in(unit)
-    # Read after all other ports, a port of a shared channel costs only its own time.
-    everything = sum(1 << port for port in ports)
-    alone = [costs.after(everything, port) for port in ports]
-    beyond = (costs.of(unit) - sum(alone)) / len(ports)
-    yield from ((port, (ns + beyond) / 1000) for port, ns in zip(ports, alone, strict=True))

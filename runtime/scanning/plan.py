@@ -83,6 +83,19 @@ class Costs:
         own = sum(self._ns[port] + self._waits[port] for port in ports)
         return own + sum(ns for room, ns in self._rooms if not room & ~inside)
 
+    def shares(self) -> list[float]:
+        """Return the nanoseconds of each port: its time, and its share of the common time of its unit."""
+        shares = [0.0] * len(self._ns)
+        for unit in self.units:
+            ports = ports_in(unit)
+            # Read after all other ports, a port of a shared channel costs only its own time.
+            everything = sum(1 << port for port in ports)
+            alone = [self.after(everything, port) for port in ports]
+            common = (self.of(unit) - sum(alone)) / len(ports)
+            for port, ns in zip(ports, alone, strict=True):
+                shares[port] = ns + common
+        return shares
+
 
 def _numbers(ports: int) -> Iterator[int]:
     return (port for port in range(ports.bit_length()) if ports >> port & 1)

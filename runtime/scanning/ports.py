@@ -41,30 +41,29 @@ def cover(chip: Chip, pins: Collection[int]) -> tuple[Reading, ...]:
     raise ValueError(f"a {chip.name} has no readings of its pins {sorted(wanted - _shown(chip.readings))}")
 
 
-def ports_of(harness: Harness, numbers: Mapping[str, int], levels: Levels | None = None) -> tuple[Port, ...]:
+def ports_of(harness: Harness, numbers: Mapping[str, int], levels: Levels) -> tuple[Port, ...]:
     """Return the fewest ports whose replies hold all switches of `numbers` that are wired to chips, chip by chip, and
     the conversions of all taxels of `levels`.
     """
-    found = levels or {}
     expanders = (
         port
         for bus, wiring in enumerate(harness.buses)
         for chip, wired in enumerate(wiring.chips)
-        for port in (_conversions(bus, chip, wired, found) if wired.measures else _ports(bus, chip, wired, numbers))
+        for port in (_conversions(bus, chip, wired, levels) if wired.measures else _ports(bus, chip, wired, numbers))
     )
     spi = (
         port
         for bus, device in enumerate(harness.spi, start=len(harness.buses))
-        for port in _conversions(bus, 0, device, found)
+        for port in _conversions(bus, 0, device, levels)
     )
     return (*expanders, *spi)
 
 
 def _ports(bus: int, number: int, wired: ChipWiring, numbers: Mapping[str, int]) -> list[Port]:
-    left = {pin: numbers[name] for pin, name in wired.numbered_pins.items() if name in numbers}
+    pins = {pin: numbers[name] for pin, name in wired.numbered_pins.items() if name in numbers}
     ports = []
-    for reading in cover(wired.chip, left):
-        shown: tuple[Pair, ...] = tuple((bit, left.pop(pin)) for bit, pin in enumerate(reading.pins) if pin in left)
+    for reading in cover(wired.chip, pins):
+        shown: tuple[Pair, ...] = tuple((bit, pins.pop(pin)) for bit, pin in enumerate(reading.pins) if pin in pins)
         ports.append(Port(bus, number, reading.name, shown, wired.closed == "high"))
     return ports
 
@@ -93,11 +92,11 @@ def whole_scan(harness: Harness, switch_names: Sequence[str], *, every_taxel: bo
     on_taxels = {number for pairs in levels.values() for _, number in pairs}
     numbers = {name: number for number, name in enumerate(switch_names) if number not in on_taxels}
     streams = tuple(
-        StreamRead(_places(each.switches, numbers), _levels(tuple(each.taxels), levels)) for each in harness.streams
+        StreamRead(_places(board.switches, numbers), _levels(tuple(board.taxels), levels)) for board in harness.streams
     )
-    converted = {taxel: levels.get(taxel, ()) for taxel in harness.taxel_names} if every_taxel else levels
-    ports = ports_of(harness, numbers, converted)
-    return ScanMap(SCHEMA, harness.fingerprint, ports, streams)
+    if every_taxel:
+        levels = {taxel: levels.get(taxel, ()) for taxel in harness.taxel_names}
+    return ScanMap(SCHEMA, harness.fingerprint, ports_of(harness, numbers, levels), streams)
 
 
 def _places(names: Sequence[str], numbers: Mapping[str, int]) -> tuple[Pair, ...]:

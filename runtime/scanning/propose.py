@@ -51,10 +51,10 @@ def propose_harness(
     """
     if kind not in CHIPS and kind not in SPI_CHIPS:
         raise HarnessError(f"there is no chip {kind!r}{nearest(kind, [*CHIPS, *SPI_CHIPS])}")
-    switches, measured = _parted(switch_names, taxels)
+    switches, taxels = _parted(switch_names, taxels)
     expander, converter = (kind, CONVERTER) if kind in expanders() else (next(iter(CHIPS)), kind)
-    spi = _on_spi(converter, measured) if converter in SPI_CHIPS else ()
-    chips = (*_hung(expander, switches), *(() if spi else _hung(converter, measured)))
+    spi = _on_spi(converter, taxels) if converter in SPI_CHIPS else ()
+    chips = (*_hung(expander, switches), *(() if spi else _hung(converter, taxels)))
     clock_hz = min([CLOCK_HZ, *(each.chip.clock_hz for each in chips)])
     return Harness(
         name=name,

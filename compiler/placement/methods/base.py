@@ -116,11 +116,11 @@ class Method:
         if not self.by_number and keep is not None:
             raise PlacementError(f"method {self.name!r} takes ``prune`` S and no ``keep``: choose another ``method``")
 
-    def ladder(self, n_switches: int) -> tuple[int, ...]:
-        """Return the parameters that a frontier tries among `n_switches` switches."""
+    def ladder(self, n_elements: int) -> tuple[int, ...]:
+        """Return the parameters that a frontier tries among `n_elements` switches."""
         if not self.by_number:
             return self.sizes
-        return (*(size for size in self.sizes if size < n_switches), *([n_switches] if self.try_all_switches else []))
+        return (*(size for size in self.sizes if size < n_elements), *([n_elements] if self.try_all_switches else []))
 
     def chooser(self, samples: Samples, ports: PortCosts | None = None) -> Chooser:
         """Do the expensive work, and return the kept switches as a function of the parameter.

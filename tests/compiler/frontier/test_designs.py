@@ -1,13 +1,14 @@
 """Designs of a finalist, made up by hand: what they take, and what becomes of them as points."""
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.frontier.designs import Design, best_designs, designs, lucks, points_of
+from thenar.compiler.frontier.designs import Design, best_designs, designs_of, lucks, points_of
 from thenar.compiler.frontier.finalists import EvaluatedFinalist, Screened
 from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, PointTime
@@ -30,14 +31,14 @@ class Surveyed:
 
     chosen: Training | None = None
 
-    def names(self, choice: Recipe) -> tuple[str, ...]:
-        return tuple(f"s{number}" for number in range(choice.prune))
+    def names(self, recipe: Recipe) -> tuple[str, ...]:
+        return tuple(f"s{number}" for number in range(recipe.prune))
 
-    def some_joints(self, choice: Recipe) -> tuple[str, ...]:
+    def some_joints(self, recipe: Recipe) -> tuple[str, ...]:
         return ()
 
-    def training(self, choice: Recipe) -> Training:
-        return self.chosen or Search().alone(choice.trainer).training
+    def training(self, recipe: Recipe) -> Training:
+        return self.chosen or Search().alone(recipe.trainer).training
 
 
 SURVEY: Any = Surveyed()
@@ -52,10 +53,10 @@ def judged(rate: float) -> TrialAccuracy:
 def close_of(
     switches: int = 20, rate: float = 0.9, scan_us: float = 500.0, classify_us: float = 50.0
 ) -> EvaluatedFinalist:
-    choice = placed("id3", switches, PAPERS_TRAINER, "switches" if switches else "joints")
+    recipe = placed("id3", switches, PAPERS_TRAINER, "switches" if switches else "joints")
     scans = (ScanTimes("mcp23017", 400_000, scan_us, 4, 2, "wire"),) if switches else ()
-    tables = PricedTables(tabled(choice, 10), b"", Classified(classify_us, "model", 900, 30), scans)
-    screened = Screened(choice, tuple(map(Element, range(switches))), judged(rate), classify_us)
+    tables = PricedTables(tabled(recipe, 10), b"", Classified(classify_us, "model", 900, 30), scans)
+    screened = Screened(recipe, tuple(map(Element, range(switches))), judged(rate), classify_us)
     return EvaluatedFinalist(screened, {}, {tables.recipe: judged(rate)}, {}, {}, (tables,))
 
 
@@ -64,14 +65,15 @@ def simulated(design: Design, us: float) -> Design:
 
 
 def test_joints_alone_have_one_design_and_wait_for_a_record() -> None:
-    (design,) = designs(close_of(switches=0), records_of(SENSORS_18).of(18))
+    (design,) = designs_of(close_of(switches=0), records_of(SENSORS_18).of(18))
     assert (design.scan.us, design.wired, design.classify.us) == (0.0, None, 50.0)
     assert design.frame.us == pytest.approx(18 * 250 + 21 * 10 / 115_200 * 1e6 + 50.0)
 
 
 def test_luck_is_the_same_however_often_the_same_folds_are_repeated() -> None:
     """Each trial that is recognised is, in every repeat; the luck is of a share of trials all the same."""
-    cuts = Cuts.of(samples_of_trials(200), Search(methods=("id3",)))
+    search = Search(methods=("id3",))
+    survey: Any = SimpleNamespace(search=search, cuts=Cuts.of(samples_of_trials(200), search))
     found = []
     for repeats in (1, 3):
         random = np.random.default_rng(1)
@@ -83,9 +85,8 @@ def test_luck_is_the_same_however_often_the_same_folds_are_repeated() -> None:
             close = replace(
                 close, tables=dict.fromkeys(close.tables, judged_so), screened=replace(close.screened, judged=judged_so)
             )
-            several.append(next(designs(close)))
-        fronts = best_designs(several)
-        found.append(sorted(lucks(fronts, several, [], cuts, 1).values()))
+            several.append(next(designs_of(close)))
+        found.append(sorted(lucks(several, [], survey).values()))
     assert found[0] == pytest.approx(found[1])
     assert found[0][-1] > 0.001
 
@@ -96,13 +97,13 @@ def samples_of_trials(trials: int) -> Samples:
 
 def test_fronts_hold_the_quickest_and_the_smallest() -> None:
     big, small = close_of(30, 0.95, scan_us=100.0), close_of(5, 0.9, scan_us=400.0)
-    by_time, by_switches = best_designs([*designs(small), *designs(big)])
+    by_time, by_switches = best_designs([*designs_of(small), *designs_of(big)])
     assert [design.n_switches for design in by_time] == [30]
     assert [design.n_switches for design in by_switches] == [5, 30]
 
 
 def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
-    one, other = next(designs(close_of(20, 0.9))), next(designs(close_of(10, 0.8, classify_us=30.0)))
+    one, other = next(designs_of(close_of(20, 0.9))), next(designs_of(close_of(10, 0.8, classify_us=30.0)))
     # The model has the other one faster, the simulator the better one: so the other is beaten on time.
     assert other.frame.us < one.frame.us
     several = [simulated(one, 20.0), simulated(other, 60.0)]
@@ -118,7 +119,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
 
 
 def test_luck_lowers_a_points_rate_and_its_intervals_lower_end() -> None:
-    design = next(designs(close_of(20, 0.9)))
+    design = next(designs_of(close_of(20, 0.9)))
     waits = dict.fromkeys(((design, kind) for kind in POLICIES), WAIT)
     (point, *_) = points_of([design], waits, {design.judged: 0.25}, SURVEY)
     found = design.judged.rate
@@ -129,7 +130,7 @@ def test_luck_lowers_a_points_rate_and_its_intervals_lower_end() -> None:
 
 
 def test_a_point_says_its_trainer_and_every_setting_that_is_no_default() -> None:
-    (design,) = designs(close_of())
+    (design,) = designs_of(close_of())
     waits = dict.fromkeys(((design, kind) for kind in POLICIES), WAIT)
     usual = {own.name: own.default for own in TRAINERS["logit"].settings}
     chosen = Training("logit", {**usual, "penalty": 17.0, "max_bins": 8})

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.frontier.finalists import Screened, depth_of, finalists, papers_tables, worthwhile
+from thenar.compiler.frontier.finalists import Screened, depth_of, papers_tables, select_finalists, worthwhile
 from thenar.compiler.frontier.search import SHAPES, Search, placed, tabled
 from thenar.compiler.frontier.survey import FoldHits, TrialAccuracy
 from thenar.compiler.placement.elements import Element
@@ -14,35 +14,35 @@ def judged(rate: float) -> TrialAccuracy:
 
 
 def _screened(size: int, rate: float, frame_us: float, inputs: Inputs = "switches", method: str = "id3") -> Screened:
-    choice = placed(method, size, PAPERS_TRAINER, inputs)
-    return Screened(choice, tuple(map(Element, range(size))), judged(rate), frame_us)
+    recipe = placed(method, size, PAPERS_TRAINER, inputs)
+    return Screened(recipe, tuple(map(Element, range(size))), judged(rate), frame_us)
 
 
 def test_the_best_and_the_smallest_that_is_level_come_first() -> None:
     best, level, between = _screened(40, 0.99, 300), _screened(16, 0.986, 200), _screened(8, 0.9, 100)
-    assert finalists([between, level, best], [], 2) == (level, best)
+    assert select_finalists([between, level, best], [], 2) == (level, best)
 
 
 def test_kinds_of_inputs_share_evenly() -> None:
     switches = [_screened(size, rate, size) for size, rate in ((40, 0.9), (20, 0.85), (10, 0.8))]
     both = [_screened(size, rate, 1000 + size, "both") for size, rate in ((40, 0.99), (20, 0.98), (10, 0.95))]
-    chosen = finalists([*switches, *both], [], 4)
-    assert [one.choice.inputs for one in chosen] == ["switches"] * 2 + ["both"] * 2
+    chosen = select_finalists([*switches, *both], [], 4)
+    assert [one.recipe.inputs for one in chosen] == ["switches"] * 2 + ["both"] * 2
 
 
 def test_what_others_beat_is_no_finalist() -> None:
     best, beaten = _screened(8, 0.9, 100), _screened(9, 0.8, 110)
-    assert finalists([best, beaten], [], 5) == (best,)
+    assert select_finalists([best, beaten], [], 5) == (best,)
 
 
 def test_what_is_wanted_is_among_them_however_bad() -> None:
     best, bad = _screened(8, 0.9, 100), _screened(9, 0.1, 300)
-    assert finalists([best, bad], [bad.choice], 1) == (best, bad)
+    assert select_finalists([best, bad], [bad.recipe], 1) == (best, bad)
 
 
 def test_equal_placements_count_once() -> None:
     one, same = _screened(8, 0.9, 100), _screened(8, 0.9, 100, method="id3-ccp")
-    assert finalists([one, same], [], 2) == (one,)
+    assert select_finalists([one, same], [], 2) == (one,)
 
 
 CHOICE = placed("id3", 62, PAPERS_TRAINER, "both")

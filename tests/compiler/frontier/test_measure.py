@@ -2,15 +2,24 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from thenar.compiler.frontier.cache import Cache, Store
-from thenar.compiler.frontier.price import ClassifyModel, measured, random_tables
+from thenar.compiler.frontier.points import PointTime
+from thenar.compiler.frontier.price import ClassifyModel, random_tables
+from thenar.compiler.frontier.survey import Survey
 from thenar.runtime.model.integers import tables_to_bytes
 
 TABLES = random_tables(6, 0, 4)
 CONTENT = tables_to_bytes(TABLES)
+
+
+def measured(contents: list[bytes], model: ClassifyModel, cache: Cache) -> dict[bytes, PointTime]:
+    survey: Any = SimpleNamespace(equipment=SimpleNamespace(model=model), cache=cache)
+    return Survey.measured(survey, contents)
 
 
 @pytest.mark.slow

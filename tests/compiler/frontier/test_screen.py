@@ -1,9 +1,11 @@
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from thenar.compiler.frontier.finalists import choices_to_mark
+from thenar.compiler.frontier.finalists import recipes_to_mark
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.price import Classified, PricedTables
@@ -36,16 +38,22 @@ def test_elimination_is_tried_at_every_size_up_to_all_switches(elements: int, si
     assert [*METHODS["elimination"].ladder(elements)] == sizes
 
 
+def surveyed(elements: int, joints: int) -> Any:
+    """What marks ask a survey for."""
+    inputs = SimpleNamespace(n_joints=joints)
+    return SimpleNamespace(search=Search(), levels=(None,), size=lambda _levels: elements, inputs=inputs)
+
+
 def test_the_papers_placements_are_marked_with_all_inputs_that_there_are() -> None:
     papers, every = ("id3", 62, PAPERS_TRAINER), ("elimination", 14, PAPERS_TRAINER)
-    assert choices_to_mark(14, 3, PAPERS_TRAINER) == {
+    assert recipes_to_mark(surveyed(14, 3)) == {
         placed(*papers, "switches"): "paper, S = 62",
         placed(*every, "switches"): "all of 14",
         placed(*papers, "both"): "paper, S = 62, joints",
         placed(*every, "both"): "all of 14, joints",
     }
-    assert list(choices_to_mark(14, 0, PAPERS_TRAINER)) == [placed(*papers, "switches"), placed(*every, "switches")]
-    assert choices_to_mark(0, 3, PAPERS_TRAINER) == {}
+    assert list(recipes_to_mark(surveyed(14, 0))) == [placed(*papers, "switches"), placed(*every, "switches")]
+    assert recipes_to_mark(surveyed(0, 3)) == {}
 
 
 def test_one_type_leaves_nothing_to_tell_apart(grasp_set: GraspSet) -> None:

@@ -80,7 +80,7 @@ def test_twenty_two_switches_take_two_chips_and_two_transactions() -> None:
     harness = propose_harness(names_of(22))
     time = scan_us(whole_scan(harness, names_of(22)), harness)
     assert time.us == pytest.approx(2 * 121.3)
-    assert len(ports_of(harness, {name: number for number, name in enumerate(names_of(22))})) == 2
+    assert len(ports_of(harness, {name: number for number, name in enumerate(names_of(22))}, {})) == 2
 
 
 def test_the_clock_is_one_that_the_chip_can_follow() -> None:

@@ -40,7 +40,7 @@ def test_no_set_of_readings_is_smaller_or_as_small_and_shorter(harnesses: Harnes
         if on_chips <= set[str]().union(*(shown for _, shown in some))
     )
     names = sorted(wanted)
-    ports = ports_of(harness, {name: number for number, name in enumerate(names)})
+    ports = ports_of(harness, {name: number for number, name in enumerate(names)}, {})
     us = sum(port_us(reading_of(port, harness), harness.buses[port.bus].clock_hz) for port in ports)
     assert (len(ports), us) == pytest.approx(best)
     # Each wanted switch is read once, from the pin that it hangs on; no transaction is without one.
@@ -82,5 +82,5 @@ def test_every_input_of_every_kind_is_shown_by_a_reading(kind: str) -> None:
 def test_a_switch_that_nobody_asks_for_costs_nothing() -> None:
     chip = ChipWiring(kind="mcp23017", address=0x20, pins={"GPA0": "s0", "GPB0": "s1"})
     harness = Harness(name="x", buses=(BusWiring(device="d", chips=(chip,)),))
-    assert [port.reading for port in ports_of(harness, {"s1": 0})] == ["B"]
-    assert ports_of(harness, {}) == ()
+    assert [port.reading for port in ports_of(harness, {"s1": 0}, {})] == ["B"]
+    assert ports_of(harness, {}, {}) == ()
