@@ -104,11 +104,10 @@ class LivePage(Closing):
         return (*self._first, self._past.text())
 
 
-def build_message(
-    folder: Path | None, manifest: Manifest | None, name: str, *, preshapes: bool = False, records: bool = False
-) -> bytes:
+def build_message(folder: Path | None, manifest: Manifest | None, name: str, **shows: bool) -> bytes:
     """Return the message on the build of a page called `name`: which one it is, None where it is not known; its types,
-    switches and joints; whether it knows an empty hand; and what else the page can show and do.
+    switches and joints; whether it knows an empty hand; and what else the page `shows`: "preshapes", the buttons of
+    "records", or a "replay".
     """
     known: dict[str, object] = {"grasps": (), "switches": (), "joints": (), "partial": True}
     if folder is not None and manifest is not None:
@@ -119,7 +118,7 @@ def build_message(
             "joints": [joint.name for joint in manifest.joints],
             "empty_hand": manifest.knows_none,
         }
-    return message("build", known, name=name, preshapes=preshapes, records=records)
+    return message("build", known, name=name, **{"preshapes": False, "records": False, "replay": False} | shows)
 
 
 class Past:

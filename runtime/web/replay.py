@@ -165,7 +165,7 @@ class ReplayPage(Closing):
         self._told = 0.0
         self._stop = Event()
         self._thread = Thread(target=self._scan, name="thenar scan", daemon=True)
-        self.server = Server("replay", address, token=token, on_message=self._take, hello=lambda: self._first)
+        self.server = Server("live", address, token=token, on_message=self._take, hello=lambda: self._first)
 
     def run(self, stop: Event) -> None:
         """Show the recording, as pages request it, until `stop` is set."""
@@ -188,8 +188,9 @@ class ReplayPage(Closing):
     def _described(self, name: str, folder: Path | None) -> Sequence[bytes]:
         build = self._build
         if build is None or folder is None:
-            return (build_message(None, None, name),)
-        return build_message(folder, build.manifest, name), message("hand", load_hand(folder, build.manifest))
+            return (build_message(None, None, name, replay=True),)
+        hand = message("hand", load_hand(folder, build.manifest))
+        return build_message(folder, build.manifest, name, replay=True), hand
 
     def _scan(self) -> None:
         """Scan the whole recording for its overview."""

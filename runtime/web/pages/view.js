@@ -1,4 +1,4 @@
-// The view of a run on the live page, wherever its moments come from.
+// The view of a run or a recording on their page.
 import { drawHand } from "./hand.js";
 import { counted, State } from "./state.js";
 import { Timeline } from "./timeline.js";
@@ -20,9 +20,8 @@ const HEALTHS = {
 };
 
 export class View {
-  /** @param {boolean} live whether moments are shown as they happen: those of a recording have no age */
-  constructor({ live = true } = {}) {
-    this.live = live;
+  constructor() {
+    this.live = true;
     this.state = new State((old) => this.#aged(old));
     this.timeline = new Timeline($("past"));
     this.frame = null;
@@ -41,10 +40,11 @@ export class View {
     requestAnimationFrame(() => this.#draw());
   }
 
-  /** Take the grasp types, switches and joints of the build. */
+  /** Take the grasp types, switches and joints of the build, and whether its moments are those of a recording. */
   build(build) {
+    this.live = !build.replay; // moments of a recording have no age
     say($("name"), build.name);
-    this.timeline.setNames(build.grasps);
+    this.timeline.types = build.grasps.filter((name) => name !== "none");
     this.bits = new Map(build.switches.map((name, bit) => [name, bit]));
     this.joints = build.joints;
     this.closed = build.switches.map(() => false);
@@ -82,8 +82,7 @@ export class View {
     this.latencies.push(frame.latency_us);
     const ages = [frame.switch_age_us, frame.glove_age_us].filter((age) => age !== null);
     const age = ages.length ? Math.min(...ages) : null;
-    if (!this.live) this.state.data(frame.time_us, 0);
-    else if (age !== null) this.state.data(frame.time_us - age, age + (frame.late_us ?? 0));
+    if (this.live && age !== null) this.state.data(frame.time_us - age, age + (frame.late_us ?? 0));
     this.timeline.add(frame);
   }
 
@@ -115,12 +114,6 @@ export class View {
   task({ text }) {
     $("task").hidden = false;
     say($("task"), `Task: ${text}`);
-  }
-
-  /** Show the state of the source of the server's moments. */
-  source(source) {
-    this.state.source(source.connected);
-    say($("source"), source.error);
   }
 
   #aged(old) {
@@ -158,7 +151,7 @@ export class View {
     const news = this.shown?.grasp !== frame.grasp;
     this.shown = frame;
     this.#now(frame);
-    // Some streams lack the switches and the probabilities of the other types.
+    // Without a build, the switches and the probabilities of the other types are not known.
     $("types-say").hidden = frame.closed !== undefined;
     this.#hand(frame);
     this.timeline.draw();
