@@ -280,22 +280,23 @@ def _lead_on_page(
     """
     from thenar.runtime.frames import now_us
     from thenar.runtime.posing import PoseStage
-    from thenar.runtime.web.posed import PosePage
+    from thenar.runtime.web.guided import pose_page
 
-    page = PosePage(address, token=token, guide=guide, subject=subject)
+    page = pose_page(address, token=token, names=guide.names, subject=subject)
     with ended_by_signals() as stop, page:
         say_page(page.url)
         try:
             while guide.stage is not PoseStage.OVER and not stop.is_set():
                 take()
-                page.step(now_us())
+                page.press(now_us(), guide)
+                page.show(now_us(), guide)
             if guide.left or stop.is_set():
                 raise click.Abort
             said = write()
         except Exception as fault:
-            page.say("left; nothing is written" if isinstance(fault, click.Abort) else str(fault))
+            page.end("left; nothing is written" if isinstance(fault, click.Abort) else str(fault))
             raise
-        page.say(said)
+        page.end(said)
     return said
 
 

@@ -193,20 +193,22 @@ def test_a_recordings_wrong_predictions_are_marked_by_sign_and_words(browser: An
 
 def test_a_calibration_whose_glove_falls_silent_is_grey_and_says_its_age(browser: Any) -> None:
     pose = {
-        **{"step": 1, "stage": "ready", "number": 1, "total": 2, "name": "Flat hand", "instruction": "Lay it flat."},
-        **{"picture": None, "left_s": 0.0, "problems": [], "offered": {}, "silent": False},
-        **{"bytes": [80], "flat": None, "concerned": [True], "states": [""]},
+        **{"step": 1, "stage": "ready", "count": "pose 1 of 2", "done": 0, "total": 2, "title": "Flat hand"},
+        **{"detail": "Lay it flat.", "pose": None, "says": "", "number": "", "problems": [], "offered": {}},
+        **{"devices": [], "sees": "all 1 sensors are measured"},
+        "rows": [{"byte": 80, "flat": None, "state": "", "concerned": True, "faulty": False}],
     }
-    first = [message("sensors", names=["thumb_mcp"], subject="anna"), message("hand", HAND)]
-    with Server("calibrate", "127.0.0.1:0", token=None, hello=lambda: first) as server:
+    about = {"what": "Calibration of", "subject": "anna", "leave": "", "table": ["thumb_mcp"], "study": False}
+    first = [message("about", about), message("hands", pose=HAND)]
+    with Server("guided", "127.0.0.1:0", token=None, hello=lambda: first) as server:
         browser.open(server.url)
         for number in range(5):
-            server.publish("pose", message("pose", pose, time_us=10_000 * number, age_us=1_000))
+            server.publish("guide", message("guide", pose, time_us=10_000 * number, age_us=1_000))
         browser.wait(lambda: browser.text("sees") == "all 1 sensors are measured")
         # Nothing more comes: the run has stopped.
         old = "return document.documentElement.classList.contains('old')"
         browser.wait(lambda: browser.script(old) and browser.text("age").startswith("this is "))
         assert browser.text("glove-state").startswith("glove: silent since ")
-        server.publish("pose", message("pose", pose, time_us=9_000_000, age_us=1_000))
+        server.publish("guide", message("guide", pose, time_us=9_000_000, age_us=1_000))
         browser.wait(lambda: not browser.script(old))
         browser.driver.get("about:blank")
