@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 from thenar.drivers.errors import SettingError
 
 from ..detail import Details
-from ..preshape.selector import Preshape
+from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkReport

@@ -5,7 +5,6 @@ Every open browser shows the same, and keys count in each.
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from enum import Enum
 from math import ceil
 from typing import Any
 
@@ -18,9 +17,9 @@ from ..hand import HandDrawing, drawn_joints
 from ..live.sources import DeviceState
 from ..manifest import Calibration
 from ..names import list_names
-from ..posing import PoseGuide, PoseKey, PoseStage
+from ..posing import POSE_KEYS, PoseGuide, PoseStage
 from ..published import NONE
-from ..recording.guide import CollectionGuide, Key, Stage, Trial
+from ..recording.guide import KEYS, CollectionGuide, Trial
 from ..recording.session import Session
 from .server import Server, message
 
@@ -63,7 +62,7 @@ class GuidePage(Closing):
     ----------
     address, token
         As for `Server`.
-    keys : type
+    keys : sequence of str
         The keys of the guide.
     view : callable
         Returns what is shown of the guide at a moment: it gets the moment, the guide, and what `show` gets in addition.
@@ -90,13 +89,13 @@ class GuidePage(Closing):
         address: str,
         *,
         token: str | None,
-        keys: type[Enum],
+        keys: Sequence[str],
         view: Callable[..., dict[str, object]],
         about: Mapping[str, object],
         hands: Mapping[str, object],
     ) -> None:
         self._keys, self._view = keys, view
-        self._pressed: deque[tuple[int, Enum]] = deque(maxlen=64)
+        self._pressed: deque[tuple[int, str]] = deque(maxlen=64)
         self._due_us, self._step = 0, -1
         self._shown: dict[str, object] = {}
         first = (message("about", about), message("hands", hands))
@@ -115,7 +114,7 @@ class GuidePage(Closing):
         if now_us < self._due_us and guide.step == self._step:
             return
         self._due_us, self._step = now_us + _PERIOD_US, guide.step
-        self._shown = {"step": guide.step, "stage": guide.stage.value, **self._view(now_us, guide, *more)}
+        self._shown = {"step": guide.step, "stage": guide.stage, **self._view(now_us, guide, *more)}
         self._server.publish("guide", message("guide", self._shown))
 
     def end(self, sentence: str) -> None:
@@ -133,10 +132,10 @@ class GuidePage(Closing):
         self._server.close()
 
     def _take(self, asked: Mapping[str, object]) -> None:
-        step, names = asked.get("step"), [key.value for key in self._keys]
-        if asked["do"] not in names or type(step) is not int:
-            raise SettingError(f"this page presses {', '.join(names)}, each at a step")
-        self._pressed.append((step, self._keys(asked["do"])))
+        step, key = asked.get("step"), str(asked["do"])
+        if key not in self._keys or type(step) is not int:
+            raise SettingError(f"this page presses {', '.join(self._keys)}, each at a step")
+        self._pressed.append((step, key))
 
 
 def collection_page(
@@ -154,7 +153,7 @@ def collection_page(
     assert session.collection is not None
     leave = "Leave? The recording is kept, and the same command continues it another time."
     about = {"what": "Subject", "subject": session.collection.subject, "leave": leave, "table": (), "study": True}
-    return GuidePage(address, token=token, keys=Key, view=_CollectionView(session, shown), about=about, hands=hands)
+    return GuidePage(address, token=token, keys=KEYS, view=_CollectionView(session, shown), about=about, hands=hands)
 
 
 class _CollectionView:
@@ -173,8 +172,8 @@ class _CollectionView:
 
     def __call__(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> dict[str, object]:
         trial, newest_us = guide.trial, guide.newest_us
-        number = {Stage.REVIEW: "✓"}.get(guide.stage, "")
-        if guide.stage in (Stage.COUNTDOWN, Stage.MOVING):
+        number = {"review": "✓"}.get(guide.stage, "")
+        if guide.stage in ("countdown", "moving"):
             number = str(ceil(guide.seconds_left(now_us)))
         nothing = {"title": "No trial is left", "detail": "", "pose": None}
         return {
@@ -185,7 +184,7 @@ class _CollectionView:
             "says": _collection_says(guide),
             "number": number,
             "problems": [f"not captured: {guide.problem}"] if guide.problem else [],
-            "offered": {key.value: what for key, what in guide.offered().items()},
+            "offered": guide.offered(),
             "time_us": newest_us,
             "age_us": newest_us and now_us - newest_us,
             "devices": [
@@ -201,7 +200,7 @@ class _CollectionView:
         how far each taxel is pressed, 0 to 1; and a sentence on them.
         """
         switches, glove = guide.captured
-        session, captured = self._session, guide.stage is Stage.REVIEW
+        session, captured = self._session, guide.stage == "review"
         joints: list[float | None] = []
         if glove is not None and glove.plugged and (captured or now_us - glove.time_us <= guide.old_us):
             joints = [
@@ -239,16 +238,16 @@ def _collection_says(guide: CollectionGuide) -> str:
     """Return what to do now."""
     none = guide.trial is not None and guide.trial.grasp == NONE
     waits = f"the countdown waits: {guide.lost}" if guide.lost else ""
-    if guide.stage is Stage.DONE and guide.skipped:
+    if guide.stage == "done" and guide.skipped:
         return "no trial is left; the skipped ones come another time"
     return {
-        Stage.READY: waits or "Enter starts the countdown",
-        Stage.COUNTDOWN: "move so in" if none else "take the grasp: hold it in",
-        Stage.MOVING: "move so for",
-        Stage.REVIEW: "captured: keep it?",
-        Stage.PAUSED: "; ".join(filter(None, ("paused; nothing is recorded meanwhile", waits))),
-        Stage.DONE: "all trials are done",
-        Stage.OVER: "the collection has ended",
+        "ready": waits or "Enter starts the countdown",
+        "countdown": "move so in" if none else "take the grasp: hold it in",
+        "moving": "move so for",
+        "review": "captured: keep it?",
+        "paused": "; ".join(filter(None, ("paused; nothing is recorded meanwhile", waits))),
+        "done": "all trials are done",
+        "over": "the collection has ended",
     }[guide.stage]
 
 
@@ -273,22 +272,22 @@ def pose_page(address: str, *, token: str | None, names: Sequence[str], subject:
     """Return the page of a calibration of the sensors called `names`, of a subject."""
     leave = "Leave? Nothing is written; an older calibration stays as it is."
     about = {"what": "Calibration of", "subject": subject, "leave": leave, "table": names, "study": False}
-    return GuidePage(address, token=token, keys=PoseKey, view=_pose_view, about=about, hands={"pose": posed_hand()})
+    return GuidePage(address, token=token, keys=POSE_KEYS, view=_pose_view, about=about, hands={"pose": posed_hand()})
 
 
-_POSE_SAYS = {
-    PoseStage.READY: "hold this pose, then press Enter",
-    PoseStage.HELD: "hold still",
-    PoseStage.DOUBTED: "this pose is in doubt",
-    PoseStage.DONE: "all poses are taken",
-    PoseStage.OVER: "the calibration has ended",
+_POSE_SAYS: dict[PoseStage, str] = {
+    "ready": "hold this pose, then press Enter",
+    "held": "hold still",
+    "doubted": "this pose is in doubt",
+    "done": "all poses are taken",
+    "over": "the calibration has ended",
 }
 
 
 def _pose_view(now_us: int, guide: PoseGuide) -> dict[str, object]:
     """Return the view of a calibration."""
     pose, total, silent = guide.pose, len(guide.poses), guide.silent(now_us)
-    done, first = guide.stage in (PoseStage.DONE, PoseStage.OVER), not guide.taken
+    done, first = guide.stage in ("done", "over"), not guide.taken
     raw: Sequence[int | None] = [*guide.raw] if guide.raw else [None] * len(guide.names)
     states = guide.states() or [""] * len(guide.names)
     rows = []
@@ -305,7 +304,7 @@ def _pose_view(now_us: int, guide: PoseGuide) -> dict[str, object]:
         )
     faulty = sum(map(bool, states))
     sees = f"{faulty} of {len(rows)} sensors: see State" if faulty else f"all {len(rows)} sensors are measured"
-    waits = guide.stage is PoseStage.READY and silent
+    waits = guide.stage == "ready" and silent
     return {
         "count": f"{total} of {total} poses taken" if done else f"pose {len(guide.taken) + 1} of {total}",
         "done": len(guide.taken),
@@ -315,8 +314,8 @@ def _pose_view(now_us: int, guide: PoseGuide) -> dict[str, object]:
         "pose": None if done else posed({**_FURTHER.get(pose.name, {}), **pose.degrees}),
         "says": "the glove is silent: no pose can be taken until it sends" if waits else _POSE_SAYS[guide.stage],
         "number": "",
-        "problems": guide.problems if guide.stage is PoseStage.DOUBTED else [],
-        "offered": {key.value: what for key, what in guide.offered(now_us).items()},
+        "problems": guide.problems if guide.stage == "doubted" else [],
+        "offered": guide.offered(now_us),
         "time_us": guide.raw_us,
         "age_us": guide.raw_us and now_us - guide.raw_us,
         "devices": (),
