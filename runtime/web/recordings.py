@@ -13,8 +13,6 @@ from pathlib import Path
 from threading import Thread
 from time import time
 
-import msgspec
-
 from thenar.drivers.errors import SettingError
 
 from ..frames import now_us
@@ -24,29 +22,6 @@ from ..recording.writer import LiveRecorder
 
 MOST_LETTERS, MOST_TEXT = 40, 200
 _NAME = re.compile(rf"[A-Za-z0-9][A-Za-z0-9_-]{{0,{MOST_LETTERS - 1}}}")
-
-
-class RecordingState(msgspec.Struct, frozen=True):
-    """The state of recordings, as shown by a page.
-
-    folder    their folder
-    on        whether one is being written
-    name      of the file, the newest one's if none is being written; "" before the first
-    fixed     whether the command began it (`--record`), so that no page can end it
-    since_s   when it began, in seconds since 1970
-    messages  its number of messages
-    marks     its number of marks
-    failure   why nothing can be recorded now; "" while there is no error
-    """
-
-    folder: str
-    on: bool = False
-    name: str = ""
-    fixed: bool = False
-    since_s: float = 0.0
-    messages: int = 0
-    marks: int = 0
-    failure: str = ""
 
 
 class Recordings:
@@ -66,21 +41,22 @@ class Recordings:
         self.made: list[LiveRecorder] = []
 
     @property
-    def state(self) -> RecordingState:
-        """The current state."""
+    def state(self) -> dict[str, object]:
+        """What a page shows: the "folder"; whether one is being written ("on"), and since when ("since_s", since 1970);
+        the "name" of the file, the newest one's if none is being written; whether the command began it (--record), so
+        that no page can end it ("fixed"); numbers of "messages" and "marks"; why nothing can be recorded now.
+        """
         shown = self._glove.recorder or self._own
-        if shown is None:
-            return RecordingState(str(self._folder))
-        return RecordingState(
-            str(self._folder),
-            on=self._glove.recorder is not None,
-            name=shown.path.name,
-            fixed=shown is not self._own,
-            since_s=self._since_s,
-            messages=shown.messages,
-            marks=self._marks,
-            failure=shown.failure or "",
-        )
+        return {
+            "folder": str(self._folder),
+            "on": self._glove.recorder is not None,
+            "name": "" if shown is None else shown.path.name,
+            "fixed": shown is not self._own,
+            "since_s": self._since_s,
+            "messages": 0 if shown is None else shown.messages,
+            "marks": self._marks,
+            "failure": "" if shown is None else shown.failure or "",
+        }
 
     def take(self, message: Mapping[str, object]) -> None:
         """Carry out a page's request. Raises SettingError if it is impossible."""

@@ -31,11 +31,9 @@ export class Replay {
     $("at").addEventListener("input", () => this.#seek(Number($("at").value)));
     $("play").addEventListener("click", () => this.#toggle());
     $("speed").addEventListener("change", () => ask("speed", Number($("speed").value)));
-    $("span").addEventListener("change", () => this.#draw());
     $("whole").addEventListener("click", (event) => {
-      if (!this.#state) return;
-      const [from, to] = this.#shown(), box = $("whole").getBoundingClientRect();
-      this.#seek((from + ((event.clientX - box.left) / box.width) * (to - from) - this.#state.first_us) / 1e6);
+      const box = $("whole").getBoundingClientRect();
+      this.#seek(((event.clientX - box.left) / box.width) * Number($("at").max));
     });
     addEventListener("resize", () => this.#draw());
     addEventListener("keydown", (event) => this.#key(event));
@@ -145,17 +143,9 @@ export class Replay {
     found();
   }
 
-  // The moments at both ends of the timeline.
-  #shown() {
-    const { at_us, first_us, last_us } = this.#state, span = 1e6 * Number($("span").value);
-    if (!span || span >= last_us - first_us) return [first_us, Math.max(last_us, first_us + 1)];
-    const from = Math.min(Math.max(at_us - span / 2, first_us), last_us - span);
-    return [from, from + span];
-  }
-
   #draw() {
     if (!this.#state) return;
-    const { at_us, first_us } = this.#state, { truth, predictions, wrong } = this.#spans, [from, to] = this.#shown();
+    const { at_us, first_us, last_us } = this.#state, { truth, predictions, wrong } = this.#spans;
     const names = [...new Set([...truth, ...predictions].map(({ name }) => name))];
     const types = (this.#view.timeline.types.length ? this.#view.timeline.types : names).filter((name) => name !== "none");
     const lanes = [
@@ -163,7 +153,7 @@ export class Replay {
       { name: "prediction", spans: predictions },
       { name: "wrong: another type than the truth", spans: wrong },
     ];
-    const drawn = drawLanes($("whole"), lanes, from, to, types);
+    const drawn = drawLanes($("whole"), lanes, first_us, Math.max(last_us, first_us + 1), types);
     if (drawn === null) return;
     const { pen, x, high, style } = drawn;
     pen.fillStyle = style.focus;
@@ -171,7 +161,6 @@ export class Replay {
     pen.fillStyle = style.text;
     pen.fillRect(x(at_us) - 1, 0, 2, high);
     const counts = `${truth.length} labelled spans, ${predictions.length} predictions, wrong in ${wrong.length} spans`;
-    const ends = `${clock((from - first_us) / 1e6)} to ${clock((to - first_us) / 1e6)}`;
-    $("whole").setAttribute("aria-label", `Truth and prediction from ${ends}: ${counts}`);
+    $("whole").setAttribute("aria-label", `Truth and prediction of ${clock((last_us - first_us) / 1e6)}: ${counts}`);
   }
 }

@@ -35,8 +35,6 @@ export class View {
     this.quarantined = [];
     this.words = 0;
     this.said = { text: "", at: 0, since: 0, candidate: "" };
-    this.latencies = [];
-    this.count = { frames: 0, from: performance.now(), number: null };
     requestAnimationFrame(() => this.#draw());
   }
 
@@ -78,8 +76,6 @@ export class View {
   take(frame) {
     if (frame === null) return;
     this.frame = frame;
-    this.count.frames += 1;
-    this.latencies.push(frame.latency_us);
     const ages = [frame.switch_age_us, frame.glove_age_us].filter((age) => age !== null);
     const age = ages.length ? Math.min(...ages) : null;
     if (this.live && age !== null) this.state.data(frame.time_us - age, age + (frame.late_us ?? 0));
@@ -157,7 +153,7 @@ export class View {
     this.timeline.draw();
     if (news || now - this.words >= WORDS_MS) {
       this.words = now;
-      this.#numbers(frame, now);
+      this.#numbers(frame);
     }
     this.#announce(this.state.old ? "no data" : frame.grasp, now);
   }
@@ -204,7 +200,7 @@ export class View {
     if (!this.rows.has(frame.grasp) && frame.grasp !== "unknown") this.#row(frame.grasp);
   }
 
-  #numbers(frame, now) {
+  #numbers(frame) {
     this.#bars(frame);
     for (const [grasp, { share }] of this.rows) {
       const at = this.classes.indexOf(grasp);
@@ -215,34 +211,18 @@ export class View {
     const held = frame.segment_us === null ? "" : `segment ${frame.segment}, ${frame.state} for ${((frame.time_us - frame.segment_us) / 1e6).toFixed(1)}\u00a0s`;
     say($("segment"), [sure, held].filter(Boolean).join(" · "));
     if (!$("preshape").hidden) say($("preshape"), `Preshape: ${frame.preshape?.name ?? "none yet"}`);
-    this.#times(frame, now);
+    pairs($("times"), {
+      "latency": ms(frame.latency_us),
+      "switches, age": ms(frame.switch_age_us),
+      "glove, age": ms(frame.glove_age_us),
+      ...(this.rates ? { "read": this.rates } : {}),
+    });
     this.#wrong();
     const segments = this.timeline.segments().slice(0, SHOWN);
     list($("segments"), segments.map(({ number, type, seconds, lasts }) => `${number}: ${type}, ${seconds.toFixed(1)} s${lasts && !this.state.old ? ", now" : ""}`));
     const types = segments.length ? segments.map(({ type }) => type).reverse().join(", ") : "none";
     const label = `Predictions of the last 30 seconds${this.state.old ? ", which have ended" : ""}: this frame ${frame.candidate}, announced ${frame.grasp}, segments: ${types}`;
     if ($("past").getAttribute("aria-label") !== label) $("past").setAttribute("aria-label", label);
-  }
-
-  #times(frame, now) {
-    const { count } = this, seconds = (now - count.from) / 1000;
-    if (seconds >= 1) {
-      if (count.number !== null) {
-        const made = (frame.number - count.number) / seconds;
-        this.rate = `${(count.frames / seconds).toFixed(0)}/s of ${made.toFixed(0)}/s`;
-      }
-      this.count = { frames: 0, from: now, number: frame.number };
-      const sorted = this.latencies.sort((one, other) => one - other);
-      this.latency = sorted.length ? sorted[Math.floor(sorted.length / 2)] : null;
-      this.latencies = [];
-    }
-    pairs($("times"), {
-      "latency": ms(this.latency ?? frame.latency_us),
-      "switches, age": ms(frame.switch_age_us),
-      "glove, age": ms(frame.glove_age_us),
-      "frames shown": this.rate ?? "–",
-      ...(this.rates ? { "read": this.rates } : {}),
-    });
   }
 
   #wrong() {
