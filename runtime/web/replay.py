@@ -23,7 +23,7 @@ from ..harness.loading import parse_harness
 from ..harness.wiring import Harness
 from ..live.replay import Stepper, periods_us
 from ..published import LiveGrasp
-from ..recording.index import Index
+from ..recording.reader import Index
 from ..recording.session import Label, Mark, Session
 from .live import PAST_US, FrameText, build_message
 from .server import Server, message
