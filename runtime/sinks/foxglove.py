@@ -16,7 +16,6 @@ browser of this machine may read as Foxglove does.
 Foxglove's schemas have no null, no alternatives and no references: None is left out of its message.
 """
 
-import ipaddress
 import re
 from collections import Counter
 from math import exp
@@ -24,14 +23,13 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from thenar.drivers.errors import SettingError
 from thenar.drivers.extras import optional
 
 from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
-from .sockets import resolve
+from .sockets import check_readers, resolve
 
 if TYPE_CHECKING:
     from ..build import Build
@@ -256,11 +254,7 @@ def _joints(moment: "Moment", build: "Build") -> dict[str, Any]:
 
 def _open(where: SinkPlace) -> Sink:
     _, address = resolve(where.place, where.text, "foxglove:127.0.0.1:8765")
-    if "public" not in where.options and not ipaddress.ip_address(address[0].partition("%")[0]).is_loopback:
-        raise SettingError(
-            f"{where.text}: other machines could read it there: use 127.0.0.1, or write "
-            f"foxglove:{where.place}?public to let them"
-        )
+    check_readers(address, f"foxglove:{where.place}", public="public" in where.options)
     with optional(SinkError, where.text):
         return FoxgloveServer(*address[:2], where=where.text)
 

@@ -1,7 +1,7 @@
 // The page of a guided collection or calibration: what to do now, what the glove reads, and the keys.
 import { drawHand } from "./hand.js";
 import { State } from "./state.js";
-import { connect, say } from "./wire.js";
+import { cell, connect, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 // The same letters as on the terminal.
@@ -33,13 +33,6 @@ const send = connect({
   study: studied,
 });
 
-function cell(kind, text) {
-  const made = document.createElement(kind);
-  if (kind === "th") made.scope = "row";
-  made.textContent = text;
-  return made;
-}
-
 function row(name) {
   const made = document.createElement("tr"), byte = cell("td", "");
   const meter = document.createElement("meter"), number = document.createElement("span");
@@ -69,7 +62,7 @@ function show(guide) {
     hands.pose.setPose(guide.pose);
     $("pose").setAttribute("aria-label", `picture of the hand: ${guide.title}`);
   }
-  list($("problems"), guide.problems, () => {});
+  list($("problems"), guide.problems);
   // Read out once per stage of each step.
   if (read !== `${guide.step} ${guide.stage}`) {
     read = `${guide.step} ${guide.stage}`;
@@ -100,15 +93,6 @@ function sees(guide) {
   });
   const words = guide.devices.map(({ name, connected, error }) => (connected ? `✓ ${name}` : `✗ ${name}: ${error}`));
   list($("devices"), words, (item, at) => (item.dataset.is = guide.devices[at].connected ? "good" : "bad"));
-}
-
-function list(element, texts, style) {
-  while (element.children.length > texts.length) element.lastChild.remove();
-  texts.forEach((text, at) => {
-    const item = element.children[at] ?? element.appendChild(document.createElement("li"));
-    style(item, at);
-    say(item, text);
-  });
 }
 
 function studied(study) {

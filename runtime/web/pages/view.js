@@ -2,7 +2,7 @@
 import { drawHand } from "./hand.js";
 import { counted, State } from "./state.js";
 import { Timeline } from "./timeline.js";
-import { say } from "./wire.js";
+import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 const WORDS_MS = 200; // numbers and words change five times a second, so that they can be read
@@ -86,11 +86,10 @@ export class View {
   health(report) {
     this.state.devices(report.devices);
     const rows = report.devices.map((device) => {
-      const row = document.createElement("tr"), head = cell("th", device.name);
-      head.scope = "row";
+      const row = document.createElement("tr");
       const state = device.error || (device.connected ? "connected" : "not connected");
       const counted = device.counts.filter((count) => count.value).map((count) => `${count.name} ${count.value}`);
-      row.append(head, cell("td", state), cell("td", counted.join(", ") || "nothing"));
+      row.append(cell("th", device.name), cell("td", state), cell("td", counted.join(", ") || "nothing"));
       return row;
     });
     $("devices").replaceChildren(...rows);
@@ -229,7 +228,7 @@ export class View {
     const named = new Set(this.quarantined.map((text) => text.split(": ")[0]));
     const lost = (this.frame?.lost ?? []).filter((name) => !named.has(name)).map((name) => `${name}: lost`);
     const all = [...this.quarantined, ...lost, ...(this.suspects ?? [])];
-    list($("wrong"), all.length ? all : ["nothing"], all.length ? "" : "none");
+    list($("wrong"), all.length ? all : ["nothing"]);
   }
 
   // For screen readers: a text that was stable for a second, at most every three seconds.
@@ -244,28 +243,12 @@ export class View {
   }
 }
 
-function cell(kind, text) {
-  const made = document.createElement(kind);
-  made.textContent = text;
-  return made;
-}
-
 const ms = (us) => (us === null || us === undefined ? "none yet" : `${(us / 1000).toFixed(1)} ms`);
 
 function listed(names) {
   if (!names.length) return "";
   const more = names.length > SHOWN ? ` and ${names.length - SHOWN} more` : "";
   return `: ${names.slice(0, SHOWN).join(", ")}${more}`;
-}
-
-// Fill a list, changing only the entries that differ.
-function list(element, texts, className = "") {
-  while (element.children.length > texts.length) element.lastChild.remove();
-  texts.forEach((text, at) => {
-    const item = element.children[at] ?? element.appendChild(document.createElement("li"));
-    if (item.className !== className) item.className = className;
-    say(item, text);
-  });
 }
 
 function pairs(element, values) {

@@ -15,7 +15,6 @@ from msgspec.structs import replace
 
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.layout import (
-    LARGEST_RECORD,
     RECOGNITION,
     SWITCHES,
     TRIALS,
@@ -23,6 +22,7 @@ from thenar.runtime.recording.layout import (
     encode_bytes,
     encode_text,
 )
+from thenar.runtime.recording.mcap import LARGEST_RECORD
 from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session, to_metadata
 
 READ = """
