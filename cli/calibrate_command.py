@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from thenar.drivers.calibration import GloveCalibration
     from thenar.runtime.harness.wiring import Harness
     from thenar.runtime.live.sources import Sources
-    from thenar.runtime.posing import PoseGuide
+    from thenar.runtime.posing import PoseGuide, PoseKey
     from thenar.runtime.taxels import TaxelCalibration
 
 Codes = tuple[int | None, ...]
@@ -234,7 +234,6 @@ def _lead(guide: "PoseGuide", take: Callable[[], None]) -> None:
     Raises click.Abort if the user quits, DeviceError if the glove is disconnected or unplugged.
     """
     from thenar.runtime.frames import now_us
-    from thenar.runtime.posing import PoseKey, PoseStage
 
     typed = TypedLines(sys.stdin.fileno())
 
@@ -244,25 +243,26 @@ def _lead(guide: "PoseGuide", take: Callable[[], None]) -> None:
             table.add_row(name, str(byte), "yes" if name in guide.pose.degrees else "", state)
         return table
 
-    while guide.stage is not PoseStage.DONE:
-        if guide.stage is PoseStage.HELD:
+    while guide.stage != "done":
+        if guide.stage == "held":
             take()
             continue
-        if guide.stage is PoseStage.DOUBTED:
+        keys: dict[str, PoseKey]
+        if guide.stage == "doubted":
             for problem in guide.problems:
                 echo(f"  {problem}", err=True)
-            question, keys = "Enter to hold it again (k: keep it anyway, q: quit)", {"k": PoseKey.KEEP}
+            question, keys = "Enter to hold it again (k: keep it anyway, q: quit)", {"k": "keep"}
         else:
             number = f"{len(guide.taken) + 1} of {len(guide.poses)}"
             echo(f"\nPose {number}, {guide.pose.name}: {guide.pose.instruction}", err=True)
             question = "Enter when you hold it (b: back to the previous pose, q: quit)"
-            keys = {"b": PoseKey.BACK}
+            keys = {"b": "back"}
         reply = typed.ask(question, keys, take, drawn)
         if guide.silent(now_us()):
             echo("The glove is silent: waiting until it sends.", err=True)
             while guide.silent(now_us()):
                 take()
-        guide.press(now_us(), keys.get(reply, PoseKey.ACCEPT))
+        guide.press(now_us(), keys.get(reply, "accept"))
 
 
 def _lead_on_page(
@@ -279,23 +279,23 @@ def _lead_on_page(
     `take` and `write`.
     """
     from thenar.runtime.frames import now_us
-    from thenar.runtime.posing import PoseStage
-    from thenar.runtime.web.posed import PosePage
+    from thenar.runtime.web.guided import pose_page
 
-    page = PosePage(address, token=token, guide=guide, subject=subject)
+    page = pose_page(address, token=token, names=guide.names, subject=subject)
     with ended_by_signals() as stop, page:
         say_page(page.url)
         try:
-            while guide.stage is not PoseStage.OVER and not stop.is_set():
+            while guide.stage != "over" and not stop.is_set():
                 take()
-                page.step(now_us())
+                page.press(now_us(), guide)
+                page.show(now_us(), guide)
             if guide.left or stop.is_set():
                 raise click.Abort
             said = write()
         except Exception as fault:
-            page.say("left; nothing is written" if isinstance(fault, click.Abort) else str(fault))
+            page.end("left; nothing is written" if isinstance(fault, click.Abort) else str(fault))
             raise
-        page.say(said)
+        page.end(said)
     return said
 
 

@@ -31,7 +31,7 @@ from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources
 from thenar.runtime.names import list_names
 from thenar.runtime.published import NONE
-from thenar.runtime.recording.guide import CollectionGuide, Journal, Key, Stage, Trial
+from thenar.runtime.recording.guide import KEYS, CollectionGuide, Journal, Key, Trial
 from thenar.runtime.recording.session import Collection, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.scanning.ports import whole_scan
@@ -50,8 +50,8 @@ _WAIT_US = 50_000
 # Time for a device that is just being plugged in.
 _PATIENCE_US = 3_000_000
 _REDRAW_US = 100_000
-_LETTERS = {Key.ACCEPT: "Enter", Key.REDO: "r", Key.UNDO: "u", Key.SKIP: "s", Key.PAUSE: "p", Key.QUIT: "q"}
-_MEANT = {letter: key for key, letter in _LETTERS.items()} | dict.fromkeys(("", " ", "a"), Key.ACCEPT)
+_LETTERS: dict[Key, str] = {"accept": "Enter", "redo": "r", "undo": "u", "skip": "s", "pause": "p", "quit": "q"}
+_MEANT = {letter: key for key, letter in _LETTERS.items()} | dict.fromkeys(("", " ", "a"), KEYS[0])
 # Escape sequences that a terminal sends for arrows, function keys and the like.
 _ESCAPES = re.compile(r"\x1b(?:\[[0-9;?]*[ -/]*[@-~]|O.)?")
 
@@ -187,7 +187,7 @@ class Terminal(Closing):
             typed = ""
         self._ended = not typed
         if self._ended:
-            return [Key.QUIT]
+            return ["quit"]
         self._rest += typed
         return [_MEANT[word] for word in self._words() if word in _MEANT]
 
@@ -212,7 +212,7 @@ class Terminal(Closing):
         problem = f"not captured: {guide.problem}{why}; " if guide.problem else ""
         waits = f"the countdown waits: {guide.lost}{why}; " if _waits(guide) else ""
         line = f"{self._task(guide)}: {problem}{waits}{_keys(guide)}"
-        if line != self._said and guide.stage is not Stage.OVER:
+        if line != self._said and guide.stage != "over":
             self._said = line
             self._console.print(line, soft_wrap=True)
 
@@ -240,16 +240,16 @@ class Terminal(Closing):
     def _standing(self, now_us: int, guide: CollectionGuide) -> str:
         if _waits(guide):
             return f"the countdown waits: {guide.lost}"
-        if guide.stage is Stage.PAUSED:
+        if guide.stage == "paused":
             return "paused; nothing is recorded meanwhile"
         if guide.problem:
             return f"not captured: {guide.problem}"
-        if guide.stage is Stage.COUNTDOWN:
+        if guide.stage == "countdown":
             doing = "move so" if guide.trial is not None and guide.trial.grasp == NONE else "hold it"
             return f"{doing} in {guide.seconds_left(now_us):.1f} s"
-        if guide.stage is Stage.MOVING:
+        if guide.stage == "moving":
             return f"move so for {guide.seconds_left(now_us):.1f} s more"
-        if guide.stage is not Stage.REVIEW:
+        if guide.stage != "review":
             return ""
         switches, glove = guide.captured
         closed = "" if switches is None else f"{switches.closed.bit_count()} switches closed"
@@ -259,7 +259,7 @@ class Terminal(Closing):
 
 def _waits(guide: CollectionGuide) -> bool:
     """Return whether no countdown can start, because something is not read."""
-    return bool(guide.lost) and guide.stage in (Stage.READY, Stage.PAUSED)
+    return bool(guide.lost) and guide.stage in ("ready", "paused")
 
 
 def _keys(guide: CollectionGuide) -> str:
@@ -271,7 +271,7 @@ def _lead(
     guide: CollectionGuide, devices: Sources, recorder: Recorder, faces: "Sequence[Terminal | StudiedPage]", stop: Event
 ) -> None:
     """Lead through the guide's trials until all are done, the user leaves, `stop` is set, or the recording fails."""
-    while guide.stage is not Stage.OVER and not recorder.lost and recorder.failure is None and not stop.is_set():
+    while guide.stage != "over" and not recorder.lost and recorder.failure is None and not stop.is_set():
         arrived = devices.take(_WAIT_US).arrived
         devices.raise_settings()
         guide.take(now_us(), arrived, [device.name for device in devices.devices() if not device.connected])
@@ -279,7 +279,7 @@ def _lead(
             face.press(now_us(), guide)
             face.show(now_us(), guide, devices.devices())
     # However it ended, the page shows that it has.
-    guide.press(now_us(), Key.QUIT)
+    guide.press(now_us(), "quit")
     for face in faces:
         face.show(now_us(), guide, devices.devices())
 

@@ -17,8 +17,7 @@ from thenar.drivers.closing import Closing
 from thenar.runtime.published import NONE
 from thenar.runtime.recording.guide import CollectionGuide, Trial
 from thenar.runtime.recording.session import Session
-from thenar.runtime.web.guided import GuidePage
-from thenar.runtime.web.posed import posed, posed_hand
+from thenar.runtime.web.guided import collection_page, posed, posed_hand
 from thenar.simulator.handmaps.handmap import hand_map
 from thenar.simulator.planning.prehension import Prehension, load_prehensions
 
@@ -67,7 +66,7 @@ class StudiedPage(Closing):
         assert session.collection is not None
         self._recording, self._round = recording, len(session.collection.tasks)
         hands = {"glove": drawn_glove(session, hand_map()), "pose": posed_hand()}
-        self._page = GuidePage(address, token=token, session=session, hands=hands, shown=partial(shown, taxonomy))
+        self._page = collection_page(address, token=token, session=session, hands=hands, shown=partial(shown, taxonomy))
         say_page(self._page.url)
         self._background: BackgroundTask[InterimAccuracy | None] = BackgroundTask()
         self._studied = -1
@@ -81,9 +80,9 @@ class StudiedPage(Closing):
         self._page.show(now_us, guide, devices)
         try:
             if (found := self._background.fetch()) is not None:
-                self._page.tell({"problem": "", **to_builtins(found)})
+                self._page.study({"problem": "", **to_builtins(found)})
         except BrokenExecutor as wrong:
-            self._page.tell({"problem": f"the accuracy so far could not be computed: {wrong}"})
+            self._page.study({"problem": f"the accuracy so far could not be computed: {wrong}"})
         if self._background.busy or guide.done < 2 or guide.done == self._studied:
             return
         if self._studied < 0 or abs(guide.done - self._studied) >= self._round or guide.trial is None:
@@ -92,7 +91,7 @@ class StudiedPage(Closing):
 
     def warn(self, warnings: Sequence[str]) -> None:
         """Show what is odd in the set that was written, instead of the accuracy so far."""
-        self._page.tell({"problem": "; ".join(warnings)})
+        self._page.study({"problem": "; ".join(warnings)})
 
     def close(self) -> None:
         """Stop computing the accuracy, and close the page."""

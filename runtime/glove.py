@@ -19,7 +19,7 @@ from .live.recogniser import Moment
 from .live.sources import Snapshot
 from .live.system import LiveSystem
 from .policy import Policy
-from .preshape.loading import preshape_selector
+from .preshape import preshape_selector
 from .published import DeviceHealth, HealthReport, JointAngles, OutputTrouble, Quarantined
 from .recording.session import Session
 from .recording.writer import LiveRecorder

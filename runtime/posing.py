@@ -5,7 +5,7 @@ the lines from them.
 """
 
 from collections.abc import Sequence
-from enum import Enum
+from typing import Literal, get_args
 
 from thenar.drivers.calibration import (
     CalibrationPose,
@@ -25,23 +25,11 @@ SETTLE_US = 150_000
 _ENDS = (1, 255)
 
 
-class PoseStage(Enum):
-    """The stage of a calibration: before a pose, holding it, in doubt about it, all taken, or over."""
-
-    READY = "ready"
-    HELD = "held"
-    DOUBTED = "doubted"
-    DONE = "done"
-    OVER = "over"
-
-
-class PoseKey(Enum):
-    """The meanings of keys: continue, take the previous pose again, keep a doubtful one, leave."""
-
-    ACCEPT = "accept"
-    BACK = "back"
-    KEEP = "keep"
-    QUIT = "quit"
+# Before a pose, holding it, in doubt about it, all taken, or over.
+PoseStage = Literal["ready", "held", "doubted", "done", "over"]
+# Continue, take the previous pose again, keep a doubtful one, leave.
+PoseKey = Literal["accept", "back", "keep", "quit"]
+POSE_KEYS: tuple[PoseKey, ...] = get_args(PoseKey)
 
 
 class PoseGuide:
@@ -58,7 +46,7 @@ class PoseGuide:
         """Take the sensors, the time to hold a pose, and the age from which a record is old."""
         self.names = tuple(names)
         self.poses = poses_of(self.names)
-        self.stage = PoseStage.READY
+        self.stage: PoseStage = "ready"
         self.left = False
         self.step = 0
         self.raw: bytes | None = None
@@ -83,28 +71,24 @@ class PoseGuide:
     def offered(self, now_us: int) -> dict[PoseKey, str]:
         """Return the keys that are active now, and their effects."""
         words: dict[PoseStage, dict[PoseKey, str]] = {
-            PoseStage.READY: {PoseKey.ACCEPT: "I hold it: take it"},
-            PoseStage.DOUBTED: {PoseKey.ACCEPT: "hold it again", PoseKey.KEEP: "keep it anyway"},
-            PoseStage.DONE: {PoseKey.ACCEPT: "write the calibration"},
+            "ready": {"accept": "I hold it: take it"},
+            "doubted": {"accept": "hold it again", "keep": "keep it anyway"},
+            "done": {"accept": "write the calibration"},
         }
-        waits = self.stage is PoseStage.READY and self.silent(now_us)
+        waits = self.stage == "ready" and self.silent(now_us)
         found = {} if waits else dict(words.get(self.stage, {}))
-        if self.taken and self.stage in (PoseStage.READY, PoseStage.DONE):
-            found[PoseKey.BACK] = "back to the previous pose"
-        if self.stage is not PoseStage.OVER:
-            found[PoseKey.QUIT] = "leave, and write nothing"
+        if self.taken and self.stage in ("ready", "done"):
+            found["back"] = "back to the previous pose"
+        if self.stage != "over":
+            found["quit"] = "leave, and write nothing"
         return found
-
-    def seconds_left(self, now_us: int) -> float:
-        """Return how long the pose must still be held."""
-        return max(0, self._settled_us + self._hold_us - now_us) / 1e6 if self.stage is PoseStage.HELD else 0.0
 
     def take(self, now_us: int, raw: bytes) -> None:
         """Take a record, one byte per sensor; if the pose has been held long enough, judge it."""
         self.raw, self.raw_us = raw, now_us
         for place, byte in enumerate(raw):
             self._low[place], self._high[place] = min(self._low[place], byte), max(self._high[place], byte)
-        if self.stage is not PoseStage.HELD or now_us < self._settled_us:
+        if self.stage != "held" or now_us < self._settled_us:
             return
         self._samples.append(raw)
         if now_us < self._settled_us + self._hold_us:
@@ -112,7 +96,7 @@ class PoseGuide:
         self._found = held(self._samples)
         self.problems = problems(self.names, self.taken[0] if self.taken else None, self.pose, self._found)
         if self.problems:
-            self._become(PoseStage.DOUBTED)
+            self._become("doubted")
         else:
             self._keep()
 
@@ -120,19 +104,19 @@ class PoseGuide:
         """Carry out `key`, if it is active now."""
         if key not in self.offered(now_us):
             return
-        if key is PoseKey.QUIT:
+        if key == "quit":
             self.left = True
-            self._become(PoseStage.OVER)
-        elif key is PoseKey.KEEP:
+            self._become("over")
+        elif key == "keep":
             self._keep()
-        elif key is PoseKey.BACK:
+        elif key == "back":
             self.taken.pop()
-            self._become(PoseStage.READY)
-        elif self.stage is PoseStage.READY:
+            self._become("ready")
+        elif self.stage == "ready":
             self._samples, self.problems, self._settled_us = [], [], now_us + SETTLE_US
-            self._become(PoseStage.HELD)
+            self._become("held")
         else:
-            self._become(PoseStage.READY if self.stage is PoseStage.DOUBTED else PoseStage.OVER)
+            self._become("ready" if self.stage == "doubted" else "over")
 
     def states(self) -> list[str]:
         """Return the fault of each sensor now, in a few words; "" if there is none.
@@ -158,7 +142,7 @@ class PoseGuide:
     def _keep(self) -> None:
         assert self._found is not None
         self.taken.append(self._found)
-        self._become(PoseStage.DONE if len(self.taken) == len(self.poses) else PoseStage.READY)
+        self._become("done" if len(self.taken) == len(self.poses) else "ready")
 
     def _become(self, stage: PoseStage) -> None:
         self.stage = stage

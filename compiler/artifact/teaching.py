@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from thenar.runtime.build import Build
 from thenar.runtime.live.replay import recognised
 from thenar.runtime.policy import Policy
-from thenar.runtime.preshape.selector import PreshapeTable
+from thenar.runtime.preshape import PreshapeTable
 from thenar.runtime.task import Task, TaskStep
 
 from ..movements.segments import levenshtein, segments_of

@@ -25,7 +25,7 @@ from thenar.runtime.manifest import Calibration as BuildCalibration
 from thenar.runtime.names import SHOWN, shortened
 from thenar.runtime.published import NONE
 from thenar.runtime.recording.guide import FRESH_US
-from thenar.runtime.recording.messages import switch_matrix
+from thenar.runtime.recording.layout import switch_matrix
 from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.taxels import TaxelLine, Taxels

@@ -11,7 +11,7 @@ from ..calibration import Joints, Meaning
 from ..frames import PERIODS, GloveFrame, Mask, Newest, SwitchFrame
 from ..model.integers import IntegerTables
 from ..policy import Policy
-from ..preshape.selector import Preshape
+from ..preshape import Preshape
 from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
 from ..scores import LiveScores
 from ..segmenting.live import LiveSegments, Segment

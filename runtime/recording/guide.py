@@ -6,8 +6,8 @@ It has no terminal, device or clock: frames, keys and the time come in, labels g
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
+from typing import Literal, get_args
 
 from thenar.drivers.errors import SettingError
 
@@ -88,49 +88,31 @@ FRESH_US = 200_000
 MOVING_US = 2_000_000
 
 
-class Stage(Enum):
-    """The stage of a collection: before its first countdown, counting, while the empty hand moves, with a captured
-    trial to judge, paused, with no trial left, or over.
-    """
+# Before the first countdown, counting, while the empty hand moves, with a captured trial to judge, paused, with no
+# trial left, or over.
+Stage = Literal["ready", "countdown", "moving", "review", "paused", "done", "over"]
+# Continue (and accept), repeat, undo the previous trial, skip this one, pause, leave.
+Key = Literal["accept", "redo", "undo", "skip", "pause", "quit"]
+KEYS: tuple[Key, ...] = get_args(Key)
 
-    READY = "ready"
-    COUNTDOWN = "countdown"
-    MOVING = "moving"
-    REVIEW = "review"
-    PAUSED = "paused"
-    DONE = "done"
-    OVER = "over"
-
-
-class Key(Enum):
-    """The meanings of keys: continue (and accept), repeat, undo the previous trial, skip this one, pause, leave."""
-
-    ACCEPT = "accept"
-    REDO = "redo"
-    UNDO = "undo"
-    SKIP = "skip"
-    PAUSE = "pause"
-    QUIT = "quit"
-
-
-_UNDER_WAY = {Key.PAUSE: "pause", Key.REDO: "begin the countdown again"}
+_UNDER_WAY: dict[Key, str] = {"pause": "pause", "redo": "begin the countdown again"}
 _OFFERED: dict[Stage, dict[Key, str]] = {
-    Stage.READY: {Key.ACCEPT: "start the countdown"},
-    Stage.COUNTDOWN: _UNDER_WAY,
-    Stage.MOVING: _UNDER_WAY,
-    Stage.REVIEW: {Key.ACCEPT: "keep it, next grasp", Key.REDO: "do it again"},
-    Stage.PAUSED: {Key.ACCEPT: "continue"},
-    Stage.DONE: {Key.ACCEPT: "finish"},
-    Stage.OVER: {},
+    "ready": {"accept": "start the countdown"},
+    "countdown": _UNDER_WAY,
+    "moving": _UNDER_WAY,
+    "review": {"accept": "keep it, next grasp", "redo": "do it again"},
+    "paused": {"accept": "continue"},
+    "done": {"accept": "finish"},
+    "over": {},
 }
 # Keys that are not offered but still work.
-_ALSO = {
-    (Stage.READY, Key.REDO): Key.ACCEPT,
-    (Stage.PAUSED, Key.REDO): Key.ACCEPT,
-    (Stage.PAUSED, Key.PAUSE): Key.ACCEPT,
+_ALSO: dict[tuple[Stage, Key], Key] = {
+    ("ready", "redo"): "accept",
+    ("paused", "redo"): "accept",
+    ("paused", "pause"): "accept",
 }
 # In these stages a trial waits for the user to start it.
-_WAITING = (Stage.READY, Stage.PAUSED)
+_WAITING: tuple[Stage, ...] = ("ready", "paused")
 
 
 class CollectionGuide:
@@ -174,7 +156,7 @@ class CollectionGuide:
         self._glove: GloveFrame | None = None
         self._captured: tuple[SwitchFrame | None, GloveFrame | None] = (None, None)
         self._whole_us: int | None = None
-        self.stage = Stage.READY if self._left else Stage.DONE
+        self.stage: Stage = "ready" if self._left else "done"
 
     @property
     def done(self) -> int:
@@ -194,7 +176,7 @@ class CollectionGuide:
     @property
     def captured(self) -> tuple[SwitchFrame | None, GloveFrame | None]:
         """The newest frames; in review, those that were captured."""
-        return self._captured if self.stage is Stage.REVIEW else (self._switches, self._glove)
+        return self._captured if self.stage == "review" else (self._switches, self._glove)
 
     @property
     def newest_us(self) -> int | None:
@@ -203,15 +185,15 @@ class CollectionGuide:
 
     def offered(self) -> dict[Key, str]:
         """Return the keys that are active now, and their effects."""
-        if self.stage is Stage.OVER:
+        if self.stage == "over":
             return {}
         found = {} if self.lost and self.stage in _WAITING else dict(_OFFERED[self.stage])
         if self._left:
-            found[Key.SKIP] = "skip this one"
+            found["skip"] = "skip this one"
         if self._past:
-            found[Key.UNDO] = f"undo the last ({self._past[-1][0].grasp})"
+            found["undo"] = f"undo the last ({self._past[-1][0].grasp})"
         if self._left:
-            found[Key.QUIT] = "leave, and continue another time" if self.stage in _WAITING else "leave"
+            found["quit"] = "leave, and continue another time" if self.stage in _WAITING else "leave"
         return found
 
     def seconds_left(self, now_us: int) -> float:
@@ -226,11 +208,11 @@ class CollectionGuide:
         for frame in arrived:
             self._record(frame)
         self.lost = self._lost(now_us, disconnected)
-        if self.stage not in (Stage.COUNTDOWN, Stage.MOVING) or now_us < self._zero_us:
+        if self.stage not in ("countdown", "moving") or now_us < self._zero_us:
             return
-        if self.stage is Stage.COUNTDOWN and self._left[-1].grasp == NONE:
+        if self.stage == "countdown" and self._left[-1].grasp == NONE:
             self._zero_us = now_us + MOVING_US
-            self._become(Stage.MOVING)
+            self._become("moving")
             self._label(now_us, "begun")
         else:
             self._capture(now_us)
@@ -238,20 +220,20 @@ class CollectionGuide:
     def press(self, now_us: int, key: Key) -> None:
         """Carry out `key`, if it is active now."""
         key = _ALSO.get((self.stage, key), key)
-        if self.stage is Stage.OVER or key not in {*self.offered(), Key.QUIT}:
+        if self.stage == "over" or key not in {*self.offered(), "quit"}:
             return
-        if key is Key.QUIT or (self.stage is Stage.DONE and key is Key.ACCEPT):
-            self._become(Stage.OVER)
-        elif key is Key.UNDO:
+        if key == "quit" or (self.stage == "done" and key == "accept"):
+            self._become("over")
+        elif key == "undo":
             self._undo(now_us)
-        elif key is Key.SKIP:
+        elif key == "skip":
             self._judge(now_us, "skipped")
-        elif key is Key.PAUSE:
-            self._become(Stage.PAUSED)
-        elif self.stage is Stage.REVIEW and key is Key.ACCEPT:
+        elif key == "pause":
+            self._become("paused")
+        elif self.stage == "review" and key == "accept":
             self._judge(now_us, "accepted")
         else:
-            if self.stage is Stage.REVIEW:
+            if self.stage == "review":
                 self._label(now_us, "redone")
             self._begin(now_us)
 
@@ -263,12 +245,12 @@ class CollectionGuide:
 
     def _undo(self, now_us: int) -> None:
         """Return to the previous trial, dropping one that was captured but not judged."""
-        if self.stage is Stage.REVIEW:
+        if self.stage == "review":
             self._label(now_us, "redone")
         self._left.append(self._past.pop()[0])
         self._label(now_us, "undone")
-        if self.stage is Stage.DONE:
-            self.stage = Stage.READY
+        if self.stage == "done":
+            self.stage = "ready"
         self._turn(now_us)
 
     def _turn(self, now_us: int) -> None:
@@ -282,10 +264,10 @@ class CollectionGuide:
     def _begin(self, now_us: int) -> None:
         self.problem = ""
         if self._left and self.lost:
-            self._become(Stage.READY)
+            self._become("ready")
             return
         self._zero_us = now_us + self._countdown_us
-        self._become(Stage.COUNTDOWN if self._left else Stage.DONE)
+        self._become("countdown" if self._left else "done")
         if self._left and self._left[-1].grasp != NONE:
             self._label(now_us, "begun")
 
@@ -294,7 +276,7 @@ class CollectionGuide:
         self.step += 1
 
     def _record(self, frame: SwitchFrame | GloveFrame) -> None:
-        recorded = self.stage is not Stage.PAUSED
+        recorded = self.stage != "paused"
         if isinstance(frame, SwitchFrame):
             if recorded:
                 self._recorder.switches(frame)
@@ -307,11 +289,11 @@ class CollectionGuide:
     def _capture(self, now_us: int) -> None:
         self.problem = self._lack(now_us, FRESH_US)
         if self.problem:
-            self._become(Stage.READY)
+            self._become("ready")
             return
         self._captured = self._switches, self._glove
         self._label(now_us, "captured")
-        self._become(Stage.REVIEW)
+        self._become("review")
 
     def _lack(self, now_us: int, oldest_us: int) -> str:
         """Return the inputs that are not read in frames of at most this age, as a sentence; "" if all is."""

@@ -19,8 +19,8 @@ from ..files import write_atomically
 from ..frames import GloveFrame, SwitchFrame
 from ..published import LiveGrasp
 from ..writer_thread import WriterThread
-from .layout import GLOVE, GRASP, MARKS, RECOGNITION, SWITCHES, TAXELS, TRIALS, Tail, beginning, ending, session_record
-from .messages import encode_bytes, encode_text, glove_bytes, switch_bytes, taxel_bytes
+from . import layout
+from .layout import Tail
 from .session import Label, Mark, Session
 
 SYNC_S = 1.0
@@ -153,7 +153,7 @@ class Recorder(Closing):
         self._tail = _begun(path, self.session, marks) if tail is None else tail
         self._file = AppendedFile(path, self._tail.size, sync_s)
         if tail is not None:
-            record = session_record(self.session)
+            record = layout.session_record(self.session)
             if not self._file.append(record):
                 self._file.close()
                 raise OSError(self._file.failure)
@@ -162,7 +162,7 @@ class Recorder(Closing):
         self._grasp = ""
         self._switches, self._sensors, self._taxels = len(session.switches), len(session.sensors), len(session.taxels)
         if session.taxels:
-            self._tail.counts.setdefault(TAXELS, 0)
+            self._tail.counts.setdefault(layout.TAXELS, 0)
 
     @property
     def failure(self) -> str | None:
@@ -191,35 +191,37 @@ class Recorder(Closing):
     def moment(self, arrived: Iterable[SwitchFrame | GloveFrame], grasp: LiveGrasp) -> None:
         """Record the frames that arrived since the last moment, then the prediction for the newest of them."""
         messages = [message for frame in arrived for message in self._of_frame(frame)]
-        messages.append((RECOGNITION, grasp.time_us, encode_text(_json(_Recognition(*astuple(grasp))))))
+        messages.append((layout.RECOGNITION, grasp.time_us, layout.encode_text(_json(_Recognition(*astuple(grasp))))))
         if grasp.grasp != self._grasp:
-            messages.append((GRASP, grasp.time_us, encode_text(grasp.grasp.encode())))
+            messages.append((layout.GRASP, grasp.time_us, layout.encode_text(grasp.grasp.encode())))
         if self._write(messages):
             self._grasp = grasp.grasp
 
     def label(self, label: Label) -> None:
         """Record the outcome of a trial."""
-        self._write([(TRIALS, label.time_us, encode_text(_json(label)))])
+        self._write([(layout.TRIALS, label.time_us, layout.encode_text(_json(label)))])
 
     def mark(self, mark: Mark) -> None:
         """Record a mark. Raises SettingError if the recording was begun without marks."""
-        if MARKS not in self._tail.counts:
+        if layout.MARKS not in self._tail.counts:
             raise SettingError(f"{self.path} was begun without marks: begin a recording with them")
-        self._write([(MARKS, mark.time_us, encode_text(_json(mark)))])
+        self._write([(layout.MARKS, mark.time_us, layout.encode_text(_json(mark)))])
 
     def close(self) -> None:
         """Write the summary and close; may wait for the disk, and may be called again."""
         if self._file.size == self._tail.size:
-            self._file.append(ending(self._tail))
+            self._file.append(layout.ending(self._tail))
         self._file.close()
 
     def _of_frame(self, frame: SwitchFrame | GloveFrame) -> list[_Message]:
+        sensors, found = self._sensors, list[tuple[int, bytes]]()
         if isinstance(frame, GloveFrame):
-            return [(GLOVE, frame.time_us, encode_bytes(glove_bytes(frame, self._sensors)))]
-        found = [(SWITCHES, frame.time_us, encode_bytes(switch_bytes(frame, self._switches, self._sensors)))]
-        if frame.taxels is not None:
-            found.insert(0, (TAXELS, frame.time_us, encode_bytes(taxel_bytes(frame.taxels, self._taxels))))
-        return found
+            found.append((layout.GLOVE, layout.glove_bytes(frame, sensors)))
+        else:
+            if frame.taxels is not None:
+                found.append((layout.TAXELS, layout.taxel_bytes(frame.taxels, self._taxels)))
+            found.append((layout.SWITCHES, layout.switch_bytes(frame, self._switches, sensors)))
+        return [(channel, frame.time_us, layout.encode_bytes(data)) for channel, data in found]
 
     def _write(self, messages: Sequence[_Message]) -> bool:
         """Append all messages, or none, which are then lost; return whether they are in the file."""
@@ -296,10 +298,10 @@ def _begun(path: Path, session: Session, marks: bool) -> Tail:
         raise SettingError(f"{path} exists, and a recording is never overwritten: name another file")
     tail = Tail()
     if session.taxels:
-        tail.counts[TAXELS] = 0
+        tail.counts[layout.TAXELS] = 0
     if marks:
-        tail.counts[MARKS] = 0
-    first, record = beginning(session.thenar, tail), session_record(session)
+        tail.counts[layout.MARKS] = 0
+    first, record = layout.beginning(session.thenar, tail), layout.session_record(session)
     # Written whole or not at all, so that no file lacks a session.
     write_atomically(path, first + record, mode=_PRIVATE)
     tail.add_bytes(first + record)

@@ -15,7 +15,7 @@ from thenar.drivers.errors import SettingError, ThenarError
 from thenar.drivers.members import Members
 
 from ..names import shortened
-from ..preshape.selector import Preshape
+from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp, OutputTrouble
 from ..task import Progress
 from ..writer_thread import WriterThread

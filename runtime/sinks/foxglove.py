@@ -16,7 +16,6 @@ browser of this machine may read as Foxglove does.
 Foxglove's schemas have no null, no alternatives and no references: None is left out of its message.
 """
 
-import ipaddress
 import re
 from collections import Counter
 from math import exp
@@ -24,14 +23,13 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from thenar.drivers.errors import SettingError
 from thenar.drivers.extras import optional
 
-from ..preshape.selector import Preshape
+from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
-from .sockets import resolve
+from .sockets import check_readers, resolve
 
 if TYPE_CHECKING:
     from ..build import Build
@@ -43,66 +41,45 @@ _REPEAT_US = 1_000_000
 BACKLOG = 512
 
 
-class Score(msgspec.Struct, frozen=True):
-    """The score of a frame for a grasp type, in integer steps, and its softmax among all."""
-
-    grasp: str
-    score: int
-    probability: float
-
-
-class Scores(msgspec.Struct, frozen=True):
-    """The scores of every grasp type, in the build's order, and whether the build refuses the frame; none while too
-    little can be read.
-    """
-
-    types: tuple[Score, ...]
-    refused: bool
-
-
-class Switches(msgspec.Struct, frozen=True):
-    """Names of the build's switches. A switch that is in none of the lists is known to be open."""
-
-    closed: tuple[str, ...]
-    lost: tuple[str, ...]
-
-
-class Angle(msgspec.Struct, frozen=True):
-    """The angle of a joint of the glove."""
-
-    name: str
-    position_rad: float
-
-
-class Code(msgspec.Struct, frozen=True):
-    """The scored code of a joint of the build."""
-
-    name: str
-    code: int
-
-
-class JointValues(msgspec.Struct, frozen=True):
-    """All joints; lists are empty without a calibration, or while the joints are lost."""
-
-    angles: tuple[Angle, ...]
-    codes: tuple[Code, ...]
-
-
 TOPICS: dict[str, type[msgspec.Struct]] = {
     "/thenar/grasp": LiveGrasp,
-    "/thenar/scores": Scores,
-    "/thenar/switches": Switches,
-    "/thenar/joints": JointValues,
     "/thenar/preshape": Preshape,
     "/thenar/task": Progress,
     "/thenar/health": HealthReport,
 }
+# The details of a grasp: fields and their types; a list has the type of its items.
+DETAILS: dict[str, Any] = {
+    # Of every grasp type, in the build's order: the score in integer steps, and its softmax among all; and whether the
+    # build refuses the frame. None while too little can be read.
+    "/thenar/scores": {
+        "types": [{"grasp": "string", "score": "integer", "probability": "number"}],
+        "refused": "boolean",
+    },
+    # A switch that is in none of the lists is known to be open.
+    "/thenar/switches": {"closed": ["string"], "lost": ["string"]},
+    # Lists are empty without a calibration, or while the joints are lost.
+    "/thenar/joints": {
+        "angles": [{"name": "string", "position_rad": "number"}],
+        "codes": [{"name": "string", "code": "integer"}],
+    },
+}
 
 
-def schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
-    """Return the JSON schema of a struct, in the subset that Foxglove supports."""
-    (found,), shared = msgspec.json.schema_components((kind,), ref_template="{name}")
-    return {"title": f"thenar.{kind.__name__}", **_plain(found, shared)}
+def schemas() -> dict[str, dict[str, Any]]:
+    """Return the JSON schema of each topic, in the subset that Foxglove supports."""
+    found = {}
+    for topic, kind in TOPICS.items():
+        (whole,), shared = msgspec.json.schema_components((kind,), ref_template="{name}")
+        found[topic] = {"title": f"thenar.{kind.__name__}", **_plain(whole, shared)}
+    return found | {topic: {"title": topic, **_described(fields)} for topic, fields in DETAILS.items()}
+
+
+def _described(fields: Any) -> dict[str, Any]:
+    if isinstance(fields, list):
+        return {"type": "array", "items": _described(fields[0])}
+    if isinstance(fields, dict):
+        return {"type": "object", "properties": {name: _described(field) for name, field in fields.items()}}
+    return {"type": fields}
 
 
 def _plain(found: dict[str, Any], shared: dict[str, dict[str, Any]]) -> dict[str, Any]:
@@ -120,10 +97,10 @@ def _plain(found: dict[str, Any], shared: dict[str, dict[str, Any]]) -> dict[str
     return {"type": found["type"]}
 
 
-def encode(content: msgspec.Struct) -> bytes:
-    """Return a message: the fields of a struct that are not None."""
-    fields = ((name, getattr(content, name)) for name in content.__struct_fields__)
-    return msgspec.json.encode({name: value for name, value in fields if value is not None})
+def encode(content: msgspec.Struct | dict[str, Any]) -> bytes:
+    """Return a message: the fields that are not None."""
+    fields = content if isinstance(content, dict) else msgspec.structs.asdict(content)
+    return msgspec.json.encode({name: value for name, value in fields.items() if value is not None})
 
 
 class FoxgloveServer(Sink):
@@ -141,8 +118,8 @@ class FoxgloveServer(Sink):
         # Channels end when it is garbage-collected.
         self._context = context = foxglove.Context()
         self._channels = {
-            topic: foxglove.Channel(topic, schema=schema(kind), message_encoding="json", context=context)
-            for topic, kind in TOPICS.items()
+            topic: foxglove.Channel(topic, schema=schema, message_encoding="json", context=context)
+            for topic, schema in schemas().items()
         }
         self._subscribed = Counter[int]()
         try:
@@ -202,7 +179,7 @@ class FoxgloveServer(Sink):
         self._kept[topic] = content
         self._log(topic, content)
 
-    def _log(self, topic: str, content: msgspec.Struct, later_us: int = 0) -> None:
+    def _log(self, topic: str, content: msgspec.Struct | dict[str, Any], later_us: int = 0) -> None:
         """Pass a message to the server if its topic has readers, stamped `later_us` after the newest frame."""
         channel = self._channels[topic]
         if self._closed or not channel.has_sinks():
@@ -243,16 +220,17 @@ def _listener(base: type[Any], subscribed: Counter[int]) -> Any:
     return Listener()
 
 
-def _scores(moment: "Moment", build: "Build") -> Scores:
-    if moment.scores is None:
-        return Scores((), moment.refused)
-    best = max(moment.scores)
-    odds = [exp((score - best) / build.tables.scale) for score in moment.scores]
-    shares = [each / sum(odds) for each in odds]
-    return Scores(tuple(map(Score, build.grasps, moment.scores, shares)), moment.refused)
+def _scores(moment: "Moment", build: "Build") -> dict[str, Any]:
+    scores = moment.scores or ()
+    odds = [exp((score - max(scores)) / build.tables.scale) for score in scores]
+    types = [
+        {"grasp": grasp, "score": score, "probability": odd / sum(odds)}
+        for grasp, score, odd in zip(build.grasps, scores, odds, strict=False)
+    ]
+    return {"types": types, "refused": moment.refused}
 
 
-def _switches(moment: "Moment", build: "Build") -> Switches:
+def _switches(moment: "Moment", build: "Build") -> dict[str, Any]:
     frame = moment.switches
     assert frame is not None
     names = [switch.name for switch in build.manifest.switches]
@@ -260,24 +238,23 @@ def _switches(moment: "Moment", build: "Build") -> Switches:
     def named(mask: int) -> tuple[str, ...]:
         return tuple(name for bit, name in enumerate(names) if mask >> bit & 1)
 
-    return Switches(closed=named(frame.closed & ~frame.lost), lost=named(frame.lost))
+    return {"closed": named(frame.closed & ~frame.lost), "lost": named(frame.lost)}
 
 
-def _joints(moment: "Moment", build: "Build") -> JointValues:
-    angles = moment.angles or JointAngles((), ())
-    return JointValues(
-        tuple(map(Angle, angles.names, angles.positions_rad)),
-        tuple(map(Code, (joint.name for joint in build.manifest.joints), map(int, moment.codes or ()))),
-    )
+def _joints(moment: "Moment", build: "Build") -> dict[str, Any]:
+    angles, codes = moment.angles or JointAngles((), ()), map(int, moment.codes or ())
+    positions = zip(angles.names, angles.positions_rad, strict=True)
+    return {
+        "angles": [{"name": name, "position_rad": position} for name, position in positions],
+        "codes": [
+            {"name": joint.name, "code": code} for joint, code in zip(build.manifest.joints, codes, strict=False)
+        ],
+    }
 
 
 def _open(where: SinkPlace) -> Sink:
     _, address = resolve(where.place, where.text, "foxglove:127.0.0.1:8765")
-    if "public" not in where.options and not ipaddress.ip_address(address[0].partition("%")[0]).is_loopback:
-        raise SettingError(
-            f"{where.text}: other machines could read it there: use 127.0.0.1, or write "
-            f"foxglove:{where.place}?public to let them"
-        )
+    check_readers(address, f"foxglove:{where.place}", public="public" in where.options)
     with optional(SinkError, where.text):
         return FoxgloveServer(*address[:2], where=where.text)
 

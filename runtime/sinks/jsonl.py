@@ -19,7 +19,7 @@ import msgspec
 from msgspec import json, structs
 
 from ..detail import Detail
-from ..preshape.selector import Preshape
+from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress, ProgressLine
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport

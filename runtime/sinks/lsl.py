@@ -14,7 +14,7 @@ from thenar.drivers.errors import SettingError
 from thenar.drivers.lsl import load_pylsl
 from thenar.drivers.names import fault
 
-from ..preshape.selector import Preshape
+from ..preshape import Preshape
 from ..published import JointAngles, LiveGrasp
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 

@@ -19,7 +19,7 @@ from msgspec import json
 
 from thenar.drivers.extras import optional
 
-from ..preshape.selector import Preshape
+from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
@@ -38,19 +38,19 @@ class RosTopics(Sink):
         # Cyclone DDS, which these import, is an extra.
         from cyclonedds.core import DDSException
 
-        from ..ros import domain, messages
+        from .. import ros
 
-        self._where = f"ros:{domain.namespace(name)}" + "?public" * public
-        self._name, self._messages = name, messages
-        number = domain.domain()
+        self._where = f"ros:{ros.namespace(name)}" + "?public" * public
+        self._name, self._ros = name, ros
+        number = ros.domain()
         try:
-            self._domain, participant = domain.join(number, public=public)
-            self._grasp = domain.writer(participant, f"{name}/grasp", messages.String, kept=True)
-            self._segment = domain.writer(participant, f"{name}/segment", messages.DiagnosticArray, kept=True)
-            self._preshape = domain.writer(participant, f"{name}/preshape", messages.JointTrajectory, kept=True)
-            self._task = domain.writer(participant, f"{name}/task", messages.DiagnosticArray, kept=True)
-            self._angles = domain.writer(participant, f"{name}/angles", messages.JointState)
-            self._health = domain.writer(participant, f"{name}/health", messages.String)
+            self._domain, participant = ros.join(number, public=public)
+            self._grasp = ros.writer(participant, f"{name}/grasp", ros.String, kept=True)
+            self._segment = ros.writer(participant, f"{name}/segment", ros.DiagnosticArray, kept=True)
+            self._preshape = ros.writer(participant, f"{name}/preshape", ros.JointTrajectory, kept=True)
+            self._task = ros.writer(participant, f"{name}/task", ros.DiagnosticArray, kept=True)
+            self._angles = ros.writer(participant, f"{name}/angles", ros.JointState)
+            self._health = ros.writer(participant, f"{name}/health", ros.String)
         except DDSException as reason:
             raise SinkError(
                 f"{self._where} cannot be opened in domain {number}: {reason} "
@@ -73,11 +73,11 @@ class RosTopics(Sink):
 
     def health(self, report: HealthReport) -> None:
         """Publish the glove's health."""
-        self._try(lambda: self._health.write(self._messages.String(json.encode(report).decode())))
+        self._try(lambda: self._health.write(self._ros.String(json.encode(report).decode())))
 
     def task(self, progress: Progress) -> None:
         """Publish the hand's progress, with the stamp of the newest frame."""
-        self._try(lambda: self._task.write(self._messages.task(self._name, self._unix_us, progress)))
+        self._try(lambda: self._task.write(self._ros.task(self._name, self._unix_us, progress)))
 
     def _try(self, write: Callable[[], None]) -> None:
         if self._closed:
@@ -91,13 +91,13 @@ class RosTopics(Sink):
             self._error = str(reason)
 
     def _write(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        messages = self._messages
-        self._grasp.write(messages.String(grasp.grasp))
-        self._segment.write(messages.segment(self._name, grasp))
+        ros = self._ros
+        self._grasp.write(ros.String(grasp.grasp))
+        self._segment.write(ros.segment(self._name, grasp))
         if angles is not None:
-            self._angles.write(messages.joint_state(grasp.unix_us, angles))
+            self._angles.write(ros.joint_state(grasp.unix_us, angles))
         if preshape is not None and preshape != self._told:
-            self._preshape.write(messages.trajectory(preshape))
+            self._preshape.write(ros.trajectory(preshape))
             self._told = preshape
 
     def report(self) -> SinkReport:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 from thenar.drivers.errors import SettingError
 
 from ..detail import Details
-from ..preshape.selector import Preshape
+from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkReport
@@ -302,13 +302,18 @@ def open_tcp(
     Anyone who can connect can read, so only addresses of this machine are accepted unless `public`. Port 0 means any
     free one. Raises SinkError, or SettingError if `place` is not such an address.
     """
-    where = f"tcp-public:{place}" if public else f"tcp:{place}"
+    where = f"tcp:{place}" + "?public" * public
     family, address = resolve(place, where, "tcp:127.0.0.1:7777")
+    check_readers(address, f"tcp:{place}", public=public)
+    return SocketLines(_listener(family, address, where), where, clock=clock, detail=detail)
+
+
+def check_readers(address: tuple[str, int], where: str, *, public: bool) -> None:
+    """Raise SettingError for an address that other machines can read, unless `public`; `where` is without options."""
     if not public and not ipaddress.ip_address(address[0].partition("%")[0]).is_loopback:
         raise SettingError(
-            f"{where}: other machines could read it there: use 127.0.0.1, or write tcp-public:{place} to let them"
+            f"{where}: other machines could read it there: use 127.0.0.1, or write {where}?public to let them"
         )
-    return SocketLines(_listener(family, address, where), where, clock=clock, detail=detail)
 
 
 def listen(place: str, where: str, example: str) -> socket.socket:
@@ -349,30 +354,21 @@ def resolve(place: str, where: str, example: str) -> tuple[socket.AddressFamily,
     return family, address  # type: ignore[return-value]
 
 
-_DETAIL = ("detail",)
 MEMBER = (
     SinkKind(
         "unix",
         "PATH",
         "JSON lines to all who connect to a socket",
         lambda where: open_unix(where.place, detail="detail" in where.options),
-        _DETAIL,
+        ("detail",),
         rank=1,
     ),
     SinkKind(
         "tcp",
         "127.0.0.1:PORT",
-        "the same on a port of this machine",
-        lambda where: open_tcp(where.place, detail="detail" in where.options),
-        _DETAIL,
+        "the same on a port of this machine; with public also for other machines",
+        lambda where: open_tcp(where.place, public="public" in where.options, detail="detail" in where.options),
+        ("detail", "public"),
         rank=2,
-    ),
-    SinkKind(
-        "tcp-public",
-        "ADDRESS:PORT",
-        "the same, readable by other machines",
-        lambda where: open_tcp(where.place, public=True, detail="detail" in where.options),
-        _DETAIL,
-        rank=3,
     ),
 )

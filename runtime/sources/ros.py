@@ -50,12 +50,12 @@ class RosReader(RowReader):
         with optional(SettingError, self._port):
             from cyclonedds.core import DDSException, ReadCondition, WaitSet
 
-            from ..ros import domain, messages
+            from .. import ros
         self._senders = FirstSender()
-        number, name = domain.domain(), domain.namespace(found[1])
+        number, name = ros.domain(), ros.namespace(found[1])
         try:
-            self._domain, participant = domain.join(number, public=bool(found[3]))
-            self._reader = domain.reader(participant, name, getattr(messages, found[2] or _TYPES[0]))
+            self._domain, participant = ros.join(number, public=bool(found[3]))
+            self._reader = ros.reader(participant, name, getattr(ros, found[2] or _TYPES[0]))
             self._waiting = WaitSet(participant)
             self._waiting.attach(ReadCondition(self._reader, _ANY))
         except (DDSException, OSError) as reason:

@@ -12,7 +12,6 @@ from threading import Event, Thread
 from time import monotonic
 from typing import Any
 
-import msgspec
 from msgspec.structs import replace
 
 from thenar.drivers.closing import Closing
@@ -24,7 +23,7 @@ from ..harness.loading import parse_harness
 from ..harness.wiring import Harness
 from ..live.replay import Stepper, periods_us
 from ..published import LiveGrasp
-from ..recording.index import Index
+from ..recording.reader import Index
 from ..recording.session import Label, Mark, Session
 from .live import PAST_US, FrameText, build_message
 from .server import Server, message
@@ -37,24 +36,6 @@ _SAMPLE_US, _MOST_CHANGES = 20_000, 100_000
 _FRAME_S, _IDLE_S, _TOLD_S = 0.02, 0.2, 0.5
 _PERIODS_OF = 20_000
 _MOST_MARKS = 10_000
-_encode = msgspec.json.Encoder().encode
-
-
-class State(msgspec.Struct, frozen=True):
-    """The position of the pages: moments in microseconds since 1970; `share` of the file was scanned, with `faults`.
-
-    first_us, last_us  the span that can be shown
-    truth              the label at `at_us`; null without one
-    """
-
-    at_us: int
-    first_us: int
-    last_us: int
-    playing: bool
-    speed: float
-    share: float
-    truth: str | None
-    faults: tuple[str, ...]
 
 
 Change = tuple[int, str, str, str, str, int, str, int | None]
@@ -165,7 +146,7 @@ class ReplayPage(Closing):
         self._told = 0.0
         self._stop = Event()
         self._thread = Thread(target=self._scan, name="thenar scan", daemon=True)
-        self.server = Server("replay", address, token=token, on_message=self._take, hello=lambda: self._first)
+        self.server = Server("live", address, token=token, on_message=self._take, hello=lambda: self._first)
 
     def run(self, stop: Event) -> None:
         """Show the recording, as pages request it, until `stop` is set."""
@@ -188,8 +169,9 @@ class ReplayPage(Closing):
     def _described(self, name: str, folder: Path | None) -> Sequence[bytes]:
         build = self._build
         if build is None or folder is None:
-            return (build_message(None, None, name),)
-        return build_message(folder, build.manifest, name), message("hand", load_hand(folder, build.manifest))
+            return (build_message(None, None, name, replay=True),)
+        hand = message("hand", load_hand(folder, build.manifest))
+        return build_message(folder, build.manifest, name, replay=True), hand
 
     def _scan(self) -> None:
         """Scan the whole recording for its overview."""
@@ -272,9 +254,19 @@ class ReplayPage(Closing):
         self._tell(first, last)
 
     def _tell(self, first_us: int, last_us: int) -> None:
-        share = 1.0 if self._scanned.is_set() else self._index.scanned / max(self._index.size, 1)
-        truth = self._overview.truth_at(self._at_us)
-        state = State(self._at_us, first_us, last_us, self._playing, self._speed, share, truth, tuple(self._faults[:8]))
+        """Show where the pages are: moments in microseconds since 1970, the label there, and the share of the file that
+        was scanned, with its faults.
+        """
+        state = {
+            "at_us": self._at_us,
+            "first_us": first_us,
+            "last_us": last_us,
+            "playing": self._playing,
+            "speed": self._speed,
+            "share": 1.0 if self._scanned.is_set() else self._index.scanned / max(self._index.size, 1),
+            "truth": self._overview.truth_at(self._at_us),
+            "faults": self._faults[:8],
+        }
         self.server.publish("replay", message("replay", state))
         now = monotonic()
         if self._told < float("inf") and now - self._told >= _TOLD_S:

@@ -14,7 +14,7 @@ from thenar.compiler.recordings.graspset import CODES, GraspSet, Joint
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.published import NONE, UNKNOWN, LiveGrasp
-from thenar.runtime.recording.messages import switch_matrix
+from thenar.runtime.recording.layout import switch_matrix
 from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Label
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine

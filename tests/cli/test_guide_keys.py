@@ -10,7 +10,7 @@ from thenar.compiler.recordings.taxonomy import Taxonomy
 from thenar.runtime.recording.guide import Key
 
 TAXONOMY = Taxonomy("own", ("A",))
-A, R, Q = Key.ACCEPT, Key.REDO, Key.QUIT
+A, R, Q = "accept", "redo", "quit"
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def terminal() -> Iterator[tuple[int, int]]:
         (b" a", [A, A]),
         (b"rR", [R, R]),
         (b"q", [Q]),
-        (b"usp", [Key.UNDO, Key.SKIP, Key.PAUSE]),
+        (b"usp", ["undo", "skip", "pause"]),
         (b"xyz1", []),
         (b"\x1b[A\x1b[1;5C\x1bOP", []),
         (b"\x1b[Ar", [R]),

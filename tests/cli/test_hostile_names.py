@@ -17,7 +17,7 @@ from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import load_harness
-from thenar.runtime.preshape.loading import load_preshapes
+from thenar.runtime.preshape import load_preshapes
 from thenar.runtime.task import load_task
 from thenar.runtime.toml_source import read_source
 from thenar.simulator import load_scene

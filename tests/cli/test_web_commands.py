@@ -196,31 +196,9 @@ def test_what_cannot_be_is_one_sentence(
 def test_a_port_that_is_taken_is_said_so(thenar: Thenar, build_folder: Path, glove: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         place = f"127.0.0.1:{taken.getsockname()[1]}"
-        for command in (("run", build_folder, "--glove", glove), ("monitor", "unix:/nowhere")):
-            done = thenar(*command, "--web", place)
-            assert done.returncode == 2
-            assert f"--web {place} cannot be opened: Address already in use: another process serves" in done.stderr
-
-
-def test_monitor_shows_a_run_elsewhere(
-    start: Callable[..., Command], build_folder: Path, glove: Path, tmp_path: Path
-) -> None:
-    where = f"unix:{tmp_path}/grasps"
-    monitor = start("monitor", where, "--build", build_folder, "--web", "127.0.0.1:0")
-    monitor.until("cannot be opened")
-    run = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0", "--sink", f"{where}?detail", "--status")
-    monitor.until(f"{where}: connected")
-    with monitor.page() as live:
-        assert told(live, "build")["grasps"] == ["cup", "pen", "rod", "none"]
-        assert told(live, "frame")["grasp"] == "unknown"
-        assert told(live, "health")["devices"][0]["name"].startswith("stream")
-        detailed = told(live, "frame", lambda frame: "closed" in frame)
-        assert (detailed["closed"], detailed["joints"], detailed["probabilities"]) == (5 * "0", None, None)
-        ask(live, do="record")
-        assert told(live, "refused")["why"] == "this page takes no requests"
-        assert run.end() == 0
-        told(live, "source", lambda source: not source["connected"])
-    assert monitor.end() == 0
+        done = thenar("run", build_folder, "--glove", glove, "--web", place)
+        assert done.returncode == 2
+        assert f"--web {place} cannot be opened: Address already in use: another process serves" in done.stderr
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ from zlib import crc32
 from mutating import INTEGERS, TEXTS, altered, json_file
 
 from thenar.runtime.errors import McapError
-from thenar.runtime.recording.layout import MAGIC
-from thenar.runtime.recording.messages import decode_text, encode_bytes, encode_text
+from thenar.runtime.recording.layout import decode_text, encode_bytes, encode_text
+from thenar.runtime.recording.mcap import MAGIC
 
 _OPENING = Struct("<BQ")
 _LENGTH = Struct("<I")

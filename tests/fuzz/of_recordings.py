@@ -20,8 +20,16 @@ from thenar.runtime.live.replay import replayed
 from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.recording import layout
 from thenar.runtime.recording.guide import planned, read_journal
-from thenar.runtime.recording.layout import Tail, beginning, ending, session_record
-from thenar.runtime.recording.messages import encode_bytes, encode_text, glove_bytes, switch_bytes
+from thenar.runtime.recording.layout import (
+    Tail,
+    beginning,
+    encode_bytes,
+    encode_text,
+    ending,
+    glove_bytes,
+    session_record,
+    switch_bytes,
+)
 from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.simulator.playing.performance import of_recording
 

@@ -19,7 +19,7 @@ from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.live.sources import Sources
 from thenar.runtime.manifest import Calibration
-from thenar.runtime.preshape.loading import SHIPPED, load_preshapes
+from thenar.runtime.preshape import SHIPPED, load_preshapes
 from thenar.runtime.recording.guide import planned
 from thenar.runtime.recording.session import Collection
 from thenar.runtime.scanning.plan import plan_scan

@@ -31,11 +31,6 @@ const hand = drawHand(at("hand"), data.hand, {
     else state.bits[bit] = closed;
     byHand();
   },
-  onJoint(joint, value) {
-    state.codes[joint] = codeOf(joints[joint], value);
-    state.lostJoints[joint] = false;
-    byHand();
-  },
 });
 at("flat").hidden = !switches.length;
 

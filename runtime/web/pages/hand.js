@@ -294,11 +294,10 @@ const mixed = (a, b, share) => a.map((value, at) => value + share * (b[at] - val
 const length = (points) => Math.max(Math.hypot(...add(points[3], points[2], -1)), 6);
 
 class Posed {
-  constructor(parent, joints, onJoint) {
+  constructor(parent, joints) {
     this.group = element("g", {}, parent);
     this.joints = joints;
     this.values = joints.map(() => null);
-    this.onJoint = onJoint;
     this.box = { left: -72, top: -202, width: 152, height: 246 };
     this.forearm = element("path", { class: "flesh" }, this.group);
     this.palm = element("path", { class: "flesh" }, this.group);
@@ -318,25 +317,10 @@ class Posed {
 
   #handle(joint) {
     const tilted = joint.moves === "abduction" || joint.moves === "yaw";
-    const group = element("g", { class: this.onJoint ? "held" : tilted ? "aid" : "" }, this.group);
-    if (this.onJoint) element("circle", { r: 8, fill: "transparent" }, group);
+    const group = element("g", { class: tilted ? "aid" : "" }, this.group);
     element("path", { class: "handle", d: tilted ? "M0 -3.4L3.4 0L0 3.4L-3.4 0Z" : "M-2.6 0a2.6 2.6 0 1 0 5.2 0a2.6 2.6 0 1 0 -5.2 0" }, group);
     named(group, joint.name);
-    if (this.onJoint) dragging(group, (point) => this.onJoint(joint.joint, this.#nearest(joint, point)));
     return group;
-  }
-
-  // The value at which the joint's handle comes nearest to a point of the drawing.
-  #nearest(joint, { x, y }) {
-    const number = this.joints.indexOf(joint), steps = 90;
-    let best = Infinity, found = joint.low;
-    for (let step = 0; step <= steps; step++) {
-      const value = joint.low + (step / steps) * (joint.high - joint.low);
-      const values = this.values.with(number, value), [u, v] = handleOf(joint, posed(this.#angles(values)));
-      const far = Math.hypot(u - x, -v - y);
-      if (far < best) [best, found] = [far, value];
-    }
-    return found;
   }
 
   #angles(values) {
@@ -376,26 +360,19 @@ const rounded = (text) => text.replace(/-?\d+\.\d+(e-?\d+)?/g, (number) => Numbe
 /* ---- Joints of which nobody knows where they are: needles, from level to upright ---- */
 
 class Dials {
-  constructor(parent, joints, onJoint) {
+  constructor(parent, joints) {
     this.group = element("g", {}, parent);
     this.joints = joints;
     const columns = Math.max(1, Math.min(4, Math.ceil(Math.sqrt(joints.length)))), [wide, high] = [46, 46];
     this.box = { left: 0, top: 0, width: wide * columns, height: high * Math.ceil(joints.length / columns) };
     this.needles = joints.map((joint, at) => {
       const x = wide * (at % columns) + 9, y = high * Math.floor(at / columns) + 34;
-      const group = element("g", { class: onJoint ? "held" : "", transform: `translate(${x} ${y})` }, this.group);
+      const group = element("g", { transform: `translate(${x} ${y})` }, this.group);
       element("path", { class: "dial", d: "M0 0H26A26 26 0 0 0 0 -26Z" }, group);
       const needle = element("path", { class: "needle", d: "M0 0H26" }, group);
       const handle = element("path", { class: "handle", d: "M-2.6 0a2.6 2.6 0 1 0 5.2 0a2.6 2.6 0 1 0 -5.2 0" }, group);
-      if (onJoint) element("path", { d: "M-4 4H30V-30H-4Z", fill: "transparent" }, group);
       element("text", { x: 13, y: 9, class: "middle" }, group).textContent = shortened(joint.name, 12);
       named(group, joint.name);
-      if (onJoint) {
-        dragging(group, (point) => {
-          const share = Math.min(Math.max(Math.atan2(y - point.y, Math.max(point.x - x, 0)) / (Math.PI / 2), 0), 1);
-          onJoint(joint.joint, joint.low + share * (joint.high - joint.low));
-        }, this.group);
-      }
       return { group, needle, handle };
     });
     this.set([]);
@@ -416,22 +393,6 @@ class Dials {
   fit() {}
 }
 
-// The points to which a pointer drags a group, in the coordinates of `space`.
-function dragging(group, dragged, space = group.parentNode) {
-  const move = (event) => {
-    const matrix = space.getScreenCTM();
-    if (matrix) dragged(new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix.inverse()));
-  };
-  group.addEventListener("pointerdown", (event) => {
-    event.preventDefault();
-    group.setPointerCapture(event.pointerId);
-    group.addEventListener("pointermove", move);
-  });
-  const end = () => group.removeEventListener("pointermove", move);
-  group.addEventListener("pointerup", end);
-  group.addEventListener("pointercancel", end);
-}
-
 /* ---- All of it ---- */
 
 /**
@@ -440,7 +401,6 @@ function dragging(group, dragged, space = group.parentNode) {
  * hand      the content of hand.json
  * onSwitch  called with (bit, closed) when a kept switch, or the next level of a taxel, is pressed; without it the
  *           drawing is a picture
- * onJoint   called with (joint, value) while a joint is dragged, in the joint's unit
  *
  * Returns functions that show a state; each may be called at every screen refresh, and unchanged parts cost nothing:
  *
@@ -448,15 +408,15 @@ function dragging(group, dragged, space = group.parentNode) {
  * setTaxels(values)      how far each of hand.taxels is pressed, 0 to 1; null: unknown
  * setPose(values)        the value of each of hand.joints, in its unit; null: lost
  */
-export function drawHand(svg, hand, { onSwitch = null, onJoint = null } = {}) {
+export function drawHand(svg, hand, { onSwitch = null } = {}) {
   svg.replaceChildren();
   svg.classList.add("hand");
   const glove = new Glove(svg, hand, onSwitch), placed = hand.joints.filter((joint) => joint.digit);
   const others = hand.joints.filter((joint) => !joint.digit), parts = [];
   if (glove.box) parts.push(glove);
   const joints = [];
-  if (placed.length) joints.push(new Posed(svg, placed, onJoint));
-  if (others.length) joints.push(new Dials(svg, others, onJoint));
+  if (placed.length) joints.push(new Posed(svg, placed));
+  if (others.length) joints.push(new Dials(svg, others));
   parts.push(...joints);
   svg.setAttribute("role", onSwitch ? "group" : "img");
   const say = () => svg.setAttribute("aria-label", ["The hand", onSwitch ? "" : glove.said].filter(Boolean).join(": "));

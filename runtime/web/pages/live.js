@@ -1,36 +1,38 @@
-// The live page of a run: shows messages and sends requests.
+// The page of a run, or of its recording: shows messages and sends requests.
+import { Replay } from "./replay.js";
 import { View } from "./view.js";
 import { connect, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 const view = new View();
-let recording = null;
+const replay = new Replay(view, (what, value) => ask({ do: what, value }));
 
 const send = connect({
   open: () => view.state.link(true),
-  closed: () => {
-    view.state.link(false);
-    say($("source"), "");
-  },
-  source: (source) => view.source(source),
+  closed: () => view.state.link(false),
   build: (build) => {
     view.build(build);
     $("record-panel").hidden = !build.records;
+    $("replay-panel").hidden = $("truth").hidden = !build.replay;
+    $("glove-state").hidden = Boolean(build.replay);
+    $("main").classList.toggle("replay", Boolean(build.replay));
   },
   hand: (hand) => view.setHand(hand),
   past: (past) => view.past(past),
-  frame: (frame) => view.take(frame),
+  frame: (frame) => {
+    view.take(frame);
+    replay.judge();
+  },
   health: (report) => view.health(report),
   task: (task) => view.task(task),
-  recording: (state) => {
-    recording = state;
-    say($("refused"), "");
-    show(state);
-  },
+  recording: show,
+  overview: (overview) => replay.overview(overview),
+  replay: (state) => replay.show(state),
   refused: ({ why }) => say($("refused"), why),
 });
 
 function show({ on, fixed, name, folder, since_s, messages, marks, failure }) {
+  say($("refused"), "");
   $("recording").dataset.on = on ? "yes" : "no";
   const begun = new Date(1000 * since_s).toLocaleTimeString();
   const held = `${messages} messages, ${marks} ${marks === 1 ? "mark" : "marks"}`;
@@ -56,6 +58,5 @@ $("mark").addEventListener("click", () => ask({ do: "mark" }));
 $("stop").addEventListener("click", () => ask({ do: "stop" }));
 
 function ask(asked) {
-  if (!send(asked)) say($("refused"), "not connected");
-  else if (recording) say($("refused"), "");
+  say($("refused"), send(asked) ? "" : "not connected");
 }

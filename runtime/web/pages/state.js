@@ -17,7 +17,6 @@ export class State {
   #dataUs = null;
   #intervals = [];
   #link = null;
-  #up = true;
   #devices = null;
   #lostAt = new Map();
 
@@ -30,7 +29,7 @@ export class State {
 
   /**
    * Take the moment at which the newest data was read, on any clock, and its age now, both in microseconds; null: none
-   * was read yet. Data of a recording has no age: 0.
+   * was read yet.
    */
   data(timeUs, ageUs) {
     if (timeUs === null) return;
@@ -51,12 +50,6 @@ export class State {
     this.#look();
   }
 
-  /** Take whether the server itself is connected to the run. */
-  source(up) {
-    this.#up = up;
-    this.#look();
-  }
-
   /** Take the devices: name, and whether each is connected. */
   devices(devices) {
     for (const { name, connected } of devices) {
@@ -69,7 +62,7 @@ export class State {
   }
 
   #look() {
-    const up = Boolean(this.#link?.up) && this.#up, age = this.#readAt === null ? 0 : performance.now() - this.#readAt;
+    const up = Boolean(this.#link?.up), age = this.#readAt === null ? 0 : performance.now() - this.#readAt;
     const middle = [...this.#intervals].sort((one, other) => one - other)[this.#intervals.length >> 1] ?? 0;
     const silent = age > Math.max(LEAST_MS, PERIODS * middle), old = !up || silent;
     const since = this.#readAt === null ? "" : ` since ${clock(this.#readAt)}`;

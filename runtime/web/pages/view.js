@@ -1,8 +1,8 @@
-// The view of a run on the live page, wherever its moments come from.
+// The view of a run or a recording on their page.
 import { drawHand } from "./hand.js";
 import { counted, State } from "./state.js";
 import { Timeline } from "./timeline.js";
-import { say } from "./wire.js";
+import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 const WORDS_MS = 200; // numbers and words change five times a second, so that they can be read
@@ -20,9 +20,8 @@ const HEALTHS = {
 };
 
 export class View {
-  /** @param {boolean} live whether moments are shown as they happen: those of a recording have no age */
-  constructor({ live = true } = {}) {
-    this.live = live;
+  constructor() {
+    this.live = true;
     this.state = new State((old) => this.#aged(old));
     this.timeline = new Timeline($("past"));
     this.frame = null;
@@ -36,15 +35,14 @@ export class View {
     this.quarantined = [];
     this.words = 0;
     this.said = { text: "", at: 0, since: 0, candidate: "" };
-    this.latencies = [];
-    this.count = { frames: 0, from: performance.now(), number: null };
     requestAnimationFrame(() => this.#draw());
   }
 
-  /** Take the grasp types, switches and joints of the build. */
+  /** Take the grasp types, switches and joints of the build, and whether its moments are those of a recording. */
   build(build) {
+    this.live = !build.replay; // moments of a recording have no age
     say($("name"), build.name);
-    this.timeline.setNames(build.grasps);
+    this.timeline.types = build.grasps.filter((name) => name !== "none");
     this.bits = new Map(build.switches.map((name, bit) => [name, bit]));
     this.joints = build.joints;
     this.closed = build.switches.map(() => false);
@@ -78,12 +76,9 @@ export class View {
   take(frame) {
     if (frame === null) return;
     this.frame = frame;
-    this.count.frames += 1;
-    this.latencies.push(frame.latency_us);
     const ages = [frame.switch_age_us, frame.glove_age_us].filter((age) => age !== null);
     const age = ages.length ? Math.min(...ages) : null;
-    if (!this.live) this.state.data(frame.time_us, 0);
-    else if (age !== null) this.state.data(frame.time_us - age, age + (frame.late_us ?? 0));
+    if (this.live && age !== null) this.state.data(frame.time_us - age, age + (frame.late_us ?? 0));
     this.timeline.add(frame);
   }
 
@@ -91,11 +86,10 @@ export class View {
   health(report) {
     this.state.devices(report.devices);
     const rows = report.devices.map((device) => {
-      const row = document.createElement("tr"), head = cell("th", device.name);
-      head.scope = "row";
+      const row = document.createElement("tr");
       const state = device.error || (device.connected ? "connected" : "not connected");
       const counted = device.counts.filter((count) => count.value).map((count) => `${count.name} ${count.value}`);
-      row.append(head, cell("td", state), cell("td", counted.join(", ") || "nothing"));
+      row.append(cell("th", device.name), cell("td", state), cell("td", counted.join(", ") || "nothing"));
       return row;
     });
     $("devices").replaceChildren(...rows);
@@ -115,12 +109,6 @@ export class View {
   task({ text }) {
     $("task").hidden = false;
     say($("task"), `Task: ${text}`);
-  }
-
-  /** Show the state of the source of the server's moments. */
-  source(source) {
-    this.state.source(source.connected);
-    say($("source"), source.error);
   }
 
   #aged(old) {
@@ -158,13 +146,13 @@ export class View {
     const news = this.shown?.grasp !== frame.grasp;
     this.shown = frame;
     this.#now(frame);
-    // Some streams lack the switches and the probabilities of the other types.
+    // Without a build, the switches and the probabilities of the other types are not known.
     $("types-say").hidden = frame.closed !== undefined;
     this.#hand(frame);
     this.timeline.draw();
     if (news || now - this.words >= WORDS_MS) {
       this.words = now;
-      this.#numbers(frame, now);
+      this.#numbers(frame);
     }
     this.#announce(this.state.old ? "no data" : frame.grasp, now);
   }
@@ -211,7 +199,7 @@ export class View {
     if (!this.rows.has(frame.grasp) && frame.grasp !== "unknown") this.#row(frame.grasp);
   }
 
-  #numbers(frame, now) {
+  #numbers(frame) {
     this.#bars(frame);
     for (const [grasp, { share }] of this.rows) {
       const at = this.classes.indexOf(grasp);
@@ -222,7 +210,12 @@ export class View {
     const held = frame.segment_us === null ? "" : `segment ${frame.segment}, ${frame.state} for ${((frame.time_us - frame.segment_us) / 1e6).toFixed(1)}\u00a0s`;
     say($("segment"), [sure, held].filter(Boolean).join(" · "));
     if (!$("preshape").hidden) say($("preshape"), `Preshape: ${frame.preshape?.name ?? "none yet"}`);
-    this.#times(frame, now);
+    pairs($("times"), {
+      "latency": ms(frame.latency_us),
+      "switches, age": ms(frame.switch_age_us),
+      "glove, age": ms(frame.glove_age_us),
+      ...(this.rates ? { "read": this.rates } : {}),
+    });
     this.#wrong();
     const segments = this.timeline.segments().slice(0, SHOWN);
     list($("segments"), segments.map(({ number, type, seconds, lasts }) => `${number}: ${type}, ${seconds.toFixed(1)} s${lasts && !this.state.old ? ", now" : ""}`));
@@ -231,32 +224,11 @@ export class View {
     if ($("past").getAttribute("aria-label") !== label) $("past").setAttribute("aria-label", label);
   }
 
-  #times(frame, now) {
-    const { count } = this, seconds = (now - count.from) / 1000;
-    if (seconds >= 1) {
-      if (count.number !== null) {
-        const made = (frame.number - count.number) / seconds;
-        this.rate = `${(count.frames / seconds).toFixed(0)}/s of ${made.toFixed(0)}/s`;
-      }
-      this.count = { frames: 0, from: now, number: frame.number };
-      const sorted = this.latencies.sort((one, other) => one - other);
-      this.latency = sorted.length ? sorted[Math.floor(sorted.length / 2)] : null;
-      this.latencies = [];
-    }
-    pairs($("times"), {
-      "latency": ms(this.latency ?? frame.latency_us),
-      "switches, age": ms(frame.switch_age_us),
-      "glove, age": ms(frame.glove_age_us),
-      "frames shown": this.rate ?? "–",
-      ...(this.rates ? { "read": this.rates } : {}),
-    });
-  }
-
   #wrong() {
     const named = new Set(this.quarantined.map((text) => text.split(": ")[0]));
     const lost = (this.frame?.lost ?? []).filter((name) => !named.has(name)).map((name) => `${name}: lost`);
     const all = [...this.quarantined, ...lost, ...(this.suspects ?? [])];
-    list($("wrong"), all.length ? all : ["nothing"], all.length ? "" : "none");
+    list($("wrong"), all.length ? all : ["nothing"]);
   }
 
   // For screen readers: a text that was stable for a second, at most every three seconds.
@@ -271,28 +243,12 @@ export class View {
   }
 }
 
-function cell(kind, text) {
-  const made = document.createElement(kind);
-  made.textContent = text;
-  return made;
-}
-
 const ms = (us) => (us === null || us === undefined ? "none yet" : `${(us / 1000).toFixed(1)} ms`);
 
 function listed(names) {
   if (!names.length) return "";
   const more = names.length > SHOWN ? ` and ${names.length - SHOWN} more` : "";
   return `: ${names.slice(0, SHOWN).join(", ")}${more}`;
-}
-
-// Fill a list, changing only the entries that differ.
-function list(element, texts, className = "") {
-  while (element.children.length > texts.length) element.lastChild.remove();
-  texts.forEach((text, at) => {
-    const item = element.children[at] ?? element.appendChild(document.createElement("li"));
-    if (item.className !== className) item.className = className;
-    say(item, text);
-  });
 }
 
 function pairs(element, values) {

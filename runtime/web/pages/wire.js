@@ -1,4 +1,4 @@
-// The WebSocket of a page: every message to the handler of its topic; it reconnects automatically.
+// The WebSocket of a page: every message to the handler of its topic; it reconnects automatically. And texts on the page.
 
 const FIRST_MS = 250;
 const LONGEST_MS = 5000;
@@ -41,4 +41,22 @@ export function connect(handlers) {
 /** Set the text of an element if it differs: unchanged text is not read out again. */
 export function say(element, text) {
   if (element.textContent !== text) element.textContent = text;
+}
+
+/** Return a cell of a table: "td", or "th" for the head of its row. */
+export function cell(kind, text) {
+  const made = document.createElement(kind);
+  if (kind === "th") made.scope = "row";
+  made.textContent = text;
+  return made;
+}
+
+/** Fill a list, changing only the entries that differ; `style` gets each entry and its number. */
+export function list(element, texts, style = () => {}) {
+  while (element.children.length > texts.length) element.lastChild.remove();
+  texts.forEach((text, at) => {
+    const item = element.children[at] ?? element.appendChild(document.createElement("li"));
+    style(item, at);
+    say(item, text);
+  });
 }

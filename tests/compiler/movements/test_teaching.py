@@ -26,7 +26,7 @@ from thenar.compiler.movements.streams import MovementError
 from thenar.compiler.movements.transitions import Transitions
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime import Build
-from thenar.runtime.preshape.selector import Preshape, PreshapeTable
+from thenar.runtime.preshape import Preshape, PreshapeTable
 from thenar.runtime.task import Task, load_task
 
 STRINGS = st.lists(st.text("abcd", max_size=6), min_size=1, max_size=5)

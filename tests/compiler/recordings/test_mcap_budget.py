@@ -14,8 +14,15 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.runtime.published import LiveGrasp
-from thenar.runtime.recording.layout import LARGEST_RECORD, RECOGNITION, SWITCHES, TRIALS, beginning
-from thenar.runtime.recording.messages import encode_bytes, encode_text
+from thenar.runtime.recording.layout import (
+    RECOGNITION,
+    SWITCHES,
+    TRIALS,
+    beginning,
+    encode_bytes,
+    encode_text,
+)
+from thenar.runtime.recording.mcap import LARGEST_RECORD
 from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session, to_metadata
 
 READ = """

@@ -10,7 +10,7 @@ from thenar.compiler.recordings.mcap_recording import import_files, import_recor
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14, MOVEMENTS, collected
 from thenar.runtime.errors import McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.recording.guide import MOVING_US, CollectionGuide, Key, Stage, planned, read_journal
+from thenar.runtime.recording.guide import MOVING_US, CollectionGuide, planned, read_journal
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
@@ -41,11 +41,11 @@ class Wearer:
     def collect(self) -> None:
         """Go through all trials."""
         now, begun, judge = START_US, 0, 0
-        self.guide.press(now, Key.ACCEPT)
+        self.guide.press(now, "accept")
         while self.guide.trial is not None:
             now += TICK_US
             trial = self.guide.trial
-            counting = self.guide.stage is Stage.COUNTDOWN and self.guide.seconds_left(now) <= 1
+            counting = self.guide.stage == "countdown" and self.guide.seconds_left(now) <= 1
             if counting and trial.grasp != "none" and begun != trial.number:
                 begun, (self._closed, goal) = trial.number, POSES[trial.grasp]
                 self._goal = np.array(goal, float)
@@ -53,17 +53,17 @@ class Wearer:
             self._at += 0.08 * (self._goal - self._at)
             raw = np.rint(self._at + self._random.normal(0, 0.6, 4)).astype(np.uint8).tobytes()
             self.guide.take(now, [SwitchFrame(now, self._closed), GloveFrame(now, raw)])
-            if self.guide.stage is not Stage.REVIEW:
+            if self.guide.stage != "review":
                 judge = 0
             elif not judge:
                 judge = now + 700_000
             elif now >= judge:
                 again = trial.grasp != "none" and self._redo > 0
                 self._redo -= again
-                self.guide.press(now, Key.REDO if again else Key.ACCEPT)
+                self.guide.press(now, "redo" if again else "accept")
                 if self._undo and trial.grasp != "none" and self.guide.trial is not None:
                     self._undo -= 1
-                    self.guide.press(now, Key.UNDO)
+                    self.guide.press(now, "undo")
                     again = True
                 begun = 0 if again else begun
                 if self._closed:

@@ -1,4 +1,4 @@
-"""try.html as a visitor has it: opened from its file in a real browser, clicked, dragged, typed at."""
+"""try.html as a visitor has it: opened from its file in a real browser, clicked, typed at."""
 
 import csv
 import io
@@ -277,25 +277,6 @@ def test_the_keyboard_alone_reaches_and_works_everything(opened: Trier, folder: 
     assert sum(one.get_attribute("role") == "button" for one in reached) == build.tables.n_switches
     assert sum(pressed(opened)) > 0
     assert (opened.text("grasp"), opened.text("margin")) == said_of(build, bits_now(opened, build), codes_now(opened))
-
-
-def test_dragging_a_finger_bends_its_joint(opened: Trier, folder: Path) -> None:
-    build = Build.load(folder)
-    number = [joint.name for joint in build.manifest.joints].index("index_mpj")
-    before = codes_now(opened)
-    handle = opened.script(
-        "return [...document.querySelectorAll('#hand .held')]"
-        ".find((one) => one.querySelector('title').textContent === 'index_mpj')"
-    )
-    opened.script("arguments[0].scrollIntoView({block: 'center'})", handle)
-    # Towards the palm, which is to the left of the finger as it is seen, and down.
-    ActionChains(opened.driver).click_and_hold(handle).move_by_offset(-70, 60).release().perform()
-    after = codes_now(opened)
-    assert after[number] > before[number]
-    assert [code for at, code in enumerate(after) if at != number] == [
-        code for at, code in enumerate(before) if at != number
-    ]
-    assert (opened.text("grasp"), opened.text("margin")) == said_of(build, bits_now(opened, build), after)
 
 
 def test_rows_are_replayed_and_the_bars_show_all_answers(opened: Trier, folder: Path, gloved: GraspSet) -> None:

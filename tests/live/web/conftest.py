@@ -102,9 +102,7 @@ class Run:
     def __init__(self, stack: ExitStack, scene: Any, harness: Harness, folder: Path, build: Path) -> None:
         self.scene, self.recordings = scene, folder / "recordings"
         self.bench, wired = on_bench(stack, scene, harness, folder)
-        self.stream, self.build = f"unix:{folder}/stream", build
-        sinks = [f"{self.stream}?detail"]
-        self.glove = Glove(scene.truth.build, wired, policy=FRANK, recordable=True, sinks=sinks, status=True)
+        self.glove = Glove(scene.truth.build, wired, policy=FRANK, recordable=True, status=True)
         self.page = LivePage(self.glove, build, "127.0.0.1:0", token=None, recordings=self.recordings)
         stack.enter_context(self.page)
         stack.enter_context(self.glove)

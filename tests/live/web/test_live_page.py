@@ -1,7 +1,6 @@
 """The live page in a real browser: what it shows is what was published, and what is pressed happens."""
 
 from collections.abc import Callable
-from threading import Event, Thread
 from typing import Any
 
 import pytest
@@ -13,7 +12,6 @@ from thenar.runtime.live.replay import replayed
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Mark
-from thenar.runtime.web.monitor import StreamMonitor
 from thenar.runtime.web.server import Server, message
 
 pytestmark = pytest.mark.slow
@@ -80,34 +78,6 @@ def bars_are(browser: Any, scene: Any) -> bool:
     share: str = browser.script(_BARS)[found.grasp]
     # While too little is read, there is none.
     return share.endswith(" %") and abs(float(share.removesuffix(" %")) - 100 * found.probability) < 0.11
-
-
-def test_the_page_of_a_run_elsewhere_shows_the_same(run: Callable[[], Any], browser: Any) -> None:
-    running, stop = run(), Event()
-    scene, truth = running.scene, running.scene.truth
-    with StreamMonitor(running.stream, "127.0.0.1:0", token=None, build=running.build) as monitor:
-        thread = Thread(target=monitor.run, args=(stop,))
-        thread.start()
-        try:
-            browser.open(monitor.server.url)
-            for row in range(0, len(truth.performance), 7):
-                shown(browser, scene, row)
-                browser.wait(lambda: bars_are(browser, scene))
-            browser.wait(lambda: len(browser.texts("#devices tr")) == 2)
-            assert not browser.driver.find_element("id", "record-panel").is_displayed()
-            assert not browser.driver.find_element("id", "types-say").is_displayed()
-            assert browser.texts("#types .name") == list(truth.build.manifest.classes)
-            # A page that is opened after the last moment knows how old it is.
-            running.end()
-            browser.wait(lambda: browser.text("age").startswith("this is "))
-            age = float(browser.text("age").split()[2])
-            browser.open(monitor.server.url)
-            browser.wait(lambda: browser.text("age").startswith("this is "))
-            assert float(browser.text("age").split()[2]) >= age
-            browser.driver.get("about:blank")
-        finally:
-            stop.set()
-            thread.join()
 
 
 def test_the_posed_hand_follows_the_joints(run: Callable[[], Any], browser: Any) -> None:

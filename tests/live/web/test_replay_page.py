@@ -110,6 +110,12 @@ def test_wherever_the_slider_stands_the_page_shows_what_was_there(
         browser.wait(lambda label=found.candidate: browser.text("truth") == f"Truth: {label}")
         assert place(browser) == pytest.approx(seconds, abs=0.02)
         assert browser.texts("#types li[aria-current] .name") == [found.grasp]
+    # A moment of a recording has no age, however long it is looked at.
+    clock = "return performance.now()"
+    start = browser.script(clock)
+    browser.wait(lambda: browser.script(clock) > start + 1000)
+    assert browser.text("age") == ""
+    assert not browser.script("return document.documentElement.classList.contains('old')")
     label = browser.script("return document.getElementById('whole').getAttribute('aria-label')")
     assert f"{len(ROWS)} labelled spans" in label
     assert browser.text("faults") == ""

@@ -19,7 +19,7 @@ HAND = {
 }
 BUILD = {
     **{"name": "bench", "build": "build 01234567", "grasps": ["Add", "PoS"], "switches": ["a", "b", "c"], "joints": []},
-    **{"preshapes": False, "records": False, "empty_hand": True},
+    **{"preshapes": False, "records": False, "replay": False, "empty_hand": True},
 }
 GRASP = LiveGrasp(0, 0, 0, "Add", "Add", 0.95, 9, "ok", 2_000, None, 2_000)
 DETAIL = {"closed": "110", "joints": [], "taxels": {}, "probabilities": [0.95, 0.05], "late_us": 0}
@@ -167,7 +167,8 @@ def test_a_recordings_wrong_predictions_are_marked_by_sign_and_words(browser: An
     state = {"first_us": 0, "last_us": 9_000_000, "playing": False, "speed": 1.0, "share": 1.0, "faults": []}
     predictions = [(0, "none"), (1_000_000, "Add"), (2_000_000, "unknown"), (5_000_000, "PoS")]
     truth = [(500_000, 3_000_000, "Add"), (4_000_000, 8_000_000, "Add")]
-    with Server("replay", "127.0.0.1:0", token=None, hello=lambda: [message("build", BUILD)]) as server:
+    hello = [message("build", BUILD | {"replay": True})]
+    with Server("live", "127.0.0.1:0", token=None, hello=lambda: hello) as server:
         server.publish("overview", message("overview", predictions=predictions, truth=truth, marks=[]))
         browser.open(server.url)
         for grasp, label, said in (
@@ -192,20 +193,22 @@ def test_a_recordings_wrong_predictions_are_marked_by_sign_and_words(browser: An
 
 def test_a_calibration_whose_glove_falls_silent_is_grey_and_says_its_age(browser: Any) -> None:
     pose = {
-        **{"step": 1, "stage": "ready", "number": 1, "total": 2, "name": "Flat hand", "instruction": "Lay it flat."},
-        **{"picture": None, "left_s": 0.0, "problems": [], "offered": {}, "silent": False},
-        **{"bytes": [80], "flat": None, "concerned": [True], "states": [""]},
+        **{"step": 1, "stage": "ready", "count": "pose 1 of 2", "done": 0, "total": 2, "title": "Flat hand"},
+        **{"detail": "Lay it flat.", "pose": None, "says": "", "number": "", "problems": [], "offered": {}},
+        **{"devices": [], "sees": "all 1 sensors are measured"},
+        "rows": [{"byte": 80, "flat": None, "state": "", "concerned": True, "faulty": False}],
     }
-    first = [message("sensors", names=["thumb_mcp"], subject="anna"), message("hand", HAND)]
-    with Server("calibrate", "127.0.0.1:0", token=None, hello=lambda: first) as server:
+    about = {"what": "Calibration of", "subject": "anna", "leave": "", "table": ["thumb_mcp"], "study": False}
+    first = [message("about", about), message("hands", pose=HAND)]
+    with Server("guided", "127.0.0.1:0", token=None, hello=lambda: first) as server:
         browser.open(server.url)
         for number in range(5):
-            server.publish("pose", message("pose", pose, time_us=10_000 * number, age_us=1_000))
+            server.publish("guide", message("guide", pose, time_us=10_000 * number, age_us=1_000))
         browser.wait(lambda: browser.text("sees") == "all 1 sensors are measured")
         # Nothing more comes: the run has stopped.
         old = "return document.documentElement.classList.contains('old')"
         browser.wait(lambda: browser.script(old) and browser.text("age").startswith("this is "))
         assert browser.text("glove-state").startswith("glove: silent since ")
-        server.publish("pose", message("pose", pose, time_us=9_000_000, age_us=1_000))
+        server.publish("guide", message("guide", pose, time_us=9_000_000, age_us=1_000))
         browser.wait(lambda: not browser.script(old))
         browser.driver.get("about:blank")

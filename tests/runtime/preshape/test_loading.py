@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from thenar.compiler.recordings.taxonomy import CUTKOSKY_16, KAMAKURA_14
 from thenar.drivers.errors import SettingError, ThenarError
-from thenar.runtime.preshape import SHIPPED, load_preshapes
-from thenar.runtime.preshape.selector import PreshapeTable
+from thenar.runtime.preshape import SHIPPED, PreshapeTable, load_preshapes
 
 OWN = """\
 name = "mine"

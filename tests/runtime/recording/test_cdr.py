@@ -5,7 +5,7 @@ from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from thenar.runtime.errors import McapError
-from thenar.runtime.recording.messages import (
+from thenar.runtime.recording.layout import (
     BYTES,
     DEFINITIONS,
     STRING,

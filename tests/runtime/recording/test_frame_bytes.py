@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from thenar.runtime.errors import FrameError, McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.recording.messages import glove_bytes, glove_frame, switch_bytes, switch_frame
+from thenar.runtime.recording.layout import glove_bytes, glove_frame, switch_bytes, switch_frame
 
 times = st.integers(0, 2**63)
 

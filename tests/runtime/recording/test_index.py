@@ -10,8 +10,7 @@ from msgspec.structs import replace
 from thenar.runtime.errors import McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.published import LiveGrasp
-from thenar.runtime.recording.index import Index
-from thenar.runtime.recording.reader import Entry, Reader
+from thenar.runtime.recording.reader import Entry, Index, Reader
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
 

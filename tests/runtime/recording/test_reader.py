@@ -20,7 +20,7 @@ from thenar.runtime.errors import McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.guide import read_journal
-from thenar.runtime.recording.layout import LARGEST_RECORD, MAGIC
+from thenar.runtime.recording.mcap import LARGEST_RECORD, MAGIC
 from thenar.runtime.recording.reader import OTHER_RECORDS, Reader
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder

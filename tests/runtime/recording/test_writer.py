@@ -25,7 +25,8 @@ from thenar.runtime.errors import FrameError, McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.guide import read_journal
-from thenar.runtime.recording.layout import LARGEST_RECORD, Tail
+from thenar.runtime.recording.layout import Tail
+from thenar.runtime.recording.mcap import LARGEST_RECORD
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, Label, Mark, Session
 from thenar.runtime.recording.writer import Recorder

@@ -124,7 +124,7 @@ def test_every_type_has_ross_name_and_fields(ros: ModuleType) -> None:
 
 
 def test_a_preshape_is_a_trajectory_of_one_point_that_starts_at_once(ros: ModuleType, preshape: Preshape) -> None:
-    from thenar.runtime.ros.messages import trajectory
+    from thenar.runtime.ros import trajectory
 
     point = ros.JointTrajectoryPoint([0.0, 0.5], [], [], [], ros.Duration(1, 250_000_000))
     names = ["finger_1/prox_joint", "finger_1/med_joint"]

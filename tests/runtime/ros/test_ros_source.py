@@ -38,9 +38,7 @@ def _topic() -> str:
 def talk(ros: ModuleType, monkeypatch: pytest.MonkeyPatch) -> Iterator[Talk]:
     """Return what starts a process that sends a message of a topic for each line of values."""
     # The other process keeps to loopback as well, by the same settings.
-    from thenar.runtime.ros import domain
-
-    monkeypatch.setenv("CYCLONEDDS_URI", domain._LOOPBACK)
+    monkeypatch.setenv("CYCLONEDDS_URI", ros._LOOPBACK)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
     with ExitStack() as stack:
 

@@ -21,7 +21,7 @@ def test_every_kind_is_opened_by_its_name(tmp_path: Path) -> None:
         (f"jsonl:{tmp_path}/lines", JsonLines),
         (f"unix:{tmp_path}/socket", SocketLines),
         ("tcp:127.0.0.1:0", SocketLines),
-        ("tcp-public:127.0.0.1:0", SocketLines),
+        ("tcp:127.0.0.1:0?public", SocketLines),
     ):
         sink = open_sink(where)
         assert isinstance(sink, kind)

@@ -14,11 +14,11 @@ from websockets.typing import Origin
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.frames import OLD_US, GloveFrame, SwitchFrame
 from thenar.runtime.live.sources import DeviceState
-from thenar.runtime.recording.guide import CollectionGuide, Key, planned
+from thenar.runtime.recording.guide import CollectionGuide, planned
 from thenar.runtime.recording.session import Collection, CollectionTask, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine
-from thenar.runtime.web.guided import GuidePage
+from thenar.runtime.web.guided import GuidePage, collection_page
 
 COLLECTION = Collection(
     "A", "own", ("cup", "pen"), (CollectionTask("cup", ("mug",)), CollectionTask("none", ("open hand",))), 2, 1
@@ -37,7 +37,7 @@ DEVICES = (DeviceState("glove", True, "", 1), DeviceState("stream", False, "is g
 
 @pytest.fixture
 def page() -> Iterator[GuidePage]:
-    with GuidePage(
+    with collection_page(
         "127.0.0.1:0", token=None, session=SESSION, hands={}, shown=lambda trial: {"title": trial.grasp}
     ) as it:
         yield it
@@ -90,18 +90,21 @@ def test_joints_of_an_old_record_are_not_told_as_measured(page: GuidePage, guide
         page.show(now_us, guide, DEVICES)
         found = told(page, "guide")["guide"]
         assert found["joints"] == joints
-        assert found["lost"] == ("" if joints else "switches cannot be read: a, b, c")
+        says = "the countdown waits: switches cannot be read: a, b, c"
+        assert (found["says"] == says) == (joints == [])
+        assert found["sees"].startswith("0 of 0 readable switches closed; 3 lost (a, b, c); ")
         assert (found["time_us"], found["age_us"]) == (now_us, 0)
 
 
 def test_a_browser_that_comes_late_gets_all_and_presses_at_its_step(page: GuidePage, guide: CollectionGuide) -> None:
-    page.tell({"problem": "not yet"})
+    page.study({"problem": "not yet"})
     page.show(0, guide, DEVICES)
-    found = told(page, "collection", "hands", "guide", "study")
-    assert found["collection"]["types"] == ["cup", "none"]
+    found = told(page, "about", "hands", "guide", "study")
+    assert (found["about"]["subject"], found["about"]["study"]) == ("A", True)
     assert found["study"]["problem"] == "not yet"
-    assert found["guide"]["offered"] == {key.value: what for key, what in guide.offered().items()}
-    assert found["guide"]["trial"]["title"] == found["guide"]["trial"]["grasp"]
+    assert found["guide"]["offered"] == guide.offered()
+    assert guide.trial is not None
+    assert found["guide"]["title"] == guide.trial.grasp
     with opened(page) as live:
         for step in (guide.step + 1, guide.step, guide.step):
             live.send(json.dumps({"do": "accept", "step": step}))
@@ -109,7 +112,7 @@ def test_a_browser_that_comes_late_gets_all_and_presses_at_its_step(page: GuideP
         while json.loads(live.recv(timeout=20))["topic"] != "refused":
             pass
     page.press(5, guide)
-    assert (guide.stage.value, guide.step) == ("countdown", found["guide"]["step"] + 1)
+    assert (guide.stage, guide.step) == ("countdown", found["guide"]["step"] + 1)
 
 
 def test_stages_are_sent_at_once_movements_20_times_a_second(
@@ -121,7 +124,7 @@ def test_stages_are_sent_at_once_movements_20_times_a_second(
         guide.take(time_us, frames(time_us, (500, 40), lost=0))
         page.show(time_us, guide, DEVICES)
     assert len(published) == 20
-    guide.press(999_000, Key.ACCEPT)
+    guide.press(999_000, "accept")
     page.show(999_000, guide, DEVICES)
     assert len(published) == 21
     page.show(999_001, guide, DEVICES)
@@ -131,7 +134,7 @@ def test_stages_are_sent_at_once_movements_20_times_a_second(
 def test_a_session_without_calibrations_is_shown_by_its_bytes(tmp_path: Path) -> None:
     bare = replace(SESSION, calibration=None, taxels=(), taxel_calibration=None)
     with (
-        GuidePage("127.0.0.1:0", token=None, session=bare, hands={}, shown=lambda _: {}) as page,
+        collection_page("127.0.0.1:0", token=None, session=bare, hands={}, shown=lambda _: {"title": ""}) as page,
         Recorder(tmp_path / "b.mcap", bare) as recorder,
     ):
         guide = CollectionGuide(planned(COLLECTION), recorder, 0)
