@@ -120,8 +120,8 @@ def health_lines(report: HealthReport | None) -> tuple[str, ...]:
     if report is None:
         return ()
     found = {
-        "never closed": report.stuck_open,
-        "never open": report.stuck_closed,
+        "stuck open": report.stuck_open,
+        "stuck closed": report.stuck_closed,
         "chattering": report.chattering,
         "drifting": [f"{drift.joint} by {drift.codes:+d} codes" for drift in report.drifting],
     }

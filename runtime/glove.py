@@ -1,5 +1,6 @@
 """`Glove`: a glove that recognises grasps, as an iterator of published moments."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from os import PathLike
@@ -10,17 +11,17 @@ from typing import Protocol, Self
 
 from .build import Build
 from .calibration import AngleReader
-from .frames import GloveFrame, now_us
+from .frames import GloveFrame, SwitchFrame, now_us
 from .harness.loading import load_harness
 from .harness.wiring import Harness
 from .harness.writing import harness_to_toml
-from .live.health import Health
+from .live.quarantine import CHATTERING, STUCK_CLOSED, STUCK_OPEN, Quarantine
 from .live.recogniser import Moment
 from .live.sources import Snapshot
 from .live.system import LiveSystem
 from .policy import Policy
 from .preshape.loading import preshape_selector
-from .published import DeviceHealth, HealthReport, JointAngles, OutputTrouble, Quarantined
+from .published import DeviceHealth, HealthReport, JointAngles, LiveGrasp, OutputTrouble, Quarantined
 from .recording.session import Session
 from .recording.writer import LiveRecorder
 from .sinks.base import LATE_US, Fanout, Sink, SinkReport, open_sink
@@ -151,7 +152,7 @@ class Glove:
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
         self.follower = None if task is None else TaskFollower.of(Path(task), loaded.grasps)
-        self._health, self._due_us = Health(loaded, self._recognizer.quarantine), 0
+        self._health, self._due_us = GloveHealth(self._recognizer.quarantine), 0
         self._quarantined: tuple[Quarantined, ...] = ()
         self._fanout = Fanout(())
         self._open = ExitStack()
@@ -239,7 +240,7 @@ class Glove:
     def _look(self, now: int) -> None:
         self._due_us, self.sources.changed = now + _REPORT_US, False
         devices, overflowed = self.sources.health(), self.sources.overflowed
-        self.health = self._health.report(now, devices, overflowed, self._quarantined, self._troubles())
+        self.health = self._health.report(now, devices, overflowed, self._troubles())
         if self._status:
             self._fanout.health(self.health)
         self.sources.raise_settings()
@@ -266,3 +267,81 @@ class Glove:
             taxels=system.harness.taxel_names,
             taxel_calibration=calibration_of(system.harness.taxel_settings),
         )
+
+
+class GloveHealth:
+    """Counts published grasps and frames, for reports; `quarantine` finds the faults of inputs."""
+
+    def __init__(self, quarantine: Quarantine) -> None:
+        self._quarantine = quarantine
+        self._switches, self._glove = FrameRate(), FrameRate()
+        self._published = Counter[str]()
+
+    def update(self, grasp: LiveGrasp, switches: SwitchFrame | None, glove_us: int | None = None) -> None:
+        """Take a published grasp, the frame of switches behind it, and the time of the glove's; a frame that was seen
+        before counts once.
+        """
+        self._published[grasp.health] += 1
+        if switches is not None:
+            self._switches.frame(switches.time_us)
+        if glove_us is not None:
+            self._glove.frame(glove_us)
+
+    def report(
+        self,
+        now_us: int,
+        devices: Sequence[DeviceHealth] = (),
+        overflowed: int = 0,
+        outputs: tuple[OutputTrouble, ...] = (),
+    ) -> HealthReport:
+        """Return the current health."""
+        quarantine, published = self._quarantine, self._published
+        return HealthReport(
+            time_us=now_us,
+            stuck_open=quarantine.names(STUCK_OPEN),
+            stuck_closed=quarantine.names(STUCK_CLOSED),
+            chattering=quarantine.names(CHATTERING),
+            drifting=quarantine.drifts(),
+            switch_hz=self._switches.hz(now_us),
+            glove_hz=self._glove.hz(now_us),
+            frames=published.total(),
+            changing=published["changing"],
+            degraded=published["degraded"],
+            unknown=published["unknown"],
+            overflowed=overflowed,
+            devices=tuple(devices),
+            quarantined=quarantine.found,
+            outputs=outputs,
+        )
+
+
+class FrameRate:
+    """Frames per second over the last second."""
+
+    def __init__(self) -> None:
+        self._began_us: int | None = None
+        self._last_us = -1
+        self._frames = 0
+        self._hz = 0.0
+
+    def frame(self, time_us: int) -> None:
+        """Count a frame, unless it is no newer than the last one."""
+        if time_us <= self._last_us:
+            return
+        self._last_us = time_us
+        if self._began_us is None:
+            self._began_us = time_us
+            return
+        self._frames += 1
+        if time_us - self._began_us >= _REPORT_US:
+            self._hz = self._over(time_us)
+            self._began_us, self._frames = time_us, 0
+
+    def hz(self, now_us: int) -> float:
+        """Return the rate of the last whole second, or of the time since the last frames, if none come."""
+        if self._began_us is not None and now_us - self._began_us > 2 * _REPORT_US:
+            return self._over(now_us)
+        return self._hz
+
+    def _over(self, now_us: int) -> float:
+        return self._frames * 1e6 / (now_us - (self._began_us or 0))

@@ -103,8 +103,8 @@ export class View {
       `${name}: ${reason}, ${used ? "still used" : "treated as lost"}`,
     );
     this.suspects = [
-      ...report.stuck_open.map((name) => `${name}: was never seen closed`),
-      ...report.stuck_closed.map((name) => `${name}: was never seen open`),
+      ...report.stuck_open.map((name) => `${name}: stuck open`),
+      ...report.stuck_closed.map((name) => `${name}: stuck closed`),
       ...report.chattering.map((name) => `${name}: chatters`),
       ...report.drifting.map(({ joint, codes }) => `${joint}: has drifted by ${codes} codes`),
     ];

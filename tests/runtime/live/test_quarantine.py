@@ -123,6 +123,7 @@ def test_a_switch_stuck_closed_is_lost_until_it_opens(make_build: MakeBuild, swi
     for _ in range(30):
         last = hand.grasp(next(grasps), stuck=bit).grasp
     assert hand.found == (Quarantined(name, STUCK_CLOSED),)
+    assert hand.live.quarantine.names(STUCK_CLOSED) == (name,)
     assert (last.health, last.lost) == ("degraded", (name,))
     for _ in range(30):
         last = hand.grasp(next(grasps)).grasp
