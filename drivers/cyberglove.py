@@ -37,12 +37,11 @@ from .cyberglove_protocol import (
     period_us,
     period_words,
     query,
-    sending_us,
     setting,
     shortest_us,
 )
 from .errors import DeviceError, SettingError
-from .serial_line import SerialLine
+from .serial_line import SerialLine, sending_us
 
 _LOG = logging.getLogger(__name__)
 

@@ -149,6 +149,11 @@ class SerialLine(Closing):
         return DeviceError(f"{self.url}: the serial line is gone ({reason}): check cable and power")
 
 
+def sending_us(size: int, baud: int) -> float:
+    """Return the time of `size` bytes on the line, in microseconds: 8 data bits, a start bit, a stop bit each."""
+    return size * BITS_A_BYTE * 1e6 / baud
+
+
 def _opened(url: str, baud: int) -> "Serial":
     from serial import serial_for_url
 

@@ -11,9 +11,10 @@ code that a recorded one got.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from operator import getitem, itemgetter
 from pathlib import Path
+
+from msgspec import Struct
 
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError
@@ -40,8 +41,7 @@ def load_calibration(path: Path) -> GloveCalibration:
     return convert(source, (), source.tables(), GloveCalibration)
 
 
-@dataclass(frozen=True, slots=True)
-class Numbers:
+class Numbers(Struct, frozen=True):
     """The meaning of the bytes of an uncalibrated stream's joints: the numbers that it sends, in the unit of the
     recordings.
     """

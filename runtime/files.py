@@ -3,7 +3,6 @@
 import errno
 import os
 import re
-import secrets
 from contextlib import suppress
 from pathlib import Path
 
@@ -47,7 +46,7 @@ def _write_beside_and_rename(path: Path, data: bytes, mode: int) -> None:
 def _new_part(path: Path, mode: int) -> tuple[Path, int]:
     """Return a new temporary file next to `path`, and its descriptor, which locks it while it is open."""
     while True:
-        part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+        part = path.with_name(f".{path.name}.{os.urandom(4).hex()}.part")
         # The system subtracts the umask.
         descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
         _lock(descriptor)

@@ -7,26 +7,24 @@ from os import PathLike
 from pathlib import Path
 from threading import Event
 from time import time_ns
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 from .build import Build
 from .calibration import AngleReader
 from .frames import GloveFrame, SwitchFrame, now_us
-from .harness.loading import load_harness
 from .harness.wiring import Harness
-from .harness.writing import harness_to_toml
 from .live.quarantine import CHATTERING, STUCK_CLOSED, STUCK_OPEN, Quarantine
 from .live.recogniser import Moment
 from .live.sources import Snapshot
 from .live.system import LiveSystem
 from .policy import Policy
-from .preshape.loading import preshape_selector
 from .published import DeviceHealth, HealthReport, JointAngles, LiveGrasp, OutputTrouble, Quarantined
-from .recording.session import Session
-from .recording.writer import LiveRecorder
 from .sinks.base import LATE_US, Fanout, Sink, SinkReport, open_sink
-from .task import TaskFollower
 from .taxels import calibration_of
+
+if TYPE_CHECKING:
+    from .recording.session import Session
+    from .recording.writer import LiveRecorder
 
 _REPORT_US = 1_000_000
 
@@ -128,8 +126,11 @@ class Glove:
         feed: Feed | None = None,
     ) -> None:
         loaded = build if isinstance(build, Build) else Build.load(build)
-        wired = harness if isinstance(harness, Harness) else load_harness(Path(harness))
-        self.system = system = LiveSystem.of(loaded, wired, policy)
+        if not isinstance(harness, Harness):
+            from .harness.loading import load_harness
+
+            harness = load_harness(Path(harness))
+        self.system = system = LiveSystem.of(loaded, harness, policy)
         self.stop = Event() if stop is None else stop
         self.frames, self.lacking = 0, ""
         self.health: HealthReport | None = None
@@ -141,6 +142,8 @@ class Glove:
         self.feed: Feed = self.sources if feed is None else feed
         self._selector = None
         if preshapes is not None:
+            from .preshape.loading import preshape_selector
+
             by_segments = system.policy.lag_us is not None
             self._selector, self.lacking = preshape_selector(
                 preshapes, loaded, segments=by_segments, change_while_held=change_while_held
@@ -151,7 +154,11 @@ class Glove:
         self._measured: GloveFrame | None = None
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
-        self.follower = None if task is None else TaskFollower.of(Path(task), loaded.grasps)
+        self.follower = None
+        if task is not None:
+            from .task import TaskFollower
+
+            self.follower = TaskFollower.of(Path(task), loaded.grasps)
         self._health, self._due_us = GloveHealth(self._recognizer.quarantine), 0
         self._quarantined: tuple[Quarantined, ...] = ()
         self._fanout = Fanout(())
@@ -209,12 +216,14 @@ class Glove:
         self.frames += 1
         return moment
 
-    def new_recording(self, path: Path) -> LiveRecorder:
+    def new_recording(self, path: Path) -> "LiveRecorder":
         """Return a running recording of this glove. Only the thread that iterates may set it as `recorder`, or remove
         it; its creator closes it.
 
         Raises SettingError if the file exists, OSError as the operating system gives it.
         """
+        from .recording.writer import LiveRecorder
+
         return LiveRecorder(path, self._session())
 
     @property
@@ -251,9 +260,12 @@ class Glove:
         recording = () if failure is None else (OutputTrouble("recording", failure),)
         return (*recording, *self._fanout.troubles())
 
-    def _session(self) -> Session:
+    def _session(self) -> "Session":
         # It takes a third as long to import as everything else.
         from importlib.metadata import version
+
+        from .harness.writing import harness_to_toml
+        from .recording.session import Session
 
         system = self.system
         return Session(

@@ -24,7 +24,8 @@ whose results and evidence are dropped at the next whole frame.
 """
 
 import math
-from dataclasses import dataclass, field
+
+from msgspec import Struct
 
 from ..scores import odds, softmax
 
@@ -67,8 +68,7 @@ class Ranking:
         return Ranking((*self.biased_scores, max(self.biased_scores) + lead))
 
 
-@dataclass(slots=True)
-class Decision:
+class Decision(Struct):
     """The decided class, from candidates frame by frame. A frame is whole if none of its inputs is lost.
 
     - The first candidate, with no class decided, is decided on at once.
@@ -127,8 +127,7 @@ class Decision:
         return candidate
 
 
-@dataclass(slots=True)
-class SequentialTest:
+class SequentialTest(Struct):
     """Decides test after test; a result holds until the next test has one, or `longest_us` have passed.
 
     After a whole frame, one with no input lost, both the result and the evidence are based on whole frames.
@@ -142,7 +141,7 @@ class SequentialTest:
     longest_us: int
     spacing_us: int = 0
     held: int | None = None
-    threshold: int = field(init=False)
+    threshold: int = 0
     _sums: tuple[int, ...] = ()
     _began_us: int = 0
     _counted_us: int | None = None

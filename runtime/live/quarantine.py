@@ -39,10 +39,11 @@ has moved by at least the smaller of both; grasps that merely use less of the ra
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from operator import gt, lt
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from ..build import Build
@@ -176,8 +177,7 @@ class StuckTest:
         return evidence * grasp.read
 
 
-@dataclass(frozen=True, slots=True)
-class _Grasp:
+class _Grasp(Struct, frozen=True):
     """An observed grasp: scores (K,), and which switches were closed, read, and scored as lost (s,)."""
 
     biased_scores: Ints

@@ -1,10 +1,10 @@
 """The live recogniser: joins the newest frame of each device, scores it and decides."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from ..build import Build
 from ..calibration import Joints, Meaning
@@ -14,7 +14,7 @@ from ..policy import Policy
 from ..preshape.selector import Preshape
 from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
 from ..scores import LiveScores
-from ..segmenting.live import LiveSegments, Segment
+from ..segmenting.decoder import LiveSegments, Segment
 from .decision import Decision, Ranking, SequentialTest
 from .quarantine import Quarantine
 
@@ -118,7 +118,8 @@ class LiveRecognizer:
             self.quarantine.look(read, biased_scores, lost)
         refused = False
         if self._rejector is not None:
-            refused = self._rejector.refuses(biased_scores, closed, lost, codes, lost_joints=lost_joints)
+            counts = closed.bit_count(), lost.bit_count()
+            refused = self._rejector.refuses(biased_scores, *counts, codes, lost_joints=lost_joints)
             standing = standing.with_none_class(self._none_leads[refused])
         seen_us = max(newest.time_us, self._joints.newest.time_us)
         if too_much:

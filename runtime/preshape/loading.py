@@ -16,8 +16,6 @@ grasps = ["PoS", "CMF"]         # the grasp types, spelled as in the build; "non
 
 import math
 import os
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -32,6 +30,8 @@ from ..toml_struct import check_finite, convert
 from .selector import Preshape, PreshapeSelector, PreshapeTable
 
 if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
+
     from ..build import Build
 
 SHIPPED = ("barrett_bh8", "parallel_gripper")
@@ -92,8 +92,10 @@ def preshape_selector(
     return PreshapeSelector(table, segments=by_segments, change_while_held=change_while_held), table.check(build.grasps)
 
 
-def _find(name: str | os.PathLike[str]) -> Traversable:
+def _find(name: str | os.PathLike[str]) -> "Traversable":
     if name in SHIPPED:
+        from importlib.resources import files
+
         return files(__package__) / "tables" / f"{name}.toml"
     path = Path(name)
     if not path.exists():

@@ -4,7 +4,6 @@ moment.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 import msgspec
 
@@ -48,6 +47,8 @@ class PreshapeTable:
         if not missing:
             return ""
         spare = [grasp for grasp in self.chosen if grasp not in wanted]
+        from difflib import get_close_matches  # for messages only
+
         likely = {grasp: get_close_matches(grasp, spare, n=1, cutoff=0.8) for grasp in missing}
         if len(missing) == len(wanted) and not any(likely.values()):
             raise SettingError(

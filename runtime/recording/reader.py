@@ -1,7 +1,7 @@
 """Read a recording back: sessions, frames, predictions and labels in the order in which they were written."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from struct import Struct, pack
 from typing import Any
@@ -134,7 +134,7 @@ class EntryDecoder:
         if channel == SWITCHES:
             frame = switch_frame(time_us, decode_bytes(data), len(session.switches), len(session.sensors))
             coded_us, codes = self._codes
-            return frame if coded_us != time_us else replace(frame, taxels=codes)
+            return frame if coded_us != time_us else msgspec.structs.replace(frame, taxels=codes)
         if channel == GLOVE:
             return glove_frame(time_us, decode_bytes(data), len(session.sensors))
         return _from_json(channel, decode_text(data))

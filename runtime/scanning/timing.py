@@ -13,10 +13,9 @@ from math import fsum
 
 from msgspec import Struct
 
-from thenar.drivers import cyberglove_protocol as glove_protocol
-from thenar.drivers.cyberglove_protocol import sending_us, shortest_us
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import Conversion, Reading
+from thenar.drivers.serial_line import sending_us
 from thenar.drivers.spi.chips import SELECT_US, Transfer
 
 from ..harness.wiring import GloveWiring, Harness, MuxChannel
@@ -186,8 +185,10 @@ def glove_us(glove: GloveWiring, sensors: int) -> float:
     and no less than the period of requests. An unknown rate counts as 115200 baud. A requested record also includes the
     byte of the request.
     """
+    from thenar.drivers.cyberglove_protocol import POLL, shortest_us  # for gloves with one
+
     baud = _BAUD if glove.baud == "auto" else glove.baud
-    asking_us = 0.0 if glove.mode == "stream" else sending_us(len(glove_protocol.POLL), baud)
+    asking_us = 0.0 if glove.mode == "stream" else sending_us(len(POLL), baud)
     filtered = bool(glove.filter)
     us = shortest_us(sensors, baud, status=True, filtered=filtered)
     if glove.record_us is not None:

@@ -3,8 +3,10 @@
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any, Literal
+
+from msgspec import Struct
 
 from thenar.drivers.debounce import Debouncer
 from thenar.drivers.members import Members
@@ -87,8 +89,7 @@ class Source(ABC):
         """
 
 
-@dataclass(frozen=True, slots=True)
-class SourceKind:
+class SourceKind(Struct, frozen=True):
     """A kind of source: its devices in a harness, and their periods.
 
     A module of `thenar.runtime.sources` defines one as `MEMBER`; another package registers one under the entry point
