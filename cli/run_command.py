@@ -68,9 +68,6 @@ def _sinks_help() -> str:
     help="Let the preshape change while something is held, not only after nothing was held.",
 )
 @click.option(
-    "--task", metavar="task.json", type=existing_file, help="Follow a task of thenar teach: its steps, and deviations."
-)
-@click.option(
     "--record", metavar="FILE.mcap", type=OutputFile(".mcap"), help="Record the raw frames and the predictions."
 )
 @overwrite_flag
@@ -105,7 +102,6 @@ def command(
     sinks: tuple[str, ...],
     preshape: str | None,
     change_while_held: bool,
-    task: Path | None,
     record: Path | None,
     web: str | None,
     web_token: str | None,
@@ -127,13 +123,11 @@ def command(
         thenar run build/ --glove glove.toml --sink unix:/run/grasps --preshape barrett_bh8 --record run.mcap
         thenar run build/ --glove glove.toml --web
         thenar run build/ --replay run.mcap | head -3
-        thenar run build/ --glove glove.toml --task task.json
         thenar run build/ --replay set.grasps --sink jsonl:grasps.jsonl --preshape parallel_gripper
     """
     if (glove is None) == (replay is None):
         raise click.UsageError("name either a glove to run on (--glove) or recorded frames (--replay)")
     from thenar.runtime import Build
-    from thenar.runtime.task import TaskFollower
 
     _refuse_idle(glove, replay)
     loaded = Build.load(build)
@@ -143,7 +137,7 @@ def command(
             raise click.UsageError("stdout is closed: name a --sink to send grasps to")
         viewed = sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
         asked: dict[str, Any] = {"preshapes": preshape, "record": record, "status": status}
-        asked |= {"change_while_held": change_while_held, "task": task}
+        asked |= {"change_while_held": change_while_held}
         asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy, "recordable": web is not None}
         page_of = None
         if web is not None:
@@ -154,8 +148,7 @@ def command(
         _run_live(loaded, glove, viewed, page_of, frames, **asked)
     elif replay.suffix == ".mcap":
         selector = selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
-        follower = None if task is None else TaskFollower.of(task, loaded.grasps)
-        replay_recording(loaded, replay, sinks, selector, frames, policy, follower)
+        replay_recording(loaded, replay, sinks, selector, frames, policy)
     else:
         replay_set(loaded, replay, sinks, selecting(loaded, preshape, segments=False), frames, period_us)
 
@@ -176,8 +169,8 @@ def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
     elif replay is not None and replay.suffix == ".mcap":
         _refuse("for a recording, which has the times of its frames", "period_us", *_LIVE)
     else:
-        held = ("change_while_held", "task")
-        _refuse("for a set of grasps, each row of which is classified alone", *held, *_LIVE, *_POLICY)
+        alone = "for a set of grasps, each row of which is classified alone"
+        _refuse(alone, "change_while_held", *_LIVE, *_POLICY)
     if click.get_current_context().params["error_rate"] is not None:
         _refuse("with --error-rate, whose test decides alone", "lead", "dwell_ms")
     else:
@@ -256,7 +249,7 @@ def _look_on(glove: "Glove", view: "LiveView | None", page: "LivePage | None", f
                 if glove.recorder is None and page is None and nobody_listens(glove.reports()):
                     return
         if view is not None:
-            view.show(moment.grasp, glove.devices, health, None if glove.follower is None else glove.follower.progress)
+            view.show(moment.grasp, glove.devices, health)
 
 
 def _say_news(glove: "Glove", health: "HealthReport", said: dict[str, str]) -> None:

@@ -62,8 +62,6 @@ class Glove:
         A new .mcap file for the raw frames and the predictions.
     recordable : bool
         Whether recordings may begin later (`new_recording`): all sensors are read, as for `record`.
-    task : str or path, optional
-        A task of `thenar teach`: sinks get the hand's progress in it, whenever it changes.
     status : bool
         Whether sinks get a report of the glove's health once a second, and whenever a device comes or goes.
     stop : threading.Event, optional
@@ -81,8 +79,6 @@ class Glove:
         The devices.
     recorder : LiveRecorder or None
         The writer of the recording.
-    follower : TaskFollower or None
-        The follower of the hand through `task`; `progress` is its state.
     health : HealthReport or None
         The glove's health, updated once a second, and whenever a device comes or goes, or an input is quarantined or
         released.
@@ -121,7 +117,6 @@ class Glove:
         record: str | PathLike[str] | None = None,
         recordable: bool = False,
         status: bool = False,
-        task: str | PathLike[str] | None = None,
         stop: Event | None = None,
         feed: Feed | None = None,
     ) -> None:
@@ -154,11 +149,6 @@ class Glove:
         self._measured: GloveFrame | None = None
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
-        self.follower = None
-        if task is not None:
-            from .task import TaskFollower
-
-            self.follower = TaskFollower.of(Path(task), loaded.grasps)
         self._health, self._due_us = GloveHealth(self._recognizer.quarantine), 0
         self._quarantined: tuple[Quarantined, ...] = ()
         self._fanout = Fanout(())
@@ -201,13 +191,10 @@ class Glove:
             self.recorder.moment(taken.arrived, grasp)
         if self._selector is not None:
             moment.preshape = self._selector.update(grasp)
-        progress = None if self.follower is None else self.follower.update(grasp)
         moment.angles = self._angles_of(taken.measured)
         # Only this process may have been stopped in between.
         if self.feed is not self.sources or now_us() - now <= LATE_US:
             self._fanout.publish(grasp, moment.preshape, moment.angles, moment)
-        if progress is not None:
-            self._fanout.task(progress)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None)
         if self._recognizer.quarantine.found != self._quarantined:
             self._quarantined, self._due_us = self._recognizer.quarantine.found, now

@@ -19,7 +19,6 @@ else:
 
 from ..preshape.selector import Preshape
 from ..published import Health, JointAngles, LiveGrasp
-from ..task import Progress
 
 # REP-2011: ROS 2 from Iron on expects it in the endpoint's user data, and warns if it is missing.
 TYPE_HASHES = {
@@ -196,20 +195,6 @@ def segment(name: str, grasp: LiveGrasp) -> DiagnosticArray:
         "lost": ", ".join(grasp.lost),
     }
     return _diagnosed(grasp.unix_us, LEVELS[grasp.health], name, grasp.grasp, values)
-
-
-def task(name: str, unix_us: int, progress: Progress) -> DiagnosticArray:
-    """Return a hand's progress in a task as the status of component `name`, at a moment."""
-    values = {
-        "step": str(progress.step),
-        "steps": str(progress.steps),
-        "grasp": progress.grasp,
-        "expected": ", ".join(progress.expected),
-        "deviation": progress.deviation,
-        "detail": progress.detail,
-        "done": "true" if progress.done else "false",
-    }
-    return _diagnosed(unix_us, 1 if progress.deviation else 0, name, progress.text, values)
 
 
 def _diagnosed(unix_us: int, level: int, name: str, message: str, values: dict[str, str]) -> DiagnosticArray:

@@ -22,7 +22,6 @@ from ..frames import now_us
 from ..hand import load_hand
 from ..names import shortened
 from ..sinks.jsonl import DetailLine, GraspLine, HealthLine, Line
-from ..task import ProgressLine
 from .live import Past, build_message
 from .server import Server, message
 
@@ -115,8 +114,6 @@ class StreamMonitor(Closing):
             self._detail(line)
         elif isinstance(line, HealthLine):
             self.server.publish("health", partial(message, "health", line))
-        elif isinstance(line, ProgressLine):
-            self.server.publish("task", partial(message, "task", text=line.text))
 
     def _detail(self, detail: DetailLine) -> None:
         """Show the newest moment with its details, if they are of the given build."""

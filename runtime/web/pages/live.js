@@ -21,7 +21,6 @@ const send = connect({
   past: (past) => view.past(past),
   frame: (frame) => view.take(frame),
   health: (report) => view.health(report),
-  task: (task) => view.task(task),
   recording: (state) => {
     recording = state;
     say($("refused"), "");

@@ -112,11 +112,6 @@ export class View {
     this.#wrong();
   }
 
-  task({ text }) {
-    $("task").hidden = false;
-    say($("task"), `Task: ${text}`);
-  }
-
   /** Show the state of the source of the server's moments. */
   source(source) {
     this.state.source(source.connected);
