@@ -315,7 +315,7 @@ def _optional(dialogue: Dialogue, command: Command) -> bytes | None:
 
 
 class CyberGlove(Closing):
-    """A glove at `url`: a device, socket://HOST:PORT or rfc2217://HOST:PORT.
+    """A glove at `url`: a device or socket://HOST:PORT.
 
     baud     bits a second; None tries the rates that a box supports
     mode     "stream": the box sends by its own clock; "poll": each record is requested

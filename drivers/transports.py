@@ -1,6 +1,6 @@
 """Ports of lines: a serial port, TCP, UDP, a Unix socket, stdin or a WebSocket, all read in the same way.
 
-/dev/ttyUSB0          a serial port, also rfc2217://HOST:PORT
+/dev/ttyUSB0          a serial port
 tcp://HOST:PORT       a server that sends lines to whoever connects
 udp://HOST:PORT       datagrams that come to this port; HOST is this computer's own address: 127.0.0.1, or 0.0.0.0
 for all; a datagram holds one line or more; datagrams of a second sender are left out
@@ -59,7 +59,7 @@ def line_port_fault(port: str) -> str:
         return "" if found and 0 < int(found[3]) < 65536 else f"is not an address: {_WAYS}"
     if port.startswith(("ws:", "wss:")):
         return "" if _is_web(port) else f"is not an address: {_WAYS}"
-    if "://" in port and not port.startswith(("rfc2217://", "socket://")):
+    if "://" in port and not port.startswith("socket://"):
         return f"is not a supported port: {_WAYS}"
     return port_fault(port)
 

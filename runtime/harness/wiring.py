@@ -31,7 +31,7 @@ class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit
 
 
 class GloveWiring(_Table, frozen=True):
-    """The CyberGlove: its port (a device, socket:// or rfc2217://), and how it is read.
+    """The CyberGlove: its port (a device or socket://), and how it is read.
 
     baud         "auto" tries the usual ones
     mode         "stream": it sends by its own clock; "poll": every record is requested

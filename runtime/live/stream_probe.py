@@ -93,7 +93,7 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
 
 
 def _is_serial(port: str) -> bool:
-    return port.startswith("rfc2217:") or not (port == "-" or re.match("[a-z0-9]+:", port))
+    return not (port == "-" or re.match("[a-z0-9]+:", port))
 
 
 def _no_rows(bare: StreamWiring, reader: RowReader) -> str:
