@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from dataclasses import replace
 from functools import partial
 from io import UnsupportedOperation
 from itertools import islice
@@ -16,7 +15,7 @@ from click.core import ParameterSource
 
 from .options import LazyOption
 from .parameters import Number, OutputFile, OutputFolder, existing_file, existing_folder, overwrite_flag, web_options
-from .printing import err, of_device, out, say, say_page
+from .printing import of_device, out, say, say_page
 from .replaying import nobody_listens, replay_recording, replay_set, say_what_was_lost, selecting, spoilt
 
 if TYPE_CHECKING:
@@ -186,6 +185,8 @@ def _refuse(where: str, *names: str) -> None:
 
 def _policy(asked: dict[str, Any]) -> "Policy | None":
     """Return the usual policy with the given values in it, or None if there are none."""
+    from msgspec.structs import replace
+
     from thenar.runtime.policy import Policy
 
     given: dict[str, Any] = {"quarantine": False} if asked.pop("no_quarantine") else {}
@@ -211,19 +212,22 @@ def _run_live(
     from thenar.runtime import Glove
 
     from . import ended_by_signals
-    from .live_view import LiveView
 
     with _unblocked("stderr"), _unblocked("stdout", _VIEW_US) if viewed else nullcontext():
         with ExitStack() as stack:
             stop = stack.enter_context(ended_by_signals())
             glove = Glove(build, str(harness), stop=stop, status=status, **asked)
             for lacking in filter(None, (glove.system.unread, glove.lacking)):
-                err().print(f"thenar: {lacking}")
+                say(f"thenar: {lacking}")
             page = None if page_of is None else stack.enter_context(page_of(glove))
             if page is not None:
                 say_page(page.server.url)
             stack.enter_context(glove)
-            view = stack.enter_context(LiveView(out(), status)) if viewed else None
+            view = None
+            if viewed:
+                from .live_view import LiveView
+
+                view = stack.enter_context(LiveView(out(), status))
             recorder = glove.recorder
             _look_on(glove, view, page, frames)
         reports = glove.reports()
