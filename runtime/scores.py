@@ -159,7 +159,7 @@ class LiveScores:
     bin, its mean row while it is lost. So `biased_scores` are exactly `Scorer.biased_scores_without` of the same state.
     """
 
-    __slots__ = ("_closed", "_codes", "_joints", "_lost", "_lost_joints", "_scorer", "_silent", "_there")
+    __slots__ = ("_closed", "_codes", "_joints", "_lost", "_lost_joints", "_newest", "_scorer", "_silent", "_there")
 
     def __init__(self, scorer: Scorer) -> None:
         self._scorer = scorer
@@ -169,6 +169,7 @@ class LiveScores:
         self._codes: tuple[int, ...] | None = None
         self._lost_joints: Mask = 0
         self._joints = scorer.joints_lost
+        self._newest: tuple[int, ...] | None = None
 
     def joints(self, codes: Sequence[int] | None, lost: Mask = 0) -> None:
         """Take the codes of all joints, and which are lost; None: all are. Raises FrameError."""
@@ -182,11 +183,11 @@ class LiveScores:
             raise FrameError(f"a frame has {len(taken)} codes, but the build has {len(scorer.thresholds)} joints")
         else:
             self._joints = scorer.joint_sum(taken, lost)
-        self._codes, self._lost_joints = taken, lost
+        self._codes, self._lost_joints, self._newest = taken, lost, None
 
     def biased_scores(self, closed: Mask, lost: Mask = 0) -> tuple[int, ...]:
         """Return the K scores, each 2^15 too high, for a state of all switches; bits of `closed` that are lost are
-        ignored. Raises FrameError.
+        ignored. While nothing changes, they are the same object. Raises FrameError.
         """
         scorer = self._scorer
         if (closed | lost) >> len(scorer.switch_rows):
@@ -194,11 +195,14 @@ class LiveScores:
         there = closed & ~lost
         if there != self._there:
             self._closed = scorer.start + _sum(there, scorer.row_sums)
-            self._there = there
+            self._there, self._newest = there, None
         if lost != self._lost:
             self._silent = _sum(lost, scorer.mean_sums)
-            self._lost = lost
-        return scorer.unpack((self._closed + self._silent + self._joints).to_bytes(scorer.size, "little"))
+            self._lost, self._newest = lost, None
+        if self._newest is None:
+            total = self._closed + self._silent + self._joints
+            self._newest = scorer.unpack(total.to_bytes(scorer.size, "little"))
+        return self._newest
 
 
 def none_leads(rejection: Rejection, scale: float) -> tuple[int, int]:
@@ -258,7 +262,8 @@ class Rejector:
         if lost_joints:
             pairs = enumerate(zip(codes, low, strict=True))
             codes = [least if lost_joints >> joint & 1 else code for joint, (code, least) in pairs]
-        return sum(map(lt, codes, low)) + sum(map(gt, codes, high)) > self._outside
+        outside: int = sum(map(lt, codes, low)) + sum(map(gt, codes, high))
+        return outside > self._outside
 
 
 def refused(
@@ -273,13 +278,12 @@ def refused(
     return np.asarray((scores.max(axis=1) < least) | (count < fewest) | (count > most) | (outside > rejection.outside))
 
 
-def softmax(scores: Sequence[int], number: int, scale: float, total: float | None = None) -> float:
-    """Return the softmax of `scores` (K,), in steps of 1 / `scale`, for class `number`; it cannot overflow. `total`:
-    their `odds`, if known.
+def softmax(scores: Sequence[int], number: int, scale: float) -> float:
+    """Return the softmax of `scores` (K,), in steps of 1 / `scale`, for class `number`; it cannot overflow.
 
     It is calculated only to be published: no decision depends on it.
     """
-    return math.exp((scores[number] - max(scores)) / scale) / (odds(scores, scale) if total is None else total)
+    return math.exp((scores[number] - max(scores)) / scale) / odds(scores, scale)
 
 
 def odds(scores: Sequence[int], scale: float) -> float:

@@ -27,7 +27,7 @@ import math
 
 from msgspec import Struct
 
-from ..scores import odds, softmax
+from ..scores import odds
 
 
 class Ranking:
@@ -35,18 +35,20 @@ class Ranking:
     the last class.
     """
 
-    __slots__ = ("_odds", "biased_scores", "candidate")
+    __slots__ = ("_margin", "_odds", "biased_scores", "candidate")
 
     def __init__(self, biased_scores: tuple[int, ...]) -> None:
         self.biased_scores = biased_scores
         self.candidate = biased_scores.index(max(biased_scores))
-        self._odds = 0.0, 0.0
+        self._odds, self._margin = (0.0, 0.0), -1
 
     @property
     def margin(self) -> int:
         """The candidate's lead over the second best, in steps."""
-        second, best = sorted(self.biased_scores)[-2:]
-        return best - second
+        if self._margin < 0:
+            second, best = sorted(self.biased_scores)[-2:]
+            self._margin = best - second
+        return self._margin
 
     def lead(self, held: int) -> int:
         """Return the candidate's lead over class `held`, in steps."""
@@ -61,7 +63,7 @@ class Ranking:
         of, total = self._odds
         if of != scale:
             self._odds = scale, (total := odds(self.biased_scores, scale))
-        return softmax(self.biased_scores, number, scale, total)
+        return math.exp(-self.lead(number) / scale) / total
 
     def with_none_class(self, lead: int) -> "Ranking":
         """Return the same with none, the last class, `lead` steps above the best, or below it if that is negative."""

@@ -102,7 +102,7 @@ class RosTopics(Sink):
         if not self._closed:
             self._closed = True
             # Each entity ends with its last name; the domain, which ends all that is left in it, goes last.
-            del self._grasp, self._segment, self._preshape, self._task, self._angles, self._health
+            del self._grasp, self._segment, self._preshape, self._angles, self._health
             del self._domain
 
 
