@@ -6,7 +6,7 @@ pySerial accepts more than serial lines: `spy://` writes to any file, `alt://` l
 import re
 import stat
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.parse import parse_qsl, urlsplit
 
 from .errors import DeviceError
 
@@ -53,10 +53,11 @@ def _url_fault(url: str) -> str:
     try:
         parts = urlsplit(url)
         host, port = parts.hostname, parts.port
+        options = parse_qsl(parts.query, keep_blank_values=True, max_num_fields=8)
     except ValueError as reason:
         return f"is not the address of a line ({reason}): {_WAYS}"
     if not host or not port or not _HOST.fullmatch(host) or parts.path not in ("", "/") or parts.fragment:
         return f"is not the address of a line: {_WAYS}"
     if parts.username is not None or parts.password is not None:
         return f"names a user, which no serial line needs: {_WAYS}"
-    return f"has options, and a socket has none: {_WAYS}" if parts.query else ""
+    return f"has the option {options[0][0]!r}, which it does not support: a socket has none" if options else ""

@@ -34,7 +34,6 @@ class GloveWiring(_Table, frozen=True):
     """The CyberGlove: its port (a device or socket://), and how it is read.
 
     baud         "auto" tries the usual ones
-    mode         "stream": it sends by its own clock; "poll": every record is requested
     rate_hz      None: as fast as it can
     filter       whether the box's digital filter is on; None: as set on the box
     record_us    measured time of a record of all sensors (`thenar doctor --write`); None: by the formula
@@ -46,7 +45,6 @@ class GloveWiring(_Table, frozen=True):
 
     port: Text
     baud: Baud | Literal["auto"] = 115_200
-    mode: Literal["stream", "poll"] = "stream"
     rate_hz: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
     filter: bool | None = None
     record_us: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
