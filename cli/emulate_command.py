@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     CableOf = Callable[[int], Cable | None]
 
-_ADAPTERS = ("any", "bcm2835", "designware", "i2c-gpio", "smbus-only")
+_ADAPTERS = ("any", "bcm2835", "designware", "i2c-gpio")
 _FRAME_US = 10_000
 _HARNESS, _CALIBRATION, _TAXELS = "glove.toml", "calibration.toml", "taxels.toml"
 _LONGEST_PATH = 4095  # of Linux
@@ -76,7 +76,7 @@ def command(
     period_ms: float | None,
     rest_ms: float | None,
     repeat: bool,
-    adapter: Literal["any", "bcm2835", "designware", "i2c-gpio", "smbus-only"],
+    adapter: Literal["any", "bcm2835", "designware", "i2c-gpio"],
     log: Path | None,
 ) -> None:
     """Emulate the devices of a harness and play on them: a SCENE (a shipped one or a .toml file), a .grasps set, or the

@@ -11,7 +11,6 @@ from rich.table import Table
 from rich.text import Text
 
 from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, OutputTrouble, Quarantined
-from thenar.runtime.task import Progress
 
 Devices = Callable[[], Sequence[DeviceHealth]]
 
@@ -31,7 +30,7 @@ class LiveView:
         """Draw health reports of the glove below the devices if `status`."""
         self._status = status
         self._live = Live(console=console, transient=True, auto_refresh=False)
-        self._newest: tuple[LiveGrasp, Devices, HealthReport | None, Progress | None] | None = None
+        self._newest: tuple[LiveGrasp, Devices, HealthReport | None] | None = None
         self._closing = Event()
         self._thread = Thread(target=self._draw, name="thenar view", daemon=True)
 
@@ -51,10 +50,9 @@ class LiveView:
         grasp: LiveGrasp,
         devices: Devices,
         health: HealthReport | None = None,
-        progress: Progress | None = None,
     ) -> None:
         """Draw this next, unless something newer arrives first; the devices are queried then."""
-        self._newest = grasp, devices, health, progress
+        self._newest = grasp, devices, health
 
     def _draw(self) -> None:
         shown = None
@@ -63,12 +61,12 @@ class LiveView:
             while not self._closing.wait(_REDRAW_S):
                 newest = self._newest
                 if newest is not None and newest is not shown:
-                    grasp, devices, health, progress = shown = newest
+                    grasp, devices, health = shown = newest
                     lines = health_lines(health) if self._status else ()
                     wrong = list[Quarantined | OutputTrouble]()
                     if health is not None:
                         wrong += [*health.quarantined, *health.outputs]
-                    self._live.update(drawn(grasp, devices(), lines, wrong, progress), refresh=True)
+                    self._live.update(drawn(grasp, devices(), lines, wrong), refresh=True)
 
 
 def drawn(
@@ -76,7 +74,6 @@ def drawn(
     devices: Sequence[DeviceHealth],
     lines: Sequence[str] = (),
     wrong: Sequence[Quarantined | OutputTrouble] = (),
-    progress: Progress | None = None,
 ) -> RenderableType:
     """Return the view of one moment."""
     table = Table.grid(padding=(0, 2))
@@ -84,8 +81,6 @@ def drawn(
     table.add_row("", f"{_bar(grasp.probability)} {grasp.probability:5.1%}")
     table.add_row("this frame", f"{grasp.candidate}, ahead by {grasp.margin} steps")
     table.add_row("segment", _segment(grasp))
-    if progress is not None:
-        table.add_row("task", Text(progress.text, style="bold yellow" if progress.deviation else ""))
     table.add_row("health", Text(grasp.health, style=_STYLES[grasp.health]))
     if grasp.lost:
         more = f" and {len(grasp.lost) - _SHOWN} more" if len(grasp.lost) > _SHOWN else ""
@@ -120,8 +115,8 @@ def health_lines(report: HealthReport | None) -> tuple[str, ...]:
     if report is None:
         return ()
     found = {
-        "never closed": report.stuck_open,
-        "never open": report.stuck_closed,
+        "stuck open": report.stuck_open,
+        "stuck closed": report.stuck_closed,
         "chattering": report.chattering,
         "drifting": [f"{drift.joint} by {drift.codes:+d} codes" for drift in report.drifting],
     }

@@ -5,28 +5,24 @@ All of it is safe for terminals and encodings, whatever the names in it hold.
 
 import re
 import sys
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from copy import copy
-from dataclasses import replace
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import click
 import msgspec
-from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
-from rich.measure import Measurement
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.segment import Segment
-from rich.table import Column, Table
-from rich.text import Text, TextType
 
 from thenar.drivers.names import shown
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+    from rich.table import Table
+    from rich.text import TextType
 
 _JSON = "thenar.json"
 Found = TypeVar("Found")
 Rest = ParamSpec("Rest")
-_UNBOUNDED, _READABLE = 10_000, 24
 # Left unescaped by JSON, but perhaps unsafe for a terminal or an encoding.
 _DOUBTFUL = re.compile(r"[^\n -~]")
 
@@ -70,25 +66,13 @@ def say_page(url: str) -> None:
     echo(f"thenar: the page is at {url}", err=True)
 
 
-class _Console(Console):
-    """A console that escapes control characters in names; styles are rich's."""
-
-    def render_str(self, text: str, **options: Any) -> Text:
-        # Escaped before it is measured, so that column widths fit.
-        return super().render_str(shown(text), **options)
-
-    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
-        for segment in super().render(renderable, options):
-            yield segment if segment.control else Segment(shown(segment.text), segment.style)
-
-
-def out() -> Console:
+def out() -> "Console":
     """Return the console for results; its lines are 200 characters wide outside a terminal."""
     console = _console()
     return console if console.is_terminal else _console(width=200)
 
 
-def err() -> Console:
+def err() -> "Console":
     """Return the console for warnings and progress."""
     return _console(stderr=True)
 
@@ -98,9 +82,11 @@ def warning(sentence: str) -> None:
     echo(f"warning: {sentence}", err=True)
 
 
-def _console(stderr: bool = False, width: int | None = None) -> Console:
+def _console(stderr: bool = False, width: int | None = None) -> "Console":
+    from .consoles import SafeConsole  # a run without a terminal needs no rich
+
     # Names of the user's columns and files may hold brackets and colons: they are not markup.
-    return _Console(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
+    return SafeConsole(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
 
 
 def wants_json() -> bool:
@@ -144,44 +130,16 @@ def _json(found: Any) -> bytes:
     return msgspec.json.format(msgspec.json.encode(found), indent=2)
 
 
-class _Whole(Table):
-    """A table that truncates nothing: one that is too wide is split into several, each with the first column."""
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Yield the lines of each part."""
-        room = options.max_width - 1
-        widths = [self._width(column, console, options) for column in self.columns]
-        parts: list[list[int]] = [[]]
-        for number, width in enumerate(widths):
-            used = width + sum(widths[other] for other in parts[-1])
-            if len(parts[-1]) > 1 and used > room:
-                parts.append([0])
-            parts[-1].append(number)
-        for numbers in parts:
-            part = self._part([self.columns[number] for number in numbers])
-            part.title = self.title if numbers is parts[0] else None
-            yield from Table.__rich_console__(part, console, options)
-
-    def _part(self, columns: Sequence[Column]) -> "_Whole":
-        part = copy(self)
-        part.columns = [replace(column, _index=index) for index, column in enumerate(columns)]
-        return part
-
-    def _width(self, column: Column, console: Console, options: ConsoleOptions) -> int:
-        """Return the width that a column needs with one line: words wrap, but not to one word per line."""
-        needed = Measurement.get(console, options.update_width(_UNBOUNDED), self._part([column]))
-        most = needed.maximum if column.no_wrap else max(needed.minimum, min(needed.maximum, _READABLE))
-        return most - 1
-
-
 def table(
     columns: Iterable[str],
     numbers: Container[str] = (),
-    title: TextType | None = None,
-    rows: Iterable[Iterable[RenderableType]] = (),
-) -> Table:
+    title: "TextType | None" = None,
+    rows: "Iterable[Iterable[RenderableType]]" = (),
+) -> "Table":
     """Return a table of these columns, with `numbers` aligned right."""
-    made = _Whole(title=title)
+    from .consoles import WholeTable
+
+    made = WholeTable(title=title)
     for column in columns:
         is_number = column in numbers
         made.add_column(column, justify="right" if is_number else "left", no_wrap=is_number, overflow="fold")
@@ -200,6 +158,15 @@ def progress(what: str, *, lines: bool = False) -> Iterator[Callable[[int, int],
         echo(f"{what} ...", err=True)
         yield lambda done, total: echo(f"{what}: {done} of {total} steps", err=True)
         return
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from thenar.runtime.preshape import Preshape, PreshapeSelector
     from thenar.runtime.published import LiveGrasp
     from thenar.runtime.sinks import SinkReport
-    from thenar.runtime.task import TaskFollower
 
 
 def selecting(build: "Build", preshape: str | None, **how: bool) -> "PreshapeSelector | None":
@@ -44,7 +43,6 @@ def replay_recording(
     selector: "PreshapeSelector | None",
     frames: int | None,
     policy: "Policy | None",
-    follower: "TaskFollower | None",
 ) -> None:
     """Recognise the frames of a live recording again, at their original times.
 
@@ -55,14 +53,12 @@ def replay_recording(
     from thenar.runtime.sinks.jsonl import encode
 
     same = count = 0
-    with _published(build, sinks, selector, lambda grasp, shape: encode(grasp, shape, None), follower) as publish:
+    with _published(build, sinks, selector, lambda grasp, shape: encode(grasp, shape, None)) as publish:
         for then, now in islice(moments(build, replay, policy, warning), frames):
             same += then == now.grasp
             count += 1
             publish(now.grasp, now)
     echo(f"{same} of {count} frames recognised as they were recorded", err=True)
-    if follower is not None:
-        echo(follower.progress.text, err=True)
 
 
 def replay_set(
@@ -131,13 +127,11 @@ def _published(
     sinks: Sequence[str],
     selector: "PreshapeSelector | None",
     line: "Callable[[LiveGrasp, Preshape | None], bytes]",
-    follower: "TaskFollower | None" = None,
 ) -> "Iterator[Callable[[LiveGrasp, Moment | None], None]]":
-    """Yield a function that publishes a replayed grasp with its preshape, and news of a task: to sinks, which wait for
-    their readers, or without any as a `line` on stdout. At the end report losses, with exit code 1.
+    """Yield a function that publishes a replayed grasp with its preshape: to sinks, which wait for their readers, or
+    without any as a `line` on stdout. At the end report losses, with exit code 1.
     """
     from thenar.runtime.sinks import Fanout, open_sink
-    from thenar.runtime.sinks.jsonl import encode_task
 
     with ExitStack() as stack:
         opened = []
@@ -153,11 +147,6 @@ def _published(
                 fanout.publish(grasp, shape, None, moment)
             else:
                 sys.stdout.buffer.write(line(grasp, shape))
-            progress = None if follower is None else follower.update(grasp)
-            if progress is not None and opened:
-                fanout.task(progress)
-            elif progress is not None:
-                sys.stdout.buffer.write(encode_task(progress))
 
         yield publish
     sys.stdout.flush()

@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from dataclasses import replace
 from functools import partial
 from io import UnsupportedOperation
 from itertools import islice
@@ -16,7 +15,7 @@ from click.core import ParameterSource
 
 from .options import LazyOption
 from .parameters import Number, OutputFile, OutputFolder, existing_file, existing_folder, overwrite_flag, web_options
-from .printing import err, of_device, out, say, say_page
+from .printing import of_device, out, say, say_page
 from .replaying import nobody_listens, replay_recording, replay_set, say_what_was_lost, selecting, spoilt
 
 if TYPE_CHECKING:
@@ -68,9 +67,6 @@ def _sinks_help() -> str:
     help="Let the preshape change while something is held, not only after nothing was held.",
 )
 @click.option(
-    "--task", metavar="task.json", type=existing_file, help="Follow a task of thenar teach: its steps, and deviations."
-)
-@click.option(
     "--record", metavar="FILE.mcap", type=OutputFile(".mcap"), help="Record the raw frames and the predictions."
 )
 @overwrite_flag
@@ -105,7 +101,6 @@ def command(
     sinks: tuple[str, ...],
     preshape: str | None,
     change_while_held: bool,
-    task: Path | None,
     record: Path | None,
     web: str | None,
     web_token: str | None,
@@ -127,13 +122,11 @@ def command(
         thenar run build/ --glove glove.toml --sink unix:/run/grasps --preshape barrett_bh8 --record run.mcap
         thenar run build/ --glove glove.toml --web
         thenar run build/ --replay run.mcap | head -3
-        thenar run build/ --glove glove.toml --task task.json
         thenar run build/ --replay set.grasps --sink jsonl:grasps.jsonl --preshape parallel_gripper
     """
     if (glove is None) == (replay is None):
         raise click.UsageError("name either a glove to run on (--glove) or recorded frames (--replay)")
     from thenar.runtime import Build
-    from thenar.runtime.task import TaskFollower
 
     _refuse_idle(glove, replay)
     loaded = Build.load(build)
@@ -143,7 +136,7 @@ def command(
             raise click.UsageError("stdout is closed: name a --sink to send grasps to")
         viewed = sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
         asked: dict[str, Any] = {"preshapes": preshape, "record": record, "status": status}
-        asked |= {"change_while_held": change_while_held, "task": task}
+        asked |= {"change_while_held": change_while_held}
         asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy, "recordable": web is not None}
         page_of = None
         if web is not None:
@@ -154,8 +147,7 @@ def command(
         _run_live(loaded, glove, viewed, page_of, frames, **asked)
     elif replay.suffix == ".mcap":
         selector = selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
-        follower = None if task is None else TaskFollower.of(task, loaded.grasps)
-        replay_recording(loaded, replay, sinks, selector, frames, policy, follower)
+        replay_recording(loaded, replay, sinks, selector, frames, policy)
     else:
         replay_set(loaded, replay, sinks, selecting(loaded, preshape, segments=False), frames, period_us)
 
@@ -176,8 +168,8 @@ def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
     elif replay is not None and replay.suffix == ".mcap":
         _refuse("for a recording, which has the times of its frames", "period_us", *_LIVE)
     else:
-        held = ("change_while_held", "task")
-        _refuse("for a set of grasps, each row of which is classified alone", *held, *_LIVE, *_POLICY)
+        alone = "for a set of grasps, each row of which is classified alone"
+        _refuse(alone, "change_while_held", *_LIVE, *_POLICY)
     if click.get_current_context().params["error_rate"] is not None:
         _refuse("with --error-rate, whose test decides alone", "lead", "dwell_ms")
     else:
@@ -193,6 +185,8 @@ def _refuse(where: str, *names: str) -> None:
 
 def _policy(asked: dict[str, Any]) -> "Policy | None":
     """Return the usual policy with the given values in it, or None if there are none."""
+    from msgspec.structs import replace
+
     from thenar.runtime.policy import Policy
 
     given: dict[str, Any] = {"quarantine": False} if asked.pop("no_quarantine") else {}
@@ -218,19 +212,22 @@ def _run_live(
     from thenar.runtime import Glove
 
     from . import ended_by_signals
-    from .live_view import LiveView
 
     with _unblocked("stderr"), _unblocked("stdout", _VIEW_US) if viewed else nullcontext():
         with ExitStack() as stack:
             stop = stack.enter_context(ended_by_signals())
             glove = Glove(build, str(harness), stop=stop, status=status, **asked)
             for lacking in filter(None, (glove.system.unread, glove.lacking)):
-                err().print(f"thenar: {lacking}")
+                say(f"thenar: {lacking}")
             page = None if page_of is None else stack.enter_context(page_of(glove))
             if page is not None:
                 say_page(page.server.url)
             stack.enter_context(glove)
-            view = stack.enter_context(LiveView(out(), status)) if viewed else None
+            view = None
+            if viewed:
+                from .live_view import LiveView
+
+                view = stack.enter_context(LiveView(out(), status))
             recorder = glove.recorder
             _look_on(glove, view, page, frames)
         reports = glove.reports()
@@ -256,7 +253,7 @@ def _look_on(glove: "Glove", view: "LiveView | None", page: "LivePage | None", f
                 if glove.recorder is None and page is None and nobody_listens(glove.reports()):
                     return
         if view is not None:
-            view.show(moment.grasp, glove.devices, health, None if glove.follower is None else glove.follower.progress)
+            view.show(moment.grasp, glove.devices, health)
 
 
 def _say_news(glove: "Glove", health: "HealthReport", said: dict[str, str]) -> None:

@@ -37,12 +37,11 @@ def command(
     or sets of whole movements (.grasps), each stream of which counts as one.
 
     A grasp becomes a step if most demonstrations have it at that place. A step has its preshape, the median of each
-    joint, its duration, and the types that may follow. Use `thenar run --task` to follow the task.
+    joint, its duration, and the types that may follow.
 
     \b
     Example:
         thenar teach demo1.mcap demo2.mcap demo3.mcap -b build/ -o task.json --preshape barrett_bh8
-        thenar run build/ --glove glove.toml --task task.json
     """
     from thenar.compiler.artifact.teaching import Demonstration, behaviour_tree, task_json, taught
     from thenar.compiler.artifact.teaching import demonstrations as shown_in

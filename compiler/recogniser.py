@@ -23,7 +23,7 @@ from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.published import NONE
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.rejection import refused
+from thenar.runtime.scores import refused
 
 from .artifact import CompileError
 from .artifact.ensemble import model_fault

@@ -14,9 +14,7 @@ orthopaedic textbooks, not measurements of this hand: if you have measured a pos
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import isfinite
-from statistics import median_low
 from typing import Annotated, Literal
 
 import msgspec
@@ -82,8 +80,7 @@ class GloveCalibration(
         return msgspec.toml.encode(self).decode("utf-8")
 
 
-@dataclass(frozen=True, slots=True)
-class CalibrationPose:
+class CalibrationPose(msgspec.Struct, frozen=True):
     """A pose to hold: an instruction, and the angle in degrees at each sensor that the pose calibrates."""
 
     name: str
@@ -91,8 +88,7 @@ class CalibrationPose:
     degrees: Mapping[str, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Held:
+class Held(msgspec.Struct, frozen=True):
     """The samples of one held pose: the median byte of each sensor, and its drift in counts."""
 
     raw: bytes
@@ -143,6 +139,8 @@ def poses_of(names: Sequence[str]) -> tuple[CalibrationPose, ...]:
 
 def held(samples: Sequence[bytes]) -> Held:
     """Return the median and the drift of at least one sample of all sensors. A glitch does not move a median."""
+    from statistics import median_low  # a run calibrates nothing
+
     columns = list(zip(*samples, strict=True))
     raw = bytes(median_low(column) for column in columns)
     return Held(raw, tuple(max(column) - min(column) for column in columns))

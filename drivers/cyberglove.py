@@ -13,13 +13,11 @@ from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import monotonic, monotonic_ns
-from typing import Literal, Self
+from typing import Self
 
 from .closing import Closing
 from .cyberglove_protocol import (
-    FASTEST,
     INFORMATION,
-    POLL,
     READY,
     SENSORS_18,
     SENSORS_22,
@@ -37,7 +35,6 @@ from .cyberglove_protocol import (
     period_us,
     period_words,
     query,
-    sending_us,
     setting,
     shortest_us,
 )
@@ -60,8 +57,6 @@ BAUD_RATES = (115_200, 38_400, 19_200, 9_600)
 # After power-on, a box reports for a while that it is not ready.
 _READY_S = 1.0
 _NAMES = {18: SENSORS_18, 22: SENSORS_22}
-# After this time a poll counts as lost: a record takes 27 ms at 9600 baud, an FTDI adapter adds 16.
-_POLLED_S = 0.2
 # After this time without a byte the glove counts as dead: short, since it must be read within a second of its return.
 _SILENT_S = 0.5
 # The same with bytes, but without a record.
@@ -72,7 +67,6 @@ _SILENT_PERIODS = 4
 _BACKLOG = 2048
 _LONGEST_BACKLOG = 1 << 18
 Timed = tuple[int, Record]
-Mode = Literal["stream", "poll"]
 
 
 class Dialogue:
@@ -126,14 +120,12 @@ class GloveSetup:
     """The requested configuration of a glove.
 
     words    the period (`cyberglove_protocol.period_words`)
-    poll     whether to request each record, so that the host keeps the period
     sensors  the required number of sensors; None: as reported
     only     places, in wire order, of the sensors to send; None: all
     filtered  whether its digital filter is on; None: unchanged
     """
 
     words: Words
-    poll: bool
     sensors: int | None
     only: frozenset[int] | None = None
     filtered: bool | None = None
@@ -221,8 +213,6 @@ def set_up(line: SerialLine, wanted: GloveSetup) -> GloveInfo:
         odd += (f"Its digital filter stays {'on' if filtered else 'off'}, contrary to the setting.",)
     period = period_us(wanted.words)
     shortest = shortest_us(len(places), line.baud, status=status, filtered=filtered)
-    if wanted.poll:
-        shortest += sending_us(len(POLL), line.baud)
     return GloveInfo(
         baud=line.baud,
         total=total,
@@ -251,7 +241,7 @@ def _masked(dialogue: Dialogue, mask: bytes) -> bool:
 
 def _configured(dialogue: Dialogue, wanted: GloveSetup) -> tuple[bool, tuple[str, ...]]:
     """Configure the box; return whether its records will carry the status byte, and notes on rejected settings."""
-    words = b"".join(word.to_bytes(2, "big") for word in (FASTEST if wanted.poll else wanted.words))
+    words = b"".join(word.to_bytes(2, "big") for word in wanted.words)
     dialogue.ask(setting("T", words))
     odd: tuple[str, ...] = ()
     if _optional(dialogue, query("T")) not in (None, words):
@@ -316,10 +306,9 @@ def _optional(dialogue: Dialogue, command: Command) -> bytes | None:
 
 
 class CyberGlove(Closing):
-    """A glove at `url`: a device, socket://HOST:PORT or rfc2217://HOST:PORT.
+    """A glove at `url`: a device or socket://HOST:PORT.
 
     baud     bits a second; None tries the rates that a box supports
-    mode     "stream": the box sends by its own clock; "poll": each record is requested
     rate_hz  records a second; None: as many as possible
     sensors  18 or 22; None: as reported by the glove
     only     places, in wire order, of the requested sensors; None: all. If the box cannot send only these, by its
@@ -334,7 +323,6 @@ class CyberGlove(Closing):
         url: str,
         *,
         baud: int | None = 115_200,
-        mode: Mode = "stream",
         rate_hz: float | None = None,
         sensors: int | None = None,
         only: Collection[int] | None = None,
@@ -345,7 +333,6 @@ class CyberGlove(Closing):
         self._rates = BAUD_RATES if baud is None else (baud,)
         self._wanted = GloveSetup(
             period_words(rate_hz),
-            poll=mode == "poll",
             sensors=sensors,
             only=None if only is None else frozenset(only),
             filtered=filtered,
@@ -384,9 +371,8 @@ class CyberGlove(Closing):
         """Return the oldest record not yet returned, as (time_us, Record); None at the timeout.
 
         time_us is the arrival of its last byte, in microseconds of the monotonic clock. Of records that arrive together
-        each is one period older than the next, and a polled one is dated before its repetition was due: a record from a
-        buffer is not mistaken for a new one after a delay of the host. A record with the fault "unplugged" holds no
-        measurement.
+        each is one period older than the next: a record from a buffer is not mistaken for a new one after a delay of
+        the host. A record with the fault "unplugged" holds no measurement.
 
         Raises DeviceError if the line is gone, no byte came for half a second, or no record for a second (or for four
         periods, if these are longer).
@@ -394,11 +380,7 @@ class CyberGlove(Closing):
         line, end = self._opened(), monotonic() + timeout_s
         while not self._ready:
             now = monotonic()
-            until = min(end, self._given_up_at)
-            if self._wanted.poll:
-                self._poll(line, now)
-                until = min(end, self._given_up_at, self._poll_at)
-            self._receive(line, until - now)
+            self._receive(line, min(end, self._given_up_at) - now)
             if not self._ready and now >= end:
                 return None
         return self._ready.popleft()
@@ -438,20 +420,8 @@ class CyberGlove(Closing):
         """Start, or start again after another command."""
         self._decoder = RecordDecoder(self._info.sensors, self.counts, self._info.status)
         self._ready: deque[Timed] = deque()
-        self._heard_at = self._quiet_from = self._due = self._poll_at = monotonic()
-        self._expected = not self._wanted.poll
-        if self._expected:
-            line.write(STREAM)
-
-    def _poll(self, line: SerialLine, now: float) -> None:
-        """Request a record when one is due, or when the last one counts as lost."""
-        if now < self._poll_at:
-            return
-        line.write(POLL)
-        if not self._expected:
-            self._expected, self._heard_at, self._quiet_from = True, now, now
-        self._poll_at = now + _POLLED_S
-        self._due = max(self._due + period_us(self._wanted.words) / 1e6, now)
+        self._heard_at = self._quiet_from = monotonic()
+        line.write(STREAM)
 
     @property
     def _given_up_at(self) -> float:
@@ -465,13 +435,11 @@ class CyberGlove(Closing):
         if data:
             self._heard_at = now_us / 1e6
         if records:
-            polled = self._wanted.poll
-            newest_us = min(now_us, round((self._quiet_from + _POLLED_S) * 1e6)) if polled else now_us
             for behind, record in zip(reversed(range(len(records))), records, strict=True):
-                self._last_us = max(self._last_us, newest_us - behind * self._info.period_us)
+                self._last_us = max(self._last_us, now_us - behind * self._info.period_us)
                 self._ready.append((self._last_us, record))
-            self._quiet_from, self._expected, self._poll_at = now_us / 1e6, not polled, self._due
-        elif now_us / 1e6 > self._given_up_at and self._expected:
+            self._quiet_from = now_us / 1e6
+        elif now_us / 1e6 > self._given_up_at:
             line.check_plugged()
             if self._info.sensors < self._info.total and self.counts.wrong_length > self._misfits:
                 total, self._wanted = self._info.total, replace(self._wanted, only=None)

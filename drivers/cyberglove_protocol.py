@@ -30,7 +30,7 @@ from math import ceil, isfinite
 from typing import Literal
 
 from .errors import SettingError
-from .serial_line import BITS_A_BYTE, Pieces
+from .serial_line import Pieces, sending_us
 
 _LOG = logging.getLogger(__name__)
 
@@ -202,11 +202,6 @@ def digitising_us(sensors: int, filtered: bool = False) -> float:
 def shortest_us(sensors: int, baud: int, *, status: bool = False, filtered: bool = False) -> float:
     """Return the shortest period in microseconds that the line and the box allow."""
     return digitising_us(sensors, filtered) + sending_us(sensors + OVERHEAD + status, baud)
-
-
-def sending_us(size: int, baud: int) -> float:
-    """Return the time of `size` bytes on the line, in microseconds: 8 data bits, a start bit, a stop bit each."""
-    return size * BITS_A_BYTE * 1e6 / baud
 
 
 @dataclass(frozen=True, slots=True)

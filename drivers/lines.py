@@ -20,13 +20,19 @@ number, of a digit for every four switches, is switch k. A reading without a val
 import json
 import math
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import xor
+from time import monotonic_ns
 from typing import Any, NamedTuple
 
+from .closing import Closing
+from .errors import SettingError
 from .names import LONGEST_SHOWN, shortened
+from .senders import Address, FirstSender, parse_address
+from .transports import Datagrams, Transport, line_port_fault, open_transport
 
 # Long enough for two thousand columns of five digits.
 LONGEST = 16_384
@@ -330,3 +336,97 @@ class LineParser:
         self._header = ()
         named = self._names is not None and len(self._names) == len(row.values)
         return row._replace(names=self._names) if named else row
+
+
+class RowReader(Closing, ABC):
+    """A source of rows of numbers. It may be reopened after it was closed.
+
+    odd       the last input that was not a row, for display; "" if there was none
+    kind      what every column holds, "joint" or "" if the source does not say
+    received  how many bytes came, rows or not, if the source counts them
+    """
+
+    odd, kind, received = "", "", 0
+
+    @abstractmethod
+    def open(self) -> None:
+        """Open it. Raises DeviceError if a retry may help, SettingError if it does not."""
+
+    @abstractmethod
+    def read(self, timeout_s: float) -> Sequence[Row]:
+        """Return the received rows; wait for some until the timeout. Raises DeviceError if the source is gone."""
+
+    def counts(self) -> LineCounts:
+        """Return the counts of input that was not a row."""
+        return LineCounts()
+
+    def other_sender(self) -> str:
+        """Return a sentence on another sender whose rows do not count; "" if nobody else sends."""
+        return ""
+
+
+class LineReader(RowReader):
+    """Rows of the lines from `port`, of `columns` columns; 0: unknown. The constructor does not open it.
+
+    sender  the address of the only sender of datagrams that counts; "": the first one
+    """
+
+    def __init__(self, port: str, baud: int = 115_200, columns: int = 0, sender: str = "") -> None:
+        self.port, self._baud = port, baud
+        self._line: Transport | None = None
+        self._parser = LineParser(columns)
+        self._named = parse_address(sender) if sender else None
+        self._senders = FirstSender(self._named)
+
+    def open(self) -> None:
+        """Open the port."""
+        if reason := line_port_fault(self.port):
+            raise SettingError(f"{shortened(repr(self.port))} {reason}")
+        self._parser.begin()
+        self._senders = FirstSender(self._named)
+        self._line = open_transport(self.port, self._baud)
+
+    def read(self, timeout_s: float) -> Sequence[Row]:
+        """Return the received rows."""
+        if isinstance(self._line, Datagrams):
+            came = self._line.read(timeout_s)
+            return () if came is None else self._of_datagram(*came)
+        assert self._line is not None
+        return self._rows(self._line.read(timeout_s))
+
+    def _rows(self, data: bytes) -> list[Row]:
+        self.received += len(data)
+        rows = self._parser.feed(data)
+        self.odd = self._parser.odd
+        return rows
+
+    def _of_datagram(self, data: bytes, address: Address, came_us: int) -> Sequence[Row]:
+        """Return the rows of a datagram, each of which begins and ends lines; none if it is from another sender."""
+        named, before = self._named, self._senders.current
+        sender = named if named is not None and named.covers(address) else address
+        if not self._senders.admits(sender, came_us):
+            self._parser.counts.foreign += data.strip().count(b"\n") + 1
+            return ()
+        if self._senders.current != before:
+            self._parser.begin()
+        return [row._replace(came_us=came_us) for row in self._rows(data + b"\n")]
+
+    def other_sender(self) -> str:
+        """Return a sentence on another sender of datagrams."""
+        other = self._senders.other(monotonic_ns() // 1000)
+        if other is None:
+            return ""
+        advice = "" if self._named else f', or choose one by `from = "{self._senders.current}"` in glove.toml'
+        return (
+            f"{other} sends, too, and its lines are left out: those of {self._senders.current} count; stop it{advice}"
+        )
+
+    def counts(self) -> LineCounts:
+        """Return the counts of input that was not a row."""
+        return self._parser.counts
+
+    def close(self) -> None:
+        """Close the port."""
+        if self._line is not None:
+            self._line.close()
+            self._line = None

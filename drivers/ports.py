@@ -10,15 +10,8 @@ from urllib.parse import parse_qsl, urlsplit
 
 from .errors import DeviceError
 
-_SCHEMES = ("socket", "rfc2217")
 _HOST = re.compile(r"[A-Za-z0-9._-]+|[0-9A-Fa-f:.]+(%[A-Za-z0-9._-]+)?")
-# Options of pySerial's connection to a redirector, and their values.
-_OPTIONS = {
-    "ign_set_control": re.compile(""),
-    "poll_modem": re.compile(""),
-    "timeout": re.compile(r"\d{1,4}(\.\d{1,6})?"),
-}
-_WAYS = "a port is a device such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"
+_WAYS = "a port is a device such as /dev/ttyUSB0 or socket://HOST:PORT"
 
 
 def port_fault(port: str) -> str:
@@ -26,7 +19,7 @@ def port_fault(port: str) -> str:
     scheme, found, _ = port.partition("://")
     if not found:
         return device_fault(port)
-    if scheme.lower() not in _SCHEMES:
+    if scheme.lower() != "socket":
         return f"is not a supported port: {_WAYS}"
     return _url_fault(port)
 
@@ -67,9 +60,4 @@ def _url_fault(url: str) -> str:
         return f"is not the address of a line: {_WAYS}"
     if parts.username is not None or parts.password is not None:
         return f"names a user, which no serial line needs: {_WAYS}"
-    known = _OPTIONS if parts.scheme == "rfc2217" else {}
-    for option, value in options:
-        if option not in known or not known[option].fullmatch(value):
-            allowed = f": there are {', '.join(known)}" if known else ": a socket has none"
-            return f"has the option {option!r}, which it does not support{allowed}"
-    return ""
+    return f"has the option {options[0][0]!r}, which it does not support: a socket has none" if options else ""

@@ -1,4 +1,4 @@
-"""A serial line on any transport: a port, a pty, socket://HOST:PORT or rfc2217://HOST:PORT.
+"""A serial line on any transport: a port, a pty or socket://HOST:PORT.
 
 8 data bits, no parity, one stop bit, no handshake; DTR and RTS stay as opening leaves them. Every wait has a limit, and
 every error of pySerial or the kernel about a lost line becomes a `DeviceError`.
@@ -25,8 +25,6 @@ BITS_A_BYTE = 10  # a start bit, 8 data bits, a stop bit
 _CHUNK = 4096
 # A line accepts a command of a few bytes at once; one that has not done so within this time is dead.
 _WRITE_TIMEOUT_S = 1.0
-# Poll period of a port without a file descriptor: a read may time out late by this much.
-_SLICE_S = 0.005
 # How often an open line checks that its name still refers to the open port.
 _LOOK_S = 0.2
 
@@ -74,11 +72,8 @@ class SerialLine(Closing):
             raise SettingError(f"{url}: a baud rate is at least 1, not {baud}")
         self.url, self.baud = url, baud
         self._port = _opened(url, baud)
-        self._sliced = not _has_descriptor(self._port)
-        if self._sliced:
-            self._port.timeout = _SLICE_S
-        self._descriptor = -1 if self._sliced else self._port.fileno()
-        self._node = None if self._sliced else _node(self._descriptor)
+        self._descriptor = self._port.fileno()
+        self._node = _node(self._descriptor)
         self._look_at = 0.0 if self._node else float("inf")
         _lower_latency(self._port)
 
@@ -91,7 +86,7 @@ class SerialLine(Closing):
         if monotonic() >= self._look_at:
             self._look()
         try:
-            return self._in_slices(timeout_s) if self._sliced else self._when_ready(timeout_s)
+            return self._when_ready(timeout_s)
         except (OSError, TypeError, ValueError) as reason:  # TypeError, ValueError: closed meanwhile by another thread
             raise self._gone(reason) from reason
 
@@ -136,17 +131,13 @@ class SerialLine(Closing):
             raise OSError("the other end has hung up")
         return data
 
-    def _in_slices(self, timeout_s: float) -> bytes:
-        end = monotonic() + timeout_s
-        # pySerial waits at most one slice for this byte; bytes that came with it are available then.
-        while not (first := self._port.read(1)):
-            if monotonic() >= end:
-                return b""
-        waiting = min(self._port.in_waiting, _CHUNK)
-        return first + (self._port.read(waiting) if waiting else b"")
-
     def _gone(self, reason: Exception | str) -> DeviceError:
         return DeviceError(f"{self.url}: the serial line is gone ({reason}): check cable and power")
+
+
+def sending_us(size: int, baud: int) -> float:
+    """Return the time of `size` bytes on the line, in microseconds: 8 data bits, a start bit, a stop bit each."""
+    return size * BITS_A_BYTE * 1e6 / baud
 
 
 def _opened(url: str, baud: int) -> "Serial":
@@ -154,10 +145,8 @@ def _opened(url: str, baud: int) -> "Serial":
 
     if "://" not in url:
         check_node(url)
-    # pySerial supports no write timeout there; that connection has a timeout of 5 s.
-    write_timeout = None if url.lower().startswith("rfc2217:") else _WRITE_TIMEOUT_S
     try:
-        return serial_for_url(url, baud, timeout=0, write_timeout=write_timeout, exclusive=True)
+        return serial_for_url(url, baud, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True)
     except Exception as reason:  # termios.error is not an OSError, and each kind of URL raises different errors
         advice = _ADVICE.get(getattr(reason, "errno", None) or 0, f"cannot be opened at {baud} baud ({reason})")
         raise DeviceError(f"{url}: {advice}") from reason
@@ -169,14 +158,6 @@ def _node(port: str | int) -> int | None:
         return os.stat(port).st_rdev or None  # noqa: PTH116 - of a descriptor, too
     except (OSError, ValueError):
         return None
-
-
-def _has_descriptor(port: "Serial") -> bool:
-    try:
-        port.fileno()
-    except OSError:  # io.UnsupportedOperation
-        return False
-    return True
 
 
 def _lower_latency(port: "Serial") -> None:

@@ -1,12 +1,13 @@
 """A loaded build folder: `build.json` describes the tables, `tables.bin` holds them, `scan.json` the reading order."""
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Self
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import ArrayLike, NDArray
 
 from . import manifest_file
@@ -18,17 +19,15 @@ from .manifest_file import manifest_from_bytes
 from .model import integers as tables_file
 from .model.integers import IntegerTables, tables_from_bytes
 from .published import NONE
-from .rejection import Rejector, none_leads
 from .scanning import scanmap as scan_file
 from .scanning.scanmap import ScanMap, check_switches, scanmap_from_bytes
-from .scores import LANE_OFFSET, Scorer, softmax
+from .scores import LANE_OFFSET, Rejector, Scorer, none_leads, softmax
 from .softmax import Softmax
 
 MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME = "build.json", "tables.bin", "ensemble.bin", "scan.json"
 
 
-@dataclass(frozen=True, slots=True)
-class Recognition:
+class Recognition(Struct, frozen=True):
     """The prediction for a frame, and its confidence.
 
     probability is the published softmax of the scores of all classes, including nothing held if the build may refuse a
@@ -54,7 +53,18 @@ class Build:
     the leads of none for a frame that is not refused and for one that is.
     """
 
-    __slots__ = ("grasps", "manifest", "none", "none_leads", "rejector", "scan", "scorer", "softmax", "tables")
+    __slots__ = (
+        "classes",
+        "grasps",
+        "manifest",
+        "none",
+        "none_leads",
+        "rejector",
+        "scan",
+        "scorer",
+        "softmax",
+        "tables",
+    )
 
     def __init__(self, manifest: Manifest, tables: IntegerTables, scan: ScanMap | None = None) -> None:
         """Combine the parts of a build. Raises BuildError if they describe different builds."""
@@ -70,7 +80,7 @@ class Build:
         self.manifest = manifest
         self.tables = tables
         self.scan = scan
-        self.grasps = manifest.grasps
+        self.grasps, self.classes = manifest.grasps, manifest.classes
         self.scorer = Scorer(tables)
         self.softmax = Softmax(tables.scale)
         self.none = len(self.grasps) - 1 if self.grasps[-1] == NONE else None
@@ -104,22 +114,19 @@ class Build:
 
     def classify(self, bits: ArrayLike, codes: ArrayLike) -> str:
         """Return the grasp type of one frame, "none" if nothing is held. Raises FrameError."""
-        biased_scores = self._all_scores(self.scorer.biased_scores(bits, codes), bits, codes)
-        return self.manifest.classes[biased_scores.index(max(biased_scores))]
+        switches, values = self.scorer.frame(bits, codes)
+        scores = self._all_scores(self.scorer.frame_scores(switches, values), sum(switches), values)
+        return self.classes[scores.index(max(scores))]
 
     def _all_scores(
-        self,
-        biased_scores: tuple[int, ...],
-        bits: ArrayLike,
-        codes: ArrayLike,
-        lost_switches: Mask = 0,
-        lost_joints: Mask = 0,
+        self, biased_scores: tuple[int, ...], closed: int, codes: Sequence[int], lost: int = 0, lost_joints: Mask = 0
     ) -> tuple[int, ...]:
-        """Return the scores of all classes, with one for none if the build may refuse the frame."""
+        """Return the scores of all classes, with one for none if the build may refuse the frame: `closed` switches are
+        closed, and `lost` are lost.
+        """
         if self.rejector is None:
             return biased_scores
-        values = np.asarray(codes).tolist()
-        refused = self.rejector.refuses(biased_scores, _mask(bits), lost_switches, values, lost_joints=lost_joints)
+        refused = self.rejector.refuses(biased_scores, closed, lost, codes, lost_joints=lost_joints)
         return (*biased_scores, max(biased_scores) + self.none_leads[refused])
 
     def recognise(
@@ -147,22 +154,22 @@ class Build:
         FrameError
             If the frame does not fit the build.
         """
+        scorer, degraded = self.scorer, False
+        switches, values = scorer.frame(bits, codes)
         if lost_switches is None and lost_joints is None:
-            biased_scores, degraded = self._all_scores(self.scorer.biased_scores(bits, codes), bits, codes), False
+            biased_scores = self._all_scores(scorer.frame_scores(switches, values), sum(switches), values)
         else:
-            switches = np.zeros(self.tables.n_switches, bool) if lost_switches is None else lost_switches
-            joints = np.zeros(self.tables.n_joints, bool) if lost_joints is None else lost_joints
-            biased_scores = self.scorer.biased_scores_without(bits, codes, switches, joints)
-            degraded = bool(np.any(switches) or np.any(joints))
-            biased_scores = self._all_scores(biased_scores, bits, codes, _mask(switches), _mask(joints))
+            lost = np.zeros(self.tables.n_switches, bool) if lost_switches is None else np.asarray(lost_switches)
+            joints = np.zeros(self.tables.n_joints, bool) if lost_joints is None else np.asarray(lost_joints)
+            biased_scores = scorer.biased_scores_without(bits, codes, lost, joints)
+            degraded = bool(np.any(lost) or np.any(joints))
+            closed, gone = int(np.count_nonzero(switches & ~lost.astype(bool))), int(np.count_nonzero(lost))
+            mask = sum(1 << joint for joint in np.flatnonzero(joints).tolist())
+            biased_scores = self._all_scores(biased_scores, closed, values, gone, mask)
         second, best = sorted(biased_scores)[-2:]
         winner = biased_scores.index(best)
         probability = softmax(biased_scores, winner, self.tables.scale)
-        return Recognition(self.manifest.classes[winner], probability, best - second, degraded)
-
-
-def _mask(flags: ArrayLike) -> Mask:
-    return int.from_bytes(np.packbits(np.asarray(flags, np.bool_), bitorder="little").tobytes(), "little")
+        return Recognition(self.classes[winner], probability, best - second, degraded)
 
 
 def load_manifest(folder: Path) -> Manifest:

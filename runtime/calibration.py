@@ -11,7 +11,6 @@ code that a recorded one got.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from operator import getitem, itemgetter
 from pathlib import Path
 
@@ -40,21 +39,14 @@ def load_calibration(path: Path) -> GloveCalibration:
     return convert(source, (), source.tables(), GloveCalibration)
 
 
-@dataclass(frozen=True, slots=True)
-class Numbers:
-    """The meaning of the bytes of an uncalibrated stream's joints: the numbers that it sends, in the unit of the
-    recordings.
-    """
-
-    sensors: tuple[SensorCalibration, ...]
+# The meaning of the bytes of joints: by a calibration, or, of an uncalibrated stream, by the lines of the numbers that
+# it sends, in the unit of the recordings.
+Meaning = GloveCalibration | tuple[SensorCalibration, ...] | None
 
 
-Meaning = GloveCalibration | Numbers | None
-
-
-def numbers_of(ranges: Mapping[str, tuple[float, float]]) -> Numbers:
+def numbers_of(ranges: Mapping[str, tuple[float, float]]) -> tuple[SensorCalibration, ...]:
     """Return the meaning of the bytes of a stream whose joints have these ranges."""
-    return Numbers(tuple(SensorCalibration(name, 1, low, 255, high) for name, (low, high) in ranges.items()))
+    return tuple(SensorCalibration(name, 1, low, 255, high) for name, (low, high) in ranges.items())
 
 
 class CodeTables:
@@ -191,14 +183,15 @@ def place_of(joint: str, sensor_names: Sequence[str]) -> int:
 
 def codes_of_bytes(joint: Calibration, calibration: Meaning) -> tuple[int, ...]:
     """Return the code of each byte, 0 to 255, of the sensor of `joint`. Raises SettingError if there is none."""
-    if calibration is None or (isinstance(calibration, Numbers) and joint.unit == _RAW):
+    if calibration is None or (isinstance(calibration, tuple) and joint.unit == _RAW):
         return _raw(joint)
     if isinstance(calibration, GloveCalibration) and calibration.unit != joint.unit:
         raise SettingError(
             f"the glove is calibrated in {calibration.unit!r}, joint {joint.name!r} of the build in {joint.unit!r}: "
             "compile recordings in the calibration's unit"
         )
-    lines = {line.name: line for line in calibration.sensors}
+    sensors = calibration if isinstance(calibration, tuple) else calibration.sensors
+    lines = {line.name: line for line in sensors}
     if joint.name not in lines:
         raise SettingError(f"the calibration has no sensor {joint.name!r}: calibrate the glove again")
     sensor = lines[joint.name]

@@ -4,9 +4,10 @@ A calibration gives the codes of two readings. A straight line runs between them
 codes gets the even one. The codes of the two points are rounded once, to 2^-24 of a code.
 """
 
-from dataclasses import dataclass
 from math import isfinite
 from typing import NamedTuple
+
+from msgspec import Struct
 
 from thenar.drivers.errors import SettingError
 
@@ -26,8 +27,7 @@ class Point(NamedTuple):
     code: int
 
 
-@dataclass(frozen=True, slots=True)
-class CodeLine:
+class CodeLine(Struct, frozen=True):
     """The line through two points, with codes clipped to `least` to `most`.
 
     Raises ValueError if the two have the same reading, or are further apart than the C can hold.

@@ -3,13 +3,14 @@
 import errno
 import os
 import re
-import secrets
+import stat
 from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO
 
-from thenar.drivers.files import open_file, read_file
+from .errors import ThenarError
 
-__all__ = ["is_special", "open_file", "read_file", "sync_folder", "write_atomically"]
+_PIECE = 1 << 20
 
 
 def write_atomically(path: Path, data: bytes, mode: int = 0o666) -> None:
@@ -47,7 +48,7 @@ def _write_beside_and_rename(path: Path, data: bytes, mode: int) -> None:
 def _new_part(path: Path, mode: int) -> tuple[Path, int]:
     """Return a new temporary file next to `path`, and its descriptor, which locks it while it is open."""
     while True:
-        part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+        part = path.with_name(f".{path.name}.{os.urandom(4).hex()}.part")
         # The system subtracts the umask.
         descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
         _lock(descriptor)
@@ -93,3 +94,39 @@ def sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def open_file(path: Path, raises: type[ThenarError]) -> BinaryIO:
+    """Open a regular file for reading bytes. The caller closes it.
+
+    Raises `raises` if `path` is a device, a pipe or a socket, which may never end; OSError from the operating system,
+    also for a folder.
+    """
+    # A pipe without a writer would block open() itself.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        mode = os.fstat(descriptor).st_mode
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if not stat.S_ISREG(mode):
+            raise raises(f"{path} is a device or a pipe, not a file: save its content as a file first")
+        return os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def read_file(path: Path, limit: int, raises: type[ThenarError]) -> bytes:
+    """Return the content of a regular file of at most `limit` bytes.
+
+    Raises `raises` if the file is larger or not regular; OSError from the operating system.
+    """
+    pieces, left = [], limit + 1
+    with open_file(path, raises) as file:
+        # read() allocates its full argument, however short the file is.
+        while piece := file.read(min(left, _PIECE)):
+            pieces.append(piece)
+            left -= len(piece)
+    if not left:
+        raise raises(f"{path} is larger than {limit} bytes, the limit for such a file")
+    return b"".join(pieces)

@@ -5,9 +5,10 @@ one Python integer: bit k is switch k of the requested list (a build's kept swit
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from time import monotonic_ns
 from typing import Generic, TypeVar
+
+from msgspec import Struct
 
 Mask = int
 
@@ -20,8 +21,7 @@ def now_us() -> int:
     return monotonic_ns() // 1000
 
 
-@dataclass(frozen=True, slots=True)
-class GloveFrame:
+class GloveFrame(Struct, frozen=True):
     """One record of the CyberGlove: arrival time of its last byte, its sensors' bytes in wire order, and its status
     byte if the glove sends one.
     """
@@ -36,8 +36,7 @@ class GloveFrame:
         return self.status is None or bool(self.status & _PLUGGED)
 
 
-@dataclass(frozen=True, slots=True)
-class SwitchFrame:
+class SwitchFrame(Struct, frozen=True):
     """One reading of the switches.
 
     time_us  when the last port was read

@@ -1,31 +1,30 @@
 """`Glove`: a glove that recognises grasps, as an iterator of published moments."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
 from threading import Event
 from time import time_ns
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 from .build import Build
 from .calibration import AngleReader
-from .frames import GloveFrame, now_us
-from .harness.loading import load_harness
+from .frames import GloveFrame, SwitchFrame, now_us
 from .harness.wiring import Harness
-from .harness.writing import harness_to_toml
-from .live.health import Health
+from .live.quarantine import CHATTERING, STUCK_CLOSED, STUCK_OPEN, Quarantine
 from .live.recogniser import Moment
 from .live.sources import Snapshot
 from .live.system import LiveSystem
 from .policy import Policy
-from .preshape import preshape_selector
-from .published import DeviceHealth, HealthReport, JointAngles, OutputTrouble, Quarantined
-from .recording.session import Session
-from .recording.writer import LiveRecorder
+from .published import DeviceHealth, HealthReport, JointAngles, LiveGrasp, OutputTrouble, Quarantined
 from .sinks.base import LATE_US, Fanout, Sink, SinkReport, open_sink
-from .task import TaskFollower
 from .taxels import calibration_of
+
+if TYPE_CHECKING:
+    from .recording.session import Session
+    from .recording.writer import LiveRecorder
 
 _REPORT_US = 1_000_000
 
@@ -63,8 +62,6 @@ class Glove:
         A new .mcap file for the raw frames and the predictions.
     recordable : bool
         Whether recordings may begin later (`new_recording`): all sensors are read, as for `record`.
-    task : str or path, optional
-        A task of `thenar teach`: sinks get the hand's progress in it, whenever it changes.
     status : bool
         Whether sinks get a report of the glove's health once a second, and whenever a device comes or goes.
     stop : threading.Event, optional
@@ -82,8 +79,6 @@ class Glove:
         The devices.
     recorder : LiveRecorder or None
         The writer of the recording.
-    follower : TaskFollower or None
-        The follower of the hand through `task`; `progress` is its state.
     health : HealthReport or None
         The glove's health, updated once a second, and whenever a device comes or goes, or an input is quarantined or
         released.
@@ -122,13 +117,15 @@ class Glove:
         record: str | PathLike[str] | None = None,
         recordable: bool = False,
         status: bool = False,
-        task: str | PathLike[str] | None = None,
         stop: Event | None = None,
         feed: Feed | None = None,
     ) -> None:
         loaded = build if isinstance(build, Build) else Build.load(build)
-        wired = harness if isinstance(harness, Harness) else load_harness(Path(harness))
-        self.system = system = LiveSystem.of(loaded, wired, policy)
+        if not isinstance(harness, Harness):
+            from .harness.loading import load_harness
+
+            harness = load_harness(Path(harness))
+        self.system = system = LiveSystem.of(loaded, harness, policy)
         self.stop = Event() if stop is None else stop
         self.frames, self.lacking = 0, ""
         self.health: HealthReport | None = None
@@ -140,6 +137,8 @@ class Glove:
         self.feed: Feed = self.sources if feed is None else feed
         self._selector = None
         if preshapes is not None:
+            from .preshape import preshape_selector
+
             by_segments = system.policy.lag_us is not None
             self._selector, self.lacking = preshape_selector(
                 preshapes, loaded, segments=by_segments, change_while_held=change_while_held
@@ -150,8 +149,7 @@ class Glove:
         self._measured: GloveFrame | None = None
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
-        self.follower = None if task is None else TaskFollower.of(Path(task), loaded.grasps)
-        self._health, self._due_us = Health(loaded, self._recognizer.quarantine), 0
+        self._health, self._due_us = GloveHealth(self._recognizer.quarantine), 0
         self._quarantined: tuple[Quarantined, ...] = ()
         self._fanout = Fanout(())
         self._open = ExitStack()
@@ -193,13 +191,10 @@ class Glove:
             self.recorder.moment(taken.arrived, grasp)
         if self._selector is not None:
             moment.preshape = self._selector.update(grasp)
-        progress = None if self.follower is None else self.follower.update(grasp)
         moment.angles = self._angles_of(taken.measured)
         # Only this process may have been stopped in between.
         if self.feed is not self.sources or now_us() - now <= LATE_US:
             self._fanout.publish(grasp, moment.preshape, moment.angles, moment)
-        if progress is not None:
-            self._fanout.task(progress)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None)
         if self._recognizer.quarantine.found != self._quarantined:
             self._quarantined, self._due_us = self._recognizer.quarantine.found, now
@@ -208,12 +203,14 @@ class Glove:
         self.frames += 1
         return moment
 
-    def new_recording(self, path: Path) -> LiveRecorder:
+    def new_recording(self, path: Path) -> "LiveRecorder":
         """Return a running recording of this glove. Only the thread that iterates may set it as `recorder`, or remove
         it; its creator closes it.
 
         Raises SettingError if the file exists, OSError as the operating system gives it.
         """
+        from .recording.writer import LiveRecorder
+
         return LiveRecorder(path, self._session())
 
     @property
@@ -239,7 +236,7 @@ class Glove:
     def _look(self, now: int) -> None:
         self._due_us, self.sources.changed = now + _REPORT_US, False
         devices, overflowed = self.sources.health(), self.sources.overflowed
-        self.health = self._health.report(now, devices, overflowed, self._quarantined, self._troubles())
+        self.health = self._health.report(now, devices, overflowed, self._troubles())
         if self._status:
             self._fanout.health(self.health)
         self.sources.raise_settings()
@@ -250,9 +247,12 @@ class Glove:
         recording = () if failure is None else (OutputTrouble("recording", failure),)
         return (*recording, *self._fanout.troubles())
 
-    def _session(self) -> Session:
+    def _session(self) -> "Session":
         # It takes a third as long to import as everything else.
         from importlib.metadata import version
+
+        from .harness.writing import harness_to_toml
+        from .recording.session import Session
 
         system = self.system
         return Session(
@@ -266,3 +266,81 @@ class Glove:
             taxels=system.harness.taxel_names,
             taxel_calibration=calibration_of(system.harness.taxel_settings),
         )
+
+
+class GloveHealth:
+    """Counts published grasps and frames, for reports; `quarantine` finds the faults of inputs."""
+
+    def __init__(self, quarantine: Quarantine) -> None:
+        self._quarantine = quarantine
+        self._switches, self._glove = FrameRate(), FrameRate()
+        self._published = Counter[str]()
+
+    def update(self, grasp: LiveGrasp, switches: SwitchFrame | None, glove_us: int | None = None) -> None:
+        """Take a published grasp, the frame of switches behind it, and the time of the glove's; a frame that was seen
+        before counts once.
+        """
+        self._published[grasp.health] += 1
+        if switches is not None:
+            self._switches.frame(switches.time_us)
+        if glove_us is not None:
+            self._glove.frame(glove_us)
+
+    def report(
+        self,
+        now_us: int,
+        devices: Sequence[DeviceHealth] = (),
+        overflowed: int = 0,
+        outputs: tuple[OutputTrouble, ...] = (),
+    ) -> HealthReport:
+        """Return the current health."""
+        quarantine, published = self._quarantine, self._published
+        return HealthReport(
+            time_us=now_us,
+            stuck_open=quarantine.names(STUCK_OPEN),
+            stuck_closed=quarantine.names(STUCK_CLOSED),
+            chattering=quarantine.names(CHATTERING),
+            drifting=quarantine.drifts(),
+            switch_hz=self._switches.hz(now_us),
+            glove_hz=self._glove.hz(now_us),
+            frames=published.total(),
+            changing=published["changing"],
+            degraded=published["degraded"],
+            unknown=published["unknown"],
+            overflowed=overflowed,
+            devices=tuple(devices),
+            quarantined=quarantine.found,
+            outputs=outputs,
+        )
+
+
+class FrameRate:
+    """Frames per second over the last second."""
+
+    def __init__(self) -> None:
+        self._began_us: int | None = None
+        self._last_us = -1
+        self._frames = 0
+        self._hz = 0.0
+
+    def frame(self, time_us: int) -> None:
+        """Count a frame, unless it is no newer than the last one."""
+        if time_us <= self._last_us:
+            return
+        self._last_us = time_us
+        if self._began_us is None:
+            self._began_us = time_us
+            return
+        self._frames += 1
+        if time_us - self._began_us >= _REPORT_US:
+            self._hz = self._over(time_us)
+            self._began_us, self._frames = time_us, 0
+
+    def hz(self, now_us: int) -> float:
+        """Return the rate of the last whole second, or of the time since the last frames, if none come."""
+        if self._began_us is not None and now_us - self._began_us > 2 * _REPORT_US:
+            return self._over(now_us)
+        return self._hz
+
+    def _over(self, now_us: int) -> float:
+        return self._frames * 1e6 / (now_us - (self._began_us or 0))

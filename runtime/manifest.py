@@ -247,7 +247,7 @@ class Detected(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
 
 
 class Rejection(Struct, frozen=True, forbid_unknown_fields=True):
-    """The rejection rules of a build that was trained on grasps only: see rejection.py.
+    """The rejection rules of a build that was trained on grasps only: see scores.py.
 
     share         the requested share of new grasps that may be refused
     least_scores  for each grasp type the least score of a candidate, in steps

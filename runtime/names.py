@@ -1,6 +1,5 @@
 """Names: their rules, and how messages show, list and suggest them."""
 
-import difflib
 from collections.abc import Sequence
 
 from thenar.drivers.names import LONGEST_NAME, LONGEST_SHOWN, fault, printable, shortened, sound_name
@@ -27,6 +26,8 @@ MOST_COMPARED = 1000
 
 def nearest(name: str, names: Sequence[str]) -> str:
     """Return " (did you mean ...?)" with the names most like `name`, or the first of `names` if none is near."""
+    import difflib  # for messages only
+
     near = difflib.get_close_matches(name[:LONGEST_SHOWN], names[:MOST_COMPARED], n=3, cutoff=0.5)
     if near:
         return f" (did you mean {' or '.join(map(repr, near))}?)"

@@ -1,7 +1,8 @@
 """The rules of a live recogniser: when it changes its decision, and when it makes none."""
 
 import math
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from thenar.drivers.errors import SettingError
 
@@ -13,8 +14,7 @@ _GRACE_US = 60_000
 _LONGEST_LAG_US = 10_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class Policy:
+class Policy(Struct, frozen=True):
     """The rules of decisions. Raises SettingError if a value is out of range.
 
     lead        minimum lead of a new grasp type over the decided one: natural logarithm of the ratio of their

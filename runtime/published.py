@@ -110,9 +110,7 @@ class OutputTrouble(msgspec.Struct, frozen=True):
 class HealthReport(msgspec.Struct, frozen=True):
     """State at `time_us` of the host's monotonic clock.
 
-    stuck_open, stuck_closed   switches that should have been seen closed, or open, by now
-    chattering                 switches that changed more often in the last second than a hand can
-    drifting                   joints whose codes have moved since the first minute
+    stuck_open, stuck_closed, chattering, drifting  inputs with these faults, as the quarantine finds them
     switch_hz, glove_hz        frames per second over the last whole second
     frames, changing, degraded, unknown  numbers of grasps published so far, in all and with that health
     overflowed                 frames that arrived but were not taken in time: a recording lacks them

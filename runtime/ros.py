@@ -18,7 +18,6 @@ from thenar.drivers.extras import optional
 
 from .preshape import Preshape
 from .published import Health, JointAngles, LiveGrasp
-from .task import Progress
 
 with optional():
     from cyclonedds.core import DDSException
@@ -127,20 +126,6 @@ def segment(name: str, grasp: LiveGrasp) -> Any:
         "lost": ", ".join(grasp.lost),
     }
     return _diagnosed(grasp.unix_us, LEVELS[grasp.health], name, grasp.grasp, values)
-
-
-def task(name: str, unix_us: int, progress: Progress) -> Any:
-    """Return a hand's progress in a task as the status of component `name`, at a moment."""
-    values = {
-        "step": str(progress.step),
-        "steps": str(progress.steps),
-        "grasp": progress.grasp,
-        "expected": ", ".join(progress.expected),
-        "deviation": progress.deviation,
-        "detail": progress.detail,
-        "done": "true" if progress.done else "false",
-    }
-    return _diagnosed(unix_us, 1 if progress.deviation else 0, name, progress.text, values)
 
 
 def _diagnosed(unix_us: int, level: int, name: str, message: str, values: dict[str, str]) -> Any:

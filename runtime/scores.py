@@ -3,6 +3,12 @@
 A row of K int16 steps is one Python integer, 16 bits a class: row = sum_k steps_k * 2^(16 k). Adding two such integers
 adds all K lanes at once. `IntegerTables` has proved that no sum leaves int16, so no lane can spill into the next; the
 offset 2^15 per lane, added once, keeps every lane positive while it is read out.
+
+Rejection: a frame unlike all training frames of a build has none of its grasp types, so nothing is held. A frame is
+refused for its candidate, the grasp type with the largest score, in three cases: that score is below the type's
+minimum; fewer or more switches are closed than the type's minimum and maximum; or more joints than `outside` are beyond
+the type's ranges. All of these are integers, so Python and C refuse the same frames. Lost inputs are left out: a lost
+switch may be closed or open, a lost joint lies within, and the score is judged only in frames without lost inputs.
 """
 
 import math
@@ -10,7 +16,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import compress
-from operator import getitem, not_
+from operator import getitem, gt, lt, not_
 from struct import Struct
 
 import numpy as np
@@ -18,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import FrameError
 from .frames import Mask
+from .manifest import Rejection
 from .model.integers import IntegerTables
 from .model.terms.base import HIGHEST_CODE
 
@@ -26,6 +33,9 @@ LANE_OFFSET = 1 << 15
 _EIGHT = 8
 # A sensor's byte has no more codes than these; a finer stream reuses the entries.
 _MOST_CODES = 1 << 12
+_LEAST_SHARE, _EVEN = 1e-9, 0.5
+# In a frame that is not refused, none trails by this many steps: no sum of scores comes near.
+_NEVER = -(1 << 40)
 
 
 class Scorer:
@@ -76,8 +86,15 @@ class Scorer:
 
     def biased_scores(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
         """Return the scores of one frame, each 2^15 too high: K integers. Raises FrameError."""
-        switches = _flags(bits, len(self.switch_rows), "switches")
-        total = sum(compress(self.switch_rows, switches), self.start) + self.joint_sum(self._codes(codes))
+        return self.frame_scores(*self.frame(bits, codes))
+
+    def frame(self, bits: ArrayLike, codes: ArrayLike) -> tuple[list[bool], list[int]]:
+        """Return the switches and the codes of one frame as lists. Raises FrameError."""
+        return _flags(bits, len(self.switch_rows), "switches"), self._codes(codes)
+
+    def frame_scores(self, switches: Sequence[bool], codes: Sequence[int]) -> tuple[int, ...]:
+        """Return `biased_scores` of the lists that `frame` returns."""
+        total = sum(compress(self.switch_rows, switches), self.start) + self.joint_sum(codes)
         return self.unpack(total.to_bytes(self.size, "little"))
 
     def joint_sum(self, codes: Sequence[int], lost: Mask = 0) -> int:
@@ -142,7 +159,7 @@ class LiveScores:
     bin, its mean row while it is lost. So `biased_scores` are exactly `Scorer.biased_scores_without` of the same state.
     """
 
-    __slots__ = ("_closed", "_codes", "_joints", "_lost", "_lost_joints", "_scorer", "_silent", "_there")
+    __slots__ = ("_closed", "_codes", "_joints", "_lost", "_lost_joints", "_newest", "_scorer", "_silent", "_there")
 
     def __init__(self, scorer: Scorer) -> None:
         self._scorer = scorer
@@ -152,6 +169,7 @@ class LiveScores:
         self._codes: tuple[int, ...] | None = None
         self._lost_joints: Mask = 0
         self._joints = scorer.joints_lost
+        self._newest: tuple[int, ...] | None = None
 
     def joints(self, codes: Sequence[int] | None, lost: Mask = 0) -> None:
         """Take the codes of all joints, and which are lost; None: all are. Raises FrameError."""
@@ -165,11 +183,11 @@ class LiveScores:
             raise FrameError(f"a frame has {len(taken)} codes, but the build has {len(scorer.thresholds)} joints")
         else:
             self._joints = scorer.joint_sum(taken, lost)
-        self._codes, self._lost_joints = taken, lost
+        self._codes, self._lost_joints, self._newest = taken, lost, None
 
     def biased_scores(self, closed: Mask, lost: Mask = 0) -> tuple[int, ...]:
         """Return the K scores, each 2^15 too high, for a state of all switches; bits of `closed` that are lost are
-        ignored. Raises FrameError.
+        ignored. While nothing changes, they are the same object. Raises FrameError.
         """
         scorer = self._scorer
         if (closed | lost) >> len(scorer.switch_rows):
@@ -177,20 +195,95 @@ class LiveScores:
         there = closed & ~lost
         if there != self._there:
             self._closed = scorer.start + _sum(there, scorer.row_sums)
-            self._there = there
+            self._there, self._newest = there, None
         if lost != self._lost:
             self._silent = _sum(lost, scorer.mean_sums)
-            self._lost = lost
-        return scorer.unpack((self._closed + self._silent + self._joints).to_bytes(scorer.size, "little"))
+            self._lost, self._newest = lost, None
+        if self._newest is None:
+            total = self._closed + self._silent + self._joints
+            self._newest = scorer.unpack(total.to_bytes(scorer.size, "little"))
+        return self._newest
 
 
-def softmax(scores: Sequence[int], number: int, scale: float, total: float | None = None) -> float:
-    """Return the softmax of `scores` (K,), in steps of 1 / `scale`, for class `number`; it cannot overflow. `total`:
-    their `odds`, if known.
+def none_leads(rejection: Rejection, scale: float) -> tuple[int, int]:
+    """Return the lead of none over the best score, at `scale` steps per unit, for a frame that is not refused and for
+    one that is: there ln((1 - share) / share), where `share` is the share of grasps that are refused.
+    """
+    share = max(rejection.share, _LEAST_SHARE)
+    return _NEVER, math.ceil(scale * math.log((1 - share) / share)) if share < _EVEN else 1
+
+
+class Rejector:
+    """Decides whether a build refuses a live frame."""
+
+    __slots__ = ("_closed", "_least", "_outside", "_ranges")
+
+    def __init__(self, rejection: Rejection) -> None:
+        self._least = [least + LANE_OFFSET for least in rejection.least_scores]
+        self._closed, self._outside = rejection.closed, rejection.outside
+        # Of each type, the lowest and the highest codes of all joints.
+        self._ranges = [
+            (tuple(low for low, _ in ranges), tuple(high for _, high in ranges)) for ranges in rejection.ranges
+        ]
+
+    def refuses(
+        self,
+        biased_scores: Sequence[int],
+        closed: int,
+        lost: int,
+        codes: Sequence[int] | None,
+        *,
+        lost_joints: Mask = 0,
+    ) -> bool:
+        """Return whether nothing is held.
+
+        Parameters
+        ----------
+        biased_scores : sequence of int
+            The K scores, each 2^15 too high, as in `Scorer.biased_scores`.
+        closed, lost : int
+            How many of the kept switches are closed, and how many are lost.
+        codes : sequence of int or None
+            The joints' codes; None: all are lost.
+        lost_joints : int
+            A mask of the joints that are lost.
+        """
+        best = max(biased_scores)
+        candidate = biased_scores.index(best)
+        whole = not (lost or lost_joints or codes is None)
+        if best < self._least[candidate] and whole:
+            return True
+        fewest, most = self._closed[candidate]
+        if closed > most or closed + lost < fewest:
+            return True
+        if codes is None:
+            return False
+        low, high = self._ranges[candidate]
+        if lost_joints:
+            pairs = enumerate(zip(codes, low, strict=True))
+            codes = [least if lost_joints >> joint & 1 else code for joint, (code, least) in pairs]
+        outside: int = sum(map(lt, codes, low)) + sum(map(gt, codes, high))
+        return outside > self._outside
+
+
+def refused(
+    rejection: Rejection, scores: NDArray[np.integer], bits: NDArray[np.bool_], codes: NDArray[np.integer]
+) -> NDArray[np.bool_]:
+    """Return which frames are refused (n,): scores (n, K), kept switches (n, s) and codes (n, j), nothing lost."""
+    candidate = scores.argmax(axis=1)
+    closed, ranges = np.array(rejection.closed), np.array(rejection.ranges).reshape(len(rejection.closed), -1, 2)
+    count, (fewest, most), (low, high) = bits.sum(axis=1), closed[candidate].T, np.moveaxis(ranges[candidate], 2, 0)
+    outside = ((codes < low) | (codes > high)).sum(axis=1)
+    least = np.array(rejection.least_scores)[candidate]
+    return np.asarray((scores.max(axis=1) < least) | (count < fewest) | (count > most) | (outside > rejection.outside))
+
+
+def softmax(scores: Sequence[int], number: int, scale: float) -> float:
+    """Return the softmax of `scores` (K,), in steps of 1 / `scale`, for class `number`; it cannot overflow.
 
     It is calculated only to be published: no decision depends on it.
     """
-    return math.exp((scores[number] - max(scores)) / scale) / (odds(scores, scale) if total is None else total)
+    return math.exp((scores[number] - max(scores)) / scale) / odds(scores, scale)
 
 
 def odds(scores: Sequence[int], scale: float) -> float:

@@ -14,7 +14,6 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
-from statistics import median_low
 from typing import Annotated, Literal
 
 import msgspec
@@ -153,6 +152,8 @@ def learnt_lines(
     The rest is the median; the press is the median of five consecutive counts that is furthest from it, so that no
     glitch counts. A taxel that moved less than three times its variation at rest was not pressed.
     """
+    from statistics import median_low  # a run calibrates nothing
+
     lines = []
     for place, name in enumerate(names):
         counts = [code for codes in rested if (code := codes[place]) is not None]

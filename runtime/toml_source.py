@@ -5,14 +5,18 @@ import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msgspec import Struct, field
 
 from .errors import ThenarError
 from .files import read_file
 from .names import shortened
 from .nesting import check_toml
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
 
 # Bytes. A harness of 4,096 switches takes a third of it; reading longer files costs more than rejecting them.
 LARGEST = 1_000_000
@@ -29,8 +33,7 @@ _TOKEN = re.compile(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class TomlText:
+class TomlText(Struct, frozen=True):
     """The text of a TOML file, its name in messages, and the kind of error that it raises."""
 
     name: str
@@ -59,7 +62,7 @@ class TomlText:
         return next(lines[place[:end]] for end in range(len(place), -1, -1) if place[:end] in lines)
 
 
-def read_source(file: Traversable, raises: type[ThenarError]) -> TomlText:
+def read_source(file: "Traversable", raises: type[ThenarError]) -> TomlText:
     """Read a TOML file. Raises an error of the kind `raises` if it cannot be opened, is too large or not UTF-8."""
     try:
         # Files shipped with thenar may lie in a zip, which has no paths.
@@ -86,8 +89,7 @@ def _tokens(text: str) -> Iterator[tuple[str, int]]:
         line += found[0].count("\n")
 
 
-@dataclass(slots=True)
-class _Lines:
+class _Lines(Struct):
     """Walks through the tokens of a valid TOML file and records the line of every table, key and list entry."""
 
     tokens: list[tuple[str, int]]

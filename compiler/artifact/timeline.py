@@ -22,7 +22,7 @@ from thenar.drivers.errors import SettingError
 from thenar.runtime.build import Build
 from thenar.runtime.files import write_atomically
 from thenar.runtime.live.replay import recognised
-from thenar.runtime.rejection import refused
+from thenar.runtime.scores import refused
 from thenar.runtime.segmenting.decoder import decode, emissions
 
 from ..movements.segments import OVERLAPS, Span, live_states, score_streams, segments_of

@@ -18,7 +18,7 @@ from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.policy import Policy
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.scores import LANE_OFFSET
-from thenar.runtime.segmenting.live import LiveSegments
+from thenar.runtime.segmenting.decoder import LiveSegments
 from thenar.runtime.segmenting.model import SegmentModel
 
 from ..evaluation.folds import Rows, leave_groups_out, trial_folds

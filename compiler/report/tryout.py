@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from thenar.drivers.extras import optional
 from thenar.runtime.hand import HandDrawing
 from thenar.runtime.manifest import Calibration, Manifest, Threshold
-from thenar.runtime.rejection import none_leads
+from thenar.runtime.scores import none_leads
 
 from ..facts import SensorCount
 from ..pictures import embedded, policy_hash, templates

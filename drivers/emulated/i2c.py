@@ -26,7 +26,7 @@ _PYTHON = "/usr/bin/python3"
 _SERVE = "import runpy, sys; sys.path.append(sys.argv[1]); runpy.run_module(sys.argv[2], run_name='__main__')"
 _INSTALL = "install the packages umockdev, gir1.2-umockdev-1.0 and python3-gi (Debian, Ubuntu)"
 
-AdapterKind = Literal["any", "bcm2835", "designware", "i2c-gpio", "smbus-only"]
+AdapterKind = Literal["any", "bcm2835", "designware", "i2c-gpio"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ gi.require_version("UMockdev", "1.0")
 from gi.repository import GLib, UMockdev  # noqa: E402
 
 from ..spi.chips.base import SpiModel  # noqa: E402
-from .i2c_wire import I2C_BLOCK, Adapter, Message, Station, TransferFault, Wire  # noqa: E402
+from .i2c_wire import FUNCTIONS, I2C_BLOCK, Adapter, Message, Station, TransferFault, Wire  # noqa: E402
 
 I2C_SLAVE, I2C_SLAVE_FORCE, I2C_FUNCS, I2C_RDWR, I2C_SMBUS = 0x703, 0x706, 0x705, 0x707, 0x720
 _READS = 0x0001
@@ -151,7 +151,7 @@ class I2cNode(EmulatedNode):
             self._addresses[hash(client)] = address
             return 0
         if request == I2C_FUNCS:
-            arg.resolve(0, 8).update(0, struct.pack("L", self.adapter.funcs))
+            arg.resolve(0, 8).update(0, struct.pack("L", FUNCTIONS))
             return 0
         if request == I2C_RDWR:
             return self._rdwr(arg.resolve(0, 16))

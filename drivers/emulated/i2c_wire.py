@@ -2,7 +2,7 @@
 kernel's adapter drivers.
 
 Read from the kernel's sources: i2c-bcm2835 (Raspberry Pi 0 to 4), i2c-designware-master (Raspberry Pi 5, many PCs),
-i2c-algo-bit (i2c-gpio); "any" has no limits, "smbus-only" offers no I2C_RDWR, like many PC chipsets.
+i2c-algo-bit (i2c-gpio); "any" has no limits.
 
 It needs only the standard library: the system's Python serves it to /dev/i2c-N.
 """
@@ -130,8 +130,8 @@ class Wire:
 
 
 MOST_MESSAGES = 42
-FUNC_I2C = 0x00000001
-FUNC_SMBUS = 0x0EFF0008
+# The reply to I2C_FUNCS: messages, and SMBus transfers made of them.
+FUNCTIONS = 0x0EFF0009
 
 QUICK, BYTE, BYTE_DATA, WORD_DATA, I2C_BLOCK = 0, 1, 2, 3, 8
 _READ_SIZES = {BYTE: 1, BYTE_DATA: 1, WORD_DATA: 2}
@@ -143,7 +143,6 @@ ADAPTERS: dict[str, tuple[int, int | None]] = {
     "designware": (errno.EREMOTEIO, errno.EAGAIN),
     "i2c-gpio": (errno.ENXIO, None),
     "any": (errno.EREMOTEIO, errno.EBUSY),
-    "smbus-only": (errno.ENXIO, errno.EBUSY),
 }
 
 
@@ -176,16 +175,10 @@ class Adapter:
         self.wire = wire
         self.kind = kind
         self.nak_errno, self.stuck_errno = ADAPTERS[kind]
-        self.plain_i2c = kind != "smbus-only"
         self.faults: list[TransferFault] = []
         self.claimed: set[int] = set()
         self.stuck_for: int | None = None
         self.calls = 0
-
-    @property
-    def funcs(self) -> int:
-        """The reply to I2C_FUNCS."""
-        return FUNC_SMBUS | (FUNC_I2C if self.plain_i2c else 0)
 
     def slave(self, address: int) -> None:
         """I2C_SLAVE: EBUSY if a kernel driver holds the address."""
@@ -207,8 +200,6 @@ class Adapter:
 
     def rdwr(self, messages: list[Message]) -> list[bytes]:
         """I2C_RDWR: send all messages in one transfer."""
-        if not self.plain_i2c:
-            raise OSError(errno.EOPNOTSUPP, "no I2C_RDWR")
         if len(messages) > MOST_MESSAGES:
             raise OSError(errno.EINVAL, "too many messages")
         if self.kind == "bcm2835" and any(message.data is None for message in messages[:-1]):

@@ -58,7 +58,7 @@ def cut(ports: Sequence[PlacedPort], way: BatchMode) -> Iterator[Group]:
 
 def _fits(port: PlacedPort, gathered: Sequence[PlacedPort], way: BatchMode) -> bool:
     last = gathered[-1]
-    if way in (BatchMode.PORT, BatchMode.SMBUS) or port.member.route != last.member.route:
+    if way is BatchMode.PORT or port.member.route != last.member.route:
         return False
     if way is BatchMode.CHIP and port.member is not last.member:
         return False
@@ -117,8 +117,9 @@ class Scan:
 
     def _one_by_one(self, ports: Sequence[tuple[int, PlacedPort]], error: OSError) -> list[bytes | None]:
         """Read the ports of a failed transfer one by one; if the adapter rejects batches, reduce them from then on."""
-        if error.errno in REFUSED and self._way is self._node.way:  # else it was lowered since `_plan`
-            self._node.way = self._way.lower() if len(ports) > 1 else BatchMode.SMBUS
+        # Else it was lowered since `_plan`, or is as low as can be.
+        if error.errno in REFUSED and self._way is self._node.way and len(ports) > 1:
+            self._node.way = self._way.lower()
         self._keeper.routes.forget()
         return [self._alone(port) for _, port in ports]
 

@@ -49,7 +49,6 @@ def stuck(device: str, code: int | None) -> str:
 
 
 MOST_MESSAGES = 42
-_FUNC_I2C = 0x00000001
 _I2C_SLAVE = 0x0703
 
 # The specification reserves 1111 1XX: no chip acknowledges this address.
@@ -62,13 +61,12 @@ class BatchMode(Enum):
     """Batching of reads, from the fastest to the one that always works.
 
     i2c-gpio accepts any batch; designware (Raspberry Pi 5, many PCs) one address a transfer, else EINVAL; bcm2835
-    (Raspberry Pi 0 to 4) one read a transfer, else EOPNOTSUPP; adapters without I2C_RDWR support only SMBus.
+    (Raspberry Pi 0 to 4) one read a transfer, else EOPNOTSUPP.
     """
 
     CHANNEL = "all ports between two mux switches in one transfer"
     CHIP = "all ports of a chip in one transfer"
     PORT = "one transfer per port"
-    SMBUS = "one SMBus transfer per port"
 
     def lower(self) -> "BatchMode":
         """Return the next less demanding way; for the last, itself."""
@@ -124,10 +122,6 @@ class DeviceNode:
             bus.close()
             raise DeviceError(f"{self.device} cannot be opened: {_cause(error)}") from None
 
-    def find_way(self) -> None:
-        """Start with the fastest way that the open adapter may support."""
-        self.way = BatchMode.CHANNEL if self._bus is not None and self._bus.funcs & _FUNC_I2C else BatchMode.SMBUS
-
     def close(self) -> None:
         """Close the node; no transfers are possible until it is reopened."""
         if self._bus is not None:
@@ -142,30 +136,22 @@ class DeviceNode:
 
     def write(self, address: int, data: bytes) -> None:
         """Write bytes in one transfer."""
+        from smbus2 import i2c_msg
+
         bus = self._ready()
         self.transfers += 1
-        if self.way is not BatchMode.SMBUS:
-            from smbus2 import i2c_msg
-
-            bus.i2c_rdwr(i2c_msg.write(address, data))
-        elif len(data) == 1:
-            bus.write_byte(address, data[0])
-        else:
-            bus.write_i2c_block_data(address, data[0], list(data[1:]))
+        bus.i2c_rdwr(i2c_msg.write(address, data))
 
     def query(self, query: Query) -> bytes:
         """Write and read in one transfer."""
         return self.prepare((query,))()[0]
 
     def prepare(self, queries: Sequence[Query]) -> Run:
-        """Return a function that makes all queries in one transfer and returns the replies; SMBus allows one query."""
-        bus = self._ready()
-        if self.way is BatchMode.SMBUS:
-            (query,) = queries
-            return lambda: [self._by_smbus(bus, query)]
+        """Return a function that makes all queries in one transfer and returns the replies."""
         from smbus2 import i2c_msg
         from smbus2.smbus2 import I2C_RDWR, i2c_rdwr_ioctl_data
 
+        bus = self._ready()
         replies = [i2c_msg.read(query.address, query.length) for query in queries]
         messages: list[i2c_msg] = []
         for query, reply in zip(queries, replies, strict=True):
@@ -185,19 +171,6 @@ class DeviceNode:
         if self._bus is None or not self.is_open:
             raise OSError(errno.EBADF, f"{self.device} is not open")
         return self._bus
-
-    def _by_smbus(self, bus: "SMBus", query: Query) -> bytes:
-        self.transfers += 1
-        if not query.command:
-            if query.length == 1:
-                return bytes((bus.read_byte(query.address),))
-            raise OSError(errno.EOPNOTSUPP, "SMBus reads one byte at most without a command")
-        command = query.command[0]
-        if query.length == 1:
-            return bytes((bus.read_byte_data(query.address, command),))
-        if query.length == 2:
-            return bus.read_word_data(query.address, command).to_bytes(2, "little")
-        return bytes(bus.read_i2c_block_data(query.address, command, query.length))
 
 
 def _cause(error: OSError) -> str:

@@ -8,7 +8,7 @@ from time import monotonic
 from typing import TypeVar
 
 from .chips import CHIPS, Chip, Write
-from .node import NOBODY, NOBODY_THERE, STUCK, DeviceNode, Query, failure, stuck
+from .node import NOBODY, NOBODY_THERE, STUCK, BatchMode, DeviceNode, Query, failure, stuck
 from .tca9548a import control
 
 _LOG = logging.getLogger(__name__)
@@ -186,7 +186,7 @@ class ChipSupervisor:
         """Open the node and set up every chip."""
         self._renew()
         self.routes = self._unknown_routes()
-        self._node.find_way()
+        self._node.way = BatchMode.CHANNEL
         self.fault_message = ""
         for member in self._members:
             member.present = False

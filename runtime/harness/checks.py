@@ -7,10 +7,10 @@ from thenar.drivers import cd74hc4067
 from thenar.drivers.errors import SettingError
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS
-from thenar.drivers.line_reader import line_port_fault
 from thenar.drivers.ports import device_fault, port_fault
 from thenar.drivers.senders import parse_address
 from thenar.drivers.spi.chips import SPI_CHIPS
+from thenar.drivers.transports import line_port_fault
 
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, spelled

@@ -10,7 +10,6 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct, field
 
-from thenar.drivers.cyberglove_protocol import SENSORS, SENSORS_18, SENSORS_22
 from thenar.drivers.i2c.chips import CHIPS, Chip, Converter
 from thenar.drivers.spi.chips import SPI_CHIPS, SpiChip
 
@@ -18,6 +17,8 @@ from ..taxels import TaxelSettings
 
 # A line has no room for more.
 MOST_COLUMNS = 2000
+# Of a CyberGlove that does not say how many it has.
+_SENSORS = 18
 # Clock rates of a bus.
 SLOWEST_HZ = 1000
 Text = Annotated[str, Meta(min_length=1)]
@@ -30,10 +31,9 @@ class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit
 
 
 class GloveWiring(_Table, frozen=True):
-    """The CyberGlove: its port (a device, socket:// or rfc2217://), and how it is read.
+    """The CyberGlove: its port (a device or socket://), and how it is read.
 
     baud         "auto" tries the usual ones
-    mode         "stream": it sends by its own clock; "poll": every record is requested
     rate_hz      None: as fast as it can
     filter       whether the box's digital filter is on; None: as set on the box
     record_us    measured time of a record of all sensors (`thenar doctor --write`); None: by the formula
@@ -45,7 +45,6 @@ class GloveWiring(_Table, frozen=True):
 
     port: Text
     baud: Baud | Literal["auto"] = 115_200
-    mode: Literal["stream", "poll"] = "stream"
     rate_hz: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
     filter: bool | None = None
     record_us: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
@@ -57,12 +56,14 @@ class GloveWiring(_Table, frozen=True):
     @property
     def all_sensors(self) -> int:
         """The number of sensors that the glove must have: 18 by default."""
-        return len(self.joints) or self.sensors or SENSORS
+        return len(self.joints) or self.sensors or _SENSORS
 
     @property
     def sensor_names(self) -> tuple[str, ...]:
         """The names of all its sensors in wire order: ours, or the driver's."""
-        return self.joints or (SENSORS_18 if self.all_sensors == SENSORS else SENSORS_22)
+        from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
+
+        return self.joints or (SENSORS_18 if self.all_sensors == _SENSORS else SENSORS_22)
 
 
 class MuxChannel(_Table, frozen=True):
@@ -149,7 +150,7 @@ Range = tuple[float, float]
 
 
 class StreamWiring(_Table, frozen=True):
-    """Rows of numbers sent by a board or a program: lines (`thenar.drivers.line_reader`), LSL, a ROS topic.
+    """Rows of numbers sent by a board or a program: lines (`thenar.drivers.transports`), LSL, a ROS topic.
 
     sender       (`from`) the address of the only sender of datagrams that counts, with or without its port; None: the
                  first one

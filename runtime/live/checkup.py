@@ -85,7 +85,7 @@ def _glove(wiring: GloveWiring, read: Sequence[str]) -> tuple[CheckResult, ...]:
         device.close()
     found = _remarked(CheckResult(device.name, "" if info is None else info.text, True, predicted, measured, remarks))
     some = read if 0 < len(read) < device.sensors else wiring.sensor_names[: device.sensors // 2]
-    fastest = msgspec.structs.replace(wiring, rate_hz=None, mode="stream", record_us=None)
+    fastest = msgspec.structs.replace(wiring, rate_hz=None, record_us=None)
     return (found, _record(fastest, wiring.sensor_names), _record(fastest, some))
 
 

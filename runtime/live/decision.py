@@ -24,9 +24,10 @@ whose results and evidence are dropped at the next whole frame.
 """
 
 import math
-from dataclasses import dataclass, field
 
-from ..scores import odds, softmax
+from msgspec import Struct
+
+from ..scores import odds
 
 
 class Ranking:
@@ -34,18 +35,20 @@ class Ranking:
     the last class.
     """
 
-    __slots__ = ("_odds", "biased_scores", "candidate")
+    __slots__ = ("_margin", "_odds", "biased_scores", "candidate")
 
     def __init__(self, biased_scores: tuple[int, ...]) -> None:
         self.biased_scores = biased_scores
         self.candidate = biased_scores.index(max(biased_scores))
-        self._odds = 0.0, 0.0
+        self._odds, self._margin = (0.0, 0.0), -1
 
     @property
     def margin(self) -> int:
         """The candidate's lead over the second best, in steps."""
-        second, best = sorted(self.biased_scores)[-2:]
-        return best - second
+        if self._margin < 0:
+            second, best = sorted(self.biased_scores)[-2:]
+            self._margin = best - second
+        return self._margin
 
     def lead(self, held: int) -> int:
         """Return the candidate's lead over class `held`, in steps."""
@@ -60,15 +63,14 @@ class Ranking:
         of, total = self._odds
         if of != scale:
             self._odds = scale, (total := odds(self.biased_scores, scale))
-        return softmax(self.biased_scores, number, scale, total)
+        return math.exp(-self.lead(number) / scale) / total
 
     def with_none_class(self, lead: int) -> "Ranking":
         """Return the same with none, the last class, `lead` steps above the best, or below it if that is negative."""
         return Ranking((*self.biased_scores, max(self.biased_scores) + lead))
 
 
-@dataclass(slots=True)
-class Decision:
+class Decision(Struct):
     """The decided class, from candidates frame by frame. A frame is whole if none of its inputs is lost.
 
     - The first candidate, with no class decided, is decided on at once.
@@ -127,8 +129,7 @@ class Decision:
         return candidate
 
 
-@dataclass(slots=True)
-class SequentialTest:
+class SequentialTest(Struct):
     """Decides test after test; a result holds until the next test has one, or `longest_us` have passed.
 
     After a whole frame, one with no input lost, both the result and the evidence are based on whole frames.
@@ -142,7 +143,7 @@ class SequentialTest:
     longest_us: int
     spacing_us: int = 0
     held: int | None = None
-    threshold: int = field(init=False)
+    threshold: int = 0
     _sums: tuple[int, ...] = ()
     _began_us: int = 0
     _counted_us: int | None = None

@@ -39,17 +39,18 @@ has moved by at least the smaller of both; grasps that merely use less of the ra
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from operator import gt, lt
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from ..build import Build
 from ..frames import Mask, SwitchFrame
 from ..model.integers import IntegerTables
 from ..model.terms.base import HIGHEST_CODE
-from ..published import Quarantined
+from ..published import Drift, Quarantined
 
 # Time for which contacts must stay the same before a grasp is evaluated.
 SETTLED_US = 100_000
@@ -176,8 +177,7 @@ class StuckTest:
         return evidence * grasp.read
 
 
-@dataclass(frozen=True, slots=True)
-class _Grasp:
+class _Grasp(Struct, frozen=True):
     """An observed grasp: scores (K,), and which switches were closed, read, and scored as lost (s,)."""
 
     biased_scores: Ints
@@ -275,7 +275,6 @@ class Quarantine:
 
     found  every wrong input, and whether it is still used
     out    the switches and joints that are left out now
-    chattering, drift  what finds chattering switches and drifting joints
     """
 
     def __init__(self, build: Build, fits: Callable[[Mask, Mask], bool], *, active: bool = True) -> None:
@@ -285,7 +284,7 @@ class Quarantine:
         self._fits, self._active, self._all = fits, active, (1 << len(switches)) - 1
         # Only compiled builds say how often their switches are closed.
         self._stuck = StuckTest(build) if switches and switches[0].closed_least else None
-        self.chattering, self.drift = Chattering(len(switches)), JointDrift(build.tables)
+        self._chattering, self._drift = Chattering(len(switches)), JointDrift(build.tables)
         self._wrong: dict[tuple[bool, int], str] = {}
         self._chosen: dict[tuple[Mask, Mask], tuple[tuple[Mask, Mask], tuple[Quarantined, ...]]] = {}
         self.out: tuple[Mask, Mask] = 0, 0
@@ -325,16 +324,27 @@ class Quarantine:
             found.append(Quarantined(self._names[is_joint][number], reason, not fits))
         return (out[0], out[1]), tuple(found)
 
+    def names(self, reason: str) -> tuple[str, ...]:
+        """Return the inputs that are wrong for this reason, in the order of detection."""
+        wrong = (which for which, why in self._wrong.items() if why == reason)
+        return tuple(self._names[is_joint][number] for is_joint, number in wrong)
+
+    def drifts(self) -> tuple[Drift, ...]:
+        """Return the joints that drift, and by how many codes."""
+        return tuple(
+            Drift(name, codes) for name, codes in zip(self._names[True], self._drift.codes, strict=False) if codes
+        )
+
     def look(self, frame: SwitchFrame, biased_scores: Sequence[int], lost: Mask) -> None:
         """Take a frame, its scores, and the switches that are scored as lost."""
         time_us = frame.time_us
         if time_us <= self._seen_us:
             return
         self._seen_us, read = time_us, self._all & ~frame.lost
-        chattering = self.chattering.switches
-        self.chattering.frame(time_us, frame.closed, read)
+        chattering = self._chattering.switches
+        self._chattering.frame(time_us, frame.closed, read)
         stuck = self._stuck
-        if chattering != self.chattering.switches:
+        if chattering != self._chattering.switches:
             self._sort()
         if stuck is None:
             return
@@ -350,7 +360,7 @@ class Quarantine:
             self._contacts, self._since_us, self._read, self._weighed = contacts, time_us, read, False
         elif not self._weighed and time_us - self._since_us >= SETTLED_US and not self._read & ~read:
             self._contacts, self._weighed = contacts, True
-            quiet = ~self.chattering.switches
+            quiet = ~self._chattering.switches
             least, kept, seen, scores, without = self._fewest
             if _differ(least, contacts) and _differ(least, self._before):
                 stuck.weigh(scores, kept, seen & quiet & ~(kept & ~self._stayed), without)
@@ -361,17 +371,17 @@ class Quarantine:
     def look_at_joints(self, time_us: int, codes: Sequence[int]) -> None:
         """Take the codes of a record of the glove."""
         if time_us > self._joints_us:
-            self._joints_us, before = time_us, self.drift.codes
-            self.drift.frame(time_us, codes)
-            if before != self.drift.codes:
+            self._joints_us, before = time_us, self._drift.codes
+            self._drift.frame(time_us, codes)
+            if before != self._drift.codes:
                 self._sort()
 
     def _sort(self) -> None:
         """Update the list of wrong inputs, in the order of detection."""
         stuck = {} if self._stuck is None else self._stuck.stuck
         now = {(False, number): (STUCK_CLOSED, STUCK_OPEN)[kind] for number, kind in stuck.items()}
-        now |= {(False, number): CHATTERING for number in numbers(self.chattering.switches)}
-        now |= {(True, number): DRIFTING for number, codes in enumerate(self.drift.codes) if codes}
+        now |= {(False, number): CHATTERING for number in numbers(self._chattering.switches)}
+        now |= {(True, number): DRIFTING for number, codes in enumerate(self._drift.codes) if codes}
         if now != self._wrong:
             self._wrong = {which: now[which] for which in (*(each for each in self._wrong if each in now), *now)}
             self._chosen.clear()

@@ -1,10 +1,10 @@
 """The live recogniser: joins the newest frame of each device, scores it and decides."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from ..build import Build
 from ..calibration import Joints, Meaning
@@ -14,7 +14,7 @@ from ..policy import Policy
 from ..preshape import Preshape
 from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
 from ..scores import LiveScores
-from ..segmenting.live import LiveSegments, Segment
+from ..segmenting.decoder import LiveSegments, Segment
 from .decision import Decision, Ranking, SequentialTest
 from .quarantine import Quarantine
 
@@ -78,6 +78,7 @@ class LiveRecognizer:
         self._joints = Joints(build.manifest.joints, sensor_names, calibration, glove_period_us, grace_us)
         self._scores = LiveScores(build.scorer)
         self._scored: tuple[Sequence[int] | None, Mask] = None, 0
+        self._scored_last: tuple[int, ...] | None = None
         self._missing = MissingInputs(build, self._policy.max_lost)
         self.quarantine = Quarantine(build, self._missing.may_be_lost, active=self._policy.quarantine)
         self._all_joints = (1 << tables.n_joints) - 1
@@ -112,14 +113,15 @@ class LiveRecognizer:
             self._scores.joints(codes, lost_joints)
             self._scored = codes, lost_joints
         closed, lost = (0, self._all_switches) if frame is None else (frame.closed & ~frame.lost, frame.lost)
-        standing = Ranking(biased_scores := self._scores.biased_scores(closed, lost))
+        biased_scores = self._scores.biased_scores(closed, lost)
+        if biased_scores is not self._scored_last:
+            # A hand at rest is ranked once.
+            self._scored_last = biased_scores
+            self._ranking, self._refused = self._ranked(biased_scores, closed, lost, codes, lost_joints)
+        standing, refused = self._ranking, self._refused
         missing, too_much = self._missing.of(lost, lost_joints | joints_lost)
         if read is not None:
             self.quarantine.look(read, biased_scores, lost)
-        refused = False
-        if self._rejector is not None:
-            refused = self._rejector.refuses(biased_scores, closed, lost, codes, lost_joints=lost_joints)
-            standing = standing.with_none_class(self._none_leads[refused])
         seen_us = max(newest.time_us, self._joints.newest.time_us)
         if too_much:
             self._decider.forget()
@@ -131,6 +133,17 @@ class LiveRecognizer:
         grasp = self._published(now_us, unix_us, standing, missing, too_much, decided, seen_us, segment, late)
         self._number += 1
         return Moment(grasp, switches, glove, codes, scores=scores, refused=refused)
+
+    def _ranked(
+        self, biased_scores: tuple[int, ...], closed: Mask, lost: Mask, codes: Sequence[int] | None, lost_joints: Mask
+    ) -> tuple[Ranking, bool]:
+        """Return the ranking of a frame's classes, and whether the build refuses it."""
+        ranking = Ranking(biased_scores)
+        if self._rejector is None:
+            return ranking, False
+        counts = closed.bit_count(), lost.bit_count()
+        refused = self._rejector.refuses(biased_scores, *counts, codes, lost_joints=lost_joints)
+        return ranking.with_none_class(self._none_leads[refused]), refused
 
     def _published(
         self,

@@ -1,9 +1,10 @@
 """Replay a recording: by its own build, or by another that reads the same inputs."""
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
 

@@ -3,11 +3,13 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from threading import Condition, Event, Thread
 from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from thenar.drivers.errors import DeviceError, SettingError
 
@@ -51,8 +53,7 @@ class Readable(Protocol[T_co]):
         """Close it, in whatever state it is."""
 
 
-@dataclass(frozen=True, slots=True)
-class DeviceState:
+class DeviceState(Struct, frozen=True):
     """The state of a device: `error` is the current or last error, opened how often it was opened, faults how often an
     exception ended its reading that only a bug in the program explains.
     """
@@ -145,8 +146,7 @@ class DeviceThread(Generic[T]):
             self._changed()
 
 
-@dataclass(frozen=True, slots=True)
-class Snapshot:
+class Snapshot(Struct, frozen=True):
     """The newest frames at `time_us`; all that arrived since the last time; the glove's record if it is current."""
 
     time_us: int

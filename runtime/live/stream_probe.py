@@ -11,8 +11,7 @@ from statistics import median
 import msgspec
 
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.line_reader import RowReader
-from thenar.drivers.lines import Row
+from thenar.drivers.lines import Row, RowReader
 
 from ..frames import now_us
 from ..harness.wiring import Harness, Range, StreamWiring
@@ -94,7 +93,7 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
 
 
 def _is_serial(port: str) -> bool:
-    return port.startswith("rfc2217:") or not (port == "-" or re.match("[a-z0-9]+:", port))
+    return not (port == "-" or re.match("[a-z0-9]+:", port))
 
 
 def _no_rows(bare: StreamWiring, reader: RowReader) -> str:
@@ -181,29 +180,13 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], every: str, r
     return Proposal(stream, tuple(heard), len(came), tuple(remarks))
 
 
-class _Again(RowReader):
-    """Rows that came before."""
-
-    def __init__(self, came: Sequence[tuple[int, Row]]) -> None:
-        self._rows = [row._replace(came_us=time_us) for time_us, row in came]
-
-    def open(self) -> None:
-        """Do nothing."""
-
-    def read(self, timeout_s: float) -> Sequence[Row]:
-        """Return all rows."""
-        return self._rows
-
-    def close(self) -> None:
-        """Do nothing."""
-
-
 def _faults(stream: StreamWiring, came: Sequence[tuple[int, Row]]) -> str:
     """Return the counts of faults that a run with this stream would have had with these rows."""
     harness = Harness(name="glove", streams=(stream,))
     scan = whole_scan(harness, harness.switches, every_taxel=True)
-    source = RowSource(_Again(came), harness, 0, harness.switches, scan)
-    source.read(0.0)
+    source = RowSource(reader_of(stream), harness, 0, harness.switches, scan)
+    for time_us, row in came:
+        source.take(row, time_us)
     return source.faults()
 
 

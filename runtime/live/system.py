@@ -1,8 +1,9 @@
 """A build and a harness combined: the devices, and the recogniser of their frames."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+
+from msgspec import Struct
 
 from thenar.drivers.calibration import GloveCalibration
 
@@ -11,7 +12,6 @@ from ..calibration import Meaning, load_calibration, numbers_of, place_of
 from ..harness.wiring import Harness, StreamWiring
 from ..policy import Policy
 from ..scanning.plan import check_harness, plan_scan
-from ..scanning.propose import own_joints
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
 from ..taxels import calibration_of, in_counts
@@ -28,12 +28,13 @@ def unread_joints(harness: Harness, scan: ScanMap, joints: Sequence[str]) -> str
         for joint in joints if harness.joint_device is not None else ():
             place_of(joint, harness.sensor_names)
         return ""
+    from ..scanning.propose import own_joints
+
     how = own_joints(list(joints)) or "add the [cyberglove] that measures them"
     return f"nothing in {harness.name!r} reads the build's joints, and every grasp is degraded: {how}"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LiveSystem:
+class LiveSystem(Struct, frozen=True, eq=False):
     """The running system: `scan` is the build's own map, or one that was planned for the harness now."""
 
     build: Build

@@ -86,82 +86,44 @@ class Rounding:
 class _Pairs:
     """The maximal loss of every ordered pair of classes: the sum over inputs of the largest difference of errors.
 
-    Errors have a hundred bits and more, and a thousand classes have a million pairs. So errors are cut into parts small
-    enough for sums of differences to fit machine words. The first parts alone bound every loss to within one unit per
-    input on either side; the few pairs that may have the maximum are then computed with all parts.
+    Errors have a hundred bits and more, and a thousand classes have a million pairs. So errors are cut so far that sums
+    of differences fit machine words, which bounds every loss to within one unit per input on either side; the few pairs
+    that may have the maximum are then computed exactly.
     """
 
     def __init__(self, errors: list[Exact]) -> None:
         """Take the errors (c, K) of all inputs, c choices each."""
-        self._inputs, self._n_classes = len(errors), errors[0].shape[1]
-        self._bits = 61 - self._inputs.bit_length()
+        self._errors, n_classes = errors, errors[0].shape[1]
         longest = max(max(int(each.max()), -int(each.min())).bit_length() for each in errors)
-        # Zeros behind all errors, so that the first part is a full one.
-        self._padding = -(longest + 1) % self._bits
-        self._shifts = range(longest + 1 + self._padding - self._bits, -1, -self._bits)
-        self._parts = [self._cut(each << self._padding) for each in errors]
-        by_choices: dict[int, list[NDArray[np.int64]]] = {}
-        for parts in self._parts:
-            by_choices.setdefault(parts.shape[1], []).append(parts)
-        self._alike = [np.stack(group, axis=1) for group in by_choices.values()]
-        self._first = np.stack([self._losses(k, slice(None), 1)[0] for k in range(self._n_classes)])
+        self._shift = max(longest + 1 - (61 - len(errors).bit_length()), 0)
+        self._first = np.zeros((n_classes, n_classes), np.int64)
+        for exact in errors:
+            cut = (exact >> self._shift).astype(np.int64)
+            at_once = max(1, _WORDS // cut.size)
+            for start in range(0, n_classes, at_once):
+                leaders = slice(start, start + at_once)
+                self._first[leaders] += (cut[:, leaders, np.newaxis] - cut[:, np.newaxis]).max(axis=0)
 
     def taken(self, leader: int, competitor: int) -> list[list[int]]:
         """Return by how much each choice of each input lowers the lead of `leader` over `competitor`."""
-        return [self._whole(parts[:, :, leader] - parts[:, :, competitor]) for parts in self._parts]
+        return [(each[:, leader] - each[:, competitor]).tolist() for each in self._errors]
 
     def greatest(self, tie: int) -> tuple[int, int, int]:
         """Return the greatest loss, its leader and its competitor: the first such pair.
 
         The loss counts `tie` less where the competitor has the higher number.
         """
-        classes = np.arange(self._n_classes)
+        classes = np.arange(len(self._first))
         # Sums are below 2^61: what is a quarter of a word off is further off than any two of them.
-        off = min(tie << self._padding >> self._shifts[0], 1 << 62)
+        off = min(tie >> self._shift, 1 << 62)
         near = self._first - off * (classes[:, np.newaxis] < classes)
         np.fill_diagonal(near, np.iinfo(np.int64).min)
-        likely = near >= int(near.max()) - 2 * self._inputs - 2
-        found = []
-        for leader in np.flatnonzero(likely.any(axis=1)).tolist():
-            competitors = np.flatnonzero(likely[leader])
-            losses = self._whole(self._losses(leader, competitors, len(self._shifts)))
-            pairs = zip(losses, competitors.tolist(), strict=True)
-            found += [(loss - tie * (leader < competitor), leader, competitor) for loss, competitor in pairs]
+        likely: list[list[int]] = np.argwhere(near >= int(near.max()) - 2 * len(self._errors) - 2).tolist()
+        found = [
+            (sum(map(max, self.taken(leader, competitor))) - tie * (leader < competitor), leader, competitor)
+            for leader, competitor in likely
+        ]
         return max(found, key=lambda pair: pair[0])
-
-    def _losses(self, leader: int, competitors: slice | NDArray[np.intp], parts: int) -> NDArray[np.int64]:
-        """Return the losses of `leader` to m competitors in their first parts, (parts, m); only the first is signed."""
-        totals = np.zeros((parts, len(np.arange(self._n_classes)[competitors])), np.int64)
-        for group in self._alike:
-            at_once = max(1, _WORDS // (group.shape[2] * totals.shape[1]))
-            for start in range(0, group.shape[1], at_once):
-                piece = group[:parts, start : start + at_once]
-                apart = self._carried(piece[..., leader, np.newaxis] - piece[..., competitors])
-                for part, differences in enumerate(apart):
-                    most = differences.max(axis=1, keepdims=True)
-                    totals[part] += most.sum(axis=(0, 1))
-                    for later in apart[part + 1 :]:
-                        # What is less in an earlier part is less: below anything that a later part can be.
-                        later[differences < most] = -1
-        return self._carried(totals)
-
-    def _cut(self, errors: Exact) -> NDArray[np.int64]:
-        """Return the parts (parts, c, K) of errors (c, K): the first with the sign, the others at least 0."""
-        first, *others = self._shifts
-        parts = [errors >> first, *(errors >> shift & (1 << self._bits) - 1 for shift in others)]
-        return np.array(parts, np.int64)
-
-    def _carried(self, parts: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Bring all parts but the first back to 0 or more and below 2^bits, in place."""
-        for part in range(len(parts) - 1, 0, -1):
-            parts[part - 1] += parts[part] >> self._bits
-            parts[part] &= (1 << self._bits) - 1
-        return parts
-
-    def _whole(self, parts: NDArray[np.int64]) -> list[int]:
-        """Return the whole numbers of all parts (parts, m)."""
-        padded = (zip(self._shifts, column, strict=True) for column in zip(*parts.tolist(), strict=True))
-        return [sum(part << shift for shift, part in column) >> self._padding for column in padded]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,9 +20,6 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -37,6 +34,8 @@ from ..toml_source import Place, TomlText, read_source
 from ..toml_struct import check_finite, convert
 
 if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
+
     from ..build import Build
 
 
@@ -75,6 +74,8 @@ class PreshapeTable:
         if not missing:
             return ""
         spare = [grasp for grasp in self.chosen if grasp not in wanted]
+        from difflib import get_close_matches  # for messages only
+
         likely = {grasp: get_close_matches(grasp, spare, n=1, cutoff=0.8) for grasp in missing}
         if len(missing) == len(wanted) and not any(likely.values()):
             raise SettingError(
@@ -203,8 +204,10 @@ def preshape_selector(
     return PreshapeSelector(table, segments=by_segments, change_while_held=change_while_held), table.check(build.grasps)
 
 
-def _find(name: str | os.PathLike[str]) -> Traversable:
+def _find(name: str | os.PathLike[str]) -> "Traversable":
     if name in SHIPPED:
+        from importlib.resources import files
+
         return files(__package__) / "tables" / f"{name}.toml"
     path = Path(name)
     if not path.exists():

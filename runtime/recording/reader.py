@@ -7,7 +7,7 @@ anywhere, it is scanned once (`Index`), most of its messages undecoded.
 from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from struct import Struct, pack
 from typing import Any
@@ -139,7 +139,7 @@ class EntryDecoder:
         if channel == layout.SWITCHES:
             frame = layout.switch_frame(time_us, layout.decode_bytes(data), len(session.switches), len(session.sensors))
             coded_us, codes = self._codes
-            return frame if coded_us != time_us else replace(frame, taxels=codes)
+            return frame if coded_us != time_us else msgspec.structs.replace(frame, taxels=codes)
         if channel == layout.GLOVE:
             return layout.glove_frame(time_us, layout.decode_bytes(data), len(session.sensors))
         return _from_json(channel, layout.decode_text(data))

@@ -13,10 +13,9 @@ from math import fsum
 
 from msgspec import Struct
 
-from thenar.drivers import cyberglove_protocol as glove_protocol
-from thenar.drivers.cyberglove_protocol import sending_us, shortest_us
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import Conversion, Reading
+from thenar.drivers.serial_line import sending_us
 from thenar.drivers.spi.chips import SELECT_US, Transfer
 
 from ..harness.wiring import GloveWiring, Harness, MuxChannel
@@ -183,16 +182,15 @@ def glove_us(glove: GloveWiring, sensors: int) -> float:
     """Return the shortest period of a CyberGlove's records of `sensors` sensors, in microseconds.
 
     It is the vendor's formula (`shortest_us`), scaled by the ratio of the measured `record_us` for all sensors to it;
-    and no less than the period of requests. An unknown rate counts as 115200 baud. A requested record also includes the
-    byte of the request.
+    and no less than the requested period. An unknown rate counts as 115200 baud.
     """
+    from thenar.drivers.cyberglove_protocol import shortest_us  # for gloves with one
+
     baud = _BAUD if glove.baud == "auto" else glove.baud
-    asking_us = 0.0 if glove.mode == "stream" else sending_us(len(glove_protocol.POLL), baud)
     filtered = bool(glove.filter)
     us = shortest_us(sensors, baud, status=True, filtered=filtered)
     if glove.record_us is not None:
         us *= glove.record_us / shortest_us(glove.all_sensors, baud, status=True, filtered=filtered)
-    us += asking_us
     return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
 
 

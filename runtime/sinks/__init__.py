@@ -1,7 +1,6 @@
 """The sinks for recognised grasps: one file per kind, found by the registry `SINKS`."""
 
 from ..published import JointAngles
-from ..task import ProgressLine
 from .base import SINKS, Fanout, Sink, SinkError, SinkKind, SinkPlace, SinkReport, open_sink
 from .jsonl import DetailLine, GraspLine, HeaderLine, HealthLine, JsonLines, Line
 from .sockets import SocketLines
@@ -16,7 +15,6 @@ __all__ = [
     "JointAngles",
     "JsonLines",
     "Line",
-    "ProgressLine",
     "Sink",
     "SinkError",
     "SinkKind",

@@ -17,7 +17,6 @@ from thenar.drivers.members import Members
 from ..names import shortened
 from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp, OutputTrouble
-from ..task import Progress
 from ..writer_thread import WriterThread
 
 if TYPE_CHECKING:
@@ -85,9 +84,6 @@ class Sink(ABC):
 
     def health(self, report: HealthReport) -> None:  # noqa: B027
         """Send the glove's health, about once a second."""
-
-    def task(self, progress: Progress) -> None:  # noqa: B027
-        """Send the hand's progress in a task, at the first frame and whenever it changes."""
 
     def report(self) -> SinkReport:
         """Return the state of the sink itself."""
@@ -332,10 +328,6 @@ class Fanout:
     def health(self, report: HealthReport) -> None:
         """Send the glove's health to all sinks that work."""
         self._all(lambda sink: sink.health(report), LATE_US)
-
-    def task(self, progress: Progress) -> None:
-        """Send the hand's progress to all sinks that work."""
-        self._all(lambda sink: sink.task(progress))
 
     def troubles(self) -> tuple[OutputTrouble, ...]:
         """Return the sinks that take nothing now, and why."""

@@ -5,7 +5,6 @@
     /thenar/switches  names of the switches that are closed or lost, with `grasp`
     /thenar/joints    angles of calibrated joints in rad, and the codes that are scored, with `grasp`
     /thenar/preshape  the preshape, on change, and once a second with a grasp
-    /thenar/task      if a task is followed: its step, in the same way
     /thenar/health    once a second, if requested: the glove's health
 
 A grasp comes on change and 50 times a second, unless the sink's options set another pace. A message has the time of its
@@ -27,7 +26,6 @@ from thenar.drivers.extras import optional
 
 from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
-from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 from .sockets import check_readers, resolve
 
@@ -44,7 +42,6 @@ BACKLOG = 512
 TOPICS: dict[str, type[msgspec.Struct]] = {
     "/thenar/grasp": LiveGrasp,
     "/thenar/preshape": Preshape,
-    "/thenar/task": Progress,
     "/thenar/health": HealthReport,
 }
 # The details of a grasp: fields and their types; a list has the type of its items.
@@ -138,7 +135,7 @@ class FoxgloveServer(Sink):
         self.port: int = self._server.port
         self._closed = False
         self._repeated_us = self._unix_us = self._time_us = 0
-        # Preshape and task, by topic: late readers get them within a second.
+        # By topic: late readers get them within a second.
         self._kept: dict[str, msgspec.Struct] = {}
         self._build: Build | None = None
         self._sent = self._lost = 0
@@ -170,10 +167,6 @@ class FoxgloveServer(Sink):
     def health(self, report: HealthReport) -> None:
         """Publish the glove's health."""
         self._log("/thenar/health", report, report.time_us - self._time_us)
-
-    def task(self, progress: Progress) -> None:
-        """Publish the hand's progress."""
-        self._keep("/thenar/task", progress)
 
     def _keep(self, topic: str, content: msgspec.Struct) -> None:
         self._kept[topic] = content

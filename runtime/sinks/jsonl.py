@@ -1,7 +1,7 @@
 """JSON lines to a file: stdout, a pipe, a file on disk, or anything else that takes bytes.
 
-Lines describe grasps, and now and then the glove's health and the hand's progress in a task. A header before the first
-line with angles, and wherever the joints change, names the joints. Readers distinguish lines by `kind`; msgspec does so
+Lines describe grasps, and now and then the glove's health. A header before the first line with angles, and wherever the
+joints change, names the joints. Readers distinguish lines by `kind`; msgspec does so
 automatically: `msgspec.json.decode(line, type=Line)`.
 
 A line is sent whole or not at all.
@@ -21,7 +21,6 @@ from msgspec import json, structs
 from ..detail import Detail
 from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
-from ..task import Progress, ProgressLine
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 
@@ -52,7 +51,7 @@ class HealthLine(HealthReport, frozen=True, tag_field="kind", tag="health"):
     """The fields of `HealthReport`."""
 
 
-Line = HeaderLine | GraspLine | DetailLine | HealthLine | ProgressLine
+Line = HeaderLine | GraspLine | DetailLine | HealthLine
 
 # While nothing changes, in a live run.
 _RATE_HZ = 10
@@ -88,11 +87,6 @@ def encode_health(report: HealthReport) -> bytes:
     return _encode(HealthLine(**{name: getattr(report, name) for name in report.__struct_fields__})) + b"\n"
 
 
-def encode_task(progress: Progress) -> bytes:
-    """Return the line of a task's progress, including its newline."""
-    return _encode(ProgressLine(**structs.asdict(progress))) + b"\n"
-
-
 class JsonLines(Sink):
     """Writes the lines to `file`, and waits for a slow reader, in a live run on its own thread (`Fanout`).
 
@@ -120,10 +114,6 @@ class JsonLines(Sink):
     def health(self, report: HealthReport) -> None:
         """Write one line, or lose it."""
         self._send(encode_health(report))
-
-    def task(self, progress: Progress) -> None:
-        """Write one line, or lose it."""
-        self._send(encode_task(progress))
 
     def _send(self, line: bytes) -> None:
         """Write the rest of a line that a full disk cut, then this line, or lose it."""

@@ -4,11 +4,10 @@
     NAMESPACE/segment   diagnostic_msgs/DiagnosticArray  the same with its stamp, probability, state, segment and health
     NAMESPACE/preshape  trajectory_msgs/JointTrajectory  when it changes
     NAMESPACE/angles    sensor_msgs/JointState           the glove's calibrated joints, in rad
-    NAMESPACE/task      diagnostic_msgs/DiagnosticArray  if a task is followed: its step, on change
     NAMESPACE/health    std_msgs/String                  once a second, if requested: the glove's health, as JSON
 
 Grasp, segment and angles are published on change and 20 times a second, unless the sink's options set another pace.
-Reliable, with the last 10 kept, which serves reliable and best-effort readers alike. Grasp, segment, preshape and task
+Reliable, with the last 10 kept, which serves reliable and best-effort readers alike. Grasp, segment and preshape
 are transient local: late readers get the newest at once. Nodes of this machine can read, others if CYCLONEDDS_URI or
 `?public` allows them; ROS_DOMAIN_ID sets the domain, as for a ROS 2 node.
 """
@@ -21,7 +20,6 @@ from thenar.drivers.extras import optional
 
 from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
-from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 _RATE_HZ = 20
@@ -48,7 +46,6 @@ class RosTopics(Sink):
             self._grasp = ros.writer(participant, f"{name}/grasp", ros.String, kept=True)
             self._segment = ros.writer(participant, f"{name}/segment", ros.DiagnosticArray, kept=True)
             self._preshape = ros.writer(participant, f"{name}/preshape", ros.JointTrajectory, kept=True)
-            self._task = ros.writer(participant, f"{name}/task", ros.DiagnosticArray, kept=True)
             self._angles = ros.writer(participant, f"{name}/angles", ros.JointState)
             self._health = ros.writer(participant, f"{name}/health", ros.String)
         except DDSException as reason:
@@ -63,21 +60,16 @@ class RosTopics(Sink):
             ) from None
         self._closed = False
         self._told: Preshape | None = None
-        self._sent = self._lost = self._unix_us = 0
+        self._sent = self._lost = 0
         self._error = ""
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish everything, but the preshape only if it changed."""
-        self._unix_us = grasp.unix_us
         self._try(lambda: self._write(grasp, preshape, angles))
 
     def health(self, report: HealthReport) -> None:
         """Publish the glove's health."""
         self._try(lambda: self._health.write(self._ros.String(json.encode(report).decode())))
-
-    def task(self, progress: Progress) -> None:
-        """Publish the hand's progress, with the stamp of the newest frame."""
-        self._try(lambda: self._task.write(self._ros.task(self._name, self._unix_us, progress)))
 
     def _try(self, write: Callable[[], None]) -> None:
         if self._closed:
@@ -110,7 +102,7 @@ class RosTopics(Sink):
         if not self._closed:
             self._closed = True
             # Each entity ends with its last name; the domain, which ends all that is left in it, goes last.
-            del self._grasp, self._segment, self._preshape, self._task, self._angles, self._health
+            del self._grasp, self._segment, self._preshape, self._angles, self._health
             del self._domain
 
 

@@ -25,9 +25,8 @@ from thenar.drivers.errors import SettingError
 from ..detail import Details
 from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
-from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkReport
-from .jsonl import encode, encode_detail, encode_header, encode_health, encode_task
+from .jsonl import encode, encode_detail, encode_header, encode_health
 
 if TYPE_CHECKING:
     from ..build import Build
@@ -107,11 +106,6 @@ class SocketLines(Sink):
         self._accept_clients()
         if self._readers:
             self._send_all(encode_health(report))
-
-    def task(self, progress: Progress) -> None:
-        """Send every reader the progress's line."""
-        if self._readers:
-            self._send_all(encode_task(progress))
 
     def _accept_clients(self) -> None:
         if self._listener.fileno() < 0 or not self._listener_poll.poll(0):

@@ -34,7 +34,6 @@ class GloveDevice(Source):
         return CyberGlove(
             wiring.port,
             baud=None if wiring.baud == "auto" else wiring.baud,
-            mode=wiring.mode,
             rate_hz=wiring.rate_hz,
             sensors=self.sensors,
             only=only,

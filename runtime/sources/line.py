@@ -1,6 +1,6 @@
 """Lines of a board or a program: CSV, JSON or name:value, over serial, TCP, UDP, a Unix socket, stdin, a WebSocket."""
 
-from thenar.drivers.line_reader import LineReader
+from thenar.drivers.lines import LineReader
 
 from ..harness.wiring import StreamWiring
 from .rows import row_kinds

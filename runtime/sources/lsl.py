@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.line_reader import RowReader
-from thenar.drivers.lines import Row, finite
+from thenar.drivers.lines import Row, RowReader, finite
 from thenar.drivers.lsl import load_pylsl
 
 from ..harness.wiring import StreamWiring

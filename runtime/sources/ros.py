@@ -14,8 +14,7 @@ from typing import Any
 
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.extras import optional
-from thenar.drivers.line_reader import RowReader
-from thenar.drivers.lines import LineCounts, Row, finite
+from thenar.drivers.lines import LineCounts, Row, RowReader, finite
 from thenar.drivers.names import shortened
 from thenar.drivers.senders import FirstSender
 

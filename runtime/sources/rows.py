@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from thenar.drivers.line_reader import RowReader
-from thenar.drivers.lines import SEQUENCES, Row
+from thenar.drivers.lines import SEQUENCES, Row, RowReader
 from thenar.drivers.senders import SILENCE_US
 
 from ..frames import PERIODS, GloveFrame, Mask, SwitchFrame, now_us
@@ -283,10 +282,11 @@ class RowSource(Source):
             rows = self.reader.read(timeout_s)
             read_us = now_us()
             for row in rows:
-                self._take(row, read_us if row.came_us is None else row.came_us)
+                self.take(row, read_us if row.came_us is None else row.came_us)
         return self._ready.popleft() if self._ready else None
 
-    def _take(self, row: Row, came_us: int) -> None:
+    def take(self, row: Row, came_us: int) -> None:
+        """Take a row that came at this time: its frames are then ready."""
         values, counts = self._columns.of(row), self.watch.counts
         if values is None:
             counts.wrong_columns += 1
@@ -476,8 +476,7 @@ def stream_period_us(wiring: StreamWiring) -> int:
     return max(SHORTEST_US, wiring.period_us) + _WAY_US // PERIODS
 
 
-@dataclass(frozen=True, slots=True)
-class RowKind(SourceKind):
+class RowKind(SourceKind, frozen=True):
     """A kind of source that delivers rows.
 
     takes   whether it opens a port of this text; of several kinds the first by rank does

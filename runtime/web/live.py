@@ -72,7 +72,6 @@ class LivePage(Closing):
     def __init__(self, glove: Glove, folder: Path, address: str, *, token: str | None, recordings: Path) -> None:
         self._glove, self._frames = glove, FrameText(glove.system.build, glove.system.harness)
         self._health: HealthReport | None = None
-        self._progress: object = None
         self._past = Past()
         self._recordings = Recordings(glove, recordings, self._tell_recording)
         manifest, name = glove.system.build.manifest, glove.system.harness.name
@@ -92,9 +91,6 @@ class LivePage(Closing):
             self._health = glove.health
             self.server.publish("health", partial(message, "health", self._health))
             self._tell_recording()
-        if glove.follower is not None and glove.follower.progress is not self._progress:
-            self._progress = glove.follower.progress
-            self.server.publish("task", partial(message, "task", text=glove.follower.progress.text))
         self._recordings.step()
 
     @property

@@ -18,7 +18,6 @@ from thenar.runtime import Build
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.preshape import load_preshapes
-from thenar.runtime.task import load_task
 from thenar.runtime.toml_source import read_source
 from thenar.simulator import load_scene
 
@@ -42,11 +41,6 @@ FILES = {
     "role of columns": ("columns.toml", f"label = {QUOTED}\n", "import {set}.csv --columns {file} -o {new}"),
     "head of a table": ("table.csv", TABLE, "import {file} --yes -o {new}"),
     "label of a table": ("table.csv", f"grasp,a\n{EVIL},1\ncup,0\n", "import {file} --yes -o {new}"),
-    "field of a task": (
-        "task.json",
-        json.dumps({EVIL: 1}, ensure_ascii=False),
-        "run {build} --glove {good} --task {file}",
-    ),
     "key of preshapes": ("hand.toml", f"{QUOTED} = 1\n", "run {build} --glove {good} --preshapes {file}"),
     "key of a scene": ("scene.toml", f"{QUOTED} = 1\n", "simulate {file} -o {new}"),
     "effect of a scene": ("scene.toml", f"[effects]\n{QUOTED} = 1\n", "simulate {file} -o {new}"),
@@ -92,7 +86,6 @@ LOADERS: dict[str, Callable[[Path], object]] = {
     "key of a glove": load_harness,
     "glove that is no TOML": lambda path: read_source(path, HarnessError).tables(),
     "key of columns": read_columns,
-    "field of a task": load_task,
     "key of preshapes": load_preshapes,
     "effect of a scene": lambda path: load_scene(str(path)),
     "key of a layout": load_layout,

@@ -9,7 +9,6 @@ from rich.console import Console
 
 from thenar.cli.live_view import LiveView, drawn
 from thenar.runtime.published import DeviceHealth, Health, HealthReport, LiveGrasp, OutputTrouble, Quarantined
-from thenar.runtime.task import Progress
 
 LONG_S = 10.0
 
@@ -65,14 +64,6 @@ def picture(grasp: LiveGrasp, devices: Sequence[DeviceHealth] = (), lines: Seque
 def test_the_picture_says_which_segment_it_is_and_since_when() -> None:
     held = replace(grasp("Tripod"), time_us=3_000_000, state="held", segment=7, segment_type="Tripod")
     assert "segment 7, Tripod: held, 1.5 s" in picture(replace(held, segment_us=1_500_000))
-
-
-def test_the_view_shows_the_step_of_the_task_and_deviations() -> None:
-    terminal = Terminal()
-    progress = Progress(2, 3, "rod", ("cup",), "skipped", "skipped: pen")
-    with view_on(terminal) as view:
-        view.show(grasp("rod"), nobody, None, progress)
-        terminal.until("step 2 of 3, rod held; next cup. skipped: pen")
 
 
 def test_the_view_shows_grasp_certainty_and_state_of_every_device() -> None:

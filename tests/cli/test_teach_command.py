@@ -1,25 +1,20 @@
-"""`thenar teach`, and `thenar run --task`: a task from recorded demonstrations, and hands that follow it or do not."""
+"""`thenar teach`: a task from recorded demonstrations."""
 
 import json
 import subprocess
 from collections.abc import Callable, Container, Sequence
 from pathlib import Path
-from threading import Event
 
-import msgspec
 import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, Joint, compile_build
-from thenar.drivers.errors import SettingError
-from thenar.runtime import Build, Glove
+from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.live.sources import Snapshot
 from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.recording.session import Session
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.sinks import GraspLine, HealthLine, ProgressLine
 
 from ..sets import grasp_set_of
 
@@ -118,13 +113,7 @@ def demos(build: Path, tmp_path: Path) -> list[Path]:
     return [record(build, tmp_path / f"demo{number}.mcap", states(types)) for number, types in every]
 
 
-def progress_of(done: subprocess.CompletedProcess[str]) -> list[ProgressLine]:
-    assert done.returncode == 0, done.stderr
-    lines = msgspec.json.Decoder(GraspLine | HealthLine | ProgressLine).decode_lines(done.stdout.encode())
-    return [line for line in lines if isinstance(line, ProgressLine)]
-
-
-def test_a_demonstration_follows_its_own_task_to_the_end(
+def test_demonstrations_have_their_steps_in_common(
     thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path
 ) -> None:
     (tmp_path / "gripper.toml").write_text(GRIPPER)
@@ -155,37 +144,6 @@ def test_a_demonstration_follows_its_own_task_to_the_end(
         ["rod"],
         [],
     ]
-    done = thenar("run", build, "--replay", demos[0], "--task", task)
-    news = progress_of(done)
-    assert news[0].expected == ("cup",)
-    assert [(each.step, each.grasp, each.done) for each in news] == [
-        (0, "none", False),
-        (1, "cup", False),
-        (1, "none", False),
-        (2, "pen", False),
-        (2, "none", False),
-        (3, "rod", False),
-        (3, "none", True),
-    ]
-    assert not any(each.deviation for each in news)
-    assert "frames recognised as they were recorded\ntask is done" in done.stderr
-    sent = thenar("run", build, "--replay", demos[0], "--task", task, "--sink", f"jsonl:{tmp_path / 'lines'}")
-    assert (sent.returncode, (tmp_path / "lines").read_text()) == (0, done.stdout)
-
-
-def test_what_deviates_is_said(thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path) -> None:
-    task = tmp_path / "task.json"
-    assert thenar("teach", *demos[:2], "-b", build, "-o", task).returncode == 0
-    for types, held, deviations, last in (
-        ("cr", 40, ["", "skipped"], "task is done. skipped: pen"),
-        ("pc", 40, ["skipped", "unexpected"], "step 2 of 3; next rod. cup is unexpected: rod was expected"),
-        ("cp", 95, ["too long", "too long"], "step 2 of 3; next rod. pen is held for longer than"),
-    ):
-        path = record(build, tmp_path / f"{types}.mcap", states(types, held))
-        done = thenar("run", build, "--replay", path, "--task", task)
-        ended = [each for each in progress_of(done)[1:] if each.grasp == "none"]
-        assert [each.deviation for each in ended] == deviations
-        assert last in done.stderr
 
 
 def test_what_teaches_nothing_is_refused(thenar: Thenar, build: Path, set_file: Path, tmp_path: Path) -> None:
@@ -196,8 +154,6 @@ def test_what_teaches_nothing_is_refused(thenar: Thenar, build: Path, set_file: 
         (("teach", empty, *task), "empty.mcap shows no grasp"),
         (("teach", static, *task), "each row of the set is a separate trial"),
         (("teach", set_file, *task), "the recordings lack 1 input of the build: bend"),
-        (("run", build, "--replay", set_file, "--task", set_file), "--task has no effect for a set of grasps"),
-        (("run", build, "--replay", empty, "--task", empty), "is not a task of `thenar teach`"),
     ):
         done = thenar(*asked)
         assert (done.returncode, done.stdout) == (2, "")
@@ -207,49 +163,6 @@ def test_what_teaches_nothing_is_refused(thenar: Thenar, build: Path, set_file: 
     done = thenar("teach", empty, *task)
     assert "task.xml already exists" in done.stderr
     assert not (tmp_path / "task.json").exists()
-
-
-class Played:
-    """A feed of what is held, 10 ms a frame, that ends the run."""
-
-    def __init__(self, build: Path, held: list[int], stop: Event) -> None:
-        self._kept = [switch.column for switch in Build.load(build).manifest.switches]
-        self._held, self._stop, self._frames = held, stop, 0
-
-    def take(self) -> Snapshot:
-        time_us, (closed, code) = 10_000 * self._frames, readings(self._held[self._frames])
-        self._frames += 1
-        if self._frames == len(self._held):
-            self._stop.set()
-        glove = GloveFrame(time_us, bytes([code]) + bytes(17), 3)
-        switches = SwitchFrame(time_us, sum(1 << bit for bit, column in enumerate(self._kept) if closed >> column & 1))
-        return Snapshot(time_us, switches, glove, (), glove)
-
-
-def test_a_live_glove_reports_task_steps_to_view_and_sinks(
-    thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path
-) -> None:
-    assert thenar("teach", *demos[:1], "-b", build, "-o", tmp_path / "task.json").returncode == 0
-    stop, lines = Event(), tmp_path / "lines"
-    harness = parse_harness(GLOVE, "glove.toml")
-    feed = Played(build, states("cpr"), stop)
-    with Glove(build, harness, task=tmp_path / "task.json", sinks=(f"jsonl:{lines}",), stop=stop, feed=feed) as glove:
-        for _ in glove:
-            pass
-        assert glove.follower is not None
-        assert glove.follower.progress.text == "task is done"
-    sent = msgspec.json.Decoder(GraspLine | HealthLine | ProgressLine).decode_lines(lines.read_bytes())
-    news = [line for line in sent if isinstance(line, ProgressLine)]
-    assert [(each.step, each.grasp) for each in news if each.grasp != "none"] == [(1, "cup"), (2, "pen"), (3, "rod")]
-    assert msgspec.structs.asdict(news[-1]) == msgspec.structs.asdict(glove.follower.progress)
-    other = compile_build(_without_pens(), tmp_path / "other", rounds=3, folds=0).folder
-    with pytest.raises(SettingError, match="task task: the build does not recognise pen"):
-        Glove(other, harness, task=tmp_path / "task.json")
-
-
-def _without_pens() -> GraspSet:
-    labels = np.array(states("crcrcr"))
-    return grasps_of(labels).rows(np.flatnonzero(labels != 3))
 
 
 @pytest.mark.parametrize("lag", [(), ("--lag-ms", "150")])

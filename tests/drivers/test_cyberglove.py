@@ -41,11 +41,10 @@ def read(glove: CyberGlove, wanted: Callable[[Record], bool] = lambda record: Tr
 
 
 @pytest.mark.parametrize("sensors", [18, 22])
-@pytest.mark.parametrize("mode", ["stream", "poll"])
-def test_a_glove_is_found_and_read(line: PtyLine, sensors: int, mode: str) -> None:
+def test_a_glove_is_found_and_read(line: PtyLine, sensors: int) -> None:
     with EmulatedCyberGlove(line, sensors=sensors, text="CyberGlove 2.4") as emulated:
         emulated.set(VALUES[sensors])
-        glove = CyberGlove(str(line.link), mode="poll" if mode == "poll" else "stream")
+        glove = CyberGlove(str(line.link))
         info = glove.open()
         assert (info.sensors, info.baud, info.right_hand) == (sensors, 115_200, True)
         assert info.names == {18: SENSORS_18, 22: SENSORS_22}[sensors]
@@ -54,8 +53,8 @@ def test_a_glove_is_found_and_read(line: PtyLine, sensors: int, mode: str) -> No
         assert info.status
         assert info.notes == ()
         for _ in range(5):
-            assert read(glove) == Record(VALUES[sensors], streamed=mode == "stream", status=0x81)
-        assert emulated.box.streaming == (mode == "stream")
+            assert read(glove) == Record(VALUES[sensors], status=0x81)
+        assert emulated.box.streaming
         glove.close()
 
 
@@ -113,36 +112,6 @@ def test_records_that_waited_keep_their_age(line: PtyLine, count: int) -> None:
     assert times[0] < held_up_us - (count - 20) * 10_000
     middle = times[10 : count - 10]
     assert {later - earlier for earlier, later in pairwise(middle)} == {10_000}
-
-
-def test_a_polled_record_that_is_read_late_is_not_taken_for_new(line: PtyLine) -> None:
-    with EmulatedCyberGlove(line), CyberGlove(str(line.link), mode="poll") as glove:
-        read(glove)
-        assert glove.read(0.0) is None  # but it is asked for now
-        asked_us = monotonic_ns() // 1000
-        threading.Event().wait(0.6)  # the host is held up
-        timed = glove.read(SOON_S)
-        assert timed is not None
-        assert timed[0] <= asked_us + 200_000
-
-
-@pytest.mark.parametrize("rate_hz", [None, 100.0])
-def test_polls_keep_to_the_rate(line: PtyLine, rate_hz: float | None) -> None:
-    with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link), mode="poll", rate_hz=rate_hz) as glove:
-        began = monotonic()
-        for _ in range(20):
-            read(glove)
-        assert monotonic() - began >= 19 * (0.01 if rate_hz else 0.0063)
-        assert emulated.records == 20
-
-
-def test_a_lost_poll_is_asked_again(line: PtyLine) -> None:
-    with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link), mode="poll") as glove:
-        read(glove)
-        lost = iter([b""])
-        line.damage = lambda message: next(lost, message)
-        read(glove)
-        assert emulated.records == 3
 
 
 def test_a_glove_that_is_unplugged_and_plugged_in_again_says_so(line: PtyLine) -> None:
@@ -314,10 +283,9 @@ def test_a_silent_glove_without_its_node_was_unplugged(line: PtyLine) -> None:
             read(glove, lambda _: False)
 
 
-@pytest.mark.parametrize("mode", ["stream", "poll"])
-def test_a_silent_glove_is_dead_after_half_a_second(line: PtyLine, mode: str) -> None:
+def test_a_silent_glove_is_dead_after_half_a_second(line: PtyLine) -> None:
     emulated = EmulatedCyberGlove(line)
-    with CyberGlove(str(line.link), mode="poll" if mode == "poll" else "stream") as glove:
+    with CyberGlove(str(line.link)) as glove:
         read(glove)
         emulated.close()
         began = monotonic()
@@ -404,14 +372,11 @@ def test_a_leftover_mask_is_removed_or_the_glove_refused(
 
 
 @pytest.mark.parametrize("sensors", [18, 22])
-@pytest.mark.parametrize("mode", ["stream", "poll"])
-def test_only_requested_sensors_are_sent_until_it_is_closed(
-    line: PtyLine, sensors: int, mode: Literal["stream", "poll"]
-) -> None:
+def test_only_requested_sensors_are_sent_until_it_is_closed(line: PtyLine, sensors: int) -> None:
     some, names = (17, 4, 5), {18: SENSORS_18, 22: SENSORS_22}[sensors]
     with EmulatedCyberGlove(line, sensors=sensors) as emulated:
         emulated.set(VALUES[sensors])
-        with CyberGlove(str(line.link), mode=mode, only=some) as glove:
+        with CyberGlove(str(line.link), only=some) as glove:
             for _ in range(3):
                 assert read(glove).sensors == bytes(VALUES[sensors][place] for place in sorted(some))
             assert glove.ask("M") == mask_of([names[place] for place in some])

@@ -5,13 +5,10 @@ import socket
 import threading
 import tty
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
 
 import pytest
-import serial
-import serial.rfc2217
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -158,73 +155,6 @@ def test_nobody_listening_is_told_as_such() -> None:
         port = server.getsockname()[1]
     with pytest.raises(DeviceError, match="refused"):
         SerialLine(f"socket://127.0.0.1:{port}", 115_200)
-
-
-class PlainSerial(serial.Serial):
-    """A pty has no modem lines, which the redirector reads and sets."""
-
-    cts = dsr = True
-    ri = cd = False
-    dtr = rts = property(lambda _: True, lambda _, value: None)
-
-
-class Redirector:
-    """pySerial's own RFC 2217 server around a port, for one client (its example rfc2217_server.py)."""
-
-    def __init__(self, port: str, client: socket.socket) -> None:
-        self.port = PlainSerial(port, timeout=0.05)
-        self.client = client
-        self.lock = threading.Lock()
-        self.manager = serial.rfc2217.PortManager(self.port, self)  # type: ignore[arg-type]  # the stubs are wrong
-        self.running = True
-        self.threads = [threading.Thread(target=way) for way in (self.to_client, self.to_port)]
-        for thread in self.threads:
-            thread.start()
-
-    def write(self, data: bytes) -> None:
-        with self.lock:
-            self.client.sendall(data)
-
-    def to_client(self) -> None:
-        while self.running:
-            if data := self.port.read(self.port.in_waiting or 1):
-                self.write(b"".join(self.manager.escape(data)))
-
-    def to_port(self) -> None:
-        while data := self.client.recv(1024):
-            self.port.write(b"".join(self.manager.filter(data)))
-        self.running = False
-
-    def close(self) -> None:
-        for thread in self.threads:
-            thread.join(SOON_S)
-        self.port.close()
-        self.client.close()
-
-
-@contextmanager
-def redirected(port: Path) -> Iterator[str]:
-    """Yield the URL under which one client finds `port`."""
-    served: list[Redirector] = []
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(SOON_S)
-        accepting = threading.Thread(target=lambda: served.append(Redirector(str(port), server.accept()[0])))
-        accepting.start()
-        yield f"rfc2217://127.0.0.1:{server.getsockname()[1]}"
-        accepting.join(SOON_S)
-        for redirector in served:
-            redirector.close()
-
-
-@pytest.mark.filterwarnings("ignore:set(Daemon|Name).* is deprecated:DeprecationWarning")
-def test_a_port_behind_rfc_2217_is_a_line(echo: EchoLine) -> None:
-    with redirected(echo.link) as url, SerialLine(url, 38_400) as line:
-        line.write(EVERY_BYTE)
-        assert read_exactly(line, 256) == EVERY_BYTE
-        began = monotonic()
-        assert line.read(0.05) == b""
-        assert monotonic() - began >= 0.05
-        assert line.read(0.0) == line.read(-1.0) == b""
 
 
 def test_a_redirected_port_name_is_an_error_a_missing_one_not(tmp_path: Path) -> None:

@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.runtime.manifest import Rejection
-from thenar.runtime.rejection import Rejector, refused
-from thenar.runtime.scores import LANE_OFFSET
+from thenar.runtime.scores import LANE_OFFSET, Rejector, refused
 
 K, S, J = 3, 6, 4
 
@@ -38,7 +37,7 @@ def test_a_live_frame_is_refused_as_a_row_of_an_array_is(
     lanes = [score + LANE_OFFSET for score in scores]
     bits = np.array([[closed >> number & 1 for number in range(S)]], bool)
     (expected,) = refused(rejection, np.array([scores]), bits, np.array([codes]))
-    assert Rejector(rejection).refuses(lanes, closed, 0, codes) == expected
+    assert Rejector(rejection).refuses(lanes, closed.bit_count(), 0, codes) == expected
 
 
 @given(_rejections(), _scores, _masks, _masks, _codes, st.integers(0, (1 << J) - 1))
@@ -52,8 +51,9 @@ def test_a_lost_input_refuses_only_if_every_value_would(
     sure = [number for number in range(S) if lost >> number & 1]
     states = [closed & ~lost | sum(1 << n for n in sure[:count]) for count in range(len(sure) + 1)]
     likely = [rejection.ranges[best][joint][0] if joints >> joint & 1 else code for joint, code in enumerate(codes)]
-    possible = [judging.refuses(lanes, state, 0, likely) for state in states]
-    assert rejector.refuses(lanes, closed, lost, codes, lost_joints=joints) == all(possible)
+    possible = [judging.refuses(lanes, state.bit_count(), 0, likely) for state in states]
+    counts = (closed & ~lost).bit_count(), lost.bit_count()
+    assert rejector.refuses(lanes, *counts, codes, lost_joints=joints) == all(possible)
 
 
 @given(_rejections(), _scores, _masks, _masks)
@@ -61,11 +61,11 @@ def test_joints_and_scores_that_are_not_whole_are_not_judged(
     rejection: Rejection, scores: list[int], closed: int, lost: int
 ) -> None:
     best, lanes = scores.index(max(scores)), [score + LANE_OFFSET for score in scores]
-    found = Rejector(rejection).refuses(lanes, closed, lost, None)
-    narrow = Rejector(replace(rejection, ranges=((),) * K))
-    whole = narrow.refuses(lanes, closed, lost, [])
-    fewest, most = rejection.closed[best]
     seen = (closed & ~lost).bit_count()
+    found = Rejector(rejection).refuses(lanes, seen, lost.bit_count(), None)
+    narrow = Rejector(replace(rejection, ranges=((),) * K))
+    whole = narrow.refuses(lanes, seen, lost.bit_count(), [])
+    fewest, most = rejection.closed[best]
     beyond = seen > most or seen + lost.bit_count() < fewest
     assert found == beyond
     assert whole == (beyond or (not lost and scores[best] < rejection.least_scores[best]))

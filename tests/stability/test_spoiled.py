@@ -208,7 +208,7 @@ def spoil_missing(patch: Patch) -> None:
         return small._replace(build=Build(small.build.manifest, tables.changed(switch_means=0 * tables.switch_means)))
 
     def nosy(self: Build, *frame: np.ndarray) -> Recognition:
-        return replace(right(self, *frame[:2]), degraded=False)
+        return msgspec.structs.replace(right(self, *frame[:2]), degraded=False)
 
     patch.setattr(missing, "small_build", without_replacements)
     patch.setattr(Build, "recognise", nosy)

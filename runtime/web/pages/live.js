@@ -24,7 +24,6 @@ const send = connect({
     replay.judge();
   },
   health: (report) => view.health(report),
-  task: (task) => view.task(task),
   recording: show,
   overview: (overview) => replay.overview(overview),
   replay: (state) => replay.show(state),

@@ -97,18 +97,13 @@ export class View {
       `${name}: ${reason}, ${used ? "still used" : "treated as lost"}`,
     );
     this.suspects = [
-      ...report.stuck_open.map((name) => `${name}: was never seen closed`),
-      ...report.stuck_closed.map((name) => `${name}: was never seen open`),
+      ...report.stuck_open.map((name) => `${name}: stuck open`),
+      ...report.stuck_closed.map((name) => `${name}: stuck closed`),
       ...report.chattering.map((name) => `${name}: chatters`),
       ...report.drifting.map(({ joint, codes }) => `${joint}: has drifted by ${codes} codes`),
     ];
     this.rates = `${report.switch_hz.toFixed(0)}/s switches, ${report.glove_hz.toFixed(0)}/s glove`;
     this.#wrong();
-  }
-
-  task({ text }) {
-    $("task").hidden = false;
-    say($("task"), `Task: ${text}`);
   }
 
   #aged(old) {

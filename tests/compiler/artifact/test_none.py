@@ -21,7 +21,7 @@ from thenar.compiler.samples import FRAMES as SAMPLED
 from thenar.compiler.samples import Samples, select_inputs
 from thenar.runtime.manifest import Rejection
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.rejection import refused
+from thenar.runtime.scores import refused
 
 TYPES, TRIALS, FRAMES = ("pinch", "hook", "disk"), 20, 4
 
@@ -129,8 +129,7 @@ def test_without_rows_of_none_the_requested_share_is_refused(moved: GraspSet, tm
     assert gone[~moved.is_none].mean() <= 0.02
     assert gone[moved.is_none].mean() >= 0.5
     lost = build.scorer.biased_scores(bits[0], codes[0])
-    mask = sum(1 << int(number) for number in np.flatnonzero(bits[0]))
-    assert build.rejector.refuses(lost, mask, 0, codes[0].tolist()) == gone[0]
+    assert build.rejector.refuses(lost, int(bits[0].sum()), 0, codes[0].tolist()) == gone[0]
 
 
 def test_frames_are_refused_by_how_far_whole_groups_deviate(moved: GraspSet) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import structs
 
 from thenar.compiler.frontier.latency import POLICIES, decided_on, latency
 from thenar.compiler.frontier.points import FrontierError
@@ -97,7 +98,7 @@ def policy_of(
         "sequential": {"error_rate": error_rate, "spacing_us": spacing_us, "hold_us": hold_us},
     }
     usual = POLICIES[kind]
-    return None if usual is None else replace(usual, **changes[kind])
+    return None if usual is None else structs.replace(usual, **changes[kind])
 
 
 def played_live(tables: IntegerTables, replay: Replay, step_us: int, policy: Policy | None) -> list[str]:

@@ -52,7 +52,7 @@ def test_a_transfer_takes_at_least_as_long_as_on_a_wire() -> None:
 def test_several_buses_are_served_at_a_time_each_with_its_own_chips() -> None:
     buses = [
         EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,), paced=False),
-        EmulatedBus("/dev/i2c-5", 100_000, "smbus-only", (EmulatedChip("pcf8574", 0x20),), paced=False),
+        EmulatedBus("/dev/i2c-5", 100_000, "i2c-gpio", (EmulatedChip("pcf8574", 0x20),), paced=False),
     ]
     read = "from smbus2 import SMBus; print(SMBus('/dev/i2c-3').read_byte(0x20), SMBus('/dev/i2c-5').read_byte(0x20))"
     with EmulatedI2c(buses) as emulated:

@@ -145,7 +145,6 @@ OTHER = [write(0x21, 0x12), read(0x21, 1)]
         ("i2c-gpio", PAIR + OTHER, None),
         ("any", PAIR * 21, None),
         ("any", [*PAIR * 21, write(0x20)], errno.EINVAL),
-        ("smbus-only", PAIR, errno.EOPNOTSUPP),
     ],
 )
 def test_an_adapter_lets_through_what_its_driver_does(kind: str, messages: list[Message], code: int | None) -> None:
@@ -166,7 +165,7 @@ def test_each_adapter_has_its_own_errno_for_a_nak(kind: str) -> None:
     adapter = Adapter(Wire([], 100_000), kind)
     with pytest.raises(OSError) as refused:
         adapter.smbus(0x20, True, 0, BYTE, b"")
-    assert refused.value.errno == (errno.ENXIO if kind in ("i2c-gpio", "smbus-only") else errno.EREMOTEIO)
+    assert refused.value.errno == (errno.ENXIO if kind == "i2c-gpio" else errno.EREMOTEIO)
 
 
 def test_smbus_transfers_are_made_of_the_same_messages() -> None:

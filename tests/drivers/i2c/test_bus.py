@@ -38,15 +38,6 @@ def test_every_kind_is_read_pin_by_pin_through_the_kernels_interface(rig: MakeRi
     assert all(chip.present and not chip.errors for chip in glove.client.state().chips)
 
 
-def test_an_adapter_without_i2c_messages_reads_what_smbus_can(rig: MakeRig) -> None:
-    """SMBus has no way to read two bytes without a command: a PCF8575 is out of its reach, and is said to be."""
-    glove = rig(*EVERY_KIND, adapter="smbus-only")
-    glove.emulated.set_all([LEVELS])
-    glove.client.ask("prepare", list(enumerate(WHOLE)))
-    assert glove.client.ask("read") == [*LEVELS[:4], None, *LEVELS[5:]]
-    assert "use another adapter" in glove.client.state().chips[4].last_error
-
-
 # Transfers of one scan: three MCP23017 of which one is read by both ports apart, then two chips on two mux channels.
 MIXED = [
     ("mcp23017", 0x20),
@@ -65,7 +56,6 @@ PORTS = [(0, "A"), (0, "B"), (1, "AB"), (2, "B"), (3, "AB"), (4, "01")]
         ("i2c-gpio", "all ports between two mux switches in one transfer", 1 + 2 + 2),
         ("designware", "all ports of a chip in one transfer", 3 + 2 + 2),
         ("bcm2835", "one transfer per port", 4 + 2 + 2),
-        ("smbus-only", "one SMBus transfer per port", 4 + 2 + 2),
     ],
 )
 def test_the_best_batch_that_the_adapter_takes_is_found_and_used(
@@ -79,11 +69,10 @@ def test_the_best_batch_that_the_adapter_takes_is_found_and_used(
     after = glove.emulated.counters(0)
     assert glove.client.state().way == way
     assert after.transfers - before.transfers == transfers
-    if adapter != "smbus-only":  # which is told the address by a call of its own
-        assert after.calls - before.calls == transfers
+    assert after.calls - before.calls == transfers
 
 
-@pytest.mark.parametrize("adapter", ["any", "designware", "bcm2835", "smbus-only"])
+@pytest.mark.parametrize("adapter", ["any", "designware", "bcm2835"])
 def test_a_scan_puts_only_readings_and_selects_on_the_wire(rig: MakeRig, adapter: str) -> None:
     glove = rig(*MIXED, adapter=adapter, check_every_s=NEVER_CHECKED)
     ports = [

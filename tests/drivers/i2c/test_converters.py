@@ -11,7 +11,7 @@ from thenar.drivers.i2c import bus as module
 from thenar.drivers.i2c import supervisor
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
 from thenar.drivers.i2c.chips import CHIPS
-from thenar.drivers.i2c.node import BatchMode, DeviceNode, Query, Run
+from thenar.drivers.i2c.node import DeviceNode, Query, Run
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.scanmap import Port
@@ -29,7 +29,7 @@ class World:
         self.stations = [Station(CHIPS[kind].model, address, mux, channel) for kind, address, mux, channel in places]
         for station in self.stations:
             station.device.clock = self.clock  # type: ignore[attr-defined]
-        self.adapter = Adapter(Wire(self.stations, CLOCK_HZ), "any")
+        self.adapter = Adapter(Wire(self.stations, CLOCK_HZ), "bcm2835")
 
     def clock(self) -> float:
         return self.now
@@ -55,9 +55,6 @@ class WorldNode(DeviceNode):
 
     def open(self) -> None:
         pass
-
-    def find_way(self) -> None:
-        self.way = BatchMode.PORT
 
     def claim(self, address: int) -> None:
         pass

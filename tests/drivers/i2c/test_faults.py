@@ -34,7 +34,7 @@ def recovers(glove: Any, levels: list[int], *, by_way_of: list[list[int | None]]
     assert all(answer in by_way_of for answer in met[:-1])
 
 
-@pytest.mark.parametrize("adapter", ["any", "i2c-gpio", "designware", "bcm2835", "smbus-only"])
+@pytest.mark.parametrize("adapter", ["any", "i2c-gpio", "designware", "bcm2835"])
 def test_a_chip_that_stops_acknowledging_is_lost_alone_and_comes_back(rig: MakeRig, adapter: str) -> None:
     glove = running(rig, adapter=adapter)
     glove.emulated.remove(0, 0)
@@ -105,7 +105,7 @@ def test_an_address_claimed_by_a_kernel_driver_is_left_alone(rig: MakeRig) -> No
     recovers(glove, LEVELS, by_way_of=[[None, LEVELS[1]]])
 
 
-@pytest.mark.parametrize("adapter", ["i2c-gpio", "designware", "bcm2835", "smbus-only"])
+@pytest.mark.parametrize("adapter", ["i2c-gpio", "designware", "bcm2835"])
 def test_a_line_held_low_gives_no_answers_advice_and_recovers(rig: MakeRig, adapter: str) -> None:
     """i2c-gpio notices nothing: there every byte reads 0, as if every switch were closed."""
     glove = running(rig, adapter=adapter)

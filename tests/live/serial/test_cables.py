@@ -63,10 +63,9 @@ def test_a_run_that_begins_without_a_device_finds_it_when_it_comes(run: MakeRun,
     assert (state.connected, state.error) == (True, "")
 
 
-@pytest.mark.parametrize("mode", ["stream", "poll"])
-def test_a_glove_pulled_from_its_box_gives_no_answers(run: MakeRun, outage: Outage, mode: str) -> None:
+def test_a_glove_pulled_from_its_box_gives_no_answers(run: MakeRun, outage: Outage) -> None:
     """Its records go on, with 'eg' at their ends."""
-    running = run("both", "glove", "board", glove=f'mode = "{mode}"')
+    running = run("both", "glove", "board")
     glove = running.bench.glove
     outage(
         running.scene,

@@ -1,10 +1,10 @@
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from time import time_ns
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from thenar.runtime.frames import now_us
 from thenar.runtime.live.replay import replayed

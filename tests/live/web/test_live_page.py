@@ -304,7 +304,6 @@ def test_names_are_text_wherever_they_are_shown(browser: Any) -> None:
         server.publish("frame", message("frame", frame))
         server.publish("health", message("health", report))
         server.publish("recording", message("recording", state | {"failure": ""}))
-        server.publish("task", message("task", text=SCRIPT))
         browser.open(server.url)
         browser.wait(lambda: browser.text("grasp") == SCRIPT and browser.texts("#wrong li"))
         assert browser.texts("#types .name") == [SCRIPT, image]

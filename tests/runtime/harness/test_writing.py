@@ -61,7 +61,6 @@ def harnesses(draw: st.DrawFn) -> Harness:
         GloveWiring,
         port=ports,
         baud=st.just("auto") | st.integers(1, 10**6),
-        mode=st.sampled_from(["stream", "poll"]),
         rate_hz=st.none() | st.floats(0.1, 900.0),
         sensors=st.sampled_from([None, 18, 22]),
         calibration=st.none() | st.just("/a/b.toml"),

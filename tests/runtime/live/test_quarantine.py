@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -123,6 +122,7 @@ def test_a_switch_stuck_closed_is_lost_until_it_opens(make_build: MakeBuild, swi
     for _ in range(30):
         last = hand.grasp(next(grasps), stuck=bit).grasp
     assert hand.found == (Quarantined(name, STUCK_CLOSED),)
+    assert hand.live.quarantine.names(STUCK_CLOSED) == (name,)
     assert (last.health, last.lost) == ("degraded", (name,))
     for _ in range(30):
         last = hand.grasp(next(grasps)).grasp
@@ -216,7 +216,7 @@ def test_while_all_is_lost_what_is_in_quarantine_stays_there(make_build: MakeBui
 
 def test_without_quarantine_the_fault_is_named_and_nothing_is_left_out(make_build: MakeBuild) -> None:
     shares = closing()
-    hand, grasps = Hand(exact(make_build, shares), replace(AT_ONCE, quarantine=False)), drawn(shares, 40, 3)
+    hand, grasps = Hand(exact(make_build, shares), changed(AT_ONCE, quarantine=False)), drawn(shares, 40, 3)
     for closed in grasps:
         last = hand.grasp(closed, stuck=1).grasp
     assert hand.found == (Quarantined("s0", STUCK_CLOSED, used=True),)

@@ -1,9 +1,9 @@
-from dataclasses import replace
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from thenar.runtime.errors import FrameError, McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame

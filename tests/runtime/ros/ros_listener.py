@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 else:
     from cyclonedds.idl.types import sequence
 
-KEPT = ("grasp", "segment", "preshape", "task")
+KEPT = ("grasp", "segment", "preshape")
 ANY = 0xFFFFFFFF  # samples, views and instances of all states
 
 
@@ -100,7 +100,6 @@ TYPES: dict[str, Any] = {
     "grasp": StdMsgsString,
     "segment": DiagnosticMsgsDiagnosticArray,
     "preshape": TrajectoryMsgsJointTrajectory,
-    "task": DiagnosticMsgsDiagnosticArray,
     "angles": SensorMsgsJointState,
     "health": StdMsgsString,
 }

@@ -23,7 +23,6 @@ from thenar.drivers.errors import SettingError
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import HealthReport, LiveGrasp
 from thenar.runtime.sinks import JointAngles, Sink, SinkError, open_sink
-from thenar.runtime.task import Progress
 
 MakeGrasp = Callable[..., LiveGrasp]
 Message = dict[str, Any]
@@ -175,7 +174,6 @@ def test_a_preshape_is_read_back_as_a_trajectory(
         ("grasp", "std_msgs::msg::dds_::String_", "TransientLocal"),
         ("segment", "diagnostic_msgs::msg::dds_::DiagnosticArray_", "TransientLocal"),
         ("preshape", "trajectory_msgs::msg::dds_::JointTrajectory_", "TransientLocal"),
-        ("task", "diagnostic_msgs::msg::dds_::DiagnosticArray_", "TransientLocal"),
         ("angles", "sensor_msgs::msg::dds_::JointState_", "Volatile"),
         ("health", "std_msgs::msg::dds_::String_", "Volatile"),
     ],
@@ -238,30 +236,6 @@ def test_a_node_that_comes_late_has_the_newest_at_once(
     (segment,) = heard["segment"]
     assert {"key": "segment", "value": "2"} in segment["message"]["status"][0]["values"]
     assert len(heard["preshape"]) == 1
-
-
-def test_a_late_node_gets_the_tasks_current_step(sink: Sink, listen: Listen, make_grasp: MakeGrasp) -> None:
-    sink.publish(replace(make_grasp(), unix_us=1_700_000_000_123_456), None, None)
-    sink.task(Progress(0, 3, expected=("cup",)))
-    sink.task(Progress(2, 3, "pen", ("rod", "cup"), "skipped", "skipped: cup"))
-    heard = listen("kept").hear("topic", "task")["message"]
-    (status,) = heard["status"]
-    assert heard["header"]["stamp"] == {"sec": 1_700_000_000, "nanosec": 123_456_000}
-    assert {pair["key"]: pair["value"] for pair in status.pop("values")} == {
-        "step": "2",
-        "steps": "3",
-        "grasp": "pen",
-        "expected": "rod, cup",
-        "deviation": "skipped",
-        "detail": "skipped: cup",
-        "done": "false",
-    }
-    assert status == {
-        "level": 1,
-        "name": sink.report().where[4:],
-        "message": "step 2 of 3, pen held; next rod (or cup). skipped: cup",
-        "hardware_id": "",
-    }
 
 
 def test_every_change_is_heard(sink: Sink, listen: Listen, again: MakeGrasp) -> None:

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime.published import NONE
-from thenar.runtime.segmenting.decoder import decode, emissions
-from thenar.runtime.segmenting.live import GRACE_US, LiveSegments, Segment
+from thenar.runtime.segmenting.decoder import GRACE_US, LiveSegments, Segment, decode, emissions
 from thenar.runtime.segmenting.model import SegmentModel
 
 TICK = 10_000

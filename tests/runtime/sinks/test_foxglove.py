@@ -31,7 +31,6 @@ from thenar.runtime.policy import Policy
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp
 from thenar.runtime.sinks import SinkError, open_sink
-from thenar.runtime.task import Progress
 
 MakeGrasp = Callable[..., LiveGrasp]
 LAYOUT = Path(__file__).resolve().parents[3] / "examples" / "foxglove-layout.json"
@@ -151,7 +150,7 @@ def test_every_topic_is_advertised_with_a_schema_that_foxglove_knows(listen: Cal
     assert client.server["op"] == "serverInfo"
     assert client.server["capabilities"] == []  # nobody can send anything
     assert client.socket.subprotocol == "foxglove.sdk.v1"
-    topics = "grasp", "scores", "switches", "joints", "preshape", "task", "health"
+    topics = "grasp", "scores", "switches", "joints", "preshape", "health"
     assert set(client.channels) == {f"/thenar/{topic}" for topic in topics}
     for channel in client.channels.values():
         assert (channel["encoding"], channel["schemaEncoding"]) == ("json", "jsonschema")
@@ -198,25 +197,25 @@ def test_moments_come_as_they_were_published_with_their_times(
     assert (sink.report().sent, sink.report().lost, sink.report().readers) == (80, 0, 1)
 
 
-def test_late_readers_get_preshape_and_task_within_a_second(
+def test_late_readers_get_the_preshape_within_a_second(
     sink: Any, listen: Callable[..., Client], make_grasp: MakeGrasp, preshape: Preshape, health: HealthReport
 ) -> None:
-    topics, progress = ["/thenar/preshape", "/thenar/task", "/thenar/health"], Progress(1, 3, "hook", ("cup",))
+    topics = ["/thenar/preshape", "/thenar/health"]
     first = listen(topics)
     sink.publish(make_grasp(0), preshape, None)
     sink.publish(make_grasp(1), preshape, None)
-    sink.task(progress)
     report = replace(health, time_us=make_grasp(1).time_us + 5)
     sink.health(report)
-    kept = [("/thenar/preshape", fields(preshape)), ("/thenar/task", fields(progress))]
-    came = [first.next() for _ in range(3)]
-    assert [(topic, content) for topic, _, content in came] == [*kept, ("/thenar/health", fields(report))]
-    stamps = make_grasp(0).unix_us, make_grasp(1).unix_us, make_grasp(1).unix_us + 5
+    kept = "/thenar/preshape", fields(preshape)
+    came = [first.next() for _ in range(2)]
+    assert [(topic, content) for topic, _, content in came] == [kept, ("/thenar/health", fields(report))]
+    stamps = make_grasp(0).unix_us, make_grasp(1).unix_us + 5
     assert [time_ns for _, time_ns, _ in came] == [1000 * unix_us for unix_us in stamps]
     second = listen(topics)
     for number in range(2, 102):
         sink.publish(make_grasp(number), preshape, None)
-    assert [(topic, content) for topic, _, content in (second.next(), second.next())] == kept
+    topic, _, content = second.next()
+    assert (topic, content) == kept
 
 
 def test_a_reader_that_reads_nothing_holds_nobody_up_and_no_memory(

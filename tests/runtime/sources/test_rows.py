@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.line_reader import RowReader
-from thenar.drivers.lines import SEQUENCES, LineCounts, LineParser, Row, checked
+from thenar.drivers.lines import SEQUENCES, LineCounts, LineParser, Row, RowReader, checked
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from thenar.drivers.errors import SettingError
-from thenar.drivers.files import read_file
+from thenar.runtime.files import read_file
 
 
 def test_a_file_of_the_limit_is_read_whole(tmp_path: Path) -> None:

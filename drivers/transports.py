@@ -1,6 +1,6 @@
-"""Sources of lines: a serial port, TCP, UDP, a Unix socket, stdin or a WebSocket, all read in the same way.
+"""Ports of lines: a serial port, TCP, UDP, a Unix socket, stdin or a WebSocket, all read in the same way.
 
-/dev/ttyUSB0          a serial port, also rfc2217://HOST:PORT
+/dev/ttyUSB0          a serial port
 tcp://HOST:PORT       a server that sends lines to whoever connects
 udp://HOST:PORT       datagrams that come to this port; HOST is this computer's own address: 127.0.0.1, or 0.0.0.0
 for all; a datagram holds one line or more; datagrams of a second sender are left out
@@ -16,7 +16,6 @@ import select
 import socket
 import struct
 import sys
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -27,10 +26,8 @@ from urllib.parse import urlsplit
 from .closing import Closing
 from .errors import DeviceError, SettingError
 from .extras import optional
-from .lines import LONGEST, LineCounts, LineParser, Row
-from .names import shortened
 from .ports import port_fault
-from .senders import Address, FirstSender, address_of, parse_address
+from .senders import Address, address_of
 from .serial_line import SerialLine
 
 if TYPE_CHECKING:
@@ -50,100 +47,6 @@ _WAYS = (
 )
 
 
-class RowReader(Closing, ABC):
-    """A source of rows of numbers. It may be reopened after it was closed.
-
-    odd       the last input that was not a row, for display; "" if there was none
-    kind      what every column holds, "joint" or "" if the source does not say
-    received  how many bytes came, rows or not, if the source counts them
-    """
-
-    odd, kind, received = "", "", 0
-
-    @abstractmethod
-    def open(self) -> None:
-        """Open it. Raises DeviceError if a retry may help, SettingError if it does not."""
-
-    @abstractmethod
-    def read(self, timeout_s: float) -> Sequence[Row]:
-        """Return the received rows; wait for some until the timeout. Raises DeviceError if the source is gone."""
-
-    def counts(self) -> LineCounts:
-        """Return the counts of input that was not a row."""
-        return LineCounts()
-
-    def other_sender(self) -> str:
-        """Return a sentence on another sender whose rows do not count; "" if nobody else sends."""
-        return ""
-
-
-class LineReader(RowReader):
-    """Rows of the lines from `port`, of `columns` columns; 0: unknown. The constructor does not open it.
-
-    sender  the address of the only sender of datagrams that counts; "": the first one
-    """
-
-    def __init__(self, port: str, baud: int = 115_200, columns: int = 0, sender: str = "") -> None:
-        self.port, self._baud = port, baud
-        self._line: Closing | None = None
-        self._parser = LineParser(columns)
-        self._named = parse_address(sender) if sender else None
-        self._senders = FirstSender(self._named)
-
-    def open(self) -> None:
-        """Open the port."""
-        if reason := line_port_fault(self.port):
-            raise SettingError(f"{shortened(repr(self.port))} {reason}")
-        self._parser.begin()
-        self._senders = FirstSender(self._named)
-        self._line = _opened(self.port, self._baud)
-
-    def read(self, timeout_s: float) -> Sequence[Row]:
-        """Return the received rows."""
-        if isinstance(self._line, _Datagrams):
-            came = self._line.read(timeout_s)
-            return () if came is None else self._of_datagram(*came)
-        assert isinstance(self._line, SerialLine | _Descriptor | _WebSocket)
-        return self._rows(self._line.read(timeout_s))
-
-    def _rows(self, data: bytes) -> list[Row]:
-        self.received += len(data)
-        rows = self._parser.feed(data)
-        self.odd = self._parser.odd
-        return rows
-
-    def _of_datagram(self, data: bytes, address: Address, came_us: int) -> Sequence[Row]:
-        """Return the rows of a datagram, each of which begins and ends lines; none if it is from another sender."""
-        named, before = self._named, self._senders.current
-        sender = named if named is not None and named.covers(address) else address
-        if not self._senders.admits(sender, came_us):
-            self._parser.counts.foreign += data.strip().count(b"\n") + 1
-            return ()
-        if self._senders.current != before:
-            self._parser.begin()
-        return [row._replace(came_us=came_us) for row in self._rows(data + b"\n")]
-
-    def other_sender(self) -> str:
-        """Return a sentence on another sender of datagrams."""
-        other = self._senders.other(monotonic_ns() // 1000)
-        if other is None:
-            return ""
-        advice = "" if self._named else f', or choose one by `from = "{self._senders.current}"` in glove.toml'
-        return (
-            f"{other} sends, too, and its lines are left out: those of {self._senders.current} count; stop it{advice}"
-        )
-
-    def counts(self) -> LineCounts:
-        """Return the counts of input that was not a row."""
-        return self._parser.counts
-
-    def close(self) -> None:
-        """Close the port."""
-        if self._line is not None:
-            self._line.close()
-            self._line = None
-
-
 def line_port_fault(port: str) -> str:
     """Return why `port` cannot deliver lines, or ""; streams of LSL and topics of ROS are other readers'."""
     if port == "-" or port.startswith(("lsl:", "ros:")):
@@ -156,7 +59,7 @@ def line_port_fault(port: str) -> str:
         return "" if found and 0 < int(found[3]) < 65536 else f"is not an address: {_WAYS}"
     if port.startswith(("ws:", "wss:")):
         return "" if _is_web(port) else f"is not an address: {_WAYS}"
-    if "://" in port and not port.startswith(("rfc2217://", "socket://")):
+    if "://" in port and not port.startswith("socket://"):
         return f"is not a supported port: {_WAYS}"
     return port_fault(port)
 
@@ -171,19 +74,18 @@ def _is_web(port: str) -> bool:
         return False
 
 
-def _opened(port: str, baud: int) -> "SerialLine | _Descriptor | _Datagrams | _WebSocket":
+def open_transport(port: str, baud: int) -> "Transport":
+    """Return the open port. Raises DeviceError if a retry may help, SettingError if it does not."""
     if port == "-":
-        return _Descriptor(port, None)
+        return Descriptor(port, None)
     if port.startswith(("ws:", "wss:")):
-        return _WebSocket(port)
+        return WebSocket(port)
     try:
         if port.startswith("unix:"):
-            return _Descriptor(port, _connected(socket.AF_UNIX, port.removeprefix("unix:")))
+            return Descriptor(port, _connected(socket.AF_UNIX, port.removeprefix("unix:")))
         if found := _NET.fullmatch(port):
             host, number = found[2].strip("[]"), int(found[3])
-            return (
-                _Datagrams(port, _bound(host, number)) if found[1] == "udp" else _Descriptor(port, _tcp(host, number))
-            )
+            return Datagrams(port, _bound(host, number)) if found[1] == "udp" else Descriptor(port, _tcp(host, number))
     except OSError as reason:
         raise DeviceError(f"{port}: {_advice(port, reason)}") from reason
     return SerialLine(port, baud)
@@ -231,7 +133,7 @@ def _bound(host: str, port: int) -> socket.socket:
     return line
 
 
-class _Descriptor(Closing):
+class Descriptor(Closing):
     """A stream socket, or standard input if there is none."""
 
     def __init__(self, port: str, line: socket.socket | None) -> None:
@@ -259,7 +161,7 @@ class _Descriptor(Closing):
             self._line.close()
 
 
-class _Datagrams(Closing):
+class Datagrams(Closing):
     """A socket of datagrams."""
 
     def __init__(self, port: str, line: socket.socket) -> None:
@@ -292,7 +194,7 @@ def _waited_us(notes: Sequence[tuple[int, int, bytes]]) -> int:
     return 0
 
 
-class _WebSocket(Closing):
+class WebSocket(Closing):
     """The messages of a WebSocket; the end of each ends a line."""
 
     def __init__(self, port: str) -> None:
@@ -301,7 +203,7 @@ class _WebSocket(Closing):
         self._port = port
         try:
             self._open = ExitStack()
-            line = connect(port, open_timeout=_CONNECT_S, close_timeout=0.2, max_size=4 * LONGEST, proxy=None)
+            line = connect(port, open_timeout=_CONNECT_S, close_timeout=0.2, max_size=_CHUNK, proxy=None)
             self._line: ClientConnection = self._open.enter_context(line)
         except Exception as reason:  # many kinds, from the library and the socket
             raise DeviceError(f"{port}: {reason}: is the sender running, and does it listen?") from reason
@@ -319,3 +221,6 @@ class _WebSocket(Closing):
     def close(self) -> None:
         """Close it."""
         self._open.close()
+
+
+Transport = SerialLine | Descriptor | Datagrams | WebSocket

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.debounce import Debouncer
 from thenar.drivers.errors import SettingError
+from thenar.runtime.sources.base import Debouncer
 
 # EVQPL's data sheet: so long a contact bounces when it closes, and when it opens.
 CLOSING_US, OPENING_US = 3_000, 8_000

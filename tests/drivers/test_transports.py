@@ -16,8 +16,8 @@ import pytest
 from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender, LineServer, lines_like
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.line_reader import LineReader, line_port_fault
-from thenar.drivers.lines import Row
+from thenar.drivers.lines import LineReader, Row
+from thenar.drivers.transports import line_port_fault
 
 LONG_S = 10.0
 Send = Callable[[bytes], None]

@@ -1,0 +1,109 @@
+from collections.abc import Callable
+
+import msgspec
+import pytest
+from msgspec.structs import replace as changed
+
+from thenar.runtime import Build
+from thenar.runtime.frames import SwitchFrame
+from thenar.runtime.glove import GloveHealth
+from thenar.runtime.live.quarantine import Chattering, JointDrift, Quarantine
+from thenar.runtime.published import UNKNOWN, Count, DeviceHealth, Drift, HealthReport, LiveGrasp
+
+MakeBuild = Callable[..., Build]
+
+SECOND = 1_000_000
+
+
+@pytest.fixture
+def build(make_build: MakeBuild) -> Build:
+    return make_build(switches=4, joints=2)
+
+
+def health_of(build: Build) -> GloveHealth:
+    return GloveHealth(Quarantine(build, lambda _switches, _joints: True))
+
+
+def grasp(name: str, health: str = "ok") -> LiveGrasp:
+    known = LiveGrasp(0, 0, 0, name, name, 0.9, 5, "ok", 0, 0, 0)
+    return changed(known, health=health)
+
+
+def test_a_switch_that_changes_faster_than_a_hand_chatters() -> None:
+    chattering = Chattering(4)
+    for number in range(120):
+        closed = (number & 1) | (number // 10 & 1) << 1
+        chattering.frame(number * SECOND // 100, closed, 0b1111)
+    assert chattering.switches == 0b1
+    for number in range(120, 350):
+        chattering.frame(number * SECOND // 100, 0, 0b1111)
+    assert chattering.switches == 0
+
+
+def test_a_closed_switch_read_now_and_then_does_not_chatter() -> None:
+    chattering = Chattering(1)
+    for number in range(250):
+        chattering.frame(number * SECOND // 100, 1 - number % 2, 1 - number % 2)
+    assert chattering.switches == 0
+
+
+def moving(drift: JointDrift, minutes: int, first: int, shift: int, narrow: int = 0) -> None:
+    """Move joint 0 between two ends, and joint 1 between 50 and 150, a frame a second."""
+    for second in range(minutes * 60 + 1):
+        up = second % 2
+        codes = [100 + shift + 100 * up + (-narrow if up else narrow), 50 + 100 * up]
+        drift.frame((first * 60 + second) * SECOND, codes)
+
+
+@pytest.mark.parametrize(
+    ("shift", "narrow", "drifting"),
+    [(0, 0, 0), (20, 0, 0), (21, 0, 21), (-40, 0, -40), (0, 30, 0), (0, -30, 0)],
+)
+def test_a_joint_drifts_when_both_ends_move_the_same_way(build: Build, shift: int, narrow: int, drifting: int) -> None:
+    drift = JointDrift(build.tables)
+    moving(drift, 1, 0, 0)
+    assert not any(drift.codes)
+    moving(drift, 3, 1, shift, narrow)
+    assert drift.codes == (drifting, 0)
+
+
+def test_faults_are_those_of_the_quarantine(build: Build) -> None:
+    quarantine = Quarantine(build, lambda _switches, _joints: True)
+    health = GloveHealth(quarantine)
+    for number in range(120):
+        quarantine.look(SwitchFrame(number * SECOND // 100, number % 2 << 1), (0, 0, 0, 0), 0)
+    for second in range(181):
+        code = 100 * (second % 2) + (0 if second < 60 else 30)
+        quarantine.look_at_joints(second * SECOND, [100, code])
+    quarantine.left_out(0, 0)
+    report = health.report(0)
+    assert (report.chattering, report.drifting) == (("s1",), (Drift("j1", 30),))
+    assert [(one.name, one.reason) for one in report.quarantined] == [("s1", "chattering"), ("j1", "drifting")]
+    assert (report.stuck_open, report.stuck_closed) == ((), ())
+
+
+@pytest.mark.parametrize("hz", [10, 100, 333])
+def test_rates_are_of_the_last_second_and_fall_with_silence(build: Build, hz: int) -> None:
+    health = health_of(build)
+    assert (health.report(0).switch_hz, health.report(0).glove_hz) == (0, 0)
+    for number in range(3 * hz + 1):
+        now = number * SECOND // hz
+        frame = SwitchFrame(now, 0)
+        for _ in range(2):
+            health.update(grasp("a"), frame, now if number % 2 else None)
+    report = health.report(3 * SECOND)
+    assert report.switch_hz == pytest.approx(hz, rel=0.02)
+    assert report.glove_hz == pytest.approx(hz / 2, rel=0.2)
+    assert health.report(8 * SECOND).switch_hz < 1
+
+
+def test_a_report_counts_answers_and_carries_what_drivers_count(build: Build) -> None:
+    health = health_of(build)
+    for kind, times in (("ok", 3), ("changing", 4), ("degraded", 2), ("unknown", 1)):
+        for _ in range(times):
+            health.update(grasp(UNKNOWN, kind), None)
+    devices = [DeviceHealth("stream", connected=False, error="gone", counts=(Count("crc", 4),))]
+    report = health.report(77, devices)
+    assert (report.time_us, report.frames, report.changing, report.degraded, report.unknown) == (77, 10, 4, 2, 1)
+    assert report.devices == tuple(devices)
+    assert msgspec.json.decode(msgspec.json.encode(report), type=HealthReport) == report
