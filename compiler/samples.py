@@ -231,10 +231,6 @@ class Samples:
         """The class of most rows, the lowest of several."""
         return int(np.bincount(self.labels).argmax())
 
-    def kept(self, columns: Columns) -> NDArray[np.uint16]:
-        """Return the training matrix (n, kept + j): the switches `columns` in their order, then the joints' codes."""
-        return self.keeping(columns).inputs
-
 
 def check_types(types: int, raises: type[ThenarError]) -> None:
     """Raise `raises` if the recordings hold more grasp types than a build can."""

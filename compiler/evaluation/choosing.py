@@ -52,17 +52,17 @@ def choose_path(
     rows: Rows,
     recipe: Recipe,
     numbers: tuple[float, ...],
+    elements: Elements,
     ports: PortCosts | None = None,
     limits: Limits | None = None,
 ) -> tuple[Elements, ...]:
-    """Return the elements that a recipe keeps by some rows, for each of several numbers that its method takes."""
+    """Return which of `elements` a recipe keeps by some rows, for each of several numbers that its method takes."""
     learning, method = samples.rows(rows), METHODS.named(recipe.placement)
     learning = learning if recipe.inputs == "both" else learning.with_joints(())
     if recipe.robust or limits is not None:
         name = "keep" if method.by_number else "prune"
         recipes = [replace(recipe, **{name: int(number)}) for number in numbers]
         return tuple(select(learning, numbered, ports, limits).kept for numbered in recipes)
-    elements = elements_of(learning, recipe.levels)
     choose = method.chooser(bits_of(learning, elements), None if ports is None else ports_of(ports, elements))
     return tuple(tuple(elements[column] for column in choose(number)) for number in numbers)
 
@@ -110,9 +110,12 @@ class InputChoices:
         # Costs that a method does not use are no reason to ask it again.
         used = {same for same in numbers if METHODS[same.placement].uses_ports or self.limits is not None}
         ports = {same: self.ports if same in used else None for same in numbers}
-        places = [(same, rows) for same in numbers for rows in several]
-        calls = [(self.samples, rows, same, tuple(numbers[same]), ports[same], self.limits) for same, rows in places]
-        for (same, rows), path in zip(places, self.ask(choose_path, calls), strict=True):
+        places = [(same, rows, self.available(rows, same.levels)) for same in numbers for rows in several]
+        calls = [
+            (self.samples, rows, same, tuple(numbers[same]), elements, ports[same], self.limits)
+            for same, rows, elements in places
+        ]
+        for (same, rows, _), path in zip(places, self.ask(choose_path, calls), strict=True):
             for number, elements in zip(numbers[same], path, strict=True):
                 self._elements[same, number, rows.tobytes()] = elements
 
@@ -263,10 +266,7 @@ def _joined(tests: list[_Test]) -> _Test:
     )
 
 
-_Task = tuple[Samples, Fold, list[Training], list[int]]
-
-
-def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
+def _tested(task: tuple[Samples, Fold, list[Training], list[int]]) -> tuple[str, list[int], list[_Test]]:
     samples, fold, trainings, batch = task
     learning, test = samples.rows(fold.train), samples.rows(fold.test)
     _, first, trial = np.unique(test.trials, return_index=True, return_inverse=True)

@@ -184,15 +184,12 @@ def block_folds(trials: NDArray[np.int64], n_folds: int) -> list[Fold]:
         )
     check_cut(len(numbers), n_folds, "trial numbers")
     blocks = np.array_split(numbers, n_folds)
-    return [_fold(np.isin(trials, block), _range(block)) for block in blocks]
+    names = [f"trials {block[0]}-{block[-1]}" if len(block) > 1 else f"trial {block[0]}" for block in blocks]
+    return [_fold(np.isin(trials, block), name) for block, name in zip(blocks, names, strict=True)]
 
 
 def _fold(tested: NDArray[np.bool_], name: str) -> Fold:
     return Fold(np.flatnonzero(~tested), np.flatnonzero(tested), name)
-
-
-def _range(block: NDArray[np.int64]) -> str:
-    return f"trials {block[0]}-{block[-1]}" if len(block) > 1 else f"trial {block[0]}"
 
 
 Scheme = Literal["trial", "subject", "object", "session", "block"]

@@ -253,6 +253,11 @@ class Planner:
         def pooled(least: int, population: Population, fold: Fold) -> Elements:
             return self.chosen(protocol.may_choose_pooled(everyone, fold), prune=least)
 
+        # One tree of some rows serves every S.
+        recipes = [changed(self.recipe, {"prune": least}) for least in self.prune_list]
+        folds = [fold for population in self.populations for fold in population.folds]
+        several = {rows.tobytes(): rows for rows in (protocol.may_choose_pooled(everyone, fold) for fold in folds)}
+        self.choices.choose(recipes, list(several.values()))
         everything = self._row("all", "all switches", ALL_SWITCHES, lambda population, fold: ())
         pruned = [self._row(str(s), f"S = {s}", SELECTED, partial(pooled, s)) for s in self.prune_list]
         return [everything, *pruned]

@@ -91,7 +91,8 @@ def sign_of_log_sum(multiples: Mapping[int, int]) -> int:
     coprime numbers decide. Otherwise decimal arithmetic of rising precision finds the sign after finitely many steps.
     """
     terms = {m: times for m, times in multiples.items() if times and m > 1}
-    if not terms or _product_is_one(terms):
+    base = _coprime_base(list(terms))
+    if all(sum(times * _multiplicity(m, factor) for m, times in terms.items()) == 0 for factor in base):
         return 0
     digits = _FIRST_DIGITS
     while True:
@@ -99,11 +100,6 @@ def sign_of_log_sum(multiples: Mapping[int, int]) -> int:
         if total.copy_abs() > bound:
             return 1 if total > 0 else -1
         digits *= 2
-
-
-def _product_is_one(terms: Mapping[int, int]) -> bool:
-    base = _coprime_base(list(terms))
-    return all(sum(times * _multiplicity(m, factor) for m, times in terms.items()) == 0 for factor in base)
 
 
 def _coprime_base(numbers: list[int]) -> list[int]:
@@ -160,12 +156,6 @@ class NodeCounts:
     totals: Counts
     cells: Counts
     starts: NDArray[np.intp]
-
-    def first_values(self) -> Counts:
-        """Return (K, n_columns) rows of each class at the first value of each input."""
-        columns = len(self.starts)
-        rest = self.cells if columns == self.cells.shape[1] else np.add.reduceat(self.cells, self.starts, axis=1)
-        return self.totals[:, None] - rest
 
     def table(self, position: int) -> Counts:
         """Return (K, n_values) rows of each class at each value of one input."""
@@ -264,11 +254,12 @@ def first_of_most_gain(tables: Counts, costs: Counts | None = None) -> int:
 
 def _scores(node: NodeCounts) -> tuple[Floats, NDArray[np.bool_]]:
     """Return each input's score and whether it has more than one value at the node."""
-    first = node.first_values()
+    of_bits = len(node.starts) == node.cells.shape[1]
+    first = node.totals[:, None] - (node.cells if of_bits else np.add.reduceat(node.cells, node.starts, axis=1))
     first_sizes, cell_sizes = first.sum(axis=0), node.cells.sum(axis=0)
     inside = n_log_n(node.cells).sum(axis=0) - n_log_n(cell_sizes)
     largest = cell_sizes
-    if len(node.starts) != len(inside):
+    if not of_bits:
         inside = np.add.reduceat(inside, node.starts)
         largest = np.maximum.reduceat(largest, node.starts)
     scores = n_log_n(first).sum(axis=0) - n_log_n(first_sizes) + inside
@@ -281,11 +272,6 @@ def _score_bound(node: NodeCounts) -> float:
     """
     most_values = node.cells.shape[1] - len(node.starts) + 2
     return error_bound(int(node.totals.sum()), (len(node.totals) + 1) * most_values, 2)
-
-
-def compare_scores(one: NDArray[Any], other: NDArray[Any]) -> int:
-    """Return the exact sign of score(one) - score(other); tables (K, n_values) of integer counts."""
-    return compare(one, one.sum(axis=0), other, other.sum(axis=0))
 
 
 def gain_bits(table: Counts) -> float:

@@ -41,7 +41,7 @@ _ENOUGH = 1e-4  # of the slope, for Armijo's rule
 _ROUNDING = 2.0**-50  # of the loss, per entry of the rows: a smaller increase may be a rounding error
 _MARKS = 512.0  # marks per unit of a line, whose column spans one or two units
 _NO_CHANCE = 800.0  # below all scores: exp is exactly 0 there
-_MOST_CELLS = 128  # of several columns together
+_MOST_CELLS = 256  # of several columns together
 _UNSOLVED = 0.3  # of the gradient that a step may leave
 
 
@@ -191,29 +191,24 @@ class Fit:
 
         near  starting values for the first of the rows
         """
-        asked = self._digest(tolerance, near)
-        if asked not in MINIMA:
-            if len(MINIMA) == _MOST_MINIMA:
-                del MINIMA[next(iter(MINIMA))]
-            MINIMA[asked] = self._searched(tolerance, near)
-            MINIMA[asked].setflags(write=False)
-        return MINIMA[asked]
-
-    def _digest(self, *given: object) -> bytes:
-        """Return a digest of all that the minimum depends on."""
         design = [part for each in (self._cells, self._shared) for part in (each.data, each.indices, each.indptr)]
         targets = self._labels, self._member.shape, self._weights, self._known
-        return blake2b(dumps((design, targets, self._pull, self._joint, self._grids, given))).digest()
-
-    def _searched(self, tolerance: float, near: Floats | None) -> Floats:
+        given = self._pull, self._joint, self._grids, tolerance, near
+        asked = blake2b(dumps((design, targets, given))).digest()
+        if asked in MINIMA:
+            return MINIMA[asked]
         rows = np.zeros((len(self._pull), self._member.shape[1]))
         if near is not None:
             rows[: len(near)] = near
         point = self._at(rows)
         wanted = tolerance * self._total
         for _ in range(_MOST_STEPS):
-            steep = _largest(point.gradient)
+            steep = float(np.abs(point.gradient).max())
             if steep <= wanted:
+                point.rows.setflags(write=False)
+                MINIMA[asked] = point.rows
+                if len(MINIMA) > _MOST_MINIMA:
+                    del MINIMA[next(iter(MINIMA))]
                 return point.rows
             point = self._along(point, self._direction(point, max(_UNSOLVED * steep, 0.5 * wanted)))
         raise BoostingError(
@@ -280,7 +275,7 @@ class Fit:
             length = size / dot(along, bent)
             found += length * along
             rest -= length * bent
-            if _largest(rest) <= unsolved:
+            if np.abs(rest).max() <= unsolved:
                 break
             near = rest / diagonal
             before, size = size, dot(rest, near)
@@ -342,7 +337,3 @@ def sparse(values: Floats, frames: NDArray[np.intp], rows: NDArray[np.intp], sha
     from scipy.sparse import csr_array
 
     return csr_array((values, (frames, rows)), shape=shape)
-
-
-def _largest(values: Floats) -> float:
-    return max(float(values.max()), -float(values.min()))

@@ -155,17 +155,11 @@ def _tie_bound(targets: Targets, z_max: float) -> Floats:
     |d(C^2/W)| <= 2 z_max |dC| + z_max^2 |dW|, summed over branches; twice that between two stumps. The 64 covers the
     rounding of the squares and quotients themselves. Units are those of `_explained`.
     """
-    n = targets.weights.units.shape[1]
-    unit = _unit(targets)
-    bound: Floats = (2.0 * z_max * unit + (z_max * unit) ** 2) * n + 64.0
+    weights = targets.weights
+    # The unit of weights in units of responses. Without weight nothing is explained, and it may be beyond all doubles.
+    unit = np.ldexp(1.0, np.where(weights.units.any(axis=1), targets.responses.exponents - weights.exponents, 0))
+    bound: Floats = (2.0 * z_max * unit + (z_max * unit) ** 2) * weights.units.shape[1] + 64.0
     return bound
-
-
-def _unit(targets: Targets) -> Floats:
-    """Return (K,) the unit of weights, in units of responses."""
-    # Without weight nothing is explained, and this unit may exceed the range of doubles.
-    apart = np.where(targets.weights.units.any(axis=1), targets.responses.exponents - targets.weights.exponents, 0)
-    return np.ldexp(1.0, apart)
 
 
 def _best_splits(

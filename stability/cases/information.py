@@ -7,7 +7,7 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.compiler.placement.gain import Cooccurrence, best_position, compare_scores, entropy_bits, gain_bits
+from thenar.compiler.placement.gain import Cooccurrence, best_position, compare, entropy_bits, gain_bits
 
 from ..checks.roundings import ROUNDING, part_of
 from ..finding import REFERENCE, Case, Finding, Worst
@@ -72,7 +72,9 @@ def entropies_of(tables: list[Counts]) -> Finding:
 def comparisons_of(pairs: list[tuple[Counts, Counts]]) -> Finding:
     """Count wrong comparisons of two gains."""
     worst = Worst("which of two gains is greater", WHOLE_NUMBERS, 0.0, "choices")
-    wrong = [compare_scores(a, b) != truth.compare_gains(a.tolist(), b.tolist()) for a, b in pairs]
+    wrong = [
+        compare(a, a.sum(axis=0), b, b.sum(axis=0)) != truth.compare_gains(a.tolist(), b.tolist()) for a, b in pairs
+    ]
     worst.see(float(sum(wrong)), tried=len(pairs))
     return worst.finding()
 

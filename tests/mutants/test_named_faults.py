@@ -98,8 +98,8 @@ FAULTS = (
     Fault(
         "exp is taken of scores as they are, not less the greatest",
         "compiler/elementary.py",
-        "shares = exp(scores - top)",
-        "shares = exp(scores)",
+        "odds = exp(block - top)",
+        "odds = exp(block)",
         "tests/compiler/test_elementary.py",
     ),
     Fault(

@@ -103,7 +103,7 @@ class Careless(Cooccurrence):
 def spoil_information(patch: Patch) -> None:
     patch.setattr(information, "gain_bits", lambda table: gain.gain_bits(table) + 1e-13)
     patch.setattr(information, "entropy_bits", lambda totals: gain.entropy_bits(totals) * (1 + 2.0**-45))
-    patch.setattr(information, "compare_scores", lambda a, b: int(np.sign(float_score(a) - float_score(b))))
+    patch.setattr(information, "compare", lambda a, _, b, __: int(np.sign(float_score(a) - float_score(b))))
     patch.setattr(information, "best_position", best_in_floats)
     patch.setattr(information, "Cooccurrence", Careless)
 

@@ -29,8 +29,6 @@ from ...trainers.logitboost import boost
 from ..ports import PortCosts
 from .base import BEST, FINE, Method, first_of
 
-Bits = NDArray[np.bool_]
-
 # With at most LAST left they are dropped one at a time, each from CANDIDATES candidates.
 LAST, CANDIDATES = 40, 6
 # The share of the remaining switches that is dropped at once while many are left.
@@ -153,7 +151,7 @@ def elimination_order(samples: Samples, ports: PortCosts | None = None) -> Colum
     Takes the time of some 1500 evaluations of the tables for 160 switches, independent of the data.
     """
     rows = sampled(samples)
-    left: list[int] = np.flatnonzero(_varying(rows)).tolist()
+    left: list[int] = np.flatnonzero((rows.switches != rows.switches[0]).any(axis=0)).tolist()
     gone: list[int] = []
     bits = np.ascontiguousarray(rows.switches.T[left])
     fit = Logistic(np.concatenate([bits, thermometer(rows.codes)]), rows.labels, rows.n_classes)
@@ -184,26 +182,18 @@ def elimination_order(samples: Samples, ports: PortCosts | None = None) -> Colum
 def boosted_elimination_order(samples: Samples) -> Columns:
     """Return the varying switches, most important first, after some 35 trainings for 160 switches."""
     rows = sampled(samples)
-    left = np.flatnonzero(_varying(rows))
+    left = np.flatnonzero((rows.switches != rows.switches[0]).any(axis=0))
     gone: list[int] = []
     while len(left) > 1:
-        cheapest = np.argsort(_boosted_costs(rows, left), kind="stable")[: max(1, int(BOOSTED_SHARE * len(left)))]
+        kept = rows.keeping(tuple(left.tolist()))
+        stumps, _ = boost(kept.inputs, kept.labels, kept.n_classes, rounds=BOOSTED_ROUNDS, max_bins=BINS)
+        probability = softmax(np.ascontiguousarray(stumps.scores(kept.inputs).T))
+        bits, scores = np.ascontiguousarray(kept.switches.T), collapse(stumps, len(left)).switch_rows
+        rises = removal_rises(probability, bits, scores, kept.labels)
+        cheapest = np.argsort(rises, kind="stable")[: max(1, int(BOOSTED_SHARE * len(left)))]
         gone += left[cheapest].tolist()
         left = np.delete(left, cheapest)
     return tuple(left.tolist() + gone[::-1])
-
-
-def _boosted_costs(samples: Samples, left: NDArray[np.intp]) -> Floats:
-    """Return the rise in loss (len(left),) without each of the switches `left`."""
-    X = samples.kept(tuple(left.tolist()))
-    stumps, _ = boost(X, samples.labels, samples.n_classes, rounds=BOOSTED_ROUNDS, max_bins=BINS)
-    rows = collapse(stumps, len(left)).switch_rows
-    probability = softmax(np.ascontiguousarray(stumps.scores(X).T))
-    return removal_rises(probability, np.ascontiguousarray(samples.switches[:, left].T), rows, samples.labels)
-
-
-def _varying(samples: Samples) -> Bits:
-    return np.asarray(samples.switches.any(axis=0) & ~samples.switches.all(axis=0))
 
 
 def sampled(samples: Samples, most: int = MOST_ROWS) -> Samples:
@@ -265,18 +255,13 @@ def sums_of_logs(factors: Floats) -> Floats:
     while len(product) > 1:
         joined = 1
         while len(product) > 1 and joined < _FACTORS:
-            product, joined = _halved(product), joined * 2
+            half, joined = len(product) // 2, joined * 2
+            product, rest = product[: len(product) - half].copy(), product[len(product) - half :]
+            product[:half] *= rest
         product, powers = np.frexp(product)
         exponents += powers.sum(axis=0, dtype=np.int64)
     sums: Floats = log(product[0]) + exponents * LN_2
     return sums
-
-
-def _halved(product: Floats) -> Floats:
-    half = len(product) // 2
-    first = product[: len(product) - half].copy()
-    first[:half] *= product[len(product) - half :]
-    return first
 
 
 def joint_order(samples: Samples) -> Columns:

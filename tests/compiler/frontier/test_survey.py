@@ -62,7 +62,7 @@ def fit_of(samples: Samples, cuts: Cuts, stages: tuple[int, ...], columns: tuple
 @pytest.mark.parametrize("inputs", ["both", "switches"])
 def test_every_stage_is_as_if_trained_for_it_alone(grasp_set: GraspSet, cuts: Cuts, inputs: Any) -> None:
     fold, stages, samples = cuts.screening[0], (1, 4, 9), Samples.of(grasp_set, inputs)
-    fit, X = fit_of(samples, cuts, stages), samples.kept(COLUMNS)
+    fit, X = fit_of(samples, cuts, stages), samples.keeping(COLUMNS).inputs
     for stage, correct in zip(stages, fit.stages, strict=True):
         stumps, _ = boost(X[fold.train], samples.labels[fold.train], 4, rounds=stage)
         answers = winners(stumps.scores(X[fold.test]))
@@ -73,7 +73,7 @@ def test_every_stage_is_as_if_trained_for_it_alone(grasp_set: GraspSet, cuts: Cu
 def test_tables_answer_as_they_will_when_deployed(samples: Samples, cuts: Cuts) -> None:
     fold, stages = cuts.screening[0], (2, 6)
     fit = fit_of(samples, cuts, stages)
-    X, switches = samples.kept(COLUMNS), len(COLUMNS)
+    X, switches = samples.keeping(COLUMNS).inputs, len(COLUMNS)
     bits, codes = X[:, :switches].astype(bool), X[:, switches:]
     for stage, row in zip(stages, fit.tables, strict=True):
         stumps, _ = boost(X[fold.train], samples.labels[fold.train], 4, rounds=stage)
@@ -97,7 +97,7 @@ def test_without_an_input_that_varies_the_most_frequent_type_is_answered(grasp_s
 
 def test_a_path_holds_the_placement_of_every_parameter(samples: Samples, cuts: Cuts) -> None:
     rows, prunes = cuts.screening[0].train, (0.0, 10.0, 40.0)
-    path = choose_path(samples, rows, Recipe(), prunes)
+    path = choose_path(samples, rows, Recipe(), prunes, tuple(map(Element, range(14))))
     X, y = samples.switches[rows], samples.labels[rows]
     trees = [grow_id3(X, y, min_samples=int(prune)) for prune in prunes]
     assert path == tuple(tuple(map(Element, tree.inputs)) for tree in trees)
@@ -108,7 +108,7 @@ def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -
     several = (((0,) * 14, (1.0,)), ((0,) * 14, (2.0,)), (one, (1.0, 1.0)), (two, (1.0, 1.0)))
     costs = [None, *(PortCosts(*each) for each in several)]
     folds = [*cuts.screening, *cuts.others, cuts.everything]
-    asked = {question(choose_path, (samples, folds[0].train, Recipe(), (0.0,), ports), {}) for ports in costs}
+    asked = {question(choose_path, (samples, folds[0].train, Recipe(), (0.0,), (), ports), {}) for ports in costs}
     asked |= {question(fit_stages, (samples, fold, kept((0,)), (1,), (), (), SEARCH.training), {}) for fold in folds}
     assert len(asked) == len(costs) + len(folds)
 
@@ -168,7 +168,7 @@ def test_a_trial_is_recognised_as_most_of_its_frames_are(make_set: Callable[...,
     }
     right_trials, right_rows = 0, 0
     for fold in cuts.subjects:
-        X = samples.kept(COLUMNS)
+        X = samples.keeping(COLUMNS).inputs
         stumps, _ = boost(X[fold.train], samples.labels[fold.train], 4, rounds=3)
         answers = winners(stumps.scores(X[fold.test]))
         right_rows += int(np.count_nonzero(answers == samples.labels[fold.test]))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler.placement.gain import CellCounter, NodeCounts, best_position, compare_scores, gain_bits
+from thenar.compiler.placement.gain import CellCounter, NodeCounts, best_position, compare, gain_bits
 
 LARGEST = "paper14_bits"
 SETS = ("bin14", "bin16", "bin3", "dup", "multi", LARGEST, "rare")
@@ -36,8 +36,11 @@ class Walk:
         position = best_position(node, columns)
         assert position is not None
         best, theirs = node.table(position), node.table(columns.tolist().index(taken))
-        assert compare_scores(best, theirs) == 0
-        equals = [c for i, c in enumerate(columns.tolist()) if compare_scores(node.table(i), best) == 0]
+        assert compare(best, best.sum(axis=0), theirs, theirs.sum(axis=0)) == 0
+        tables, sizes = node.tables(np.arange(len(columns))), best.sum(axis=0)
+        equals = [
+            c for c, own in zip(columns.tolist(), tables, strict=True) if not compare(own, own.sum(axis=0), best, sizes)
+        ]
         assert columns[position] == min(equals)
         self.decisions += 1
         if len(equals) == 1:
