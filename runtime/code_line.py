@@ -47,7 +47,7 @@ class CodeLine(Struct, frozen=True):
 
     def code(self, reading: int) -> int:
         """Return the code of a reading."""
-        (first, low), (last, high) = sorted((self.a, self.b))
+        (first, low), (last, high) = (self.a, self.b) if self.a.reading < self.b.reading else (self.b, self.a)
         span, above = last - first, min(max(reading, -FARTHEST), FARTHEST) - first
         whole, rest = divmod(low * span + (high - low) * above + (span << FRACTION - 1), span << FRACTION)
         nearest = whole - (whole & 1) if rest == 0 else whole

@@ -150,28 +150,45 @@ IN_REAL_TIME = {"live"}
 # alone with a long one at the end, and what a module sets up is set up once.
 LONGEST = (
     "stability/test_catalogue.py",
-    "test_written_bytes.py",
     "test_docs_commands.py",
-    "test_quarantine_benchmark.py",
-    "fuzz/test_fuzz_recordings.py",
-    "compiler/frontier/test_find.py",
+    "test_written_bytes.py",
+    "compiler/firmware/test_costs.py",
+    "live/process/test_end_to_end.py",
+    "live/test_soak.py",
+    "compiler/frontier/test_luck.py",
     "fuzz/test_fuzz_files.py",
+    "simulator/planning/test_plan_scene.py",
+    "compiler/frontier/test_find.py",
     "cli/test_frontier_command.py",
     "live/process/test_bus_faults.py",
+    "cli/test_every_option.py",
+    "fuzz/test_fuzz_recordings.py",
     "compiler/firmware/test_names.py",
     "compiler/firmware/test_core.py",
     "compiler/artifact/test_random_builds.py",
-    "cli/test_every_option.py",
+    "mutants/test_named_faults.py",
+    "test_quarantine_benchmark.py",
+    "runtime/live/test_losses.py",
     "test_examples.py",
     "test_packaging.py",
-    "simulator/planning/test_plan_scene.py",
-    "mutants/test_named_faults.py",
+    "compiler/firmware/test_cppcheck.py",
+    "compiler/artifact/test_verify.py",
+    "compiler/evaluation/test_real_data.py",
+    "compiler/artifact/test_real_recordings.py",
+    "compiler/artifact/test_compile.py",
     "runtime/recording/test_reader.py",
     "cli/test_narrow.py",
-    "compiler/firmware/test_cppcheck.py",
     "cli/test_compile_documents.py",
+    "live/guided/test_collection_page.py",
     "simulator/pipeline/test_simulation.py",
 )
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave files without a slow test out of `pytest -m slow`: importing all takes every worker half a minute."""
+    if config.getoption("-m") != "slow" or not collection_path.match("test_*.py"):
+        return None
+    return True if "mark.slow" not in collection_path.read_text(encoding="utf-8") else None
 
 
 def pytest_collection(session: pytest.Session) -> None:

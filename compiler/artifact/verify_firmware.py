@@ -163,7 +163,9 @@ class FirmwareTrial:
             return found
         lost = self._lost if missing else np.zeros((n, self._frames.bits.shape[1] + self._frames.codes.shape[1]), bool)
         at = self._frames.bits.shape[1]
-        masks = (_masks(each) for each in (self._frames.bits, lost[:, :at], lost[:, at:]))
+        flags = (self._frames.bits, lost[:, :at], lost[:, at:])
+        packed = (np.packbits(each, axis=1, bitorder="little") for each in flags)
+        masks = ([int.from_bytes(row.tobytes(), "little") for row in rows] for rows in packed)
         frames = zip((scores + LANE_OFFSET).tolist(), *masks, self._frames.codes.tolist(), strict=True)
         refused = [
             rejector.refuses(own, bits, gone, codes, lost_joints=joints) for own, bits, gone, joints, codes in frames
@@ -220,11 +222,6 @@ def _said(found: Predictions) -> NDArray[np.int64] | None:
         return None
     states = [] if found.states is None else [found.states]
     return np.stack([found.margins, found.shares, *states], axis=1).astype(np.int64)
-
-
-def _masks(flags: NDArray[np.bool_]) -> list[int]:
-    """Return each row of flags (n, m) as a mask whose lowest bit is the first flag."""
-    return [int.from_bytes(row.tobytes(), "little") for row in np.packbits(flags, axis=1, bitorder="little")]
 
 
 class FirmwareVerification(Struct, frozen=True, kw_only=True):

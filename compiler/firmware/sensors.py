@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from thenar.drivers.calibration import GloveCalibration, SensorCalibration, poses_of
+from thenar.drivers.calibration import GloveCalibration, poses_of
 from thenar.drivers.errors import SettingError
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.calibration import Meaning, codes_of_bytes, load_calibration, numbers_of, place_of
@@ -129,14 +129,10 @@ def _joint(joint: Calibration, meaning: Meaning, limits: Range | None, *, known:
         return _sensor(joint, points)
     codes_of_bytes(joint, meaning)  # whether they fit
     grid = None if limits is None else _grid(joint.name, limits, *JOINT_CODES)
-    own = None if meaning is None or unit == _RAW else _line(joint.name, meaning.sensors)
+    own = None if meaning is None or unit == _RAW else next(line for line in meaning.sensors if line.name == joint.name)
     if own is None:  # bytes are codes
         return _sensor(joint, points, (joint.code_a, joint.code_b), grid)
     return _sensor(joint, (own.value_a, own.value_b), (own.raw_a, own.raw_b), grid)
-
-
-def _line(name: str, lines: Sequence[SensorCalibration]) -> SensorCalibration:
-    return next(line for line in lines if line.name == name)
 
 
 def _points(coded: Calibration) -> tuple[float, float]:

@@ -86,18 +86,14 @@ _SWITCHES = _Cost(
 _LATENCY = _Cost(
     title="From the hand's arrival to the decision",
     axis="time until a grasp is decided on: its mean, and a line to the 99th percentile",
-    of_point=lambda point: _waited(point) if "latency" in point.fronts else None,
+    # Where every grasp was missed, there is no mean.
+    of_point=lambda point: point.latency.mean_us if "latency" in point.fronts and point.latency.missed < 1 else None,
     of_mark=lambda _: None,
     of_tried=lambda _: None,
     front="latency",
     best="the best for its latency",
     end=lambda point: point.latency.p99_us if point.latency.p99_us != point.latency.mean_us else None,
 )
-
-
-def _waited(point: FrontierPoint) -> float | None:
-    """Return the mean latency; None if every grasp was missed."""
-    return None if point.latency.missed >= 1 else point.latency.mean_us
 
 
 def pictures(frontier: Frontier, kind: Literal["svg", "png"], *, letters: bool = False) -> Mapping[str, bytes]:

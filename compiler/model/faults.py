@@ -40,6 +40,7 @@ from ..elementary import Floats, log, softmax
 
 Numbers = NDArray[np.intp]
 Steps = NDArray[np.int64]
+Scores = NDArray[np.int32]
 Found = tuple[int, ...]
 
 # Steps of all inputs kept in memory at a time, and additions beyond which pairs are skipped: some minutes.
@@ -173,7 +174,7 @@ def count_faults(
     Rows are kept switches (n, s), codes (n, j), labels and trials (n,). Labels outside the tables' classes are never
     correct. `groups` are indices of inputs that fail together, switches first, then joints.
     """
-    terms = [*_switches(tables), *_joints(tables)]
+    terms = [*_terms(tables)]
     joined = [_Joined.of(tables, grid) for grid in tables.grids]
     bins = (np.searchsorted(_steps(tables, joint), codes[:, joint]) for joint in range(tables.n_joints))
     at = np.vstack([bits.T.astype(np.intp), *(column[np.newaxis] for column in bins)])
@@ -184,8 +185,13 @@ def count_faults(
     for number, (first, end) in enumerate(pairwise(cuts), 1):
         rows = order[first:end]
         block = _Block(tables, terms, joined, at[:, rows], labels[rows], trial[first:end])
-        counts = np.fromiter(block.counts(together, pairs=few), np.int64)
-        found = counts + found if found.size else counts
+        counts = [*block.counts(together)]
+        if few:
+            kept = block.changeable()
+            part = _Block(tables, terms, joined, at[:, rows[kept]], labels[rows[kept]], trial[first:end][kept])
+            settled = counts[0] - part.right(part.whole)
+            counts += [settled + right for right in part.pairs()]
+        found = np.array(counts) + found if found.size else np.array(counts)
         if progress is not None:
             progress(number, len(cuts) - 1)
     ends = np.cumsum([1, len(terms), len(groups), *(len(term.rows) for term in terms)])
@@ -203,23 +209,21 @@ def _cuts(trial: Numbers, size: int) -> list[int]:
 class _Term:
     """An input: the rows of its values, (values, K), its substitute row (K,), and descriptions of its values."""
 
-    rows: Steps
-    mean: Steps
+    rows: Scores
+    mean: Scores
     values: tuple[str, ...]
 
 
-def _switches(tables: IntegerTables) -> Iterator[_Term]:
-    for bit, mean in zip(tables.bits, tables.switch_means.astype(np.int64), strict=True):
-        yield _Term(bit.of(np.arange(2)).astype(np.int64), mean, ("open", "closed"))
-
-
-def _joints(tables: IntegerTables) -> Iterator[_Term]:
-    for joint, mean in enumerate(tables.joint_means.astype(np.int64)):
+def _terms(tables: IntegerTables) -> Iterator[_Term]:
+    """Yield the switches, then the joints."""
+    for bit, mean in zip(tables.bits, tables.switch_means.astype(np.int32), strict=True):
+        yield _Term(bit.of(np.arange(2)).astype(np.int32), mean, _BIT)
+    for joint, mean in enumerate(tables.joint_means.astype(np.int32)):
         steps = _steps(tables, joint)
         ends = [-1, *steps.tolist()]
         words = [f"codes {low + 1} to {high}" for low, high in pairwise(ends)]
         rows = tables.binned(joint).of(np.append(0, steps + 1))
-        yield _Term(rows.astype(np.int64), mean, (*words, f"codes above {ends[-1]}" if len(ends) > 1 else "any code"))
+        yield _Term(rows.astype(np.int32), mean, (*words, f"codes above {ends[-1]}" if len(ends) > 1 else "any code"))
 
 
 def _steps(tables: IntegerTables, joint: int) -> Steps:
@@ -232,16 +236,16 @@ class _Joined:
     """The contribution of two inputs together, (values + 1, values + 1, K); the last value of each means lost."""
 
     inputs: tuple[int, int]
-    rows: Steps
+    rows: Scores
 
     @classmethod
     def of(cls, tables: IntegerTables, grid: Grid) -> "_Joined":
         codes = (np.concatenate([[0], _steps(tables, joint) + 1, [0]]) for joint in grid.joints)
         one, other = np.meshgrid(*codes, indexing="ij")
         rows = grid.of(one.ravel(), other.ravel()).reshape(*one.shape, -1)
-        return cls((tables.n_switches + grid.joints[0], tables.n_switches + grid.joints[1]), rows.astype(np.int64))
+        return cls((tables.n_switches + grid.joints[0], tables.n_switches + grid.joints[1]), rows.astype(np.int32))
 
-    def turned(self, first: int) -> tuple[int, Steps]:
+    def turned(self, first: int) -> tuple[int, Scores]:
         """Return the index of the other input than `first`, and the rows with the axis of `first` first."""
         one, other = self.inputs
         return (other, self.rows) if first == one else (one, self.rows.swapaxes(0, 1))
@@ -260,12 +264,13 @@ class _Block:
         trials: Numbers,
     ) -> None:
         self._k = tables.n_classes
-        self._labels, self._trial = labels, trials - trials[0]
-        self._first = np.flatnonzero(np.diff(trials, prepend=-1))
-        # One number per class: int64 has room for the sums under any faults.
+        self._labels, begins = labels, np.diff(trials, prepend=-1) > 0
+        self._first, self._trial = np.flatnonzero(begins), np.cumsum(begins) - 1
+        # One number per class: sums of 16 bits times K, under any faults.
         self._terms = [np.ascontiguousarray(term.rows.T * self._k) for term in terms]
         self._at = at
-        self.whole = (tables.bias.astype(np.int64) * self._k + np.arange(self._k)[::-1])[:, None].repeat(at.shape[1], 1)
+        bias = tables.bias.astype(np.int32) * self._k + np.arange(self._k, dtype=np.int32)[::-1]
+        self.whole = bias[:, None].repeat(at.shape[1], 1)
         for rows, values in zip(self._terms, at, strict=True):
             self.whole += rows[:, values]
         self.lost = [
@@ -274,7 +279,7 @@ class _Block:
         ]
         self._joined = {one: pair.turned(one) for pair in joined for one in pair.inputs}
         # If both inputs of a pair are lost, the correction to the sum of their separate differences.
-        self._both: dict[tuple[int, int], Steps] = {}
+        self._both: dict[tuple[int, int], Scores] = {}
         for pair in joined:
             (one, other), now = pair.inputs, self._added(pair.inputs[0], at[pair.inputs[0]])
             self.whole += now
@@ -284,13 +289,13 @@ class _Block:
                 self.lost[each] + more for each, more in zip(pair.inputs, alone, strict=True)
             )
 
-    def _added(self, one: int, value: Numbers | int) -> Steps:
+    def _added(self, one: int, value: Numbers | int) -> Scores:
         """Return the contribution (K, n) of a paired input with this value in each row, together with its partner."""
         other, rows = self._joined[one]
-        found: Steps = rows[value, self._at[other]].T * self._k
+        found: Scores = rows[value, self._at[other]].T * self._k
         return found
 
-    def right(self, scores: Steps) -> int:
+    def right(self, scores: Scores) -> int:
         """Return the number of trials that are correct with scores (K, n)."""
         found = self._k - 1 - scores.max(axis=0) % self._k
         if len(self._first) == len(self._labels):
@@ -298,8 +303,8 @@ class _Block:
         counts = np.bincount(self._trial * self._k + found, minlength=len(self._first) * self._k)
         return int(np.count_nonzero(counts.reshape(-1, self._k).argmax(axis=1) == self._labels[self._first]))
 
-    def counts(self, together: Sequence[Found], *, pairs: bool) -> Iterator[int]:
-        """Yield the correct trials with each group of inputs lost, each input stuck at each value, each pair lost."""
+    def counts(self, together: Sequence[Found]) -> Iterator[int]:
+        """Yield the correct trials with each group of inputs lost, and with each input stuck at each value."""
         for group in together:
             both = (more for pair, more in self._both.items() if {*pair} <= {*group})
             yield self.right(sum(both, sum((self.lost[element] for element in group), self.whole)))
@@ -308,12 +313,34 @@ class _Block:
             if paired:
                 without -= self._added(one, at)
             for value, row in enumerate(rows.T):
-                more: Steps | int = self._added(one, value) if paired else 0
+                more: Scores | int = self._added(one, value) if paired else 0
                 yield self.right(without + row[:, None] + more)
-        for one, lost in enumerate(self.lost if pairs else ()):
+
+    def pairs(self) -> Iterator[int]:
+        """Yield the correct trials with each pair of inputs lost."""
+        for one, lost in enumerate(self.lost):
             without = self.whole + lost
             for other, more in enumerate(self.lost[one + 1 :], one + 1):
-                yield self.right(without + more + self._both.get((one, other), 0))
+                scores = without + more
+                if (one, other) in self._both:
+                    scores += self._both[one, other]
+                yield self.right(scores)
+
+    def changeable(self) -> Numbers:
+        """Return all rows of the trials in which a row may be predicted otherwise with two inputs lost.
+
+        The two losses that favour a class most, over the prediction, bound what any pair does.
+        """
+        winner, rows = self.whole.argmax(axis=0), np.arange(len(self._labels))
+        most = second = joined = np.zeros_like(self.whole)
+        for lost in self.lost:
+            gained = lost - lost[winner, rows]
+            most, second = np.maximum(most, gained), np.maximum(second, np.minimum(most, gained))
+        for both in self._both.values():
+            joined = np.maximum(joined, both - both[winner, rows])
+        near = most + second + joined >= self.whole[winner, rows] - self.whole
+        near[winner, rows] = False
+        return np.flatnonzero(np.logical_or.reduceat(near.any(axis=0), self._first)[self._trial])
 
 
 def groups_of(scan: ScanMap | None, sources: Sequence[str], n_joints: int) -> Mapping[str, Found]:
@@ -357,11 +384,8 @@ def worst_faults(counts: FaultCounts, names: Sequence[str], groups: Mapping[str,
         worst = int(np.argmin(counts.pairs))
         both = next(islice(combinations(names, 2), worst, None))
         pair = [Faulty("both lost", both, counts.pairs[worst])]
-    return Faults(counts.total, counts.correct, *(_least(kind) for kind in (lost, stuck, dead, pair)))
+    worst_of = (min(kind, key=lambda each: each.correct, default=None) for kind in (lost, stuck, dead, pair))
+    return Faults(counts.total, counts.correct, *worst_of)
 
 
 _BIT = ("open", "closed")
-
-
-def _least(faults: Sequence[Faulty]) -> Faulty | None:
-    return min(faults, key=lambda each: each.correct, default=None)

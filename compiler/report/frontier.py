@@ -274,18 +274,14 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
         yield PlainTable(f"{what}; trainer: {trainer}", columns, tuple(rows), words=(0, 1))
 
 
-def _taxels(frontier: Frontier) -> str:
-    return f"{counted(frontier.n_taxels, 'taxel')} of {frontier.n_levels} levels, " if frontier.n_taxels else ""
-
-
 def _notes(frontier: Frontier) -> Iterator[str]:
     yield summary(frontier)
+    taxels = f"{counted(frontier.n_taxels, 'taxel')} of {frontier.n_levels} levels, " if frontier.n_taxels else ""
     yield (
         f"{frontier.combinations:,} combinations of {frontier.source}: {counted(frontier.rows, 'row')}, "
         f"{counted(frontier.trials, 'trial')}, "
         f"{counted(frontier.subjects, 'subject')}, {counted(frontier.n_switches, 'switch', 'switches')}, "
-        f"{_taxels(frontier)}"
-        f"{counted(frontier.n_joints, 'joint')}; times on {frontier.machine}. "
+        f"{taxels}{counted(frontier.n_joints, 'joint')}; times on {frontier.machine}. "
         f"{folds_of(frontier)}, placement inside the fold, with 95{NBSP}% intervals. {LUCK}"
     )
     if frontier.wanted and frontier.picked is not None:

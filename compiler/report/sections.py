@@ -149,10 +149,11 @@ def worst_sentence(content: ReportContent) -> str:
     rows, worst = content.manifest.source.rows, content.worst
     if worst is None:
         return ""
+    share = f" ({percent(worst.covered / rows, NBSP)})" if rows else ""
     return (
         f"In the worst case over all possible frames, recorded or not, {worst.leader} loses {worst.loss:.3f} steps "
         f"of its lead over {worst.competitor}. By this exact analysis, ties included, a lead of more than "
-        f"{worst.safe_margin:.3f} steps is safe: {_share(worst.covered, rows)} training rows have it."
+        f"{worst.safe_margin:.3f} steps is safe: {worst.covered:,} of {rows:,}{share} training rows have it."
     )
 
 
@@ -205,10 +206,6 @@ def term_bars(content: ReportContent) -> tuple[tuple[str, float], ...]:
         rows.append((span, f"{' and '.join(names[one] for one in term.inputs)}, {term.name}"))
     rows = sorted((row for row in rows if row[0]), key=lambda row: (-row[0], row[1]))
     return tuple((f"{text} {span / content.tables.scale:.2f}", span / rows[0][0]) for span, text in rows)
-
-
-def _share(count: int, total: int) -> str:
-    return f"{count:,} of {total:,}" + (f" ({percent(count / total, NBSP)})" if total else "")
 
 
 def scan_table(content: ReportContent) -> PlainTable | None:

@@ -91,7 +91,8 @@ def torques(condition: Condition, skeleton: Skeleton, pose: Pose) -> Floats:
 def _add_moments(total: Floats, skeleton: Skeleton, capsule: int, centre: Floats, force: Floats) -> None:
     digit, segment = divmod(capsule, 3)
     for joint in range(segment + 2):
-        moment = np.cross(centre - skeleton.centres[digit, joint], force, axis=0)
+        x, y, z = centre - skeleton.centres[digit, joint]
+        moment = np.stack([y * force[2] - z * force[1], z * force[0] - x * force[2], x * force[1] - y * force[0]])
         total[4 * digit + joint] += add_up(skeleton.axes[digit, joint] * moment)
 
 

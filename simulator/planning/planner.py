@@ -8,6 +8,7 @@ The least squares start from the type's nominal posture (scipy, needed only for 
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,20 +104,27 @@ class Misfit:
 
 def wrenches(normals: Floats, levers: Floats) -> Floats:
     """Return the wrenches (6, p) of unit pushes against normals (p, 3) at levers (p, 3) mm; moments over 30 mm."""
-    return np.concatenate([-normals, np.cross(levers, -normals) / 30.0], axis=1).T
+    pushes = -normals
+    (x, y, z), (u, v, w) = levers.T, pushes.T
+    moments = np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1) / 30.0
+    return np.concatenate([pushes, moments], axis=1).T
 
 
 def shares(wrench: Floats) -> tuple[Floats, Floats]:
     """Return the shares of p pads in a grip force of 1 with the best balance, none pulling, and the residual (6,)."""
     from scipy.optimize import nnls
 
-    count = wrench.shape[1]
-    even = EVENNESS * np.eye(count)
-    stacked = np.concatenate([wrench, even, 10.0 * np.ones((1, count))])
-    wanted = np.concatenate([np.zeros(6), np.full(count, EVENNESS / count), [10.0]])
-    found, _ = nnls(stacked, wanted)
+    even, wanted = _evenly(wrench.shape[1])
+    found, _ = nnls(np.concatenate([wrench, even]), wanted)
     found = found / found.sum()
     return found, wrench @ found
+
+
+@cache
+def _evenly(count: int) -> tuple[Floats, Floats]:
+    """Return the rows (p + 1, p) below a wrench, for even shares with the sum 1, and the right side (p + 7,)."""
+    rows = np.concatenate([EVENNESS * np.eye(count), 10.0 * np.ones((1, count))])
+    return rows, np.concatenate([np.zeros(6), np.full(count, EVENNESS / count), [10.0]])
 
 
 def object_start(hand: Hand, prehension: Prehension, shape: Shape) -> Floats:

@@ -296,7 +296,8 @@ def of_recording(path: Path, period_us: int, warn: Callable[[str], None] = lambd
     """
     reader = Reader(path)
     calibration = reader.session.calibration or typical()
-    rows = list(_ticks(reader, resting(calibration).tobytes(), period_us))
+    rest = b"" if reader.session.sensors else resting(calibration).tobytes()
+    rows = list(_ticks(reader, rest, period_us))
     for fault in reader.faults():
         warn(fault.message)
     if not rows:
