@@ -6,7 +6,8 @@
 trained on the training rows of each fold; accuracy is that of the deployed integers, in four folds and with each
 subject left out. libsimavr counts cycles over the test rows of the first fold, median and maximum. Flash and RAM are
 those of the whole program. Peers that are not installed are left out (`make bench` installs them), and those that do
-not fit an ATmega328P are measured on a larger part.
+not fit an ATmega328P are measured on a larger part. On Cortex-M4 and M0+, qemu counts the instructions of thenar's C
+and of the logistic regressions in C.
 """
 
 import argparse
@@ -14,12 +15,14 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split
-from firmwarepeers import peers
+from firmwarelogit import fitted, pruned
+from firmwarepeers import SHARES, peers
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
@@ -38,11 +41,49 @@ from thenar.compiler.model.collapse import collapse
 from thenar.compiler.trainers.base import Model
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.bins import Bins
+from thenar.runtime.model.terms.bit import Bit
+from thenar.runtime.model.terms.line import Line
 
 AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
+CORES = ("cortex-m4", "cortex-m0plus")
+QEMU = Path(__file__).parents[1] / "tests" / "qemu"
+sys.path.append(str(QEMU))
+qemu = import_module("qemu")
+# Prints what a function of one instruction and then what each frame took.
+MAIN = """
+#include <stdbool.h>
+#include <stdint.h>
+#include "semihosting.h"
+#include "ticks.h"
+extern uint8_t input[BYTES];
+int predict(void);
+void thenar_fault(void) { for (;;) semihosting_exit(true); }
+__attribute__((naked)) static int nothing(void) { __asm volatile("bx lr"); }
+static uint32_t said[2];
+__attribute__((noinline, noclone)) static void run(int (*function)(void))
+{
+    const uint32_t before = ticks_left();
+    said[0] = (uint32_t)function();
+    said[1] = (before - ticks_left()) & TICKS_MOST;
+}
+int main(void)
+{
+    const uint32_t frames = semihosting_open("frames", 6, SEMIHOSTING_RB);
+    const uint32_t predictions = semihosting_open("predictions", 11, SEMIHOSTING_WB);
+    start_ticking();
+    run(nothing);
+    do {
+        (void)semihosting_write(predictions, said, sizeof said);
+    } while (semihosting_read(frames, input, sizeof input) && (run(predict), true));
+    semihosting_exit(false);
+    return 0;
+}
+"""
 SLOW_ROWS = 20  # rows for a peer on the larger part
 CONSOLE = Console(width=170)
-COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "differing")
+COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "differing", "M4 / M0+, most")
 
 # Flags of thenar's Makefiles: functions that are not called are not linked.
 _HOW = ("-Os", "-w", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
@@ -51,24 +92,31 @@ Frames = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Ours:
-    """A trainer with `settings`, with entries of `bits`, and with or without joints."""
+    """A trainer with `settings`, with entries of `bits`, and with or without joints; or, with a `share` of the weights
+    of joints, the pruned logistic regression of the peers by thenar's terms, integers and firmware.
+    """
 
     trainer: str
     bits: int
     settings: tuple[tuple[str, Any], ...] = ()
     joints: bool = True
+    share: float = 1.0
 
     @property
     def name(self) -> str:
         """The name in the table."""
         given = "".join(f", {name} {value}" for name, value in self.settings if name in ("max_bins", "linear"))
         alone = "" if self.joints else ", switches only"
+        alone += f", {self.share:.0%} of the joints' weights" if self.share < 1 else ""
         return f"thenar, {self.trainer}{given}, {self.bits} bit{alone}"
 
     def integers(self, fold: Fold) -> IntegerTables:
         """Return the integer tables of a fold."""
         samples = fold.samples(joints=self.joints)
-        tables = collapse(_trained(self.trainer, self.settings, fold, self.joints), SWITCHES)
+        if self.share < 1:
+            tables = _pruned(fold, self.share)
+        else:
+            tables = collapse(_trained(self.trainer, self.settings, fold, self.joints), SWITCHES)
         return quantise(tables, samples.switches, samples.codes, 16, self.bits)
 
     def predictor(self, fold: Fold) -> Predictor:
@@ -85,6 +133,7 @@ OURS = (
     Ours("logit", 16, (BINS,)),
     Ours("logit", 16, FEW),
     Ours("logit", 8, LINE),
+    *(Ours("logit", 8, LINE, share=share) for share in SHARES[1:]),
     Ours("logit", 16, (BINS,), joints=False),
 )
 
@@ -93,6 +142,18 @@ OURS = (
 def _trained(trainer: str, settings: tuple[tuple[str, Any], ...], fold: Fold, joints: bool) -> Model:
     member = TRAINERS.named(trainer)
     return member.train(fold.samples(joints=joints), member.candidates(dict(settings))[0] | dict(settings))
+
+
+def _pruned(fold: Fold, share: float) -> ScoreTables:
+    """Return the peers' pruned logistic regression: a bit for each switch, a line for each joint."""
+    bias, switches, standardised = (np.pad(each, [(0, 0)] * (each.ndim - 1) + [(0, 1)]) for each in pruned(fold, share))
+    _, mean, deviation = fitted(fold)
+    codes = fold.samples(joints=True).codes.astype(np.int64)
+    low, high, rows = codes.min(axis=0), codes.max(axis=0), standardised / deviation[:, np.newaxis]
+    constant = np.zeros((1, len(bias)))
+    lines = [Line(joint, int(low[joint]), int(high[joint]), row) for joint, row in enumerate(rows)]
+    bins = [Bins(joint, np.zeros(0, np.uint16), constant) for joint in range(JOINTS)]
+    return ScoreTables(bias - (mean - low) @ rows, (*(Bit(n, row) for n, row in enumerate(switches)), *bins, *lines))
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,24 +241,45 @@ def of_peer(
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
-    """A row of the table."""
+class Row:
+    """A row of the table; `cores`: the most instructions on cores of 32 bits."""
 
     name: str
     rates: tuple[float, ...]
     cost: Cost
+    cores: str = ""
 
 
-def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Line:
+def on_cores(files: Mapping[str, str], frames: Frames, expected: NDArray[np.integer]) -> str:
+    """Return the most instructions of `predict` over `input` on emulated cores of 32 bits."""
+    most = []
+    for name in CORES:
+        core = qemu.CORES[name]
+        given = {path: (QEMU / path).read_text() for path in ("ticks.h",)} | files
+        given |= {"main.c": MAIN.replace("BYTES", str(frames.shape[1])), "frames": frames.tobytes()}
+        found = np.frombuffer(core.emulate(given, flags=("-w",)), np.dtype([("grasp", "<u4"), ("ticks", "<u4")]))
+        assert (found["grasp"][1:] == expected).all()
+        most.append(int(core.instructions(found["ticks"][1:], int(found["ticks"][0])).max()))
+    return " / ".join(f"{each:,}" for each in most)
+
+
+def ours_on_cores(layout: Layout, frames: Frames) -> str:
+    """Return the most instructions of thenar's classifier on emulated cores of 32 bits."""
+    files = Library("glove", numbered(layout.tables), layout).files
+    return " / ".join(f"{qemu.CORES[name].run(files, 'glove', layout, frames).most:,}" for name in CORES)
+
+
+def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Row:
     """Return the line of a trainer, on the first fold."""
     fold = cuts[CUTS[0]][0]
     tables, frames = what.integers(fold), split(fold.asked, joints=what.joints)
     layout = fit_for(AVR, tables).layout
-    cost = of_ours(layout, AVR, layout.frame_bytes(*frames), tables.scores(*frames))
-    return Line(what.name, rates(cuts, what.predictor), cost)
+    sent = layout.frame_bytes(*frames)
+    cost = of_ours(layout, AVR, sent, tables.scores(*frames))
+    return Row(what.name, rates(cuts, what.predictor), cost, ours_on_cores(layout, sent))
 
 
-def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Line]:
+def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Row]:
     """Yield the installed peers; those that do not fit the smaller part are measured on the larger one."""
     fold = cuts[CUTS[0]][0]
     for peer in track([peer for peer in peers() if peer.available], "peers", console=CONSOLE):
@@ -205,8 +287,9 @@ def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Line]:
         model = peer.train(fold)
         expected, files = peer.predictor(model)(fold.asked), peer.files(model)
         rows = raw(fold.asked)
+        cores = "" if peer.in_c is None else on_cores(peer.in_c(model), rows, expected)
         try:
-            yield Line(peer.name, found, of_peer(peer.name, files, rows, expected, AVR, peer.include))
+            yield Row(peer.name, found, of_peer(peer.name, files, rows, expected, AVR, peer.include), cores)
         except FirmwareError as lack:
             CONSOLE.print(f"{lack}"[:200], markup=False)
             some = slice(SLOW_ROWS)
@@ -215,7 +298,7 @@ def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Line]:
             except FirmwareError as also:
                 CONSOLE.print(f"{also}"[:200], markup=False)
             else:
-                yield Line(f"{peer.name} ({LARGER.part})", found, cost)
+                yield Row(f"{peer.name} ({LARGER.part})", found, cost)
 
 
 def main() -> None:
@@ -232,7 +315,7 @@ def main() -> None:
     for column in COLUMNS:
         table.add_column(column, justify="right" if column else "left")
     for line in sorted(lines, key=lambda line: (line.cost.part != AVR.part, line.cost.most)):
-        table.add_row(line.name, *(f"{rate:.2f}" for rate in line.rates), *line.cost.cells)
+        table.add_row(line.name, *(f"{rate:.2f}" for rate in line.rates), *line.cost.cells, line.cores)
     CONSOLE.print(table)
 
 

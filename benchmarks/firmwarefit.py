@@ -24,8 +24,8 @@ from scipy.optimize import linprog
 
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.costs import NAME_BYTES, estimate, sizes, terms
-from thenar.compiler.firmware.layout import GROUPS, Layout
+from thenar.compiler.firmware.costs import NAME_BYTES, estimate, sizes, table_bytes, terms
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.firmware.targets.base import Formula
@@ -33,24 +33,20 @@ from thenar.compiler.firmware.words import numbered
 from thenar.runtime.model.integers import COARSE, IntegerTables
 from thenar.runtime.model.terms.line import Slope
 
-FITTED = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "rv32imac")
+FITTED = ("avr328p", "cortex-m0plus", "cortex-m4", "rv32imac")
 FRAMES = 200
 DRAWS = range(60)
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A build, its terms and its measured time, flash without names, and RAM."""
+    """A build, the terms of its time, and its measured time, flash without names, and RAM."""
 
     layout: Layout
+    terms: Mapping[str, int]
     time: int
     flash: int
     ram: int
-
-    @property
-    def terms(self) -> Mapping[str, int]:
-        """How often each term of the time occurs."""
-        return terms(self.layout)
 
 
 def drawn(seed: int) -> IntegerTables:
@@ -105,7 +101,7 @@ def runner(target: Target) -> Any:
 def measured(name: str, seed: int) -> Point | None:
     """Return the point of a drawn build on a target; None where it does not fit."""
     target, tables = TARGETS.named(name), drawn(seed)
-    layout = Layout(tables, GROUPS[seed % len(GROUPS)])
+    layout = Layout(tables)
     plain = numbered(tables)
     names = replace(plain, grasps=tuple(f"{grasp:.<{NAME_BYTES - 1}}" for grasp in plain.grasps))
     library = Library("glove", names, layout)
@@ -116,19 +112,19 @@ def measured(name: str, seed: int) -> Point | None:
         flash, ram = sizes(library, target)
     except FirmwareError:
         return None
-    return Point(layout, found.most, flash - NAME_BYTES * tables.n_classes, ram)
+    return Point(layout, terms(layout, avr=target.avr), found.most, flash - NAME_BYTES * tables.n_classes, ram)
 
 
-def fitted(names: Sequence[str], points: Sequence[Point], values: Sequence[int]) -> dict[str, float]:
+def fitted(points: Sequence[Point], values: Sequence[int]) -> tuple[float, ...]:
     """Return coefficients, 0 or more, of the least largest relative error."""
-    matrix = np.array([[point.terms[name] for name in names] for point in points]) / np.array(values)[:, np.newaxis]
+    matrix = np.array([[*point.terms.values()] for point in points]) / np.array(values)[:, np.newaxis]
     n, k = matrix.shape
     cost = np.append(np.full(k, 1e-6), 1.0)
     ones = np.ones((n, 1))
     above, below = np.hstack([matrix, -ones]), np.hstack([-matrix, -ones])
     found = linprog(cost, np.vstack([above, below]), np.concatenate([np.ones(n), -np.ones(n)])).x
     assert found is not None
-    return {name: float(f"{each:.4g}") for name, each in zip(names, found[:-1], strict=True) if each > 0.05}
+    return tuple(float(f"{each:.4g}") for each in found[:-1])
 
 
 def errors(formula: Formula, points: Sequence[Point], *, avr: bool) -> dict[str, NDArray[np.float64]]:
@@ -152,10 +148,10 @@ def main() -> None:
         avr = TARGETS.named(name).avr
         with ProcessPoolExecutor(2) as pool:
             points = [point for point in pool.map(partial(measured, name), DRAWS) if point]
-        tables = np.array([point.layout.table_bytes(avr=avr) for point in points])
+        tables = np.array([table_bytes(point.layout, avr=avr) for point in points])
         flash = np.array([point.flash for point in points]) - tables
         ram = np.array([point.ram - 2 * point.layout.memory for point in points])
-        cycles = fitted([*points[0].terms], points, [point.time for point in points])
+        cycles = fitted(points, [point.time for point in points])
         formula = Formula(cycles, int(np.median(flash)), int(np.median(ram)))
         print(f"{name}: {len(points)} builds; flash {flash.min()} to {flash.max()}, RAM {ram.min()} to {ram.max()}")
         print(f"formula={formula},", flush=True)

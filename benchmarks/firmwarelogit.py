@@ -121,6 +121,34 @@ class IntegerLogit:
             f"    .balign 2\n    .text\n    .global predict\n    .type predict, @function\npredict:\n{text}"
         )
 
+    @property
+    def in_c(self) -> str:
+        """The same in C, for a core of 32 bits."""
+        first, rows, names = 0, [], [f"s{k}" for k in range(len(self.bias))]
+        starts = [
+            f"{name} = {start}" for name, start in zip(names, (self.bias << self.groups.shift).tolist(), strict=True)
+        ]
+        code = [f"int32_t {', '.join(starts)}, code;", "const int16_t *row;"]
+        for joint, (low, high) in enumerate(zip(self.low.tolist(), self.high.tolist(), strict=True)):
+            code.append(f"code = input[{PORTS + joint}];")
+            code.append(f"code = (code < {low} ? {low} : code > {high} ? {high} : code) - {low};")
+            code += [f"{name} += code * {w};" for name, w in zip(names, self.joints[joint].tolist(), strict=True) if w]
+        code += [f"{name} >>= {self.groups.shift};" for name in names]
+        for fields, table in zip(self.groups.fields, self.tables, strict=True):
+            bits = (f"(input[{f.port}] >> {f.bit} & {(1 << f.width) - 1}) << {f.to}" for f in fields)
+            code.append(f"row = rows + {first} + ({' | '.join(bits)}) * {len(names)};")
+            code += [f"{name} += row[{k}];" for k, name in enumerate(names)]
+            rows += table.ravel().tolist()
+            first += table.size
+        code += ["int best = 0;", "int32_t top = s0;"]
+        code += [f"if ({name} > top) {{ top = {name}; best = {k}; }}" for k, name in enumerate(names[1:], 1)]
+        body = "\n    ".join([*code, f"return top < 0 ? {len(names)} : best;"])
+        table_text = f"static const int16_t rows[] = {{{', '.join(map(str, rows))}}};"
+        return (
+            f"#include <stdint.h>\nuint8_t input[{PORTS + JOINTS}];\n{table_text}\n"
+            f"int predict(void)\n{{\n    {body}\n}}\n"
+        )
+
     def _joint(self, joint: int) -> list[str]:
         low, span = int(self.low[joint]), int(self.high[joint] - self.low[joint])
         lines = [f"lds r17, input + {PORTS + joint}", f"subi r17, {low}", "brcc 1f", "ldi r17, 0"]

@@ -36,6 +36,7 @@ class Peer:
     train    returns a model from a fold's training rows
     predictor returns the prediction function of a model, in Python
     files    returns name -> text of a model, which define `predict` over `input`
+    in_c     the same for cores of 32 bits; None where it is not measured there
     needs    packages
     include  folders of headers
     """
@@ -46,6 +47,7 @@ class Peer:
     predictor: Callable[[Any], Predictor]
     needs: tuple[str, ...] = ()
     include: tuple[str, ...] = field(default=())
+    in_c: Callable[[Any], dict[str, str]] | None = None
 
     def answers_of(self, fold: Fold) -> Predictor:
         """Return the predictor of rows after training on a fold."""
@@ -256,7 +258,8 @@ def peers() -> Iterator[Peer]:
     for groups, share in product(LOGITS, SHARES):
         name = f"{by_hand(groups, share)}, joints {2**groups.shift} times finer"
         fit = partial(integer_logit, groups=groups, share=share)
-        yield Peer(name, fit, lambda made: {"peer.S": made.source}, lambda made: made)
+        in_c = {"in_c": lambda made: {"peer.c": made.in_c}}
+        yield Peer(name, fit, lambda made: {"peer.S": made.source}, lambda made: made, **in_c)
     for kind, features, what in (("uint8_t", _coarse, "uint8, 2-degree steps"), ("int16_t", _doubled, "int16")):
         for trees, leaves in FORESTS:
             name = f"emlearn, forest {trees} x {leaves}, {what}"

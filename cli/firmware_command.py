@@ -133,7 +133,7 @@ def command(
     # The host has no cycle counts and so no cost.
     cost = fit.cost
     costs = cost and {"time": cost.cycles, "unit": fit.target.unit, "flash": cost.flash, "ram": cost.ram}
-    document = {"part": fit.target.part, "layout": fit.words, "cost": costs, "measured": measured}
+    document = {"part": fit.target.part, "cost": costs, "measured": measured}
     show(document | {"files": sorted(files)}, lambda _: _print(member, fit, measured, output))
     return 0
 
@@ -171,7 +171,8 @@ def _check(target: str | None, writes: bool, measures: bool, names_both: bool) -
 
 
 def _print(target: "Target", fit: "PartFit", measured: "Measured | None", output: Path | None) -> None:
-    echo(f"layout {fit.words}")
+    if fit.cost is not None:
+        echo(f"cost {fit.words}")
     if measured is not None:
         echo(measured.note)
     if output is not None:

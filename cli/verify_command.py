@@ -143,7 +143,7 @@ def print_firmware(found: "FirmwareVerification") -> None:
     """Print for each part whether its results match Python's, and the first frame in which they do not."""
     echo(f"firmware, on {found.rows} rows, {found.extreme} extreme and {found.random} random frames:")
     for check in found.checks:
-        echo(f"  {check.part}, {check.layout}{', inputs missing' if check.missing else ''}: {_outcome(check)}")
+        echo(f"  {check.part}{', inputs missing' if check.missing else ''}: {_outcome(check)}")
         if check.misnamed:
             echo(f"    {check.misnamed} of the grasp types have ANOTHER NAME")
         if check.first is not None:

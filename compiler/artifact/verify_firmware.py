@@ -20,7 +20,7 @@ from thenar.runtime.scores import LANE_OFFSET
 
 from ..firmware import FirmwareError
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library
-from ..firmware.costs import PartFit, features, fit_for, smallest_fit
+from ..firmware.costs import PartFit, fit_for, smallest_fit
 from ..firmware.generate import LARGEST
 from ..firmware.probes import Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames, states_of
 from ..firmware.targets import TARGETS
@@ -82,7 +82,6 @@ class Difference(Struct, frozen=True):
 class TargetCheck(Struct, frozen=True, kw_only=True):
     """The result for one part.
 
-    layout     how many switches share a lookup
     missing    whether inputs are missing in every frame; in every second frame it is a single one
     frames     how many were classified; `differing` of them differ from Python in a score, grasp type, margin,
                probability or state of a segment
@@ -94,7 +93,6 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
     """
 
     part: str
-    layout: str
     missing: bool
     shares: bool
     states: bool = False
@@ -143,7 +141,6 @@ class FirmwareTrial:
         pairs = None if found.names is None else zip(found.names, self._build.grasps, strict=True)
         return TargetCheck(
             part=target.part,
-            layout=features(layout),
             missing=missing,
             shares=said is not None,
             frames=len(wrong),

@@ -18,6 +18,7 @@ from thenar.runtime.softmax import Softmax
 from . import FirmwareError
 from .layout import Layout, Rows, StoredBins
 from .sensors import Sensors, codes_files, sensors_of
+from .straight import straight
 from .words import answers_of, check_name, comment, identifiers, inputs_in_words, joint_in_words, none_of, string
 
 LIBRARY_NAME = "glove"
@@ -95,11 +96,6 @@ class Library:
         """The names of the files to compile."""
         return [path for path in self.whole if path.endswith(".c")]
 
-    @property
-    def objects(self) -> str:
-        """The object files of its sources, for a Makefile."""
-        return " ".join(path.replace(".c", ".o") for path in self.sources)
-
 
 def _lines(cells: Iterable[object]) -> list[str]:
     """Return cells without breaks as lines, separated by commas."""
@@ -126,7 +122,6 @@ def _values(name: str, names: Manifest, layout: Layout, notes: Sequence[str]) ->
         "name_bytes": 1 + max(len(text.encode()) for text in texts),
         "memory": layout.memory,
         "row_pairs": layout.row_pairs,
-        "group": layout.group,
         "found": layout.found,
         "softmax": Softmax(tables.scale),
         "columns": _remark(f"The entries of a row: {', '.join(map(comment, names.grasps))}."),
@@ -139,6 +134,7 @@ def _values(name: str, names: Manifest, layout: Layout, notes: Sequence[str]) ->
         "thresholds": _lines(f"{step}u" for step in layout.thresholds),
         "means": [line for row in layout.means.astype("int16").tolist() for line in _lines(row)],
         "rejection": _rejection(names.rejection),
+        "straight": straight(layout),
         **_enumerations(name, names),
     }
 

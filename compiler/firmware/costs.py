@@ -1,4 +1,4 @@
-"""The cost of a classifier on a part, and with it the layout of a build there, and the smallest part that holds it.
+"""The cost of a classifier on a part, and with it the smallest part that holds a build.
 
 It is estimated without a compiler: flash is the size of the compiled core and the exact bytes of the tables, RAM is
 exact. Time is a sum of a few terms, whose coefficients `benchmarks/firmwarefit.py` fits to the cycles that simavr
@@ -10,22 +10,24 @@ from contextlib import suppress
 from dataclasses import dataclass
 from textwrap import wrap
 
+import numpy as np
+
 from thenar.runtime.model.integers import IntegerTables
 
 from . import FirmwareError
 from .classifier import Library
-from .layout import GROUPS, Layout
-from .probes import Predictions, Probes, Unit, extreme_frames, joined, random_frames
+from .layout import Layout
+from .probes import Predictions, Unit, extreme_frames, joined, random_frames
+from .straight import straight
 from .targets import TARGETS, Target
 from .targets.base import Formula
 from .tools import STRICT, call, find, workshop
 
 NAME_BYTES = 16  # of a grasp type's name, its end included, where the names are not known
 _NOTE_WIDTH = 114
+CORE_SUM = 1250  # bytes of thenar_sum() on an AVR
 # avr-gcc cannot make a larger object.
 _LARGEST_ARRAY = 32767
-# Switches share lookups, which takes more flash and less time, unless the classifier then takes half of the flash.
-_FAST_SHARE = 2
 _RANDOM = 2000
 # The linker can remove uncalled code only if it has a separate section.
 _SECTIONS = ("-ffunction-sections", "-fdata-sections")
@@ -48,30 +50,42 @@ class Cost:
 
 def estimate(formula: Formula, layout: Layout, *, avr: bool) -> Cost:
     """Return the cost of a layout on a core."""
-    found = terms(layout)
-    time = sum(each * found[name] for name, each in formula.cycles.items())
-    flash = formula.flash + layout.table_bytes(avr=avr) + NAME_BYTES * layout.tables.n_classes
+    time = sum(np.multiply(formula.cycles, [*terms(layout, avr=avr).values()]))
+    flash = formula.flash + table_bytes(layout, avr=avr) + NAME_BYTES * layout.tables.n_classes
     return Cost(round(time), flash, formula.ram + 2 * layout.memory)
 
 
-def terms(layout: Layout) -> dict[str, int]:
+def table_bytes(layout: Layout, *, avr: bool) -> int:
+    """Return the bytes of flash of the tables, without names and rejection, or of straight-line code in their place,
+    with which the linker leaves out a part of the core.
+    """
+    tables, means = layout.tables, 2 * layout.means.size
+    if avr and (function := straight(layout)) is not None:
+        return means + 2 * len(function.instructions) - CORE_SUM
+    bins, lines = len(layout.binned), len(tables.slopes)
+    slopes = lines * layout.row_pairs * (2 if avr else 4)
+    terms = 8 * (bins + lines) + 18 * len(tables.grids)
+    return 4 * layout.row_pairs * layout.n_rows + slopes + terms + 2 * len(layout.thresholds) + means
+
+
+def terms(layout: Layout, *, avr: bool) -> dict[str, int]:
     """Return how often each term of the time occurs in a layout.
 
+    one           for the core
     blocks        of eight grasp types, which are added up at once
-    classes       whose sums are compared
-    bytes         of switches
-    groups        of switches, whose rows are found
+    switches      whose rows are found
     rows, lines   that are added, in all blocks
     distances     of lines, and `shifts` of their codes
     bins, halves  joints whose thresholds are searched, and the comparisons
+    classes       whose sums are compared
+    calls         of straight-line code instead of the core, and its `cycles`
     """
     tables, blocks = layout.tables, -(-layout.row_pairs // 4)
-    return {
+    function = straight(layout) if avr else None
+    core = {
         "one": 1,
         "blocks": blocks,
-        "classes": tables.n_classes,
-        "bytes": -(-tables.n_switches // 8),
-        "groups": len(layout.groups),
+        "switches": tables.n_switches,
         "rows": layout.found * blocks,
         "lines": len(tables.slopes) * blocks,
         "distances": len(tables.slopes),
@@ -79,6 +93,10 @@ def terms(layout: Layout) -> dict[str, int]:
         "bins": len(layout.bins),
         "halves": sum(len(bins.thresholds).bit_length() for bins in layout.bins),
     }
+    if function is not None:
+        core = dict.fromkeys(core, 0)
+    cycles = 0 if function is None else function.cycles
+    return core | {"classes": tables.n_classes, "calls": int(function is not None), "cycles": cycles}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,29 +108,24 @@ class PartFit:
     cost: Cost | None
 
     def notes(self, *more: str) -> tuple[str, ...]:
-        """Return lines for an opening comment: the layout, and the notes `more`."""
-        return tuple(line for note in (f"Layout {self.words}.", *more) for line in wrap(note, _NOTE_WIDTH))
+        """Return lines for an opening comment: the cost, and the notes `more`."""
+        costs = () if self.cost is None else (f"Cost {self.words}.",)
+        return tuple(line for note in (*costs, *more) for line in wrap(note, _NOTE_WIDTH))
 
     @property
     def words(self) -> str:
-        """The part, the layout, and what it costs."""
-        said = f"for {self.target.title or self.target.part}: {features(self.layout)}"
+        """The part, and what the build costs on it."""
+        said = f"for {self.target.title or self.target.part}"
         if (cost := self.cost) is None:
             return said
-        return f"{said}, about {cost.cycles} {self.target.unit} a frame, {cost.flash} bytes of flash, {cost.ram} of RAM"
-
-
-def features(layout: Layout) -> str:
-    """Return how many switches share a lookup, in words."""
-    return f"{layout.group} switches a lookup" if layout.group > 1 else "one switch a lookup"
+        return f"{said}: about {cost.cycles} {self.target.unit} a frame, {cost.flash} bytes of flash, {cost.ram} of RAM"
 
 
 def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> PartFit:
     """Return the fit of `tables` on a target, whose flash the classifier may fill up to `flash` bytes, by default three
     quarters, so that scanning and sending have room, and never more than its `most_flash`.
 
-    Of the layouts, it is the fastest that takes half of the part's flash or less; otherwise the smallest. Raises
-    FirmwareError if it does not fit, or the part has less flash than `flash`.
+    Raises FirmwareError if it does not fit, or the part has less flash than `flash`.
     """
     if target.any_part:
         return smallest_fit(tables, flash=flash)
@@ -120,24 +133,12 @@ def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> 
         raise FirmwareError(
             f"the classifier cannot be allowed {flash} bytes of flash: {target.named} has {target.flash} bytes"
         )
-    *faster, smallest = GROUPS
-    share = target.flash // _FAST_SHARE
     allowed = min(target.flash * 3 // 4, target.most_flash) if flash is None else flash
-    for group in faster:
-        with suppress(FirmwareError):
-            fit = _fit(target, tables, group, allowed)
-            if fit.cost is None or fit.cost.flash <= share:
-                return fit
-    return _fit(target, tables, smallest, allowed)
-
-
-def _fit(target: Target, tables: IntegerTables, group: int, allowed: int) -> PartFit:
-    """Return the fit with a layout, in `allowed` bytes of flash. Raises FirmwareError if it does not fit."""
-    layout = Layout(tables, group)
+    layout = Layout(tables)
     if target.formula is None:
         return PartFit(target, layout, None)
     rows = 4 * layout.row_pairs * layout.n_rows
-    if target.avr and rows > _LARGEST_ARRAY:
+    if target.avr and rows > _LARGEST_ARRAY and straight(layout) is None:
         raise FirmwareError(
             f"the rows need {rows} bytes, but an array of an AVR has at most {_LARGEST_ARRAY}: compile with "
             "``linear`` 0 ``max_bins`` 16, or with fewer ``rounds``"
@@ -202,19 +203,17 @@ def measure(library: Library, fit: PartFit) -> Measured:
     target = fit.target
     if lack := target.missing():
         raise FirmwareError(f"firmware for {target.part} cannot be measured here: {lack}")
-    predictions = run_counted(library, target, slow_frames(library))
+    predictions = run_counted(library, target)
     flash, ram = sizes(library, target)
     return Measured(target.part, predictions.most, predictions.unit, predictions.stack, flash, ram)
 
 
-def slow_frames(library: Library) -> Probes:
-    """Return frames of which one is among the slowest: extreme and random ones."""
+def run_counted(library: Library, target: Target) -> Predictions:
+    """Return the predictions of extreme and random frames, of which one is among the slowest, and their cost on a
+    target that counts it; raise FirmwareError elsewhere.
+    """
     tables = library.layout.tables
-    return joined(extreme_frames(tables), random_frames(tables, _RANDOM, seed=1))
-
-
-def run_counted(library: Library, target: Target, frames: Probes) -> Predictions:
-    """Return the predictions and their cost on a target that counts it; raise FirmwareError elsewhere."""
+    frames = joined(extreme_frames(tables), random_frames(tables, _RANDOM, seed=1))
     sent = library.layout.frame_bytes(frames.bits, frames.codes)
     predictions = target.run(library.files, library.name, library.layout, sent)
     if predictions.cost is None:

@@ -4,7 +4,6 @@ Some frames are extreme, and the others are random. With the C a firmware folder
 """
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from textwrap import wrap
@@ -21,7 +20,6 @@ from thenar.runtime.segmenting.model import SegmentModel
 from . import FirmwareError
 from .classifier import lag_of
 from .layout import Layout
-from .words import string
 
 Frames = NDArray[np.uint8]
 Lost = NDArray[np.bool_]
@@ -240,8 +238,8 @@ CHECKS = DRAWN + 2
 _WIDTH = 120
 
 
-def check_header(name: str, layout: Layout, grasps: Sequence[str]) -> str:
-    """Return thenar_NAME_check.h: frames, the expected predictions, the types' names, and a function that compares."""
+def check_header(name: str, layout: Layout) -> str:
+    """Return thenar_NAME_check.h: frames, the expected predictions, and a function that compares."""
     frames = self_test_frames(layout)
     what = ("every switch open, lowest codes", "every switch closed, highest codes", *DRAWN * ("drawn",))
     predictions = layout.tables.scores(frames.bits, frames.codes)
@@ -249,7 +247,7 @@ def check_header(name: str, layout: Layout, grasps: Sequence[str]) -> str:
     checks = [_check(*row) for row in rows]
     values = {"name": name, "upper": name.upper(), "classes": layout.tables.n_classes, "count": len(checks)}
     inputs = {"switches": layout.tables.n_switches, "joints": layout.tables.n_joints}
-    return render("checking/check.h.j2", **values, **inputs, checks=checks, names=[string(each) for each in grasps])
+    return render("checking/check.h.j2", **values, **inputs, checks=checks)
 
 
 def self_test_frames(layout: Layout) -> Probes:

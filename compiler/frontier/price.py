@@ -24,7 +24,7 @@ from thenar.runtime.scores import Scorer
 from ..evaluation.folds import Rows
 from ..firmware import FirmwareError
 from ..firmware.classifier import LIBRARY_NAME, Library
-from ..firmware.costs import PartFit, fit_for, run_counted, slow_frames
+from ..firmware.costs import PartFit, fit_for, run_counted
 from ..firmware.probes import random_frames
 from ..firmware.targets import TARGETS, Target, timed
 from ..firmware.words import numbered
@@ -354,7 +354,7 @@ def count_steps(content: bytes, model: ClassifyModel) -> float:
     fit = fitting(tables_from_bytes(content), model.part)
     assert fit is not None
     library = Library(LIBRARY_NAME, numbered(fit.layout.tables), fit.layout)
-    return float(run_counted(library, fit.target, slow_frames(library)).most)
+    return float(run_counted(library, fit.target).most)
 
 
 @stored(2, here=True)

@@ -14,8 +14,10 @@ static bool bit_of(const uint8_t *bytes, uint16_t number)
 
 static void set_bit(uint8_t *bytes, uint16_t number, bool value)
 {
-    const uint8_t bit = (uint8_t)(1u << (number % 8u));
+    /* 1 << (number % 8), which an AVR would shift bit by bit. */
+    uint8_t bit = ((number & 1u) != 0u) ? 2u : 1u;
 
+    bit = (uint8_t)(bit * (((number & 2u) != 0u) ? 4u : 1u) * (((number & 4u) != 0u) ? 16u : 1u));
     bytes[number / 8u] = (uint8_t)(value ? (bytes[number / 8u] | bit) : (bytes[number / 8u] & (uint8_t)~bit));
 }
 
@@ -37,16 +39,21 @@ void thenar_init(thenar *hand, const thenar_model *model, uint16_t *memory)
     }
 }
 
+static bool is_set(const thenar *hand, uint16_t input)
+{
+    return (hand->n_lost == 0u) || !bit_of(hand->lost, input);
+}
+
 void thenar_set_switch(thenar *hand, uint16_t number, bool closed)
 {
-    if ((number < hand->model->switches) && !bit_of(hand->lost, number)) {
+    if ((number < hand->model->switches) && is_set(hand, number)) {
         set_bit(hand->switches, number, closed);
     }
 }
 
 void thenar_set_code(thenar *hand, uint16_t joint, uint16_t code)
 {
-    if ((joint < hand->model->joints) && !bit_of(hand->lost, (uint16_t)(hand->model->switches + joint))) {
+    if ((joint < hand->model->joints) && is_set(hand, (uint16_t)(hand->model->switches + joint))) {
         hand->codes[joint] = code;
     }
 }
@@ -90,27 +97,24 @@ static inline unsigned bin_of(const thenar *hand, const thenar_bins *bins)
     return below;
 }
 
-/* Switches: a group adds one row, the sum of the rows of its closed switches; with all open it adds none. */
+/* Switches: the row of each closed one. */
 static uint16_t *find_switches(const thenar *hand, uint16_t *found)
 {
-    const unsigned pairs = hand->model->row_pairs;
-    const uint8_t group = hand->model->group;
-    const uint8_t mask = (uint8_t)((1u << group) - 1u);
-    const unsigned per_group = pairs * mask;
+    const uint16_t pairs = hand->model->row_pairs;
     const uint8_t *const end = hand->switches + ((hand->model->switches + 7u) / 8u);
-    unsigned first = 0u; /* the row before those of the first group of a byte */
+    uint16_t first = pairs; /* the row of the first switch of a byte */
 
     for (const uint8_t *byte = hand->switches; byte < end; byte++) {
-        unsigned before = first;
+        uint16_t row = first;
 
-        for (uint_fast8_t closed = *byte; closed != 0u; closed = (uint_fast8_t)(closed >> group)) {
-            if ((closed & mask) != 0u) {
-                *found = (uint16_t)(before + ((closed & mask) * pairs));
+        for (uint_fast8_t closed = *byte; closed != 0u; closed = (uint_fast8_t)(closed >> 1)) {
+            if ((closed & 1u) != 0u) {
+                *found = row;
                 found++;
             }
-            before += per_group;
+            row = (uint16_t)(row + pairs);
         }
-        first += per_group * hand->model->groups_of_byte;
+        first = (uint16_t)(first + (8u * pairs));
     }
     return found;
 }
@@ -200,22 +204,32 @@ static void add_means(thenar *hand)
     }
 }
 
-uint16_t thenar_classify(thenar *hand)
+void thenar_sum(thenar *hand)
 {
-    const int16_t *const scores = hand->scores;
-    const unsigned classes = hand->model->classes;
-    unsigned best = 0u;
-
     find_distances(hand);
     hand->found[0] = 0u; /* the start */
     add(hand, find_bins(hand, find_switches(hand, &hand->found[1])));
+}
+
+uint16_t thenar_classify(thenar *hand)
+{
+    const int16_t *score = hand->scores;
+    uint16_t best = 0u;
+    int16_t top;
+
+    hand->model->sum(hand);
     if (hand->n_lost > 0u) {
         add_means(hand);
     }
-    for (unsigned k = 1u; k < classes; k++) {
-        best = (scores[k] > scores[best]) ? k : best;
+    top = *score;
+    for (uint16_t k = 1u, classes = hand->model->classes; k < classes; k++) {
+        score++;
+        if (*score > top) {
+            top = *score;
+            best = k;
+        }
     }
-    return (uint16_t)best;
+    return best;
 }
 
 static bool is_outside(const thenar *hand, const thenar_rejection *rejection, uint16_t grasp)

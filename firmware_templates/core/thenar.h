@@ -87,6 +87,8 @@ typedef struct {
     uint16_t outside;            /* the most joints that may be outside of their range */
 } thenar_rejection;
 
+typedef struct thenar thenar;
+
 /** A classifier: tables, and their sizes. Pointers are to tables in flash, except `rejection`, which may be NULL. */
 typedef struct {
     uint16_t classes;
@@ -95,15 +97,14 @@ typedef struct {
     uint16_t none;       /* the number of "nothing is held" */
     uint16_t n_names;    /* the classes, and "none" where it is not one of them */
     uint16_t row_pairs;  /* at least 4 */
-    uint8_t group;       /* switches that share a lookup: 1, 2 or 4 */
-    uint8_t groups_of_byte;
     uint16_t n_bins;
     uint16_t n_lines;
     uint16_t n_grids;
     uint16_t found;      /* the most rows that a frame adds, the start included */
     uint16_t step;       /* of the softmax, with `shift` */
     uint8_t shift;
-    const thenar_pair *rows;        /* the start; each group's sums but that of none; rows of bins; rows of grids */
+    void (*sum)(thenar *hand);      /* thenar_sum, or straight-line code with the tables of switches and lines in it */
+    const thenar_pair *rows;        /* the start; rows of switches; rows of bins; rows of grids */
     const thenar_slopes *slopes;    /* a row for each line */
     const thenar_bins *bins;
     const thenar_line *lines;
@@ -115,7 +116,7 @@ typedef struct {
 } thenar_model;
 
 /** A hand in a glove; the program reads `scores`, all other members are private. */
-typedef struct {
+struct thenar {
     const thenar_model *model;
     int16_t *scores;   /**< [classes] of the last classify(). */
     uint8_t *switches; /* a bit for each: closed */
@@ -124,7 +125,7 @@ typedef struct {
     uint8_t *distances;
     uint8_t *lost;     /* a bit for each: missing */
     uint16_t n_lost;
-} thenar;
+};
 
 /** Initialise: all switches open, all codes 0, nothing missing. The tables' header has the words of `memory`. */
 void thenar_init(thenar *hand, const thenar_model *model, uint16_t *memory);
@@ -143,6 +144,9 @@ void thenar_lose_joint(thenar *hand, uint16_t joint, bool lost);
 
 /** Recognise the grasp type from the inputs: the one with the largest score, the first of equal ones. */
 uint16_t thenar_classify(thenar *hand);
+
+/** The first step of classify(), by the model's tables: the scores without the means of missing inputs; private. */
+void thenar_sum(thenar *hand);
 
 /** Reject a grasp type that classify() returned if the frame is unlike all training data: return the model's `none`. */
 uint16_t thenar_decide(const thenar *hand, uint16_t grasp);

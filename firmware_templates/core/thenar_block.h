@@ -15,30 +15,27 @@ typedef struct {
     uint16_t a, b, c, d, e, f, g, h;
 } block;
 
+/* An entry, and a product with one, whose place is in Z: the compiler would compute it anew for each byte. */
+#define ADD_ENTRY(sum, row) \
+    __asm__("lpm __tmp_reg__, Z+\n\tadd %A0, __tmp_reg__\n\tlpm __tmp_reg__, Z+\n\tadc %B0, __tmp_reg__" \
+            : "+r"(sum), "+z"(row))
+#define ADD_PRODUCT(sum, slopes) \
+    __asm__("lpm %2, Z+\n\tmulsu %2, %3\n\tadd %A0, r0\n\tadc %B0, r1\n\tclr __zero_reg__" \
+            : "+r"(sum), "+z"(slopes), "=&a"(slope) : "a"(distance))
+#define EIGHT(add, place) \
+    add(sums->a, place); add(sums->b, place); add(sums->c, place); add(sums->d, place); \
+    add(sums->e, place); add(sums->f, place); add(sums->g, place); add(sums->h, place)
+
 static inline void add_row(block *sums, const int16_t *row)
 {
-    sums->a += THENAR_READ_16(&row[0]);
-    sums->b += THENAR_READ_16(&row[1]);
-    sums->c += THENAR_READ_16(&row[2]);
-    sums->d += THENAR_READ_16(&row[3]);
-    sums->e += THENAR_READ_16(&row[4]);
-    sums->f += THENAR_READ_16(&row[5]);
-    sums->g += THENAR_READ_16(&row[6]);
-    sums->h += THENAR_READ_16(&row[7]);
+    EIGHT(ADD_ENTRY, row);
 }
-
-#define TIMES(slope) ((uint16_t)(int16_t)(distance * (int8_t)THENAR_READ_8(slope)))
 
 static inline void add_line(block *sums, uint8_t distance, const int8_t *slopes)
 {
-    sums->a += TIMES(&slopes[0]);
-    sums->b += TIMES(&slopes[1]);
-    sums->c += TIMES(&slopes[2]);
-    sums->d += TIMES(&slopes[3]);
-    sums->e += TIMES(&slopes[4]);
-    sums->f += TIMES(&slopes[5]);
-    sums->g += TIMES(&slopes[6]);
-    sums->h += TIMES(&slopes[7]);
+    int8_t slope;
+
+    EIGHT(ADD_PRODUCT, slopes);
 }
 
 static inline void put(int16_t *scores, const block *sums)

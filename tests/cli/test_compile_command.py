@@ -23,7 +23,7 @@ def test_compile_writes_a_build_and_says_what_it_is(thenar: Thenar, set_file: Pa
         done.stdout,
         re.M,
     )
-    assert "\nfirmware: for atmega328p: 4 switches a lookup, " in done.stdout
+    assert "\nfirmware: for atmega328p: about " in done.stdout
     made = {path.name for path in (tmp_path / "build").iterdir()}
     files = ("build.json", "ensemble.bin", "hand.json", "report.html", "tables.bin", "try.html")
     assert made == {*files, "firmware", "spec"}

@@ -79,7 +79,7 @@ def test_firmware_is_compiled_and_held_against_python(
     tool("gcc")
     done = thenar("verify", build_folder, set_file, "--firmware", "host")
     assert done.returncode == 0, done.stderr
-    assert "host, 4 switches a lookup: every score, grasp type, margin and probability of " in done.stdout
+    assert "host: every score, grasp type, margin and probability of " in done.stdout
     assert "the build carries the firmware that thenar makes of it now" in done.stdout
     found = json.loads(thenar("verify", build_folder, set_file, "--firmware", "host", "--json").stdout)
     checks = found["firmware"]["checks"]
@@ -110,7 +110,6 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
     first = Difference("row 3", ("s1",), (7, 8), "cup", (5, 4), "pen", (5, 6), (1, 40000), (1, 40001))
     check = TargetCheck(
         part="atmega328p",
-        layout="4 switches a lookup",
         missing=False,
         shares=True,
         frames=10,
@@ -125,7 +124,7 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
     print_firmware(found)
     assert capsys.readouterr().out.splitlines() == [
         "firmware, on 4 rows, 3 extreme and 3 random frames:",
-        "  atmega328p, 4 switches a lookup: 2 of 10 frames DIFFER; the first:",
+        "  atmega328p: 2 of 10 frames DIFFER; the first:",
         "    3 of the grasp types have ANOTHER NAME",
         "    row 3: closed s1; codes 7 8",
         "    Python: cup, scores 5 4, margin 1, probability 40000 of 65535",

@@ -107,10 +107,10 @@ class Core:
         records = np.frombuffer(written, np.uint8, offset=4).reshape(len(frames), size)
         ticks = np.ascontiguousarray(records[:, -4:]).view("<u4")[:, 0]
         predictions = answers_from(records[:, :-4].tobytes(), frames, layout)
-        instructions = self._instructions(ticks, int.from_bytes(written[:4], "little"))
+        instructions = self.instructions(ticks, int.from_bytes(written[:4], "little"))
         return replace(predictions, cost=instructions, unit="instructions", names=names)
 
-    def _instructions(self, ticks: NDArray[np.uint32], of_one: int) -> NDArray[np.uint32]:
+    def instructions(self, ticks: NDArray[np.uint32], of_one: int) -> NDArray[np.uint32]:
         """Return the instructions for each number of ticks, where one instruction took `of_one`."""
         return 1 + np.rint((ticks.astype(np.int64) - of_one) * 1e9 / (self.hz << self.shift)).astype(np.uint32)
 

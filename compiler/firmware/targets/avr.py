@@ -41,7 +41,7 @@ class Avr(Target):
         from thenar.firmware_templates.rendering import render
 
         name, tables = library.name, library.layout.tables
-        values = {"name": name, "part": self.part, "programmer": self.programmer, "objects": library.objects}
+        values = {"name": name, "part": self.part, "programmer": self.programmer, "sources": library.sources}
         inputs = {"switches": tables.n_switches, "joints": tables.n_joints}
         return {
             **library.whole,
@@ -60,13 +60,7 @@ class Avr(Target):
         return None
 
     def run(
-        self,
-        files: Mapping[str, str],
-        name: str,
-        layout: "Layout",
-        frames: "Frames",
-        *,
-        lost: "Lost | None" = None,
+        self, files: Mapping[str, str], name: str, layout: "Layout", frames: "Frames", *, lost: "Lost | None" = None
     ) -> "Predictions":
         """Return the predictions for frames (n, F) in simavr, as in the base class.
 
@@ -186,28 +180,12 @@ _avr = partial(
     kind="avr",
     compiler=AVR_COMPILER,
     size=(("avr-size",), "binutils-avr"),
+    formula=Formula((250.0, 206.6, 20.39, 99.64, 102.3, 88.45, 3.988, 132.5, 29.0, 14.06, 80.66, 0.9945), 2228, 60),
 )
 
 MEMBER = (
     _avr(
         name="avr328p",
-        formula=Formula(
-            cycles={
-                "one": 378.1,
-                "blocks": 136.5,
-                "classes": 34.9,
-                "bytes": 71.78,
-                "groups": 33.38,
-                "rows": 112.9,
-                "lines": 122.9,
-                "distances": 73.62,
-                "shifts": 6.288,
-                "bins": 121.9,
-                "halves": 30.26,
-            },
-            flash=2288,
-            ram=60,
-        ),
         part="atmega328p",
         rank=10,
         flags=("-mmcu=atmega328p", "-Os"),
@@ -217,23 +195,6 @@ MEMBER = (
     ),
     _avr(
         name="avr2560",
-        formula=Formula(
-            cycles={
-                "one": 379.1,
-                "blocks": 136.6,
-                "classes": 34.9,
-                "bytes": 71.77,
-                "groups": 33.38,
-                "rows": 112.9,
-                "lines": 122.9,
-                "distances": 73.58,
-                "shifts": 6.299,
-                "bins": 123.9,
-                "halves": 30.26,
-            },
-            flash=2292,
-            ram=60,
-        ),
         part="atmega2560",
         rank=11,
         flags=("-mmcu=atmega2560", "-Os"),

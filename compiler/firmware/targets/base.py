@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Formula:
-    """What a classifier costs on a core: `cycles` a term of `costs.terms`, the bytes of the core in flash and RAM."""
+    """What a classifier costs: the cycles of each of `costs.terms`, and the bytes of flash and RAM of the core."""
 
-    cycles: Mapping[str, float]
+    cycles: tuple[float, ...]
     flash: int
     ram: int
 
@@ -106,13 +106,7 @@ class Target:
         return f"thenar has no simulator of {self.named}"
 
     def run(
-        self,
-        files: Mapping[str, str],
-        name: str,
-        layout: "Layout",
-        frames: "Frames",
-        *,
-        lost: "Lost | None" = None,
+        self, files: Mapping[str, str], name: str, layout: "Layout", frames: "Frames", *, lost: "Lost | None" = None
     ) -> "Predictions":
         """Return the predictions of the classifier `name` for frames (n, F), uint8 from `layout.frame_bytes`.
 

@@ -28,9 +28,9 @@ class Host(Target):
 
         return {
             **library.whole,
-            "Makefile": render("host/Makefile.j2", name=library.name, objects=library.objects),
+            "Makefile": render("host/Makefile.j2", name=library.name, sources=library.sources),
             "check.c": render("host/check.c.j2", name=library.name, checks=CHECKS),
-            f"thenar_{library.name}_check.h": check_header(library.name, library.layout, library.names.grasps),
+            f"thenar_{library.name}_check.h": check_header(library.name, library.layout),
         }
 
     def sources(self, library: "Library") -> dict[str, str]:

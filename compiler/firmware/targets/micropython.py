@@ -80,13 +80,7 @@ class MicroPython(Target):
         )
 
     def run(
-        self,
-        files: Mapping[str, str],
-        name: str,
-        layout: "Layout",
-        frames: "Frames",
-        *,
-        lost: "Lost | None" = None,
+        self, files: Mapping[str, str], name: str, layout: "Layout", frames: "Frames", *, lost: "Lost | None" = None
     ) -> "Predictions":
         """Return the Python module's predictions for frames (n, F), as in the base class, in the Unix port."""
         from thenar.firmware_templates.rendering import render

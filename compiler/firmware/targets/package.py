@@ -6,11 +6,12 @@ Layout and fields of the Arduino library are those of its specification, revisio
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import count, islice
 from typing import TYPE_CHECKING, Any
 
 from .base import Formula, Target
-from .cortex_m import MEMBER as _CORTEX_M
+from .cores import M0PLUS, M4, RV32
 
 if TYPE_CHECKING:
     from ..classifier import Library
@@ -66,7 +67,7 @@ class Package(Target):
             **{f"src/{path}": text for path, text in library.whole.items()},
             **{path: render(f"package/{path.rsplit('/', 1)[-1]}.j2", **values) for path in _BESIDE},
             "check/check.c": render("host/check.c.j2", name=name, checks=CHECKS),
-            f"check/thenar_{name}_check.h": check_header(name, library.layout, names.grasps),
+            f"check/thenar_{name}_check.h": check_header(name, library.layout),
             "examples/Recognise/Recognise.ino": render("package/Recognise.ino.j2", **self.example_values(library)),
         }
 
@@ -114,17 +115,20 @@ class Package(Target):
             yield from (number for number in count(_FIRST) if number != _LED)
 
 
-M0PLUS, M4 = (target.formula for target in _CORTEX_M)
 _NEXT = "{folder}/README.md explains how to use it in each ecosystem"
 # More only on request: on most parts, flash is read through a cache of 1 to 32 KiB, and larger tables miss it.
 _MOST = 64 << 10
 
 
-def family(name: str, formula: Formula | None, what: str, **given: Any) -> Package:
+def family(name: str, what: str, formula: Formula | None = M4, **given: Any) -> Package:
     """Return a package for parts whose cost is that of a similar core."""
     return Package(name=name, part=name, help=what, most_flash=_MOST, formula=formula, next_step=_NEXT, **given)
 
 
+# Espressif's pins are those of the GPIO tables of the ESP-IDF Programming Guide. Left out are pins for strapping, for
+# the flash, the PSRAM or the USB port, without a pull-up (which only analog inputs may lack), or missing on some chips
+# or modules. Analog pins are those of ADC1, since ADC2 does not convert while Wi-Fi is on.
+_esp = partial(family, rank=31, flash=16 << 20, ram=256 << 10)
 # Flash is that of a family's largest usual part, RAM that of its smallest.
 MEMBER = (
     Package(
@@ -138,8 +142,8 @@ MEMBER = (
     # RP2040 datasheet, Pico W datasheet: the module uses 23, 24, 25 and 29 itself.
     family(
         "rp2040",
-        M0PLUS,
         "a package for pico-sdk, Arduino, PlatformIO, Zephyr: Raspberry Pi Pico, Cortex-M0+",
+        M0PLUS,
         rank=32,
         flash=16 << 20,
         ram=256 << 10,
@@ -148,7 +152,6 @@ MEMBER = (
     ),
     family(
         "rp2350",
-        M4,
         "a package as for rp2040: Raspberry Pi Pico 2, Cortex-M33 or RISC-V",
         rank=33,
         flash=16 << 20,
@@ -156,7 +159,6 @@ MEMBER = (
     ),
     family(
         "nrf52",
-        M4,
         "a package for Zephyr (nRF Connect), Arduino, PlatformIO: nRF52832, nRF52840, Cortex-M4F",
         rank=34,
         flash=1 << 20,
@@ -164,11 +166,44 @@ MEMBER = (
     ),
     family(
         "stm32",
-        M4,
         "a package for STM32CubeIDE and any CMSIS project, Zephyr, Arduino, PlatformIO; counted as Cortex-M4",
         rank=35,
         flash=2 << 20,
         ram=20 << 10,
     ),
-    family("generic", M4, "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36),
+    family("generic", "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36),
+    # GPIO16 and 17 are a WROVER's PSRAM, but free on the usual WROOM-32.
+    _esp(
+        "esp32",
+        "a package for ESP-IDF, Arduino, PlatformIO, Zephyr: ESP32 (Xtensa)",
+        digital=(4, 5, 13, 14, *range(16, 20), 21, 22, 23, 25, 26, 27),
+        analog=(36, 39, 32, 33, 34, 35),
+    ),
+    _esp(
+        "esp32s2",
+        "a package as for esp32: ESP32-S2 (Xtensa)",
+        digital=(*range(11, 19), 21, *range(33, 43)),
+        analog=tuple(range(1, 11)),
+    ),
+    # GPIO33 to 37 are the octal PSRAM's of many modules; 47 and 48 have 1.8 V on an ESP32-S3R8V.
+    _esp(
+        "esp32s3",
+        "a package as for esp32: ESP32-S3 (Xtensa)",
+        digital=(*range(11, 19), 21, *range(38, 43)),
+        analog=(1, 2, *range(4, 11)),
+    ),
+    _esp(
+        "esp32c3",
+        "a package as for esp32: ESP32-C3 (RISC-V)",
+        formula=RV32,
+        digital=(5, 6, 7, 10),
+        analog=(0, 1, 3, 4),
+    ),
+    _esp(
+        "esp32c6",
+        "a package as for esp32: ESP32-C6, H2 (RISC-V)",
+        formula=RV32,
+        digital=(7, *range(18, 24)),
+        analog=(0, 1, 2, 3, 6),
+    ),
 )

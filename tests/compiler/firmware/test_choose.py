@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.costs import estimate, features, fit_for, smallest_fit
+from thenar.compiler.firmware.costs import estimate, fit_for, smallest_fit
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.model.integers import IntegerTables
@@ -23,27 +23,20 @@ def wide_tables(make_tables: MakeTables) -> IntegerTables:
     return make_tables(1, classes=14, switches=33, joints=16, bins=16, reach=300)
 
 
-def test_switches_share_look_ups_where_there_is_flash_for_it(make_tables: MakeTables, tables: IntegerTables) -> None:
-    small = make_tables(switches=8, joints=0)
-    assert [fit_for(SMALL, each).layout.group for each in (small, tables)] == [4, 4]
-    assert fit_for(TARGETS["avr2560"], tables).layout.group == 4
-    assert fit_for(TARGETS["host"], tables).layout.group == 4
-
-
 def test_a_fit_is_said_in_a_sentence(tables: IntegerTables) -> None:
     for part, unit in ((SMALL, "cycles"), (TARGETS["cortex-m4"], "instructions")):
         fit = fit_for(part, tables)
         assert fit.cost is not None
         assert fit.words == (
-            f"for {part.title or part.part}: {features(fit.layout)}, about {fit.cost.cycles} {unit} a frame, "
+            f"for {part.title or part.part}: about {fit.cost.cycles} {unit} a frame, "
             f"{fit.cost.flash} bytes of flash, {fit.cost.ram} of RAM"
         )
-    assert fit_for(TARGETS["host"], tables).words == "for this machine: 4 switches a lookup"
+    assert fit_for(TARGETS["host"], tables).words == "for this machine"
 
 
 def test_what_takes_too_much_flash_or_ram_is_refused_with_a_remedy(wide_tables: IntegerTables) -> None:
     assert SMALL.formula is not None
-    cost = estimate(SMALL.formula, Layout(wide_tables, 1), avr=True)
+    cost = estimate(SMALL.formula, Layout(wide_tables), avr=True)
     assert fit_for(SMALL, wide_tables, cost.flash).cost == cost
     told = (
         f"about {cost.flash} bytes of flash and {cost.ram} of RAM on an atmega328p, but {cost.flash - 1} and 2048 are"

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.layout import GROUPS, Layout
+from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import Lost, Predictions, Probes, joined, lost_inputs, random_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.host import MEMBER as HOST
@@ -34,6 +34,18 @@ SHAPES: dict[str, dict[str, Any]] = {
     "lines alone": {"classes": 14, "switches": 0, "joints": 3, "lines": 3},
     "lines of wide codes": {"classes": 9, "switches": 5, "joints": 4, "lines": 2, "highest": 60_000},
     "coarse rows": {"classes": 6, "switches": 6, "joints": 4, "lines": 3, "reach": 1, "unit": COARSE},
+    "bits and lines": {"classes": 14, "switches": 33, "joints": 16, "lines": 16, "constant": (0,), "highest": 3000},
+    "coarse bits and lines": {
+        "classes": 14,
+        "switches": 9,
+        "joints": 6,
+        "lines": 6,
+        "constant": (0,),
+        "reach": 1,
+        "unit": COARSE,
+    },
+    "lines alone, in three passes": {"classes": 30, "switches": 0, "joints": 5, "lines": 5, "constant": (0,)},
+    "two types of bits alone": {"classes": 2, "switches": 20, "joints": 0},
     "grids": {"classes": 17, "switches": 7, "joints": 5, "pairs": 2},
     "grids of wide codes": {"classes": 4, "switches": 5, "joints": 5, "pairs": 2, "highest": 65535},
     "grids alone": {"classes": 3, "switches": 0, "joints": 4, "pairs": 2},
@@ -48,12 +60,6 @@ SHAPES: dict[str, dict[str, Any]] = {
     "codes to the highest": {"highest": 65535, "reach": 1000},
 }
 EACH = pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
-# Every shape with every size of groups; the quick half takes the sizes in turn.
-PAIRED = [
-    pytest.param(shape, group, id=f"{name}-{group}", marks=[pytest.mark.slow] * (group != GROUPS[place % len(GROUPS)]))
-    for place, (name, shape) in enumerate(SHAPES.items())
-    for group in GROUPS
-]
 
 
 def made(
@@ -118,13 +124,13 @@ def with_missing(tables: IntegerTables, *whole: Probes) -> tuple[Probes, Lost]:
 
 
 def is_exact(
-    tables: IntegerTables, runs: Any, frames: Probes, same: SameAsPython, group: int, apart: bool = False, **given: Any
+    tables: IntegerTables, runs: Any, frames: Probes, same: SameAsPython, apart: bool = False, **given: Any
 ) -> None:
     """Compare all results on a target with Python's, those with missing inputs among them.
 
     apart  whole frames have a program of their own: on an AVR they go straight into the classifier's memory
     """
-    layout = Layout(tables, group)
+    layout = Layout(tables)
     files = Library("hand", numbered(tables), layout).files
     for some, lost in [(frames, None), with_missing(tables)] if apart else [with_missing(tables, frames)]:
         sent = layout.frame_bytes(some.bits, some.codes)
@@ -137,26 +143,25 @@ def test_results_on_this_machine_are_pythons_without_warnings(
 ) -> None:
     tool("gcc")
     tables = made(make_tables, **shape)
-    is_exact(tables, HOST, probed(tables, 500), same_as_python, GROUPS[0])
+    is_exact(tables, HOST, probed(tables, 500), same_as_python)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("group", GROUPS)
 @EACH
-def test_so_they_are_by_clang_and_with_groups_of_any_size(
-    tool: Tool, make_tables: MakeTables, probed: Probed, same_as_python: SameAsPython, shape: dict[str, Any], group: int
+def test_so_they_are_by_clang(
+    tool: Tool, make_tables: MakeTables, probed: Probed, same_as_python: SameAsPython, shape: dict[str, Any]
 ) -> None:
     name, tables = Path(tool("clang")).name, made(make_tables, 1, **shape)
-    is_exact(tables, HOST, probed(tables, 500), same_as_python, group, compiler=name)
+    is_exact(tables, HOST, probed(tables, 500), same_as_python, compiler=name)
 
 
-@pytest.mark.parametrize(("shape", "group"), PAIRED)
+@EACH
 def test_on_an_avr_results_are_python_s(
-    avr: None, make_tables: MakeTables, probed: Probed, same_as_python: SameAsPython, shape: dict[str, Any], group: int
+    avr: None, make_tables: MakeTables, probed: Probed, same_as_python: SameAsPython, shape: dict[str, Any]
 ) -> None:
     tables = made(make_tables, 2, **shape)
     part = TARGETS["avr2560" if tables.n_classes > 20 or tables.n_switches > 100 else "avr328p"]
-    is_exact(tables, part, probed(tables, 20), same_as_python, group, apart=True)
+    is_exact(tables, part, probed(tables, 20), same_as_python, apart=True)
 
 
 @pytest.mark.slow
@@ -166,7 +171,7 @@ def test_on_cores_of_32_bits_results_are_python_s(
     cores: Any, make_tables: MakeTables, probed: Probed, same_as_python: SameAsPython, shape: dict[str, Any], part: str
 ) -> None:
     tables = made(make_tables, 3, **shape)
-    is_exact(tables, cores[part], probed(tables, 100), same_as_python, GROUPS[0])
+    is_exact(tables, cores[part], probed(tables, 100), same_as_python)
 
 
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -188,7 +193,7 @@ def test_any_tables_give_python_s_results(
     joints = max(joints, int(switches == 0))
     terms: dict[str, Any] = {"pairs": min(more, joints // 2)} if paired else {"lines": min(more, joints)}
     tables = made(make_tables, seed, classes=classes, switches=switches, joints=joints, **terms)
-    is_exact(tables, HOST, random_frames(tables, 60, seed), same_as_python, GROUPS[seed % 3])
+    is_exact(tables, HOST, random_frames(tables, 60, seed), same_as_python)
 
 
 def test_tables_at_the_16_bit_limit_borrow_and_carry_correctly(tool: Tool, same_as_python: SameAsPython) -> None:
@@ -199,8 +204,7 @@ def test_tables_at_the_16_bit_limit_borrow_and_carry_correctly(tool: Tool, same_
     zero = np.zeros((0, 5), np.int16)
     tables = IntegerTables.of(np.full(5, -1, np.int16), rows, (), (), 0 * rows, zero, 1.0)
     bits = np.array([[b >> i & 1 for i in range(4)] for b in range(16)], bool)
-    for group in GROUPS:
-        is_exact(tables, HOST, Probes(bits, np.zeros((16, 0), np.uint16)), same_as_python, group)
+    is_exact(tables, HOST, Probes(bits, np.zeros((16, 0), np.uint16)), same_as_python)
 
 
 def test_every_code_finds_its_row(avr: None, make_tables: MakeTables, same_as_python: SameAsPython) -> None:
@@ -208,7 +212,7 @@ def test_every_code_finds_its_row(avr: None, make_tables: MakeTables, same_as_py
     every = np.arange(1024, dtype=np.uint16)
     frames = Probes(np.zeros((1024, 2), bool), np.stack([every, every[::-1]], axis=1))
     for target in (HOST, TARGETS["avr328p"]):
-        is_exact(tables, target, frames, same_as_python, GROUPS[0], apart=target is not HOST)
+        is_exact(tables, target, frames, same_as_python, apart=target is not HOST)
 
 
 # A hand beside another, in memory whose neighbours are watched; unknown inputs; names of every length of buffer.
@@ -279,7 +283,7 @@ def test_the_core_is_the_same_for_every_build(make_tables: MakeTables) -> None:
 
 def test_tables_beyond_16_bits_are_refused(make_tables: MakeTables) -> None:
     with pytest.raises(FirmwareError, match=r"the tables have \d+ pairs of entries, but firmware has at most 65535"):
-        Layout(make_tables(classes=400, switches=100, joints=0, reach=5))
+        Layout(make_tables(classes=400, switches=400, joints=0, reach=5))
     with pytest.raises(FirmwareError, match="no switch and no joint"):
         Layout(make_tables(switches=0, joints=0))
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from thenar.compiler.firmware.targets.esp32 import MEMBER
+from thenar.compiler.firmware.targets.package import MEMBER as PACKAGES
 
-PARTS = {part.part: part for part in MEMBER}
+PARTS = {part.part: part for part in PACKAGES if part.part.startswith("esp")}
 # Of each chip: its GPIOs, those with the comment "strapping pin", "SPI0/1", "USB" or "GPI", and those of ADC1. Some
 # modules lack or use the doubtful ones. GPIO5 of an ESP32 only sets the timing of SDIO.
 TABLES: dict[str, dict[str, set[int]]] = {

@@ -2,7 +2,6 @@
  * @file thenar_glove.h
  * @brief The numbers and tables of 3 grasp types from 6 switches and 2 joints of a glove.
  *
- * Layout for this machine: 4 switches a lookup.
  * From the tables 0123456789abcdef; thenar 0.1.0, template tables/thenar_NAME.h.j2.
  */
 #ifndef THENAR_GLOVE_H
@@ -17,7 +16,7 @@ extern "C" {
 #define THENAR_GLOVE_CLASSES 3u
 #define THENAR_GLOVE_SWITCHES 6u
 #define THENAR_GLOVE_JOINTS 2u
-#define THENAR_GLOVE_MEMORY 17u /**< Words of memory for thenar_init(). */
+#define THENAR_GLOVE_MEMORY 21u /**< Words of memory for thenar_init(). */
 #define THENAR_GLOVE_NAME_BYTES 14u /**< Of the longest name, its end included. */
 
 /** The grasp types. */

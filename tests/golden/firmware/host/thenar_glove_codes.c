@@ -5,7 +5,9 @@
 
 #ifdef __AVR__
 #define COPY(to, from) ((void)memcpy_P(&(to), &(from), sizeof(to)))
+#define APART __attribute__((noinline)) /* a short function then saves few registers */
 #else
+#define APART
 #define COPY(to, from) ((to) = (from))
 #endif
 
@@ -79,7 +81,7 @@ static void prepare(thenar_glove_line *line, const point_codes *codes)
     const int64_t step = (rises ? codes->second : codes->first) - low;
     const uint64_t steep = (uint64_t)((step < 0) ? -step : step) / (uint64_t)span;
     const int64_t unit = (int64_t)span * (INT64_C(1) << FRACTION);
-    uint32_t inexact;
+    uint32_t inexact, to_end;
 
     line->window = 4u;
     while ((line->window < ((uint32_t)span * 4u)) && (line->window < 131072u)) {
@@ -87,6 +89,9 @@ static void prepare(thenar_glove_line *line, const point_codes *codes)
     }
     line->falls = step < 0;
     line->from = begin + (line->falls ? (int32_t)(line->window / 2u) : -(int32_t)(line->window / 2u));
+    line->from = (line->from < -FARTHEST) ? -FARTHEST : ((line->from > FARTHEST) ? FARTHEST : line->from);
+    to_end = (uint32_t)(line->falls ? (line->from + FARTHEST) : (FARTHEST - line->from));
+    line->window = (line->window > to_end) ? to_end : line->window;
     const int64_t at_from = (low * span) + (step * ((int64_t)line->from - begin)) + (unit / 2);
     const int64_t rest = ((at_from % unit) + unit) % unit;
 
@@ -106,49 +111,49 @@ static void prepare(thenar_glove_line *line, const point_codes *codes)
 
         line->safe = line->mask - inexact;
         line->exact = ((step % span) == 0) && (((steep | ((uint64_t)rest / (uint64_t)span)) & dropped) == 0u);
+        line->safe = line->exact ? UINT32_MAX : line->safe;
     }
+}
+
+static APART uint16_t nearest_on(const thenar_glove_line *line, uint16_t sensor, int32_t reading)
+{
+    const point_readings at = {line->readings[0], line->readings[1]};
+    point_codes own;
+
+    COPY(own, points[sensor]);
+    return (at.first == at.second) ? 0u : nearest(&at, &own, reading, UINT16_MAX);
 }
 
 /* Return the code of a reading in the units of the readings at the points. */
-static uint16_t code_on(const thenar_glove_line *line, uint16_t sensor, int32_t reading)
+static APART uint16_t code_on(const thenar_glove_line *line, uint16_t sensor, int32_t reading)
 {
-    const int32_t held = (reading < -FARTHEST) ? -FARTHEST : ((reading > FARTHEST) ? FARTHEST : reading);
-    const int32_t distance = line->falls ? (line->from - held) : (held - line->from);
-    const uint32_t value = line->offset + (line->gain * (uint32_t)distance);
-    const uint32_t rest = value & line->mask;
-    const bool sure = line->exact || ((rest - 1u) < line->safe);
-    uint16_t code;
+    const uint32_t above = (uint32_t)reading - (uint32_t)line->from;
+    const uint32_t distance = line->falls ? (0u - above) : above;
 
-    if (sure && (distance >= 0) && ((uint32_t)distance <= line->window)) {
-        int32_t whole = line->base + (int32_t)((uint16_t)(value >> 16) >> line->shift);
+    if (distance <= line->window) {
+        const uint32_t value = line->offset + (line->gain * distance);
+        const uint32_t rest = value & line->mask;
+        const bool midway = (rest == 0u) && line->exact;
 
-        whole -= ((rest == 0u) && ((whole % 2) != 0)) ? 1 : 0; /* halfway between two */
-        code = (whole < 0) ? 0u : ((whole > UINT16_MAX) ? UINT16_MAX : (uint16_t)whole);
-    } else {
-        const point_readings at = {line->readings[0], line->readings[1]};
-        point_codes own;
+        if (((rest - 1u) < line->safe) || midway) {
+            int32_t whole = line->base;
 
-        COPY(own, points[sensor]);
-        code = nearest(&at, &own, held, UINT16_MAX);
+            /* An AVR shifts by one bit at a time, but a byte at once. */
+            whole += (line->shift == 8u) ? (uint8_t)(value >> 24) : ((uint16_t)(value >> 16) >> line->shift);
+            whole -= midway ? (int32_t)((uint32_t)whole & 1u) : 0;
+            return (whole < 0) ? 0u : ((whole > UINT16_MAX) ? UINT16_MAX : (uint16_t)whole);
+        }
     }
-    return code;
+    return nearest_on(line, sensor, reading);
 }
 
-/* Return a reading in the units of the readings at the points. */
-static int32_t coded(uint16_t sensor, int32_t reading)
-{
-    int32_t found = reading;
-
-    (void)sensor;
-    return found;
-}
+#define coded(sensor, reading) (reading)
 
 static void set_line(thenar_glove_codes *codes, uint16_t sensor, int32_t first, int32_t second)
 {
     thenar_glove_line *const line = &codes->lines[sensor];
 
-    line->readings[0] = first;
-    line->readings[1] = second;
+    *line = (thenar_glove_line){.readings = {first, second}};
     if (first != second) {
         point_codes own;
 
@@ -191,12 +196,7 @@ bool thenar_glove_calibrated(const thenar_glove_codes *codes, uint16_t sensor)
 
 uint16_t thenar_glove_code_of(const thenar_glove_codes *codes, uint16_t sensor, int32_t reading)
 {
-    uint16_t code = 0u;
-
-    if (thenar_glove_calibrated(codes, sensor)) {
-        code = code_on(&codes->lines[sensor], sensor, coded(sensor, reading));
-    }
-    return code;
+    return (sensor < SENSORS) ? code_on(&codes->lines[sensor], sensor, coded(sensor, reading)) : 0u;
 }
 
 void thenar_glove_set_reading(thenar *hand, const thenar_glove_codes *codes, uint16_t sensor, int32_t reading)

@@ -36,11 +36,11 @@ typedef struct {
     int32_t base;        /* the whole part of its code */
     uint32_t offset;     /* the fraction of its code, in units of 2^-(16 + shift) */
     uint32_t gain;       /* what the next reading adds, in these units */
-    uint32_t window;     /* how many readings the fast range has */
+    uint32_t window;     /* how many readings follow in the fast range */
     uint32_t mask;       /* the bits of a fraction */
     uint32_t safe;       /* the largest fraction that no rounding changes */
     uint8_t shift;
-    bool exact; /* nothing was rounded */
+    bool exact; /* nothing was rounded: all fractions are safe */
     bool falls; /* codes rise where readings fall */
 } thenar_glove_line;
 
