@@ -212,8 +212,6 @@ const DIGITS = {
 };
 const NEIGHBOUR = { index: ["middle", 1], ring: ["middle", -1], little: ["ring", -1] };
 const PALM = [[-21, -4, 0], [-34, 40, 0], "little", "ring", "middle", "index", [30, 45, 2], [21, -4, 0]];
-const STRAIGHT = { rotation: 20 };
-const BENDS = { thumb: ["mcp", "ip"], finger: ["mcp", "pip", "dip"] };
 const SPAN = { abduction: 30, arch: 30, yaw: 40 }; // degrees for joints not measured as angles; for others 90
 
 const add = (a, b, by = 1) => a.map((value, at) => value + by * b[at]);
@@ -254,7 +252,7 @@ function posed(angles) {
     chains[digit] = chain(add(base, bases[digit] ?? [0, 0, 0]), ahead, [0, 0, 1], lengths, bends);
   }
   const { base, lean, lengths } = DIGITS.thumb, curl = at("thumb", "curl");
-  const side = radians(at("thumb", "abduction", lean)), round = radians(at("thumb", "rotation", STRAIGHT.rotation));
+  const side = radians(at("thumb", "abduction", lean)), round = radians(at("thumb", "rotation", 20));
   const ahead = [Math.sin(side) * Math.cos(round), Math.cos(side), Math.sin(side) * Math.sin(round)];
   const over = [-1, 0.1, 0.35], flat = add(over, ahead, -dot(over, ahead)), size = Math.sqrt(dot(flat, flat)) || 1;
   const bends = [0, at("thumb", "mcp", curl * 0.6), at("thumb", "ip", curl)];
@@ -264,7 +262,6 @@ function posed(angles) {
   return {
     chains: Object.fromEntries(Object.entries(chains).map(([digit, points]) => [digit, turn(points)])),
     palm: turn(palm),
-    centre: turn([[0, 55, 0]])[0],
     forearm: [[-18, 4, 0], [-17, -34, 0], [17, -34, 0], [18, 4, 0]].map(project),
   };
 }
@@ -278,20 +275,6 @@ function chain(base, ahead, flex, lengths, bends) {
   });
   return points;
 }
-
-// The handle of a joint: at the end of the part that it bends; for a digit's abduction beyond its tip.
-function handleOf(joint, pose) {
-  const points = pose.chains[joint.digit];
-  if (joint.digit === "wrist") return joint.moves === "pitch" ? pose.centre : mixed(pose.palm[4], pose.centre, 0.5);
-  if (joint.digit === "palm") return mixed(pose.palm[1], pose.palm[2], 0.6);
-  if (joint.moves === "abduction") return add(points[3], add(points[3], points[2], -1), 10 / length(points));
-  const names = joint.digit === "thumb" ? ["rotation", "mcp", "ip"] : ["mcp", "pip", "dip"];
-  const at = names.indexOf(joint.moves);
-  return points[at < 0 ? 3 : at + 1];
-}
-
-const mixed = (a, b, share) => a.map((value, at) => value + share * (b[at] - value));
-const length = (points) => Math.max(Math.hypot(...add(points[3], points[2], -1)), 6);
 
 class Posed {
   constructor(parent, joints) {
@@ -311,16 +294,7 @@ class Posed {
         element("path", { class: "axis" }, group),
       ];
     }
-    this.handles = joints.map((joint) => this.#handle(joint));
     this.draw();
-  }
-
-  #handle(joint) {
-    const tilted = joint.moves === "abduction" || joint.moves === "yaw";
-    const group = element("g", { class: tilted ? "aid" : "" }, this.group);
-    element("path", { class: "handle", d: tilted ? "M0 -3.4L3.4 0L0 3.4L-3.4 0Z" : "M-2.6 0a2.6 2.6 0 1 0 5.2 0a2.6 2.6 0 1 0 -5.2 0" }, group);
-    named(group, joint.name);
-    return group;
   }
 
   #angles(values) {
@@ -345,11 +319,10 @@ class Posed {
     for (const [digit, parts] of Object.entries(this.digits)) {
       for (const part of parts) part.setAttribute("d", line(pose.chains[digit], false));
     }
-    this.joints.forEach((joint, at) => {
-      const [x, y] = handleOf(joint, pose);
-      this.handles[at].setAttribute("transform", `translate(${x.toFixed(1)} ${(-y).toFixed(1)})`);
-      this.handles[at].classList.toggle("gone", this.values[at] === null);
-    });
+    // A part of the hand is marked while one of its joints is lost.
+    const lost = new Set(this.joints.filter((_, at) => this.values[at] === null).map(({ digit }) => digit));
+    for (const [digit, [part]] of Object.entries(this.digits)) part.parentNode.classList.toggle("gone", lost.has(digit));
+    this.palm.classList.toggle("gone", lost.has("palm") || lost.has("wrist"));
   }
 
   fit() {}
