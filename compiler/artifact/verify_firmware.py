@@ -163,10 +163,13 @@ class FirmwareTrial:
             return found
         lost = self._lost if missing else np.zeros((n, self._frames.bits.shape[1] + self._frames.codes.shape[1]), bool)
         at = self._frames.bits.shape[1]
-        masks = (_masks(each) for each in (self._frames.bits, lost[:, :at], lost[:, at:]))
-        frames = zip((scores + LANE_OFFSET).tolist(), *masks, self._frames.codes.tolist(), strict=True)
+        closed, gone = (self._frames.bits & ~lost[:, :at]).sum(axis=1), lost[:, :at].sum(axis=1)
+        packed = np.packbits(lost[:, at:], axis=1, bitorder="little")
+        joints = [int.from_bytes(row.tobytes(), "little") for row in packed]
+        counts = closed.tolist(), gone.tolist(), joints, self._frames.codes.tolist()
         refused = [
-            rejector.refuses(own, bits, gone, codes, lost_joints=joints) for own, bits, gone, joints, codes in frames
+            rejector.refuses(own, shut, off, codes, lost_joints=silent)
+            for own, shut, off, silent, codes in zip((scores + LANE_OFFSET).tolist(), *counts, strict=True)
         ]
         return np.asarray(np.where(refused, k, found))
 
@@ -220,11 +223,6 @@ def _said(found: Predictions) -> NDArray[np.int64] | None:
         return None
     states = [] if found.states is None else [found.states]
     return np.stack([found.margins, found.shares, *states], axis=1).astype(np.int64)
-
-
-def _masks(flags: NDArray[np.bool_]) -> list[int]:
-    """Return each row of flags (n, m) as a mask whose lowest bit is the first flag."""
-    return [int.from_bytes(row.tobytes(), "little") for row in np.packbits(flags, axis=1, bitorder="little")]
 
 
 class FirmwareVerification(Struct, frozen=True, kw_only=True):
