@@ -129,13 +129,14 @@ def _joint(joint: Calibration, meaning: Meaning, limits: Range | None, *, known:
         return _sensor(joint, points)
     codes_of_bytes(joint, meaning)  # whether they fit
     grid = None if limits is None else _grid(joint.name, limits, *JOINT_CODES)
-    own = None if meaning is None or unit == _RAW else _line(joint.name, meaning.sensors)
+    own = None if meaning is None or unit == _RAW else _line(joint.name, meaning)
     if own is None:  # bytes are codes
         return _sensor(joint, points, (joint.code_a, joint.code_b), grid)
     return _sensor(joint, (own.value_a, own.value_b), (own.raw_a, own.raw_b), grid)
 
 
-def _line(name: str, lines: Sequence[SensorCalibration]) -> SensorCalibration:
+def _line(name: str, meaning: GloveCalibration | tuple[SensorCalibration, ...]) -> SensorCalibration:
+    lines = meaning if isinstance(meaning, tuple) else meaning.sensors
     return next(line for line in lines if line.name == name)
 
 
