@@ -160,12 +160,13 @@ class FirmwareTrial:
             return found
         lost = self._lost if missing else np.zeros((n, self._frames.bits.shape[1] + self._frames.codes.shape[1]), bool)
         at = self._frames.bits.shape[1]
-        flags = (self._frames.bits, lost[:, :at], lost[:, at:])
-        packed = (np.packbits(each, axis=1, bitorder="little") for each in flags)
-        masks = ([int.from_bytes(row.tobytes(), "little") for row in rows] for rows in packed)
-        frames = zip((scores + LANE_OFFSET).tolist(), *masks, self._frames.codes.tolist(), strict=True)
+        closed, gone = (self._frames.bits & ~lost[:, :at]).sum(axis=1), lost[:, :at].sum(axis=1)
+        packed = np.packbits(lost[:, at:], axis=1, bitorder="little")
+        joints = [int.from_bytes(row.tobytes(), "little") for row in packed]
+        counts = closed.tolist(), gone.tolist(), joints, self._frames.codes.tolist()
         refused = [
-            rejector.refuses(own, bits, gone, codes, lost_joints=joints) for own, bits, gone, joints, codes in frames
+            rejector.refuses(own, shut, off, codes, lost_joints=silent)
+            for own, shut, off, silent, codes in zip((scores + LANE_OFFSET).tolist(), *counts, strict=True)
         ]
         return np.asarray(np.where(refused, k, found))
 

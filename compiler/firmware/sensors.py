@@ -129,9 +129,10 @@ def _joint(joint: Calibration, meaning: Meaning, limits: Range | None, *, known:
         return _sensor(joint, points)
     codes_of_bytes(joint, meaning)  # whether they fit
     grid = None if limits is None else _grid(joint.name, limits, *JOINT_CODES)
-    own = None if meaning is None or unit == _RAW else next(line for line in meaning.sensors if line.name == joint.name)
-    if own is None:  # bytes are codes
+    if meaning is None or unit == _RAW:  # bytes are codes
         return _sensor(joint, points, (joint.code_a, joint.code_b), grid)
+    lines = meaning if isinstance(meaning, tuple) else meaning.sensors
+    own = next(line for line in lines if line.name == joint.name)
     return _sensor(joint, (own.value_a, own.value_b), (own.raw_a, own.raw_b), grid)
 
 

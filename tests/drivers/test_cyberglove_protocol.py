@@ -25,11 +25,11 @@ from thenar.drivers.cyberglove_protocol import (
     period_us,
     period_words,
     query,
-    sending_us,
     setting,
     shortest_us,
 )
 from thenar.drivers.errors import SettingError
+from thenar.drivers.serial_line import sending_us
 
 # As Shadow (22) and toon (18) list them, under our names.
 OF_22 = """thumb_rotation thumb_mpj thumb_ij thumb_abduction index_mpj index_pij index_dij middle_mpj middle_pij
