@@ -115,7 +115,7 @@ class Targets:
 
         Each is within two roundings of the exact value on the grids.
         """
-        base = np.tile(self.weights.exponents, 2)
+        base = np.concatenate([self.weights.exponents] * 2)
         sums = self.both.branch_sums(left, missing, base) + self._fine.branch_sums(left, missing, base)
         return sums[:, : len(left)], sums[:, len(left) :]
 
