@@ -111,7 +111,7 @@ def least_disruptive_scale(
     scores = tables.scores(bits, codes)
     most = max(rounding_error(tables, scale, grid) for scale in scales[[0, -1]].tolist())
     near = _leads(scores) * scales[-1] <= 2 * most + 1  # no scale can change the other rows: see above
-    right, means = winners(scores[near]), _mean(bits.astype(np.int64))
+    right, means = winners(scores[near]), bits.sum(axis=0) / len(bits)
     closed, asked, changed = bits[near].astype(np.float64), codes[near], []
     for scale in scales.tolist():
         whole = ScoreTables(_whole_bias(tables, scale, grid, means), tuple(_whole(tables, scale, grid)))
@@ -231,7 +231,7 @@ def quantise(
     this is no restriction, since sums of 16 bits span no more, and the scale is the finest; with fewer it is the
     kindest. With lines, entries of fewer than 16 bits are multiples of 256 instead.
     """
-    grid, means = COARSE if tables.lines and entry_bits < 16 else 1, _mean(bits.astype(np.int64))
+    grid, means = COARSE if tables.lines and entry_bits < 16 else 1, bits.sum(axis=0) / len(bits)
     balanced = balance(as_deployed(tables, grid))
     limit, room = 2 ** (width - 1) - 1, 0.0
     while True:

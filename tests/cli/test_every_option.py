@@ -125,9 +125,10 @@ def _holds(folder: Path) -> dict[str, bytes]:
     return {str(path): path.read_bytes() if path.is_file() else b"" for path in folder.rglob("*")}
 
 
-def _tried(line: list[str], place: Path, capfd: pytest.CaptureFixture[str]) -> tuple[int, str]:
-    """Return exit code and what was said, once what any run must keep is checked; what was written is removed."""
-    before = _holds(place)
+def _tried(
+    line: list[str], place: Path, before: dict[str, bytes], capfd: pytest.CaptureFixture[str]
+) -> tuple[int, str]:
+    """Return exit code and what was said, once all that was there `before` is the same; what was written is removed."""
     with _interrupted_at_work():
         code = run(line)
     printed, said = capfd.readouterr()
@@ -159,10 +160,11 @@ def test_there_is_a_line_for_every_command() -> None:
 def test_a_value_that_makes_no_sense_is_one_sentence(
     command: str, values: tuple[str, ...], place: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    before = _holds(place)
     for parameter in _parameters(command):
         number = isinstance(parameter.type, click.types.FloatParamType | click.types.IntParamType)
         for value in values:
-            code, said = _tried(_line(command, parameter, value), place, capfd)
+            code, said = _tried(_line(command, parameter, value), place, before, capfd)
             where = (parameter.name, value, said)
             assert code in (0, 1, 2, 130), where
             if number and value in ("nan", "inf", "-inf", ""):
