@@ -14,7 +14,7 @@ static bool bit_of(const uint8_t *bytes, uint16_t number)
 
 static void set_bit(uint8_t *bytes, uint16_t number, bool value)
 {
-    /* 1 << (number % 8), which an AVR would shift bit by bit. */
+    /* 1 << (number % 8), which an AVR would shift in as many steps. */
     uint8_t bit = ((number & 1u) != 0u) ? 2u : 1u;
 
     bit = (uint8_t)(bit * (((number & 2u) != 0u) ? 4u : 1u) * (((number & 4u) != 0u) ? 16u : 1u));
