@@ -255,8 +255,8 @@ def on_cores(files: Mapping[str, str], frames: Frames, expected: NDArray[np.inte
     most = []
     for name in CORES:
         core = qemu.CORES[name]
-        given = {path: (QEMU / path).read_text() for path in ("ticks.h",)} | files
-        given |= {"main.c": MAIN.replace("BYTES", str(frames.shape[1])), "frames": frames.tobytes()}
+        main = {"main.c": MAIN.replace("BYTES", str(frames.shape[1])), "ticks.h": (QEMU / "ticks.h").read_text()}
+        given = {**files, **main, "frames": frames.tobytes()}
         found = np.frombuffer(core.emulate(given, flags=("-w",)), np.dtype([("grasp", "<u4"), ("ticks", "<u4")]))
         assert (found["grasp"][1:] == expected).all()
         most.append(int(core.instructions(found["ticks"][1:], int(found["ticks"][0])).max()))

@@ -258,8 +258,8 @@ def peers() -> Iterator[Peer]:
     for groups, share in product(LOGITS, SHARES):
         name = f"{by_hand(groups, share)}, joints {2**groups.shift} times finer"
         fit = partial(integer_logit, groups=groups, share=share)
-        in_c = {"in_c": lambda made: {"peer.c": made.in_c}}
-        yield Peer(name, fit, lambda made: {"peer.S": made.source}, lambda made: made, **in_c)
+        code, in_c = (lambda made: {"peer.S": made.source}), (lambda made: {"peer.c": made.in_c})
+        yield Peer(name, fit, code, lambda made: made, in_c=in_c)
     for kind, features, what in (("uint8_t", _coarse, "uint8, 2-degree steps"), ("int16_t", _doubled, "int16")):
         for trees, leaves in FORESTS:
             name = f"emlearn, forest {trees} x {leaves}, {what}"

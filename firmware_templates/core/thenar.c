@@ -14,7 +14,7 @@ static bool bit_of(const uint8_t *bytes, uint16_t number)
 
 static void set_bit(uint8_t *bytes, uint16_t number, bool value)
 {
-    /* 1 << (number % 8), which an AVR would shift bit by bit. */
+    /* 1 << (number % 8), which an AVR would shift in as many steps. */
     uint8_t bit = ((number & 1u) != 0u) ? 2u : 1u;
 
     bit = (uint8_t)(bit * (((number & 2u) != 0u) ? 4u : 1u) * (((number & 4u) != 0u) ? 16u : 1u));
@@ -39,21 +39,21 @@ void thenar_init(thenar *hand, const thenar_model *model, uint16_t *memory)
     }
 }
 
-static bool is_set(const thenar *hand, uint16_t input)
+static bool is_present(const thenar *hand, uint16_t input)
 {
     return (hand->n_lost == 0u) || !bit_of(hand->lost, input);
 }
 
 void thenar_set_switch(thenar *hand, uint16_t number, bool closed)
 {
-    if ((number < hand->model->switches) && is_set(hand, number)) {
+    if ((number < hand->model->switches) && is_present(hand, number)) {
         set_bit(hand->switches, number, closed);
     }
 }
 
 void thenar_set_code(thenar *hand, uint16_t joint, uint16_t code)
 {
-    if ((joint < hand->model->joints) && is_set(hand, (uint16_t)(hand->model->switches + joint))) {
+    if ((joint < hand->model->joints) && is_present(hand, (uint16_t)(hand->model->switches + joint))) {
         hand->codes[joint] = code;
     }
 }
