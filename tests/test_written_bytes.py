@@ -155,8 +155,8 @@ def test_a_recording_keeps_its_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyP
     path = tmp_path / "run.mcap"
     glove = GloveFrame(20, b"\x01\xff", 3)
     with writer.Recorder(path, Session(thenar="0.0.1", switches=("a", "b"), sensors=("thumb", "index"))) as recorder:
-        recorder.switches(SwitchFrame(10, 0b10, lost=0b1))
-        recorder.glove(glove)
-        recorder.switches(SwitchFrame(25, 0b1, glove=glove))
-        recorder.grasp(LiveGrasp(30, 1, 0, "cup", "cup", 0.75, 3, "ok", 30, 20, 10))
+        recorder.frame(SwitchFrame(10, 0b10, lost=0b1))
+        recorder.frame(glove)
+        recorder.frame(SwitchFrame(25, 0b1, glove=glove))
+        recorder.moment((), LiveGrasp(30, 1, 0, "cup", "cup", 0.75, 3, "ok", 30, 20, 10))
     kept("recording", {path.name: hashlib.sha256(path.read_bytes()).hexdigest()}, update_golden)

@@ -276,14 +276,11 @@ class CollectionGuide:
         self.step += 1
 
     def _record(self, frame: SwitchFrame | GloveFrame) -> None:
-        recorded = self.stage != "paused"
+        if self.stage != "paused":
+            self._recorder.frame(frame)
         if isinstance(frame, SwitchFrame):
-            if recorded:
-                self._recorder.switches(frame)
             self._switches = frame
         else:
-            if recorded:
-                self._recorder.glove(frame)
             self._glove = frame
 
     def _capture(self, now_us: int) -> None:

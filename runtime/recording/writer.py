@@ -174,22 +174,17 @@ class Recorder(Closing):
         """The number of messages in the file."""
         return sum(self._tail.counts.values())
 
-    def switches(self, frame: SwitchFrame) -> None:
-        """Record a reading of the switches, and the taxels' codes before it. Raises FrameError if it does not have the
-        switches of this session.
+    def frame(self, frame: SwitchFrame | GloveFrame) -> None:
+        """Record a reading of the switches, and the taxels' codes before it, or a record of the CyberGlove.
+
+        Raises FrameError if it does not have the inputs of this session.
         """
         self._write(self._of_frame(frame))
 
-    def glove(self, frame: GloveFrame) -> None:
-        """Record a record of the CyberGlove. Raises FrameError if it does not have the sensors of this session."""
-        self._write(self._of_frame(frame))
-
-    def grasp(self, grasp: LiveGrasp) -> None:
-        """Record a prediction; the grasp type also separately whenever it changes."""
-        self.moment((), grasp)
-
     def moment(self, arrived: Iterable[SwitchFrame | GloveFrame], grasp: LiveGrasp) -> None:
-        """Record the frames that arrived since the last moment, then the prediction for the newest of them."""
+        """Record the frames that arrived since the last moment, then the prediction for the newest of them; the grasp
+        type also separately whenever it changes.
+        """
         messages = [message for frame in arrived for message in self._of_frame(frame)]
         messages.append((layout.RECOGNITION, grasp.time_us, layout.encode_text(_json(_Recognition(*astuple(grasp))))))
         if grasp.grasp != self._grasp:

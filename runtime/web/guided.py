@@ -235,7 +235,7 @@ class _CollectionView:
 
 
 def _collection_says(guide: CollectionGuide) -> str:
-    """Return what to do now."""
+    """Return the next action in words."""
     none = guide.trial is not None and guide.trial.grasp == NONE
     waits = f"the countdown waits: {guide.lost}" if guide.lost else ""
     if guide.stage == "done" and guide.skipped:

@@ -72,7 +72,8 @@ class LivePage(Closing):
     def __init__(self, glove: Glove, folder: Path, address: str, *, token: str | None, recordings: Path) -> None:
         self._glove, self._frames = glove, FrameText(glove.system.build, glove.system.harness)
         self._health: HealthReport | None = None
-        self._past = Past()
+        # The latest predictions, for pages opened later.
+        self._past = deque[LiveGrasp](maxlen=PAST_US // _STEP_US)
         self._recordings = Recordings(glove, recordings, self._tell_recording)
         manifest, name = glove.system.build.manifest, glove.system.harness.name
         self._first = (
@@ -86,7 +87,8 @@ class LivePage(Closing):
         """Show the moment that the glove has just published, and carry out requests. For the thread of the run."""
         grasp, glove = moment.grasp, self._glove
         self.server.publish("frame", partial(self._frames, moment))
-        self._past.add(grasp)
+        if not self._past or grasp.time_us >= self._past[-1].time_us + _STEP_US:
+            self._past.append(grasp)
         if glove.health is not self._health and glove.health is not None:
             self._health = glove.health
             self.server.publish("health", partial(message, "health", self._health))
@@ -107,7 +109,17 @@ class LivePage(Closing):
         self.server.publish("recording", message("recording", self._recordings.state))
 
     def _hello(self) -> Sequence[bytes]:
-        return (*self._first, self._past.text())
+        changes: list[tuple[object, ...]] = []
+        past = self._past.copy()
+        for grasp in past:
+            entry = (
+                *(grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment),
+                *(grasp.segment_type, grasp.segment_us),
+            )
+            if not changes or entry != changes[-1][1:]:
+                changes.append((grasp.time_us, *entry))
+        until_us = past[-1].time_us if past else 0
+        return (*self._first, message("past", changes=changes, until_us=until_us))
 
 
 class Recordings:
@@ -233,35 +245,6 @@ def build_message(folder: Path | None, manifest: Manifest | None, name: str, **s
             "empty_hand": manifest.knows_none,
         }
     return message("build", known, name=name, **{"preshapes": False, "records": False, "replay": False} | shows)
-
-
-class Past:
-    """The latest predictions, for pages opened later. `add` and `text` may be called on two threads."""
-
-    def __init__(self) -> None:
-        self._grasps: deque[LiveGrasp] = deque(maxlen=PAST_US // _STEP_US)
-        self._newest_us, self._due_us = 0, 0
-
-    def add(self, grasp: LiveGrasp) -> None:
-        """Take a prediction."""
-        if grasp.time_us >= self._due_us or grasp.time_us < self._newest_us:
-            self._due_us = grasp.time_us + _STEP_US
-            self._grasps.append(grasp)
-        self._newest_us = grasp.time_us
-
-    def text(self) -> bytes:
-        """Return its message: an entry for every change."""
-        changes: list[tuple[object, ...]] = []
-        until_us = 0
-        for grasp in self._grasps.copy():
-            until_us = grasp.time_us
-            entry = (
-                *(grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment),
-                *(grasp.segment_type, grasp.segment_us),
-            )
-            if not changes or entry != changes[-1][1:]:
-                changes.append((until_us, *entry))
-        return message("past", changes=changes, until_us=until_us)
 
 
 class FrameText:

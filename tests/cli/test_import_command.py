@@ -286,7 +286,7 @@ def recording(tmp_path: Path) -> Path:
     )
     with Recorder(tmp_path / "a.mcap", session) as recorder:
         for trial, grasp in enumerate(types, start=1):
-            recorder.switches(SwitchFrame(trial, trial))
+            recorder.frame(SwitchFrame(trial, trial))
             recorder.label(Label(trial, "captured", trial, grasp, "A", "thing"))
             recorder.label(Label(trial, "accepted", trial, grasp, "A", "thing"))
     return recorder.path

@@ -246,9 +246,9 @@ def test_a_replayed_recording_takes_preshapes_too(
             glove = GloveFrame(time_us, codes + bytes(16), 3)
             bits = sum(1 << bit for bit, column in enumerate(kept) if small_set.switches[row, column])
             switches = SwitchFrame(time_us, bits)
-            recorder.glove(glove)
-            recorder.switches(switches)
-            recorder.grasp(recognizer.step(time_us + 1, 0, switches, glove).grasp)
+            recorder.frame(glove)
+            recorder.frame(switches)
+            recorder.moment((), recognizer.step(time_us + 1, 0, switches, glove).grasp)
     done = thenar("run", folder, "--replay", path, "--preshape", gripper, "--frames", 30)
     assert "30 of 30 frames recognised as they were recorded" in done.stderr
     shapes = [line.preshape for line in msgspec.json.Decoder(GraspLine).decode_lines(done.stdout.encode())]

@@ -99,11 +99,11 @@ def record(
             glove = GloveFrame(time_us, bytes([code]) + bytes(17), 3)
             bits = sum(1 << bit for bit, column in enumerate(kept) if closed >> column & 1)
             switches = SwitchFrame(time_us, bits, (1 << len(kept)) - 1 if number in unread else 0)
-            recorder.switches(switches)
+            recorder.frame(switches)
             if number not in unread:
-                recorder.glove(glove)
+                recorder.frame(glove)
             unix_us = clock_us[number] if clock_us else time_us + 1
-            recorder.grasp(recognizer.step(time_us + 1, unix_us, switches, glove).grasp)
+            recorder.moment((), recognizer.step(time_us + 1, unix_us, switches, glove).grasp)
     return path
 
 
@@ -214,9 +214,9 @@ def collected(path: Path, held: list[int], switches: tuple[str, ...], joint: str
     with Recorder(path, session) as recorder:
         for number, label in enumerate(held):
             time_us, (closed, code) = 10_000 * number, readings(label)
-            recorder.glove(GloveFrame(time_us, bytes(16) + bytes([code, 0]), 3))
+            recorder.frame(GloveFrame(time_us, bytes(16) + bytes([code, 0]), 3))
             bits = sum(1 << at for at, name in enumerate(switches) if closed >> int(name[1:]) & 1)
-            recorder.switches(SwitchFrame(time_us, bits))
+            recorder.frame(SwitchFrame(time_us, bits))
     return path
 
 

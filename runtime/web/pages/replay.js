@@ -20,7 +20,8 @@ export class Replay {
   #spans = { truth: [], predictions: [], wrong: [] };
   #marks = [];
   #held = false; // while the slider is dragged, messages do not move it
-  #wanted = null;
+  #wanted = null; // the requested moment, until the position has changed
+  #timer = null;
 
   /** @param {function(string, *): void} ask sends a request and its value */
   constructor(view, ask) {
@@ -51,12 +52,14 @@ export class Replay {
 
   /** Take the position in it. */
   show(state) {
-    this.#state = state;
     const { at_us, first_us, last_us, playing, speed, share, faults } = state;
+    const moved = at_us !== this.#state?.at_us;
+    this.#state = state;
+    if (this.#timer === null && (moved || at_us === this.#wanted)) this.#wanted = null;
     const slider = $("at"), length = (last_us - first_us) / 1e6, at = (at_us - first_us) / 1e6;
     this.#view.state.data(at_us, 0);
     slider.max = String(length);
-    if (!this.#held) slider.value = String(at);
+    if (!this.#held && this.#wanted === null) slider.value = String(at);
     slider.setAttribute("aria-valuetext", `${clock(at)} of ${clock(length)}`);
     say($("place"), `${clock(at)} of ${clock(length)}, ${new Date(at_us / 1000).toLocaleString()}`);
     say($("play"), playing ? "Pause" : "Play");
@@ -98,12 +101,10 @@ export class Replay {
   #seek(seconds) {
     const state = this.#state;
     if (!state) return;
-    const due = this.#wanted === null;
     this.#wanted = Math.min(Math.max(Math.round(state.first_us + 1e6 * seconds), state.first_us), state.last_us);
-    if (!due) return;
-    setTimeout(() => {
+    this.#timer ??= setTimeout(() => {
+      this.#timer = null;
       this.#ask("seek", this.#wanted);
-      this.#wanted = null;
     }, 60);
   }
 

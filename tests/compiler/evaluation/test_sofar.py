@@ -115,8 +115,8 @@ def test_a_recording_is_read_while_it_is_written(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     with Recorder(path, session) as recorder:
         for number in range(1, 7):
-            recorder.switches(SwitchFrame(10 * number, 1 + number % 2))
-            recorder.glove(GloveFrame(10 * number, bytes((100 + 50 * (number % 2),))))
+            recorder.frame(SwitchFrame(10 * number, 1 + number % 2))
+            recorder.frame(GloveFrame(10 * number, bytes((100 + 50 * (number % 2),))))
             name, thing = (("pen", "biro"), ("cup", "mug"))[number % 2]
             for event in ("begun", "captured", "accepted"):
                 recorder.label(Label(10 * number, event, number, name, "A", thing))

@@ -46,12 +46,12 @@ def do(
     grasp, thing = ("PoS", "jar") if trial % 2 else ("Tip", "pin")
     if what == "captured":
         if recorder.session.switches:
-            recorder.switches(SwitchFrame(time_us, closed))
+            recorder.frame(SwitchFrame(time_us, closed))
         if recorder.session.sensors:
-            recorder.glove(GloveFrame(time_us, sensors))
+            recorder.frame(GloveFrame(time_us, sensors))
     recorder.label(Label(time_us, what, trial, grasp, subject, thing))  # type: ignore[arg-type]
     if recorder.session.switches:
-        recorder.switches(SwitchFrame(time_us, 0b111))
+        recorder.frame(SwitchFrame(time_us, 0b111))
 
 
 @pytest.fixture
@@ -215,8 +215,8 @@ def test_recordings_of_different_gloves_are_not_mixed(write: Write, other: Sessi
 
 def test_a_row_that_misses_a_switch_is_left_out_and_told(tmp_path: Path, write: Write) -> None:
     with Recorder(tmp_path / "lost.mcap", SESSION) as recorder:
-        recorder.switches(SwitchFrame(1, 0, lost=0b100))
-        recorder.glove(GloveFrame(1, b"1234"))
+        recorder.frame(SwitchFrame(1, 0, lost=0b100))
+        recorder.frame(GloveFrame(1, b"1234"))
         recorder.label(Label(1, "captured", 7, "PoS", "A", "jar"))
         recorder.label(Label(1, "accepted", 7, "PoS", "A", "jar"))
         do(recorder, 2, "captured", 8)
@@ -285,10 +285,10 @@ def pressed(path: Path, session: Session, *trials: tuple[int | None, ...] | None
     with Recorder(path, session) as recorder:
         for trial, codes in enumerate(trials, start=1):
             time_us = trial * 1000
-            recorder.switches(SwitchFrame(time_us, 1, taxels=codes))
+            recorder.frame(SwitchFrame(time_us, 1, taxels=codes))
             for what in ("captured", "accepted"):
                 recorder.label(Label(time_us, what, trial, "PoS", "A", "jar"))
-            recorder.switches(SwitchFrame(time_us + 1, 1, taxels=(7, 7)))
+            recorder.frame(SwitchFrame(time_us + 1, 1, taxels=(7, 7)))
     return path
 
 
@@ -333,7 +333,7 @@ def test_baselines_are_taken_off_as_they_are_live(tmp_path: Path) -> None:
     session = replace(ANALOG, harness="[taxels]\nper_minute = 10.0\n")
     with Recorder(tmp_path / "a.mcap", session) as recorder:
         for tenth in range(100):
-            recorder.switches(SwitchFrame(tenth * 100_000, 1, taxels=(110, 910)))
+            recorder.frame(SwitchFrame(tenth * 100_000, 1, taxels=(110, 910)))
         for what in ("captured", "accepted"):
             recorder.label(Label(10**7, what, 1, "PoS", "A", "jar"))
     grasp_set, _ = import_recordings([recorder.path])

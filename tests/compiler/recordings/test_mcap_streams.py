@@ -183,8 +183,8 @@ def test_a_recording_whose_clock_jumps_makes_no_rows_of_the_gap(tmp_path: Path) 
     with Recorder(tmp_path / "a.mcap", SESSION) as recorder:
         wearer = Wearer(recorder)
         wearer.collect()
-        recorder.switches(SwitchFrame(2**50, 0))
-        recorder.glove(GloveFrame(2**50, b"1234"))
+        recorder.frame(SwitchFrame(2**50, 0))
+        recorder.frame(GloveFrame(2**50, b"1234"))
     grasp_set, _ = import_recordings([recorder.path], stream=True)
     assert len(grasp_set) < 5000
 

@@ -39,7 +39,7 @@ def record(path: Path, frames: list[SwitchFrame], **changes: Any) -> Path:
     calibration = TaxelCalibration(unit="N", taxels=(LINE,))
     with Recorder(path, replace(session, taxel_calibration=calibration, **changes)) as recorder:
         for frame in frames:
-            recorder.switches(frame)
+            recorder.frame(frame)
     return path
 
 

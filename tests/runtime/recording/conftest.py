@@ -74,12 +74,10 @@ def entries() -> list[Entry]:
 @pytest.fixture
 def record() -> Record:
     def one(recorder: Recorder, entry: Entry) -> None:
-        if isinstance(entry, SwitchFrame):
-            recorder.switches(entry)
-        elif isinstance(entry, GloveFrame):
-            recorder.glove(entry)
+        if isinstance(entry, SwitchFrame | GloveFrame):
+            recorder.frame(entry)
         elif isinstance(entry, LiveGrasp):
-            recorder.grasp(entry)
+            recorder.moment((), entry)
         else:
             recorder.label(entry)
 

@@ -108,7 +108,7 @@ def test_a_message_is_in_the_file_as_soon_as_it_is_recorded(tmp_path: Path, sess
     with Recorder(tmp_path / "a.mcap", session) as recorder:
         for number in range(3):
             frame = SwitchFrame(now_us(), number)
-            recorder.switches(frame)
+            recorder.frame(frame)
             assert frames_of(recorder.path)[-1] == frame
 
 
@@ -116,7 +116,7 @@ def test_the_file_is_ordered_by_log_time(tmp_path: Path, session: Session) -> No
     start = now_us()
     with Recorder(tmp_path / "a.mcap", session) as recorder:
         for late in (50, 20, 70, 0, 70):
-            recorder.switches(SwitchFrame(start + late, 0))
+            recorder.frame(SwitchFrame(start + late, 0))
         clock_ns = recorder.session.clock_ns
     with recorder.path.open("rb") as file:
         messages = [record for record in StreamReader(file).records if isinstance(record, Message)]
@@ -134,12 +134,12 @@ def test_times_are_those_of_the_date(recording: Path) -> None:
 def test_a_date_that_steps_moves_nothing(tmp_path: Path, session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.mcap"
     with Recorder(path, session) as recorder:
-        recorder.switches(SwitchFrame(now_us(), 1))
+        recorder.frame(SwitchFrame(now_us(), 1))
         monkeypatch.setattr(time, "time_ns", lambda: 0)
-        recorder.switches(SwitchFrame(now_us(), 2))
+        recorder.frame(SwitchFrame(now_us(), 2))
     # The clock of a board that has no battery starts in 1970 again.
     with Recorder(path, session, tail=read_journal(path).tail) as recorder:
-        recorder.switches(SwitchFrame(now_us(), 3))
+        recorder.frame(SwitchFrame(now_us(), 3))
     with path.open("rb") as file:
         messages = [record for record in StreamReader(file).records if isinstance(record, Message)]
     assert len(messages) == 3
@@ -180,10 +180,10 @@ def test_a_glove_whose_description_no_reader_would_take_is_refused(tmp_path: Pat
 def test_a_frame_of_another_glove_is_refused_and_the_file_stays_whole(tmp_path: Path, session: Session) -> None:
     with Recorder(tmp_path / "a.mcap", session) as recorder:
         with pytest.raises(FrameError):
-            recorder.switches(SwitchFrame(0, 1 << 12))
+            recorder.frame(SwitchFrame(0, 1 << 12))
         with pytest.raises(FrameError):
-            recorder.glove(GloveFrame(0, b"123"))
-        recorder.switches(SwitchFrame(5, 1))
+            recorder.frame(GloveFrame(0, b"123"))
+        recorder.frame(SwitchFrame(5, 1))
     assert len(frames_of(recorder.path)) == 1
 
 
@@ -221,7 +221,7 @@ def fill(recorder: Recorder) -> list[SwitchFrame]:
     frames: list[SwitchFrame] = []
     while recorder.failure is None:
         frames.append(SwitchFrame(now_us(), len(frames) % 4096))
-        recorder.switches(frames[-1])
+        recorder.frame(frames[-1])
     return frames[:-1]
 
 
@@ -229,7 +229,7 @@ def check_that_it_goes_on(recorder: Recorder, frames: list[SwitchFrame]) -> None
     """Record once there is room again, and check that the file is whole and lacks one frame only."""
     assert recorder.lost == 1
     frames.append(SwitchFrame(now_us(), 7))
-    recorder.switches(frames[-1])
+    recorder.frame(frames[-1])
     assert (recorder.failure, recorder.lost) == (None, 1)
     recorder.close()
     reader = Reader(recorder.path)
@@ -308,9 +308,9 @@ def test_nobody_waits_for_a_slow_disk(tmp_path: Path, session: Session, monkeypa
 
     monkeypatch.setattr(os, "fdatasync", slowly)
     recorder = Recorder(tmp_path / "a.mcap", session, sync_s=0.01)
-    recorder.switches(SwitchFrame(now_us(), 1))
+    recorder.frame(SwitchFrame(now_us(), 1))
     assert syncing.wait(30)
-    recorder.switches(SwitchFrame(now_us(), 2))
+    recorder.frame(SwitchFrame(now_us(), 2))
     assert [frame.closed for frame in frames_of(recorder.path)] == [1, 2]  # type: ignore[attr-defined]
     go_on.set()
     recorder.close()
@@ -327,7 +327,7 @@ def test_a_disk_that_fails_later_ends_the_recording(
 
     monkeypatch.setattr(os, "fdatasync", failing)
     with Recorder(tmp_path / "a.mcap", session, sync_s=0.01) as recorder:
-        recorder.switches(SwitchFrame(now_us(), 1))
+        recorder.frame(SwitchFrame(now_us(), 1))
         assert tried.wait(30)
     assert recorder.failure is not None
     assert "Input/output error" in recorder.failure
@@ -340,7 +340,7 @@ def test_closing_twice_is_closing_once(recording: Path, session: Session, tmp_pa
     recorder.close()
     assert recorder.path.stat().st_size == size
     # Its descriptor may be another file's by now.
-    recorder.switches(SwitchFrame(0, 1))
+    recorder.frame(SwitchFrame(0, 1))
     assert recorder.failure is None
     assert recorder.path.stat().st_size == size
 
@@ -355,7 +355,7 @@ KILLED = """
     recorder = Recorder(Path(sys.argv[1]), Session(thenar="1", switches=("s",) * 160, sensors=(), taxels=("p", "q")))
     number = 0
     while True:
-        recorder.switches(SwitchFrame(number, number, taxels=(number & 0xFFF, None)))
+        recorder.frame(SwitchFrame(number, number, taxels=(number & 0xFFF, None)))
         sys.stdout.write(f"{number}\\n")
         sys.stdout.flush()
         number += 1
@@ -399,12 +399,12 @@ def test_taxels_have_a_topic_only_where_they_are_recorded(tmp_path: Path, sessio
     list(reader)
     with Recorder(path, analog, tail=reader.tail) as recorder:
         for frame in frames:
-            recorder.switches(frame)
-        recorder.switches(SwitchFrame(7, 1))
+            recorder.frame(frame)
+        recorder.frame(SwitchFrame(7, 1))
         with pytest.raises(FrameError, match="a frame has 1 taxels, but 2 are recorded"):
-            recorder.switches(SwitchFrame(8, 1, taxels=(1,)))
+            recorder.frame(SwitchFrame(8, 1, taxels=(1,)))
         with pytest.raises(FrameError, match=r"outside 0\.\.65534"):
-            recorder.switches(SwitchFrame(8, 1, taxels=(65535, 1)))
+            recorder.frame(SwitchFrame(8, 1, taxels=(65535, 1)))
     assert frames_of(path) == [*frames, SwitchFrame(7, 1)]
     assert topics(path)["/thenar/taxels"] == 2
     other = replace(analog, taxels=("p", "r"))

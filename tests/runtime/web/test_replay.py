@@ -45,7 +45,7 @@ def collected(path: Path, switches: tuple[str, ...], rows: tuple[int, ...]) -> P
             start, kind = 1_000_000 + number * HELD_US, ("hook", "pinch")[number % 2]
             recorder.label(Label(start, "begun", number + 1, kind, "A", "cup"))
             for time_us in range(start, start + HELD_US, 10_000):
-                recorder.switches(SwitchFrame(time_us, row))
+                recorder.frame(SwitchFrame(time_us, row))
             end = "redone" if row == rows[-1] else "accepted"
             for event in ("captured", end):
                 recorder.label(Label(start + HELD_US - 1, event, number + 1, kind, "A", "cup"))  # type: ignore[arg-type]

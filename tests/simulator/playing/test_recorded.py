@@ -25,12 +25,12 @@ def raw(first: int) -> bytes:
 def test_playing_starts_once_both_devices_were_read(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with Recorder(path, session()) as recorder:
-        recorder.switches(SwitchFrame(0, 0b001))
-        recorder.glove(GloveFrame(5_000, raw(7)))
-        recorder.grasp(LiveGrasp(5_000, 0, 0, "PoS", "PoS", 1.0, 9, "ok", 0, 0, 0))
-        recorder.switches(SwitchFrame(12_000, 0b110))
-        recorder.glove(GloveFrame(15_500, raw(8)))
-        recorder.glove(GloveFrame(26_000, raw(9)))
+        recorder.frame(SwitchFrame(0, 0b001))
+        recorder.frame(GloveFrame(5_000, raw(7)))
+        recorder.moment((), LiveGrasp(5_000, 0, 0, "PoS", "PoS", 1.0, 9, "ok", 0, 0, 0))
+        recorder.frame(SwitchFrame(12_000, 0b110))
+        recorder.frame(GloveFrame(15_500, raw(8)))
+        recorder.frame(GloveFrame(26_000, raw(9)))
     played = of_recording(path, 10_000)
     assert played.switch_names == NAMES
     assert played.switches.tolist() == [[True, False, False], [False, True, True], [False, True, True]]
@@ -42,17 +42,17 @@ def test_playing_starts_once_both_devices_were_read(tmp_path: Path) -> None:
 def test_a_guided_collection_is_played_with_its_labels(tmp_path: Path) -> None:
     path = tmp_path / "collected.mcap"
     with Recorder(path, session()) as recorder:
-        recorder.switches(SwitchFrame(0, 0b001))
-        recorder.glove(GloveFrame(0, raw(7)))
+        recorder.frame(SwitchFrame(0, 0b001))
+        recorder.frame(GloveFrame(0, raw(7)))
         recorder.label(Label(time_us=20_000, event="captured", trial=1, grasp="Tip", subject="A", object="pen"))
-        recorder.glove(GloveFrame(31_000, raw(8)))
+        recorder.frame(GloveFrame(31_000, raw(8)))
     assert of_recording(path, 10_000).grasps.tolist() == ["unknown", "Tip", "Tip"]
 
 
 def test_without_a_cyberglove_its_sensors_rest(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with Recorder(path, session(sensors=())) as recorder:
-        recorder.switches(SwitchFrame(0, 0b001))
+        recorder.frame(SwitchFrame(0, 0b001))
     played = of_recording(path, 10_000)
     assert np.array_equal(played.sensors, resting(typical())[np.newaxis])
 
@@ -60,6 +60,6 @@ def test_without_a_cyberglove_its_sensors_rest(tmp_path: Path) -> None:
 def test_a_recording_without_frames_cannot_be_played(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with Recorder(path, session()) as recorder:
-        recorder.switches(SwitchFrame(0, 0b001))
+        recorder.frame(SwitchFrame(0, 0b001))
     with pytest.raises(SceneError, match=r"run\.mcap: holds no glove frames"):
         of_recording(path, 10_000)
