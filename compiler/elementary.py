@@ -132,7 +132,7 @@ def softmax_and_loss(scores: Floats, labels: NDArray[np.intp], weights: Floats |
     step = max(64, _CACHED // len(scores))
     for start in range(0, labels.size, step):
         rows = slice(start, start + step)
-        shares[:, rows], losses[rows] = _softmax_and_losses(scores[:, rows], labels[rows])
+        shares[:, rows], losses[rows] = softmax_and_losses(scores[:, rows], labels[rows])
     if weights is None:
         return shares, math.fsum(losses.tolist()) / labels.size
     # Scale the largest weight to about 1 by a power of two, which is exact: small losses of light rows keep their bits.
@@ -140,7 +140,8 @@ def softmax_and_loss(scores: Floats, labels: NDArray[np.intp], weights: Floats |
     return shares, math.fsum((losses * near_one).tolist()) / math.fsum(near_one.tolist())
 
 
-def _softmax_and_losses(scores: Floats, labels: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def softmax_and_losses(scores: Floats, labels: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Return P (K, n) and -ln P(label) (n,) for scores (K, n) and labels (n,)."""
     top = scores.max(axis=0)
     shares = exp(scores - top)
     total = add_up(shares)
@@ -200,10 +201,10 @@ def on_grids(values: Floats) -> tuple[OnGrid, OnGrid]:
     n = values.shape[1]
     sizes = np.abs(values)
     # First from the largest magnitude, which no order of summation can change, then from the exact sum on that grid.
-    rough = SUM_BITS - _bits(sizes.max(axis=1, initial=0.0) * n)
+    rough = SUM_BITS - np.frexp(sizes.max(axis=1, initial=0.0) * n)[1]
     total = np.rint(_scaled(sizes, rough)).sum(axis=1)
     # One bit is left as room for n/2 units of rounding, which is enough as long as n < 2^50.
-    exponents = (rough + np.where(total > 0, SUM_BITS - 1 - _bits(total), 0)).astype(np.int32)
+    exponents = (rough + np.where(total > 0, SUM_BITS - 1 - np.frexp(total)[1], 0)).astype(np.int32)
     scaled = _scaled(values, exponents)
     units = np.rint(scaled)
     # The remainder is at most half a unit per number, n/2 per row, which determines its grid.
@@ -242,8 +243,3 @@ def _scaled(values: Floats, exponents: NDArray[np.int32]) -> Floats:
     if exponents.max(initial=0) > _LARGEST_POWER:
         return np.ldexp(values, exponents[:, np.newaxis])
     return values * np.ldexp(1.0, exponents)[:, np.newaxis]
-
-
-def _bits(magnitudes: Floats) -> NDArray[np.int32]:
-    """Return the smallest b with magnitude < 2^b."""
-    return np.frexp(magnitudes)[1]
