@@ -12,7 +12,7 @@ from .parameters import OneOf, jobs_option
 from .printing import json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
-    from thenar.stability.report import CaseReport, Listed, Report
+    from thenar.stability.report import CaseReport, Report
 
 # Packages that a run imports at some point: better reported missing once at the start than in each case.
 _NEEDED = ("mpmath", "joblib", "scipy", "sklearn")
@@ -21,9 +21,9 @@ _NUMBERS = ("tried", "worst error")
 
 
 def _names() -> Iterable[str]:
-    from thenar.stability.report import NAMES
+    from thenar.stability.report import CASES
 
-    return NAMES
+    return CASES
 
 
 @click.command("stability")
@@ -49,28 +49,28 @@ def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int) -> int
     if listing:
         if full:
             raise click.UsageError("--list only lists: leave out --full")
-        from thenar.stability.report import listed
+        from thenar.stability.report import CASES
 
-        show(listed(cases), _print_list)
+        shown = [{"name": name, "title": CASES[name].title, "danger": CASES[name].danger} for name in cases]
+        show(shown, _print_list)
         return 0
     for name in _NEEDED:
         if find_spec(name) is None:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-    from thenar.stability.report import NAMES, Report, run
+    from thenar.stability.report import CASES, Report, run
     from thenar.stability.weka import compare_with_weka
 
     with progress("hard cases") as report:
         found = run(cases, full=full, jobs=jobs, progress=report)
     with progress("comparing with Weka"):
-        weka = compare_with_weka() if cases == NAMES else None
+        weka = compare_with_weka() if cases == tuple(CASES) else None
     result = Report(full, found, weka, all(case.holds for case in found))
     show(result, _print)
     return 0 if result.holds else 1
 
 
-def _print_list(cases: "list[Listed]") -> None:
-    rows = ((case.name, case.title, case.danger) for case in cases)
-    shown = table(("case", "subject", "what could go wrong"), rows=rows)
+def _print_list(cases: list[dict[str, str]]) -> None:
+    shown = table(("case", "subject", "what could go wrong"), rows=(tuple(case.values()) for case in cases))
     shown.show_lines = True
     out().print(shown)
 
@@ -96,7 +96,7 @@ def _print(report: "Report") -> None:
 
 
 def _print_case(console: Console, case: "CaseReport") -> None:
-    from thenar.stability.report import bound_of, figure, verdict
+    from thenar.stability.report import figure, verdict
 
     console.print(Text.assemble((case.name, "bold"), f": {case.about.title}"))
     if case.about.danger:
@@ -105,7 +105,7 @@ def _print_case(console: Console, case: "CaseReport") -> None:
     checks.box, checks.padding, checks.pad_edge = None, (0, 2, 0, 0), False
     for check in case.checks:
         finding, style = check.finding, "green" if check.holds else "bold red"
-        error = (f"{finding.tried:,}", figure(finding.error), bound_of(finding))
+        error = (f"{finding.tried:,}", figure(finding.error), f"{figure(finding.bound)} {finding.unit}")
         checks.add_row(finding.check, finding.reference, *error, Text(verdict(check), style))
     if case.checks:
         console.print(checks)

@@ -140,18 +140,22 @@ def softmax_and_loss(scores: Floats, labels: NDArray[np.intp], weights: Floats |
     step = max(64, _CACHED // len(scores))
     for start in range(0, labels.size, step):
         rows = slice(start, start + step)
-        block, own = scores[:, rows], (labels[rows], np.arange(labels[rows].size))
-        top = block.max(axis=0)
-        odds = exp(block - top)
-        total = add_up(odds)
-        np.divide(odds, total, out=shares[:, rows])
-        gap, odds[own] = top - block[own], 0.0
-        losses[rows] = np.where(gap == 0.0, _log_of_one_and(add_up(odds)), log(total) + gap)
+        shares[:, rows], losses[rows] = softmax_and_losses(scores[:, rows], labels[rows])
     if weights is None:
         return shares, math.fsum(losses.tolist()) / labels.size
     # Scale the largest weight to about 1 by a power of two, which is exact: small losses of light rows keep their bits.
     near_one = np.ldexp(weights, -int(np.frexp(weights.max())[1]))
     return shares, math.fsum((losses * near_one).tolist()) / math.fsum(near_one.tolist())
+
+
+def softmax_and_losses(scores: Floats, labels: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Return P (K, n) and -ln P(label) (n,) for scores (K, n) and labels (n,)."""
+    own, top = (labels, np.arange(labels.size)), scores.max(axis=0)
+    odds = exp(scores - top)
+    total = add_up(odds)
+    shares = odds / total
+    gap, odds[own] = top - scores[own], 0.0
+    return shares, np.where(gap == 0.0, _log_of_one_and(add_up(odds)), log(total) + gap)
 
 
 def sincos(x: Floats) -> tuple[Floats, Floats]:

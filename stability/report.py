@@ -3,7 +3,7 @@
 import math
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor
 from functools import partial
 from importlib import import_module
@@ -12,54 +12,85 @@ from types import ModuleType
 
 import msgspec
 
+from thenar.compiler.text import counted
 from thenar.compiler.workers import in_workers
 
 from .finding import Case, Finding
 from .weka import Differences, NotRun, WekaComparison
 
-NAMES = (
-    "elementary",
-    "information",
-    "targets",
-    "stumpfits",
-    "scoretables",
-    "invariances",
-    "separable",
-    "logits",
-    "degenerate",
-    "columns",
-    "codes",
-    "contradictions",
-    "weights",
-    "quantisation",
-    "missing",
-    "contact",
-    "statistics",
-    "platform",
-)
-
-
-def load(name: str) -> ModuleType:
-    """Return the module of case `name`, one of NAMES: its CASE, and its function findings(full)."""
-    return import_module(f".cases.{name}", __package__)
-
-
 Progress = Callable[[int, int], None]
 
 _KILLED = "not finished: a worker process ended early, perhaps for lack of memory"
 
+CASES = {
+    "elementary": Case(
+        "Elementary functions",
+        "an exp or log off by a few ulps, or a share outside 0..1, affects every later probability",
+    ),
+    "information": Case(
+        "Information gain",
+        "a gain made by rounding decides which switch is kept; a gain of one count in 10^9 is taken for zero",
+    ),
+    "targets": Case(
+        "Weights and working responses",
+        "1/P for P = 0, weights that underflow or turn negative, responses beyond their clamp",
+    ),
+    "stumpfits": Case(
+        "Stump fits",
+        "a branch's output is the residue of rounding its weight, and rounding breaks ties between columns",
+    ),
+    "scoretables": Case(
+        "Score tables", "scores drift over thousands of rounds, tables differ from the stumps they are made of"
+    ),
+    "invariances": Case(
+        "Scale-free facts",
+        "the order of rows, columns or classes, copies, units or names of codes change the trained model",
+    ),
+    "separable": Case(
+        "Separable classes",
+        "P goes to 0 and 1, 1/P to infinity, weights to 0; training goes on forever, and tables overflow",
+    ),
+    "logits": Case(
+        "Additive logit",
+        "scores grow without bound, a step overshoots, or rounding ends the search before the minimum is reached",
+    ),
+    "degenerate": Case(
+        "Degenerate sets", "an almost empty set ends in a warning, a traceback, or a silently wrong result"
+    ),
+    "columns": Case(
+        "Uninformative and duplicate columns",
+        "rounding decides between equal columns, or a tree without a gain stops silently",
+    ),
+    "codes": Case(
+        "Codes and degrees at their ends",
+        "a threshold falls on the wrong side of a code, or a value gets a code that is not the nearest",
+    ),
+    "contradictions": Case(
+        "Contradictions",
+        "frames that belong to several classes make boosting oscillate; one row among 10^6 is rounded away",
+    ),
+    "weights": Case("Weights", "weights underflow, or one holds everything, and outputs are rounding residue"),
+    "quantisation": Case("Integers of 4 to 16 bits", "rounding changes a score or a decision more than guaranteed"),
+    "missing": Case(
+        "Missing ports and silent joints",
+        "with fitted rows for missing inputs a sum overflows, or the loss is not reported",
+    ),
+    "contact": Case(
+        "Contact in the simulator",
+        "no weight, no contact or all contact at one point: NaN forces, or an unsettled grasp reported as settled",
+    ),
+    "statistics": Case(
+        "Rates at their ends", "an interval leaves 0 to 1, has no width, or is too narrow for trials that are alike"
+    ),
+    "platform": Case(
+        "The platform", "the same recordings give another build with other threads, processor instructions or Python"
+    ),
+}
 
-class Listed(msgspec.Struct, frozen=True):
-    """A case of the catalogue."""
 
-    name: str
-    title: str
-    danger: str
-
-
-def listed(names: Sequence[str]) -> list[Listed]:
-    """Return the titles and the dangers of the cases `names`."""
-    return [Listed(name, *msgspec.structs.astuple(load(name).CASE)) for name in names]
+def load(name: str) -> ModuleType:
+    """Return the module of case `name`: its function findings(full)."""
+    return import_module(f".cases.{name}", __package__)
 
 
 class Check(msgspec.Struct, frozen=True):
@@ -103,30 +134,31 @@ def run(
             found[report.name] = report
             progress(len(found), len(names))
     except BrokenExecutor:
-        found |= {name: _reported(name, Case(name, ""), [], _KILLED) for name in names if name not in found}
+        found |= {name: _reported(name, [], _KILLED) for name in names if name not in found}
     return tuple(found[name] for name in names)
 
 
 def run_case(name: str, *, full: bool) -> CaseReport:
     """Run one case with warnings as errors."""
-    about, findings, failure = Case(name, ""), [], None
+    findings: list[Finding] = []
+    failure = None
     try:
-        module = load(name)
-        about = module.CASE
+        case = load(name)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            for finding in module.findings(full):
+            for finding in case.findings(full):
                 findings.append(finding)  # noqa: PERF402  one by one, to keep those before a failure
     except Exception as fault:  # any exception fails this case only
         # "ZeroDivisionError in separable.py, line 40: division by zero"
         place = traceback.extract_tb(fault.__traceback__)[-1]
         failure = f"{type(fault).__name__} in {Path(place.filename).name}, line {place.lineno}: {fault}"
-    return _reported(name, about, findings, failure)
+    return _reported(name, findings, failure)
 
 
-def _reported(name: str, about: Case, findings: Sequence[Finding], failure: str | None) -> CaseReport:
+def _reported(name: str, findings: Sequence[Finding], failure: str | None) -> CaseReport:
     checks = tuple(Check(finding, finding.holds) for finding in findings)
-    return CaseReport(name, about, checks, failure, failure is None and bool(checks) and all(c.holds for c in checks))
+    holds = failure is None and bool(checks) and all(check.holds for check in checks)
+    return CaseReport(name, CASES[name], checks, failure, holds)
 
 
 # The meanings of units, in the order of the legend. Other units count violations, or are self-explanatory.
@@ -145,11 +177,6 @@ def figure(number: float) -> str:
     return f"{round(number):,}" if whole else f"{number:.3g}"
 
 
-def bound_of(finding: Finding) -> str:
-    """Return the bound with its unit."""
-    return f"{figure(finding.bound)} {finding.unit}"
-
-
 def verdict(check: Check) -> str:
     """Return the verdict in one or two words."""
     if check.holds:
@@ -161,8 +188,8 @@ def summary(report: Report) -> str:
     """Return a one-line summary."""
     checks = [check for case in report.cases for check in case.checks]
     tried = sum(check.finding.tried for check in checks)
-    looked = f"{_count(len(report.cases), 'case')} {'in full' if report.full else 'quickly'}, "
-    looked += f"{_count(len(checks), 'check')} on {_count(tried, 'input')}"
+    looked = f"{counted(len(report.cases), 'case')} {'in full' if report.full else 'quickly'}, "
+    looked += f"{counted(len(checks), 'check')} on {counted(tried, 'input')}"
     if report.holds:
         return f"{looked}: all hold"
     bad = ", ".join(case.name for case in report.cases if not case.holds)
@@ -171,17 +198,13 @@ def summary(report: Report) -> str:
 
 def failures(report: Report) -> tuple[str, ...]:
     """Return a sentence per failure: the case, the check, the size of the error, and the worst input."""
-    return tuple(f"{case.name}: {said}" for case in report.cases for said in _failures(case))
-
-
-def _failures(case: CaseReport) -> Iterator[str]:
-    for check in case.checks:
-        if not check.holds:
-            yield _fault(check.finding)
-    if case.failure is not None:
-        yield case.failure
-    elif not case.checks:
-        yield "it has no findings"
+    found = []
+    for case in report.cases:
+        faults = [_fault(check.finding) for check in case.checks if not check.holds]
+        if case.failure is not None or not case.checks:
+            faults.append(case.failure or "it has no findings")
+        found += [f"{case.name}: {fault}" for fault in faults]
+    return tuple(found)
 
 
 def _fault(finding: Finding) -> str:
@@ -189,9 +212,8 @@ def _fault(finding: Finding) -> str:
         return f"{finding.check}: nothing was tried"
     often = f", beyond it {finding.beyond:,} times" if finding.beyond > 1 else ""
     where = f"; worst: {finding.worst}" if finding.worst else ""
-    return (
-        f"{finding.check}: {figure(finding.error)} {finding.unit} against a bound of {bound_of(finding)}{often}{where}"
-    )
+    error, bound = (f"{figure(number)} {finding.unit}" for number in (finding.error, finding.bound))
+    return f"{finding.check}: {error} against a bound of {bound}{often}{where}"
 
 
 def legend(report: Report) -> tuple[tuple[str, str], ...]:
@@ -208,7 +230,7 @@ def weka_lines(weka: WekaComparison | NotRun) -> tuple[str, ...]:
     """Return the results of the comparison with Weka, one sentence per line."""
     if isinstance(weka, NotRun):
         return (f"not run: {weka.why}",)
-    changed = f"after the last round {_count(weka.weka_changed, 'row')} of {weka.held_out} change class"
+    changed = f"after the last round {counted(weka.weka_changed, 'row')} of {weka.held_out} change class"
     return (
         f"Weka {weka.weka} and thenar, {weka.rounds} rounds on {weka.rows} rows of {weka.classes} classes that "
         f"stumps overfit; largest differences between their probabilities for {weka.held_out} other rows:",
@@ -224,7 +246,3 @@ def _apart(differences: Differences, who: str) -> str:
         return f"{who}: at most {figure(max(differences.largest, default=0.0))}, in all rounds"
     most = figure(max(differences.largest[: parts - 1], default=0.0))
     return f"{who}: at most {most} until they diverge in round {parts}, then up to {figure(max(differences.largest))}"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"

@@ -28,6 +28,14 @@ EXP_IN_JAVA = ("-XX:+UnlockDiagnosticVMOptions", "-XX:-UseLibmIntrinsic")
 _LONGEST_S = 120.0
 _BRANCHES = tuple(re.compile(rf"^x(\d+) {branch} : (\S+)$", re.M) for branch in (r"<= (\S+)", r"> (\S+)", "is missing"))
 
+# Distributions further apart than this have diverged, as in docs/project/weka-parity.md.
+DIVERGED = 1e-9
+
+ROUNDS = 100
+CLASSES, ROWS_A_CLASS, SWITCHES, JOINTS = 10, 8, 16, 3
+_SEED = 6
+_FLIPPED = 0.12  # of the switches
+
 
 class WekaError(ThenarError, RuntimeError):
     """Weka could not be run, or its output is not the expected model."""
@@ -85,15 +93,6 @@ def _arff(X: NDArray[np.int64], labels: NDArray[np.intp], n_classes: int) -> str
     return "\n".join([*lines, ""])
 
 
-# Distributions further apart than this have diverged, as in docs/project/weka-parity.md.
-DIVERGED = 1e-9
-
-ROUNDS = 100
-CLASSES, ROWS_A_CLASS, SWITCHES, JOINTS = 10, 8, 16, 3
-_SEED = 6
-_FLIPPED = 0.12  # of the switches
-
-
 class Differences(msgspec.Struct, frozen=True):
     """The largest difference between two models' held-out distributions, after each round; None: they never diverge."""
 
@@ -123,10 +122,33 @@ class NotRun(msgspec.Struct, frozen=True, tag="not run"):
 
 def compare_with_weka() -> WekaComparison | NotRun:
     """Run the comparison, or return the reason why it cannot run."""
+    X, labels = separable_set()
+    half = len(labels) // 2
+    training, held_out = (X[:half], labels[:half]), X[half:]
     try:
-        return _compare()
+        processor, java = (
+            weka_stumps(*training, CLASSES, ROUNDS, options) for options in (EXP_OF_THE_PROCESSOR, EXP_IN_JAVA)
+        )
+        version = run_weka("weka.core.Version").partition("\n")[0].strip()
     except WekaError as reason:
         return NotRun(str(reason))
+    ours, _ = boost(*training, CLASSES, rounds=ROUNDS)
+    # The distributions (M, K, n) after each round.
+    by_processor, by_java, by_us = (
+        np.array([softmax(np.ascontiguousarray(scores.T)) for scores in stumps.staged_scores(held_out)])
+        for stumps in (processor, java, ours)
+    )
+    return WekaComparison(
+        weka=version,
+        rounds=ROUNDS,
+        classes=CLASSES,
+        rows=half,
+        held_out=len(held_out),
+        weka_itself=_differences(by_processor, by_java),
+        ours_processor=_differences(by_us, by_processor),
+        ours_java=_differences(by_us, by_java),
+        weka_changed=int(np.count_nonzero(winners(processor.scores(held_out)) != winners(java.scores(held_out)))),
+    )
 
 
 def separable_set() -> tuple[NDArray[np.int64], NDArray[np.intp]]:
@@ -143,33 +165,6 @@ def separable_set() -> tuple[NDArray[np.int64], NDArray[np.intp]]:
     switches = patterns[labels] ^ (random.random((len(labels), SWITCHES)) < _FLIPPED)
     joints = postures[labels] + random.integers(-15, 16, (len(labels), JOINTS))
     return np.hstack([switches, joints]), labels
-
-
-def _compare() -> WekaComparison:
-    X, labels = separable_set()
-    half = len(labels) // 2
-    training, held_out = (X[:half], labels[:half]), X[half:]
-    processor, java = (
-        weka_stumps(*training, CLASSES, ROUNDS, options) for options in (EXP_OF_THE_PROCESSOR, EXP_IN_JAVA)
-    )
-    ours, _ = boost(*training, CLASSES, rounds=ROUNDS)
-    outputs = {name: _staged(stumps, held_out) for name, stumps in (("p", processor), ("j", java), ("o", ours))}
-    return WekaComparison(
-        weka=run_weka("weka.core.Version").partition("\n")[0].strip(),
-        rounds=ROUNDS,
-        classes=CLASSES,
-        rows=half,
-        held_out=len(held_out),
-        weka_itself=_differences(outputs["p"], outputs["j"]),
-        ours_processor=_differences(outputs["o"], outputs["p"]),
-        ours_java=_differences(outputs["o"], outputs["j"]),
-        weka_changed=int(np.count_nonzero(winners(processor.scores(held_out)) != winners(java.scores(held_out)))),
-    )
-
-
-def _staged(stumps: Stumps, X: NDArray[np.int64]) -> Floats:
-    """Return the distributions (M, K, n) after each round."""
-    return np.array([softmax(np.ascontiguousarray(scores.T)) for scores in stumps.staged_scores(X)])
 
 
 def _differences(one: Floats, other: Floats) -> Differences:

@@ -1,1 +1,1 @@
-"""The hard cases, one a module: `CASE` says what it is, `findings(full)` runs it."""
+"""The hard cases, one a module: `findings(full)` runs it."""

@@ -17,7 +17,7 @@ from thenar.compiler.recordings.table import read_table
 from thenar.compiler.trainers.logitboost import boost
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 
-from ..finding import Case, Finding, Worst
+from ..finding import Finding
 
 # Values and their coding grids: half a step from two codes, a billionth apart, far from zero, next to the finest grid
 # allowed, subnormal, zeros, infinite binary fractions, huge and tiny.
@@ -34,11 +34,6 @@ HARD_DEGREES: tuple[tuple[tuple[float, ...], float], ...] = (
     ((1e-200, 1.4e-200, 2.3e-199), 1e-200),
 )
 
-
-CASE = Case(
-    title="Codes and degrees at their ends",
-    danger="a threshold falls on the wrong side of a code, or a value gets a code that is not the nearest",
-)
 
 EVERY_CODE = np.arange(HIGHEST_CODE + 1)
 
@@ -67,7 +62,7 @@ def hard_codes(seed: int) -> tuple[NDArray[np.uint16], NDArray[np.intp]]:
 
 def _every_code(sets: int) -> Finding:
     """A bin of the tables holds exactly the codes that every stump of its joint sends to the same branch."""
-    wrong = Worst("codes on different sides for tables and stumps", "every code there is", 0, "codes")
+    wrong = Finding.of("codes on different sides for tables and stumps", "every code there is", 0, "codes")
     for seed in range(sets):
         codes, labels = hard_codes(seed)
         stumps, _ = boost(codes, labels, 3, rounds=20)
@@ -77,7 +72,7 @@ def _every_code(sets: int) -> Finding:
             changes = {int((threshold >= EVERY_CODE).sum()) for threshold in used} - {0, len(EVERY_CODE)}
             misplaced = changes ^ {int(step) + 1 for step in steps}
             wrong.see(len(misplaced), f"set {seed}, joint {column}", tried=len(EVERY_CODE))
-    return wrong.finding()
+    return wrong
 
 
 def _coded() -> Iterator[Finding]:
@@ -86,9 +81,9 @@ def _coded() -> Iterator[Finding]:
     Half a step plus rounding: the origin, the difference, the quotient and the code's value each lose 2^-53 of at most
     1e9 steps (`Joint` rejects more) to 65536: 4.5e-7 of a step.
     """
-    off = Worst("degrees compared with their codes", "fractions", 0.5 + 4.5e-7, "steps")
-    reported = Worst("largest coding error that import reports", "fractions", 4.5e-7, "steps")
-    again = Worst("codes that do not come back from their own value", "the code itself", 0, "codes")
+    off = Finding.of("degrees compared with their codes", "fractions", 0.5 + 4.5e-7, "steps")
+    reported = Finding.of("largest coding error that import reports", "fractions", 4.5e-7, "steps")
+    again = Finding.of("codes that do not come back from their own value", "the code itself", 0, "codes")
     for values, grid in HARD_DEGREES:
         grasp_set, report = _imported(values, grid)
         joint, codes = grasp_set.joints[0], grasp_set.codes[:, 0]
@@ -101,9 +96,7 @@ def _coded() -> Iterator[Finding]:
         off.see(float(max(errors)), what, tried=len(values))
         reported.see(float(abs(max(errors) - Fraction(report.coding[0].largest_error) / step)), what)
         again.see(int((joint.code(joint.value(EVERY_CODE)) != EVERY_CODE).sum()), what, tried=len(EVERY_CODE))
-    yield off.finding()
-    yield reported.finding()
-    yield again.finding()
+    yield from (off, reported, again)
 
 
 def _imported(values: Sequence[float], grid: float) -> tuple[GraspSet, ImportReport]:

@@ -5,17 +5,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.placement.tree import Tree, grow_id3
+from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.trainers.logitboost import boost
 
-from ..finding import Case, Finding, Worst
+from ..finding import Finding
 from ..inputs.small_sets import parity
 from ..reference.information import compare_gains
-
-CASE = Case(
-    title="Uninformative and duplicate columns",
-    danger="rounding decides between equal columns, or a tree without a gain stops silently",
-)
 
 _EXACT = "gains as products of whole numbers' powers"
 
@@ -46,43 +41,33 @@ def hard_columns(seed: int) -> tuple[Bits, NDArray[np.intp]]:
 
 def _decisions(sets: Sequence[tuple[Bits, NDArray[np.intp]]]) -> Finding:
     """Every decision takes the column of largest gain, the lowest-numbered of equal ones, and never a constant one."""
-    wrong = Worst("decisions of ID3 that do not take the best column", _EXACT, 0, "decisions")
+    wrong = Finding.of("decisions of ID3 that do not take the best column", _EXACT, 0, "decisions")
     for seed, (X, labels) in enumerate(sets):
-        tree = grow_id3(X, labels)
-        for number, rows in _rows_of_nodes(tree, X):
-            if tree.nodes[number].input is not None:
-                wrong.see(tree.nodes[number].input != _due(X[rows], labels[rows]), f"set {seed}, node {number}")
-    return wrong.finding()
-
-
-def _rows_of_nodes(tree: Tree, X: Bits) -> Iterator[tuple[int, NDArray[np.intp]]]:
-    rows_of = {0: np.arange(len(X))}
-    for number, node in enumerate(tree.nodes):
-        rows = rows_of.pop(number)
-        for value, child in zip(node.values, tree.children[number], strict=True):
-            rows_of[child] = rows[X[rows, node.input] == value]
-        yield number, rows
+        tree, rows_of = grow_id3(X, labels), {0: np.arange(len(X))}
+        for number, node in enumerate(tree.nodes):
+            rows = rows_of.pop(number)
+            for value, child in zip(node.values, tree.children[number], strict=True):
+                rows_of[child] = rows[X[rows, node.input] == value]
+            if node.input is not None:
+                wrong.see(node.input != _due(X[rows], labels[rows]), f"set {seed}, node {number}")
+    return wrong
 
 
 def _due(X: Bits, labels: NDArray[np.intp]) -> int | None:
     """Return the first varying column of the largest gain, by the reference."""
     best: tuple[int, list[list[int]]] | None = None
-    for column in range(X.shape[1]):
-        table = table_of(X[:, column], labels)
-        if len(table[0]) > 1 and (best is None or compare_gains(table, best[1]) > 0):
+    for column, bits in enumerate(X.T):
+        # The count of each label (rows) at each occurring value (columns).
+        values, members = np.unique(bits), [labels == label for label in np.unique(labels)]
+        table = [[int((member & (bits == value)).sum()) for value in values] for member in members]
+        if len(values) > 1 and (best is None or compare_gains(table, best[1]) > 0):
             best = column, table
     return None if best is None else best[0]
 
 
-def table_of(column: Bits, labels: NDArray[np.intp]) -> list[list[int]]:
-    """Return the counts of each label (rows) at each occurring value (columns)."""
-    values = np.unique(column)
-    return [[int(((labels == label) & (column == value)).sum()) for value in values] for label in np.unique(labels)]
-
-
 def _unchanged_by_useless_columns(sets: Sequence[tuple[Bits, NDArray[np.intp]]]) -> Finding:
     """Constants, and later duplicates and complements, are never selected, and change no bit of an ensemble."""
-    changed = Worst(
+    changed = Finding.of(
         "sets whose ensemble useless columns change", "the same, trained without them, bit for bit", 0, "sets"
     )
     for seed, (X, labels) in enumerate(sets):
@@ -92,13 +77,13 @@ def _unchanged_by_useless_columns(sets: Sequence[tuple[Bits, NDArray[np.intp]]])
             np.array_equal(getattr(alone, part), getattr(padded, part)) for part in ("columns", "thresholds", "values")
         )
         changed.see(not same or grow_id3(X, labels).nodes != grow_id3(behind, labels).nodes, f"set {seed}")
-    return changed.finding()
+    return changed
 
 
 def _parities(sizes: range) -> Iterator[Finding]:
     """The XOR of k switches: no gain before the last decision, but the tree still grows."""
-    wrong = Worst("frames of an XOR that the tree gets wrong", "the XOR itself", 0, "frames")
-    silent = Worst("decisions without a gain that the tree does not mark", "2^(k-1) - 1 of them", 0, "decisions")
+    wrong = Finding.of("frames of an XOR that the tree gets wrong", "the XOR itself", 0, "frames")
+    silent = Finding.of("decisions without a gain that the tree does not mark", "2^(k-1) - 1 of them", 0, "decisions")
     for k in sizes:
         grasp_set = parity(k)
         tree = grow_id3(grasp_set.switches, grasp_set.grasps)
@@ -106,5 +91,4 @@ def _parities(sizes: range) -> Iterator[Finding]:
         due = 2 ** (k - 1) - 1
         marked = tree.text().count("no input gains anything alone\n")
         silent.see(abs(marked - due) + abs(tree.n_zero_gain - due), f"k = {k}", due)
-    yield wrong.finding()
-    yield silent.finding()
+    yield from (wrong, silent)

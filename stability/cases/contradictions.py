@@ -7,7 +7,7 @@ to them up to rounding. The case `separable` explains when the loss falls on the
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 
 import mpmath
 import numpy as np
@@ -16,17 +16,11 @@ from mpmath import mpf
 from thenar.compiler.trainers.logitboost import boost
 from thenar.runtime.model.tables import winners
 
-from ..checks.roundings import ROUNDING, share_error
-from ..checks.rounds import RoundState, counted, loss_rounding, moments, rise_rounding
-from ..finding import REFERENCE, Case, Finding, Worst
+from ..checks.rounds import ROUNDING, RoundState, loss_rounding, moments, rise_rounding, share_error
+from ..finding import REFERENCE, Finding
 from ..inputs.hard_data import HardSet, contradictory, imbalanced, noisy
 from ..reference.information import entropy_bits
 from ..reference.numbers import distance, precisely
-
-CASE = Case(
-    title="Contradictions",
-    danger="frames that belong to several classes make boosting oscillate; one row among 10^6 is rounded away",
-)
 
 
 def findings(full: bool) -> Iterator[Finding]:
@@ -52,22 +46,25 @@ def frames(full: bool) -> Iterator[HardSet]:
 
 def _rest(sets: Iterator[HardSet], rounds: int) -> Iterator[Finding]:
     """Yield the final errors of P against the shares of the counts, and of losses against the remaining entropy."""
-    shares = Worst("final P of a class on a contradictory frame", "shares of the counts", 1.0, "x rounding")
-    losses = Worst("the final loss", "the remaining entropy, 60 digits", 1.0, "x rounding")
+    shares = Finding.of("final P of a class on a contradictory frame", "shares of the counts", 1.0, "x rounding")
+    losses = Finding.of("the final loss", "the remaining entropy, 60 digits", 1.0, "x rounding")
     for hard in sets:
         stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
         *_, last = moments(hard, stumps)
         shares.see(resting_error(hard, last), hard.name, last.shares.size)
         least = entropy_left(hard)
-        allowed = loss_rounding(hard.n_classes, float(least)) + idle_loss(hard, last)
+        # Frames of a single class lose the most that remains if each of K classes keeps `unsettled` there.
+        lacking = sum(row.count(0) for row in hard.counts().values())
+        idle = lacking * unsettled(last) / float(hard.scaled_weights.sum())
+        allowed = loss_rounding(hard.n_classes, float(least)) + idle
         losses.see(distance(falling[-1], least) / allowed, hard.name)
-    yield from (shares.finding(), losses.finding())
+    yield from (shares, losses)
 
 
 @precisely()
 def entropy_left(hard: HardSet) -> mpf:
     """Return the entropy of the class given the frame, in nats: the least possible mean loss of scores of frames."""
-    counts = list(counted(hard).values())
+    counts = list(hard.counts().values())
     total = sum(map(sum, counts))
     return mpmath.fsum(sum(row) * entropy_bits(row) for row in counts) / total * mpmath.log(2)
 
@@ -80,13 +77,14 @@ def resting_error(hard: HardSet, last: RoundState) -> float:
     P cannot be more accurate than the scores' last places allow: two scores, each rounded, each at most one place off;
     nor than its own rounding. Each class that a frame lacks may keep the weight of `unsettled`.
     """
-    errors, counts, idle = [], counted(hard), unsettled(last)
+    errors, counts = [], hard.counts()
+    idle = unsettled(last) * float(hard.row_weights.max() / hard.scaled_weights.max())
     for row, F, got in zip(hard.X.tolist(), last.scores.T.tolist(), last.shares.T.tolist(), strict=True):
         own = counts[tuple(row)]
         for k, P in enumerate(got):
             truth = mpf(own[k]) / sum(own)
             allowed = ROUNDING * (1 + truth * (4 + 4 * max(map(abs, F)))) + share_error(F, k, truth)
-            errors.append(abs(P - truth) / (allowed + own.count(0) * idle * hard.scale / sum(own)))
+            errors.append(abs(P - truth) / (allowed + own.count(0) * idle / sum(own)))
     return float(max(errors))
 
 
@@ -98,15 +96,9 @@ def unsettled(last: RoundState) -> float:
     return 2.0**-38 * float(last.weights.sum(axis=1).max())
 
 
-def idle_loss(hard: HardSet, last: RoundState) -> float:
-    """Return the largest remaining loss of frames of a single class, in which each of K classes keeps `unsettled`."""
-    lacking = sum(row.count(0) for row in counted(hard).values())
-    return lacking * unsettled(last) / float(hard.scaled_weights.sum())
-
-
 def _ties() -> Finding:
     """Classes of equal counts on a frame: the lowest-numbered is predicted, by the tie rule."""
-    worst = Worst("equal counts go to the lowest class", "the rule itself", 0.0, "frames")
+    worst = Finding.of("equal counts go to the lowest class", "the rule itself", 0.0, "frames")
     for counts in (
         [[1, 1], [2, 2]],
         [[2, 2, 1], [1, 2, 2]],
@@ -118,14 +110,17 @@ def _ties() -> Finding:
         predicted = winners(stumps.scores(np.array([[0], [1]]))).tolist()
         for prediction, row in zip(predicted, counts, strict=True):
             worst.see(float(prediction != row.index(max(row))), hard.name)
-    return worst.finding()
+    return worst
 
 
 def _noise(rounds: int) -> Iterator[Finding]:
     """Sets of 16 frames with 0 to 60 % random labels: losses, and the fall of the loss where it is required."""
-    below = Worst("losses below the remaining entropy", REFERENCE, 0.0, "rounds")
-    rises = Worst("rise of the loss where it must fall", "convexity", 1.0, "x rounding")
-    for hard, shrinkage in noisy_sets():
+    below = Finding.of("losses below the remaining entropy", REFERENCE, 0.0, "rounds")
+    rises = Finding.of("rise of the loss where it must fall", "convexity", 1.0, "x rounding")
+    # At a shrinkage of 1/(K - 1) or below the loss must fall.
+    for percent, (classes, shrinkage) in product((0, 10, 20, 30, 40, 50, 60), ((2, 1.0), (5, 0.25), (5, 1.0))):
+        hard = noisy(classes, 60, percent / 100, seed=percent)
+        hard = replace(hard, X=hard.X[:, :4], n_switches=4)
         stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, shrinkage=shrinkage)
         least = float(entropy_left(hard))
         above = least - loss_rounding(hard.n_classes, least)
@@ -134,12 +129,4 @@ def _noise(rounds: int) -> Iterator[Finding]:
             for number, (before, after) in enumerate(pairwise(moments(hard, stumps)), 1):
                 rise = max(0.0, after.loss - before.loss)
                 rises.see(rise / rise_rounding(hard.n_classes, before, after), f"{hard.name}, round {number}")
-    yield from (worst.finding() for worst in (below, rises))
-
-
-def noisy_sets() -> Iterator[tuple[HardSet, float]]:
-    """Yield sets of 16 frames and their shrinkage: at 1/(K - 1) or below the loss must fall."""
-    for percent in (0, 10, 20, 30, 40, 50, 60):
-        for classes, shrinkage in ((2, 1.0), (5, 0.25), (5, 1.0)):
-            hard = noisy(classes, 60, percent / 100, seed=percent)
-            yield replace(hard, X=hard.X[:, :4], n_switches=4), shrinkage
+    yield from (below, rises)

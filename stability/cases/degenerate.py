@@ -15,14 +15,9 @@ from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.build import Build
 from thenar.runtime.model.tables import winners
 
-from ..finding import Case, Finding, Worst
-from ..inputs.small_sets import make_set, one_hot
+from ..finding import Finding
+from ..inputs.small_sets import make_set
 from ..reference.numbers import precisely, ulps
-
-CASE = Case(
-    title="Degenerate sets",
-    danger="an almost empty set ends in a warning, a traceback, or a silently wrong result",
-)
 
 # The output is sum P / sum P (1 - P), with one P throughout: it keeps the rounding of P in 1 - P, at most one rounding
 # of 1 - P, then that of 1 - P itself, of the product, of either sum (two each, on its two grids) and of the quotient: 8
@@ -43,10 +38,10 @@ SOLVABLE = {
     "a class of one row": make_set(["a"] * 6 + ["b"] * 5 + ["c"], [[0, 0]] * 6 + [[0, 1]] * 5 + [[1, 0]]),
     "a type without rows": make_set(["a", "b"] * 4, [[0, 1], [1, 1]] * 4, types=["a", "b", "c"]),
     "no switch that varies": make_set(["a", "b"] * 4, [[1, 0]] * 8, [[200], [100]] * 4),
-    "2 types of one row each": one_hot(2),
-    "9 types of one row each": one_hot(9),
-    "33 types of one row each": one_hot(33),
 }
+for _n in (2, 9, 33):
+    _types = [f"type {number:02}" for number in range(_n)]
+    SOLVABLE[f"{_n} types of one row each"] = make_set(_types, np.eye(_n, dtype=int).tolist())
 
 
 def findings(full: bool) -> Iterator[Finding]:
@@ -60,7 +55,7 @@ def findings(full: bool) -> Iterator[Finding]:
 
 def _recognised() -> Finding:
     """A build of a separable set predicts every row of it correctly."""
-    rows = Worst("rows that their build predicts wrongly", "their labels", 0, "rows")
+    rows = Finding.of("rows that their build predicts wrongly", "their labels", 0, "rows")
     for name, grasp_set in SOLVABLE.items():
         with TemporaryDirectory() as folder:
             built = compile_build(grasp_set, Path(folder) / "build", rounds=20, folds=0)
@@ -69,12 +64,12 @@ def _recognised() -> Finding:
         frames = zip(grasp_set.switches[:, kept], grasp_set.codes, grasp_set.grasps, strict=True)
         wrong = sum(build.classify(bits, codes) != grasp for bits, codes, grasp in frames)
         rows.see(wrong, name, tried=len(grasp_set))
-    return rows.finding()
+    return rows
 
 
 def _one_class(rounds: int) -> Finding:
     """With one class every share is exactly 1 and every loss exactly 0 in every round."""
-    off = Worst("share, score and loss of the only class", "1, 0 and 0", 0, "score")
+    off = Finding.of("share, score and loss of the only class", "1, 0 and 0", 0, "score")
     for grasp_set in (_ONE_ROW, _ONE_CLASS):
         X = np.hstack([grasp_set.switches, grasp_set.codes])
         stumps, falling = boost(X, grasp_set.labels, 1, rounds=rounds)
@@ -82,27 +77,22 @@ def _one_class(rounds: int) -> Finding:
         shares = softmax(np.ascontiguousarray(scores.T))
         error = max(float(np.abs(shares - 1).max()), float(np.abs(scores).max()), *falling)
         off.see(error, f"{len(X)} rows", tried=len(falling))
-    return off.finding()
+    return off
 
 
 def _first_round(classes: Sequence[int]) -> Iterator[Finding]:
     """At the start all K shares are 1/K: a class's own row has output K, clamped to 3, others -K/(K - 1)."""
-    own = Worst("first outputs, as many classes as rows", "min(K, 3) and -K/(K - 1)", _VALUE_ULPS, "ulp")
-    empty = Worst("first outputs of a class without rows", "-K/(K - 1)", _VALUE_ULPS, "ulp")
+    own = Finding.of("first outputs, as many classes as rows", "min(K, 3) and -K/(K - 1)", _VALUE_ULPS, "ulp")
+    empty = Finding.of("first outputs of a class without rows", "-K/(K - 1)", _VALUE_ULPS, "ulp")
     for k in classes:
+        with precisely():
+            others = -mpf(k) / (k - 1)
         stumps, _ = boost(np.eye(k), np.arange(k), k, rounds=1)
         # With two classes, both use the first column: a class's own row lies right of it, or left.
         low, high = np.sort(stumps.values[0, :, :2], axis=1).T
-        own.see(max(_error(low, _others(k)), _error(high, mpf(min(k, 3)))), f"{k} classes", tried=2 * k)
-        stumps = _without_the_last(k, 1)
-        empty.see(_error(stumps.values[0, -1], _others(k)), f"{k} classes", tried=3)
-    yield own.finding()
-    yield empty.finding()
-
-
-@precisely()
-def _others(k: int) -> mpf:
-    return -mpf(k) / (k - 1)
+        own.see(max(_error(low, others), _error(high, mpf(min(k, 3)))), f"{k} classes", tried=2 * k)
+        empty.see(_error(_without_the_last(k, 1).values[0, -1], others), f"{k} classes", tried=3)
+    yield from (own, empty)
 
 
 def _error(values: NDArray[np.float64], truth: mpf) -> float:
@@ -118,9 +108,9 @@ def _without_the_last(k: int, rounds: int) -> Stumps:
 
 def _never_predicted(classes: Sequence[int], rounds: int) -> Finding:
     """A class without rows is never predicted, not even for unseen frames."""
-    wins = Worst("frames that a class without rows wins", "every frame there is", 0, "frames")
+    wins = Finding.of("frames that a class without rows wins", "every frame there is", 0, "frames")
     for k in classes:
         frames = np.array([[code, other] for code in range(-1, k + 1) for other in range(-1, 4)])
         scores = _without_the_last(k, rounds).scores(frames)
         wins.see(int((winners(scores) == k - 1).sum()), f"{k} classes", tried=len(frames))
-    return wins.finding()
+    return wins

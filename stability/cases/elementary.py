@@ -9,17 +9,12 @@ from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats, add_exactly, add_up, exp, log, sincos, softmax, softmax_and_loss
 
-from ..checks.roundings import ROUNDING, loss_error, part_of, share_error
-from ..finding import REFERENCE, Case, Finding, Worst
+from ..checks.rounds import ROUNDING, loss_error, part_of, share_error
+from ..finding import REFERENCE, Finding
 from ..inputs.hard_data import hard_scores
 from ..reference import boosting as logistic
 from ..reference import numbers as linear
 from ..reference.numbers import precisely, ulps
-
-CASE = Case(
-    title="Elementary functions",
-    danger="an exp or log off by a few ulps, or a share outside 0..1, affects every later probability",
-)
 
 Labelled = tuple[Floats, NDArray[np.intp], Floats | None]  # scores (K, n), labels and weights (n,)
 
@@ -60,10 +55,10 @@ SINCOS_ULPS = 2.0
 def _worst(
     check: str, bound: float, ours: Callable[[Floats], Floats], truth: Callable[[float], mpf], x: Floats
 ) -> Finding:
-    worst = Worst(check, REFERENCE, bound, "ulp")
+    worst = Finding.of(check, REFERENCE, bound, "ulp")
     for argument, got in zip(x.tolist(), ours(x).tolist(), strict=True):
         worst.see(ulps(got, truth(argument)), f"at {argument!r}")
-    return worst.finding()
+    return worst
 
 
 def _around(x: Iterable[float], steps: int = 2) -> Floats:
@@ -100,48 +95,48 @@ def _labelled(rng: np.random.Generator, matrices: Iterable[Floats]) -> Iterator[
 
 def shares_of(matrices: Iterable[Floats]) -> Finding:
     """Compare softmax of scores (K, n) with the reference."""
-    worst = Worst("shares of classes", REFERENCE, 1.0, "x rounding")
+    worst = Finding.of("shares of classes", REFERENCE, 1.0, "x rounding")
     for scores in matrices:
         for row, got in zip(scores.T.tolist(), softmax(scores).T.tolist(), strict=True):
-            for k, (ours, share) in enumerate(zip(got, logistic.softmax(row), strict=True)):
+            for k, (ours, share) in enumerate(zip(got, logistic.softmax(tuple(row)), strict=True)):
                 error = part_of(ours, share, share_error(row, k, share))
                 worst.see(error, f"{len(row)} classes, {max(row) - row[k]:.3g} below")
-    return worst.finding()
+    return worst
 
 
 def losses_of(sets: Iterable[Labelled]) -> Finding:
     """Compare mean losses with the reference."""
-    worst = Worst("mean loss, weighted and not", REFERENCE, 1.0, "x rounding")
+    worst = Finding.of("mean loss, weighted and not", REFERENCE, 1.0, "x rounding")
     for scores, labels, weights in sets:
         got = softmax_and_loss(scores, labels, weights)[1]
         shares = [1.0] * labels.size if weights is None else weights.tolist()
         rows = scores.T.tolist()
         truth, allowed = (of(rows, labels.tolist(), shares) for of in (logistic.mean_loss, loss_error))
         worst.see(part_of(got, truth, allowed), f"{len(scores)} classes, loss {got:.3g}")
-    return worst.finding()
+    return worst
 
 
 def sums_of(columns: Iterable[Floats]) -> Finding:
     """Compare sums over classes, of columns (K, 1), with the reference."""
     # K - 1 additions, each within 2^-53 of a partial sum, which the sum of magnitudes bounds.
-    worst = Worst("sums over classes", REFERENCE, 1.0, "x rounding")
+    worst = Finding.of("sums over classes", REFERENCE, 1.0, "x rounding")
     for rows in columns:
         terms = rows[:, 0].tolist()
         with precisely():
             allowed = (len(terms) - 1) * ROUNDING * mpmath.fsum(map(abs, terms))
             worst.see(part_of(add_up(rows)[0], mpmath.fsum(terms), allowed), f"{len(rows)} terms")
-    return worst.finding()
+    return worst
 
 
 def long_sums_of(series: Iterable[tuple[str, Floats]]) -> Finding:
     """Compare sums over rounds, of terms (M,), with the reference."""
     # total + carry is rounded once, to half an ulp; the carry's own loss is n^2 2^-106 of the magnitudes, which for 1e5
     # terms is 1e-22 of them: without cancellation, less than 0.01 ulp of their sum.
-    worst = Worst("sums over rounds, compensated", REFERENCE, 0.51, "ulp")
+    worst = Finding.of("sums over rounds, compensated", REFERENCE, 0.51, "ulp")
     for name, terms in series:
         total = carry = np.zeros(1)
         for term in terms[:, np.newaxis]:
             total, carry = add_exactly(total, carry, term)
         with precisely():
             worst.see(ulps(float((total + carry)[0]), mpmath.fsum(terms.tolist())), f"{len(terms)} times: {name}")
-    return worst.finding()
+    return worst

@@ -7,20 +7,24 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.compiler.placement.gain import Cooccurrence, best_position, compare, entropy_bits, gain_bits
+from thenar.compiler.placement.gain import (
+    Cooccurrence,
+    NodeCounts,
+    best_position,
+    compare,
+    entropy_bits,
+    gain_bits,
+)
 
-from ..checks.roundings import ROUNDING, part_of
-from ..finding import REFERENCE, Case, Finding, Worst
-from ..inputs.hard_data import BitSet, Counts, bit_set, close_pairs, equal_pairs, hand_made, node_of, random_table
+from ..checks.rounds import ROUNDING, part_of
+from ..finding import REFERENCE, Finding
 from ..reference import information as truth
 from ..reference.numbers import precisely
 
-CASE = Case(
-    title="Information gain",
-    danger="a gain made by rounding decides which switch is kept; a gain of one count in 10^9 is taken for zero",
-)
 WHOLE_NUMBERS = "products of whole numbers"
 
+Counts = NDArray[np.int64]
+BitSet = tuple[NDArray[np.bool_], NDArray[np.intp], int]  # X (n, d), labels (n,), number of classes
 Pair = tuple[int, int | None]  # a bit, and the bit given
 
 
@@ -38,50 +42,109 @@ def findings(full: bool) -> Iterator[Finding]:
     yield given_comparisons_of(bits, rng)
 
 
-def _n_log_n(counts: list[int]) -> mpf:
-    return mpmath.fsum(m * mpmath.log(m) for m in counts if m)
+def random_table(rng: np.random.Generator) -> Counts:
+    """Return counts of all magnitudes up to 10^9, some of them 0."""
+    shape = int(rng.integers(2, 15)), int(rng.integers(2, 5))
+    counts = np.floor(10.0 ** rng.uniform(-1, 9, shape)).astype(np.int64)
+    counts[0, 0] += 1
+    return counts
+
+
+def node_of(*tables: Counts) -> NodeCounts:
+    """Return the node at which inputs have these tables (K, values), each of the same classes."""
+    cells = np.concatenate([table[:, 1:] for table in tables], axis=1)
+    starts = np.cumsum([0] + [table.shape[1] - 1 for table in tables])[:-1]
+    return NodeCounts(tables[0].sum(axis=1), cells, starts)
+
+
+def hand_made() -> Iterator[Counts]:
+    """Yield tables close to independence, close to certainty, and with one row in 10^9."""
+    for m in (1, 10, 10**3, 10**6, 10**9):
+        yield np.array([[m + 1, m - 1], [m, m]])
+        yield np.array([[m, 0], [0, m]])
+        yield np.array([[m, 1], [1, m]])
+        yield np.array([[m, 0], [m, 1]])
+        yield np.array([[m, m], [m, m]])
+
+
+def equal_pairs() -> Iterator[tuple[Counts, Counts]]:
+    """Yield tables of equal gains with different terms."""
+    for one, other in (
+        ([[8, 0], [4, 4]], [[7, 1], [2, 6]]),
+        ([[6, 0], [3, 3], [3, 3]], [[5, 1], [4, 2], [1, 5]]),
+        ([[12, 0], [6, 6]], [[12, 0, 0], [6, 6, 0]]),
+    ):
+        for factor in (1, 10**3, 10**8):
+            yield np.array(one) * factor, np.array(other) * factor
+
+
+def close_pairs(rng: np.random.Generator, n: int) -> Iterator[tuple[Counts, Counts]]:
+    """Yield tables of up to 10^9 rows a cell and the same class counts that differ by the cell of one row."""
+    for _ in range(n):
+        one = rng.integers(1, 10 ** int(rng.integers(1, 10)) + 1, (3, 2))
+        other = one[:, ::-1].copy()
+        if rng.random() < 0.8:
+            row, moved = int(rng.integers(3)), int(rng.choice([-1, 1]))
+            moved = min(max(moved, -int(other[row, 0])), int(other[row, 1]))
+            other[row] += (moved, -moved)
+        yield one, other
+
+
+def bit_set(rng: np.random.Generator) -> BitSet:
+    """Return 7 bits, some of them equal, opposite, constant and almost constant, of 2 to 8 classes."""
+    n, classes = int(rng.integers(30, 3000)), int(rng.integers(2, 9))
+    labels = rng.integers(0, classes, n)
+    one, other = rng.random(n) < 0.3 + 0.1 * labels % 0.7, rng.random(n) < 0.5
+    rare = np.arange(n) == n // 2
+    return np.column_stack([one, ~one, one, other, one ^ other, rare, np.ones(n, bool)]), labels, classes
 
 
 def gains_of(tables: list[Counts]) -> Finding:
     """Compare gains of tables (K, values) with the reference."""
-    # A term m ln m is off by 5 roundings: a logarithm within 2 ulp counts for 4, the product for one. They are summed
-    # exactly and rounded once, and divided by n ln 2, a product of a constant: 4 roundings of the gain itself.
-    worst = Worst("gain", REFERENCE, 1.0, "x rounding")
+    worst = Finding.of("gain", REFERENCE, 1.0, "x rounding")
     for table in tables:
-        n, got, gain = int(table.sum()), gain_bits(table), truth.gain_bits(table.tolist())
-        counts = [*table.ravel().tolist(), *table.sum(axis=0).tolist(), *table.sum(axis=1).tolist(), n]
-        with precisely():
-            allowed = ROUNDING * (5 * _n_log_n(counts) / (n * mpmath.log(2)) + 4 * gain)
-            worst.see(part_of(got, gain, allowed), f"of {n} rows")
-    return worst.finding()
+        counts = [*table.ravel().tolist(), *table.sum(axis=0).tolist(), *table.sum(axis=1).tolist()]
+        _see(worst, gain_bits(table), truth.gain_bits(table.tolist()), counts, int(table.sum()))
+    return worst
 
 
 def entropies_of(tables: list[Counts]) -> Finding:
     """Compare entropies of the classes of tables (K, values) with the reference."""
-    # As for the gain, of terms m ln m of the classes and of all rows.
-    worst = Worst("entropy", REFERENCE, 1.0, "x rounding")
+    worst = Finding.of("entropy", REFERENCE, 1.0, "x rounding")
     for table in tables:
         totals = table.sum(axis=1).tolist()
-        n, got, entropy = sum(totals), entropy_bits(totals), truth.entropy_bits(totals)
-        with precisely():
-            allowed = ROUNDING * (5 * _n_log_n([*totals, n]) / (n * mpmath.log(2)) + 4 * entropy)
-            worst.see(part_of(got, entropy, allowed), f"of {n} rows")
-    return worst.finding()
+        _see(worst, entropy_bits(totals), truth.entropy_bits(totals), totals, sum(totals))
+    return worst
+
+
+@precisely()
+def _see(worst: Finding, got: float, exact: mpf, counts: list[int], n: int) -> None:
+    """Add the error of a sum of terms m ln m of `counts` and of all n rows.
+
+    A term is off by 5 roundings: a logarithm within 2 ulp counts for 4, the product for one. They are summed exactly
+    and rounded once, and divided by n ln 2, a product of a constant: 4 roundings of the sum itself.
+    """
+    allowed = ROUNDING * (5 * _n_log_n([*counts, n]) / (n * mpmath.log(2)) + 4 * exact)
+    worst.see(part_of(got, exact, allowed), f"of {n} rows")
+
+
+def _n_log_n(counts: list[int]) -> mpf:
+    return mpmath.fsum(m * mpmath.log(m) for m in counts if m)
 
 
 def comparisons_of(pairs: list[tuple[Counts, Counts]]) -> Finding:
     """Count wrong comparisons of two gains."""
-    worst = Worst("which of two gains is greater", WHOLE_NUMBERS, 0.0, "choices")
+    worst = Finding.of("which of two gains is greater", WHOLE_NUMBERS, 0.0, "choices")
     wrong = [
         compare(a, a.sum(axis=0), b, b.sum(axis=0)) != truth.compare_gains(a.tolist(), b.tolist()) for a, b in pairs
     ]
     worst.see(float(sum(wrong)), tried=len(pairs))
-    return worst.finding()
+    return worst
 
 
 def choices_of(pairs: list[tuple[Counts, Counts]]) -> Finding:
     """Count wrong choices of the best of three inputs, in any order; of equal ones the lowest must win."""
-    worst = Worst("which input is kept", WHOLE_NUMBERS, 0.0, "choices")
+    worst = Finding.of("which input is kept", WHOLE_NUMBERS, 0.0, "choices")
     wrong = 0
     for one, other in pairs:
         for tables in ((one, other, one), (other, one, other)):
@@ -89,7 +152,7 @@ def choices_of(pairs: list[tuple[Counts, Counts]]) -> Finding:
             wrong += best_position(node_of(*tables), np.arange(3)) != int(greater)
             wrong += best_position(node_of(*tables), np.array([2, 1, 0])) != (1 if greater else 2)
     worst.see(float(wrong), tried=4 * len(pairs))
-    return worst.finding()
+    return worst
 
 
 def _tables(X: NDArray[np.bool_], labels: NDArray[np.intp], bit: int, given: int | None) -> list[truth.Table]:
@@ -104,7 +167,7 @@ def _tables(X: NDArray[np.bool_], labels: NDArray[np.intp], bit: int, given: int
 
 def given_of(sets: list[BitSet]) -> Finding:
     """Compare the information of bits about the class, alone and given another bit, with the reference."""
-    worst = Worst("information of a bit, given another", REFERENCE, 1.0, "x rounding")
+    worst = Finding.of("information of a bit, given another", REFERENCE, 1.0, "x rounding")
     for X, labels, classes in sets:
         counted = Cooccurrence(X, labels, classes)
         for given in (None, 0, 3):
@@ -114,7 +177,7 @@ def given_of(sets: list[BitSet]) -> Finding:
                 with precisely():
                     nats = gain * len(X) * mpmath.log(2)
                     worst.see(part_of(got, nats, _given_error(tables)), f"{len(X)} rows, {classes} classes")
-    return worst.finding()
+    return worst
 
 
 def _given_error(tables: list[truth.Table]) -> mpf:
@@ -132,7 +195,7 @@ def _given_error(tables: list[truth.Table]) -> mpf:
 
 def given_comparisons_of(sets: list[BitSet], rng: np.random.Generator) -> Finding:
     """Count wrong comparisons of the information of two bits, both alone or given another."""
-    worst = Worst("which of two bits is more informative, given others", WHOLE_NUMBERS, 0.0, "choices")
+    worst = Finding.of("which of two bits is more informative, given others", WHOLE_NUMBERS, 0.0, "choices")
     for X, labels, classes in sets:
         counted = Cooccurrence(X, labels, classes)
         wrong = 0
@@ -143,7 +206,7 @@ def given_comparisons_of(sets: list[BitSet], rng: np.random.Generator) -> Findin
             sign = truth.compare_conditional_gains(_tables(X, labels, *one), _tables(X, labels, *other))
             wrong += counted.sign(one, other) != sign
         worst.see(float(wrong), tried=len(pairs))
-    return worst.finding()
+    return worst
 
 
 def _pairs(rng: np.random.Generator, bits: int) -> Iterator[Pair]:

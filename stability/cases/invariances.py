@@ -22,10 +22,12 @@ from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 
-from ..checks.class_rounds import see_round
-from ..checks.rounds import counted, moments
-from ..finding import REFERENCE, Case, Finding, Worst
+from ..checks.rounds import moments, see_round
+from ..finding import REFERENCE, Finding
 from ..inputs.hard_data import HardSet, contradictory, intervals, noisy, separable, words
+
+ROUNDS = 30
+SAME = "training on the original set"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,31 +39,27 @@ class Change:
     inputs: tuple[int, ...]
     classes: tuple[int, ...]
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """All that a training depends on: the fixed sets change alike in many draws, and are trained once."""
+        hard = self.hard
+        numbers = (part.tobytes() for part in (hard.X, hard.labels, hard.row_weights))
+        return *numbers, hard.n_switches, self.inputs, self.classes
+
 
 def _same(name: str, hard: HardSet, changed: HardSet) -> Change:
     return Change(name, changed, tuple(range(hard.X.shape[1])), tuple(range(hard.n_classes)))
 
 
-def unweighted(hard: HardSet) -> HardSet:
-    """Return the set without weights."""
-    return replace(hard, weights=None)
-
-
 def rows_several_times(hard: HardSet, times: int) -> Change:
     """Repeat the whole set several times."""
-    return _same(f"the set {times} times", hard, with_rows(hard, np.tile(np.arange(len(hard.labels)), times)))
-
-
-def with_rows(hard: HardSet, rows: NDArray[np.intp]) -> HardSet:
-    """Return the set of the rows at these indices."""
-    weights = None if hard.weights is None else hard.weights[rows]
-    return replace(hard, X=hard.X[rows], labels=hard.labels[rows], weights=weights)
+    return _same(f"the set {times} times", hard, hard.rows(np.tile(np.arange(len(hard.labels)), times)))
 
 
 def exact_changes(hard: HardSet, rng: np.random.Generator) -> Iterator[Change]:
     """Yield equivalent sets whose trained models must be the same to the last bit."""
     n, d = hard.X.shape
-    yield _same("rows in another order", hard, with_rows(hard, rng.permutation(n)))
+    yield _same("rows in another order", hard, hard.rows(rng.permutation(n)))
     # The switch is the first column, the joint the last.
     constant = np.column_stack([np.zeros(n, np.int64), hard.X, np.full(n, 77)])
     more = replace(hard, X=constant, n_switches=hard.n_switches + 1)
@@ -75,8 +73,7 @@ def exact_changes(hard: HardSet, rng: np.random.Generator) -> Iterator[Change]:
         codes[[0, -1]] = 0, HIGHEST_CODE
         X[:, column] = codes[ranks] if len(values) > 1 else X[:, column]
     yield _same("codes recoded in order", hard, replace(hard, X=X))
-    weights = np.ones(n) if hard.weights is None else hard.weights
-    scaled = np.ldexp(weights, int(rng.choice([-1000, 900])))
+    scaled = np.ldexp(hard.row_weights, int(rng.choice([-1000, 900])))
     yield _same("weights times 2^-1000 or 2^900", hard, replace(hard, weights=scaled))
     # Copies are joints. Equal columns tie, and the lowest number wins.
     yield _same("every column twice", hard, replace(hard, X=np.column_stack([hard.X, hard.X])))
@@ -99,9 +96,6 @@ def columns_reversed(hard: HardSet) -> Change:
     changed = replace(hard, X=hard.X[:, order])
     inputs = tuple(np.argsort(order).tolist())
     return Change("columns in reverse", changed, inputs, tuple(range(hard.n_classes)))
-
-
-ROUNDS = 30
 
 
 def numbers(change: Change) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -144,9 +138,6 @@ def _stacked(rows: list[NDArray[Any]], like: NDArray[Any]) -> NDArray[Any]:
     return np.concatenate([np.zeros((0, like.size), like.dtype), *rows])
 
 
-SAME = "training on the original set"
-
-
 def renumbered(other: Stumps, change: Change) -> Stumps:
     """Return the ensemble of a changed set with the original numbering of inputs and classes."""
     place = np.full(other.n_inputs, -1, np.int32)
@@ -154,12 +145,6 @@ def renumbered(other: Stumps, change: Change) -> Stumps:
     order = list(change.classes)
     columns = place[other.columns[:, order]]
     return Stumps(len(change.inputs), columns, other.thresholds[:, order], other.values[:, order], other.shrinkage)
-
-
-CASE = Case(
-    title="Scale-free facts",
-    danger="the order of rows, columns or classes, copies, units or names of codes change the trained model",
-)
 
 
 def findings(full: bool) -> Iterator[Finding]:
@@ -173,7 +158,7 @@ def findings(full: bool) -> Iterator[Finding]:
 def hard_sets(draws: int) -> Iterator[HardSet]:
     """Yield sets with and without ties of columns, of 2 to 6 classes, separable, contradictory and noisy, draw by draw.
 
-    The sets that are not random are the same objects at every draw, so they are trained once.
+    The sets that are not random are the same at every draw.
     """
     both = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
     fixed = (
@@ -195,33 +180,37 @@ def hard_sets(draws: int) -> Iterator[HardSet]:
 def _exact(sets: list[HardSet]) -> Iterator[Finding]:
     """Yield, change by change, the number of trained arrays that differ in any bit."""
     rng = np.random.default_rng(1)
-    before = {hard: list(numbers(_same("unchanged", hard, hard))) for hard in dict.fromkeys(sets)}
-    differ: dict[str, Worst] = {}
+    trained: dict[tuple[object, ...], list[tuple[str, NDArray[Any]]]] = {}
+    differ: dict[str, Finding] = {}
     for hard in sets:
-        for change in exact_changes(hard, rng):
+        unchanged, *changes = _same("unchanged", hard, hard), *exact_changes(hard, rng)
+        for change in (unchanged, *changes):
+            if change.key not in trained:
+                trained[change.key] = list(numbers(change))
+        for change in changes:
             name = change.name
-            worst = differ.setdefault(name, Worst(f"{name}: all trained parameters", SAME, 0.0, "arrays"))
-            for (part, one), (_, other) in zip(before[hard], numbers(change), strict=True):
+            worst = differ.setdefault(name, Finding.of(f"{name}: all trained parameters", SAME, 0.0, "arrays"))
+            for (part, one), (_, other) in zip(trained[unchanged.key], trained[change.key], strict=True):
                 worst.see(float(not np.array_equal(one, other)), f"{hard.name}: {part}")
-    yield from (worst.finding() for worst in differ.values())
+    yield from differ.values()
 
 
 def _tree(sets: list[HardSet]) -> Iterator[Finding]:
     """Check ID3: the same tree if classes or the number of copies change, the same predictions if columns do."""
     rng = np.random.default_rng(2)
-    trees = Worst("ID3: classes renumbered, the set 3 times", "the tree of the original set", 0.0, "trees")
-    rows = Worst("ID3: columns renumbered", "the most frequent class of each frame", 0.0, "rows")
+    trees = Finding.of("ID3: classes renumbered, the set 3 times", "the tree of the original set", 0.0, "trees")
+    rows = Finding.of("ID3: columns renumbered", "the most frequent class of each frame", 0.0, "rows")
     for hard in sets:
         inputs = _asked(hard)
         for change in (classes_permuted(hard, rng), rows_several_times(hard, 3)):
             trees.see(float(_asked(change.hard) != inputs), f"{hard.name}, {change.name}")
         change = columns_reversed(hard)
         predicted = grow_id3(change.hard.X, change.hard.labels).predict(change.hard.X).tolist()
-        most = counted(unweighted(hard))
+        most = replace(hard, weights=None).counts()
         for frame, prediction in zip(hard.X.tolist(), predicted, strict=True):
             own = most[tuple(frame)]
             rows.see(float(prediction != own.index(max(own))), hard.name)
-    yield from (trees.finding(), rows.finding())
+    yield from (trees, rows)
 
 
 def _asked(hard: HardSet) -> list[tuple[int | None, tuple[int, ...]]]:
@@ -235,9 +224,11 @@ def _near(sets: list[HardSet], rounds: int) -> Iterator[Finding]:
     Sums of three copies are on a grid that is three times as coarse, with three times the rows.
     """
     rng = np.random.default_rng(3)
-    chosen = Worst("stumps chosen, renumbered or repeated", REFERENCE, 3.0, "x rounding")
-    outputs = Worst("outputs of branches, renumbered or repeated", REFERENCE, 1.0, "x rounding")
-    for hard in map(unweighted, sets):
+    chosen = Finding.of("stumps chosen, renumbered or repeated", REFERENCE, 3.0, "x rounding")
+    outputs = Finding.of("outputs of branches, renumbered or repeated", REFERENCE, 1.0, "x rounding")
+    trained: dict[tuple[object, ...], Stumps] = {}
+    for weighted in sets:
+        hard = replace(weighted, weights=None)
         for change in (
             classes_permuted(hard, rng),
             rows_several_times(hard, 2),
@@ -245,9 +236,11 @@ def _near(sets: list[HardSet], rounds: int) -> Iterator[Finding]:
             columns_reversed(hard),
         ):
             of = change.hard
-            stumps = renumbered(boost(of.X, of.labels, of.n_classes, rounds=rounds)[0], change)
-            named = replace(hard, name=f"{hard.name}, {change.name}")
+            if change.key not in trained:
+                stumps, _ = boost(of.X, of.labels, of.n_classes, rounds=rounds)
+                trained[change.key] = renumbered(stumps, change)
+            named, stumps = replace(hard, name=f"{hard.name}, {change.name}"), trained[change.key]
             for number, moment in enumerate(moments(named, stumps)):
                 if number < rounds and number & (number + 1) == 0:
                     see_round(named, stumps, number, moment.scores, 3.0, chosen, outputs)
-    yield from (chosen.finding(), outputs.finding())
+    yield from (chosen, outputs)

@@ -7,7 +7,9 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
 from thenar.compiler.trainers.logit import BINS, ColumnTables, fit_logit
 from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE, TOLERANCE
 from thenar.compiler.trainers.pairs import fit_pairs
@@ -15,17 +17,12 @@ from thenar.runtime.model.integers import LIMIT
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import ScoreTables
 
-from ..checks.roundings import ROUNDING
-from ..finding import REFERENCE, Case, Finding, Worst
+from ..checks.rounds import ROUNDING
+from ..finding import REFERENCE, Finding
 from ..inputs.hard_data import HardSet, contradictory, intervals, noisy, separable, words
 from ..inputs.hard_tables import largest_sum, rows_of
 from ..reference.logit import ReferenceColumn, largest_derivative
 from ..reference.numbers import precisely
-
-CASE = Case(
-    title="Additive logit",
-    danger="scores grow without bound, a step overshoots, or rounding ends the search before the minimum is reached",
-)
 
 # Penalties on scores, and on differences of neighbouring bins.
 USUAL, TINY, HUGE = (1.0, 3.0), (1e-6, 0.0), (1e6, 1e6)
@@ -33,30 +30,27 @@ USUAL, TINY, HUGE = (1.0, 3.0), (1e-6, 0.0), (1e6, 1e6)
 
 def findings(full: bool) -> Iterator[Finding]:
     """Yield the distance of each solution from the minimum, and the invariances."""
-    at_rest = Worst("largest derivative at the solution", REFERENCE, 1.0, "x tolerance and rounding")
-    large = Worst("entries beyond the limit of the penalty, or not finite", "the loss of zeros", 0.0, "sets")
-    overflow = Worst("largest sum of the integer tables, any order", "all rows' extremes", LIMIT, "steps")
-    wrong = Worst("frames predicted wrongly by tables and integers", "their labels", 0.0, "frames")
-    changed = Worst("solutions changed by the order of rows or a constant column", "itself", 0.0, "solutions")
+    at_rest = Finding.of("largest derivative at the solution", REFERENCE, 1.0, "x tolerance and rounding")
+    large = Finding.of("entries beyond the limit of the penalty, or not finite", "the loss of zeros", 0.0, "sets")
+    overflow = Finding.of("largest sum of the integer tables, any order", "all rows' extremes", LIMIT, "steps")
+    wrong = Finding.of("frames predicted wrongly by tables and integers", "their labels", 0.0, "frames")
+    changed = Finding.of("solutions changed by the order of rows or a constant column", "itself", 0.0, "solutions")
     for hard, pulls, is_separable in _fits(full):
         at = f"{hard.name}, penalty {pulls[0]:g}"
         tables = _fit(hard, pulls)
         at_rest.see(_unrest(hard, tables, pulls), at)
-        bound = math.sqrt(2 * _weights(hard).sum() * math.log(hard.n_classes) / (pulls[0] * BIAS_SHARE))
+        bound = math.sqrt(2 * hard.row_weights.sum() * math.log(hard.n_classes) / (pulls[0] * BIAS_SHARE))
         large.see(float(not all((np.abs(rows) <= bound).all() for rows in (tables.bias, *tables.rows))), at)
-        scores = tables.score_tables(hard.n_switches)
-        integers = quantise(scores, hard.bits, hard.codes)
+        integers = quantise(tables.score_tables(hard.n_switches), hard.bits, hard.codes)
         overflow.see(largest_sum(rows_of(integers)), at)
         if is_separable:
             named = tables.scores(hard.X).argmax(axis=1), integers.scores(hard.bits, hard.codes).argmax(axis=1)
             wrong.see(float(sum(np.count_nonzero(each != hard.labels) for each in named)), at, len(hard.X))
         order = np.random.default_rng(1).permutation(len(hard.X))
-        turned = replace(hard, X=np.column_stack([hard.X, np.full(len(hard.X), 7)])[order], labels=hard.labels[order])
-        turned = replace(turned, weights=None if hard.weights is None else hard.weights[order])
-        again = _fit(turned, pulls)
+        again = _fit(replace(hard, X=np.column_stack([hard.X, np.full(len(hard.X), 7)])).rows(order), pulls)
         same = all(map(np.array_equal, (tables.bias, *tables.rows), (again.bias, *again.rows[:-1])))
         changed.see(float(not same or again.rows[-1].any()), at)
-    yield from (worst.finding() for worst in (at_rest, large, overflow, wrong, changed))
+    yield from (at_rest, large, overflow, wrong, changed)
     yield _copies()
     yield from _pairs(full)
 
@@ -76,54 +70,58 @@ def _fits(full: bool) -> Iterator[tuple[HardSet, tuple[float, float], bool]]:
         yield contradictory([[10**12, 0, 1], [1, 10**12, 0], [0, 1, 10**6]]), pulls, False
 
 
-def _weights(hard: HardSet) -> np.ndarray:
-    return np.ones(len(hard.labels)) if hard.weights is None else hard.weights
-
-
 def _fit(hard: HardSet, pulls: tuple[float, float]) -> ColumnTables:
     penalty, smoothness = pulls
     return fit_logit(hard.X, hard.labels, hard.n_classes, penalty=penalty, smoothness=smoothness, weights=hard.weights)
 
 
-@precisely()
 def _unrest(hard: HardSet, tables: ColumnTables, pulls: tuple[float, float]) -> float:
+    penalty, smoothness = pulls
+    columns = [_bias(tables.bias, penalty, len(hard.X))]
+    for x, edges, rows in zip(hard.X.T, tables.edges, tables.rows, strict=True):
+        two = len(edges) < 2
+        own = rows[1:] if two else rows
+        pulled = [penalty if two else BIN_SHARE * penalty] * len(own)
+        steps = [(number, number + 1, smoothness) for number in range(len(pulled) - 1)]
+        columns.append(ReferenceColumn((np.searchsorted(edges, x) - two).tolist(), own.tolist(), pulled, steps))
+    return _share_of_allowed(columns, hard.labels, hard.row_weights, hard.n_classes)
+
+
+def _bias(bias: Floats, penalty: float, n: int) -> ReferenceColumn:
+    return ReferenceColumn([0] * n, [bias.tolist()], [BIAS_SHARE * penalty], [])
+
+
+@precisely()
+def _share_of_allowed(
+    columns: list[ReferenceColumn], labels: NDArray[np.intp], weights: Floats, n_classes: int
+) -> float:
     """Return the largest derivative as a share of the tolerance plus rounding.
 
     Scores are exact. A probability of K classes is within K + 8 roundings; the grid of residuals, and the penalty of a
     row, which is at most the total weight, add a few more roundings.
     """
-    weights, (penalty, smoothness) = _weights(hard), pulls
-    columns = [ReferenceColumn([0] * len(hard.X), [tables.bias.tolist()], [BIAS_SHARE * penalty], [])]
-    for x, edges, rows in zip(hard.X.T, tables.edges, tables.rows, strict=True):
-        bins = np.searchsorted(edges, x)
-        two = len(edges) < 2
-        own = rows[1:] if two else rows
-        pulled = [penalty if two else BIN_SHARE * penalty] * len(own)
-        steps = [(number, number + 1, smoothness) for number in range(len(pulled) - 1)]
-        columns.append(ReferenceColumn((bins - two).tolist(), own.tolist(), pulled, steps))
-    largest = largest_derivative(columns, hard.labels.tolist(), weights.tolist())
-    allowed = TOLERANCE + (hard.n_classes + 20) * 2 * ROUNDING
-    return float(largest / (allowed * float(weights.sum())))
+    largest = largest_derivative(columns, labels.tolist(), weights.tolist())
+    return float(largest / ((TOLERANCE + (n_classes + 20) * 2 * ROUNDING) * float(weights.sum())))
 
 
 def _copies() -> Finding:
     """Equal columns must have the same rows, to the last bit."""
-    worst = Worst("copies of a column with different rows", "each other", 0.0, "columns")
+    worst = Finding.of("copies of a column with different rows", "each other", 0.0, "columns")
     hard = noisy(5, 60, 0.3, seed=1)
     doubled = replace(hard, X=np.column_stack([hard.X[:, :3], hard.X, hard.X[:, -1]]))
     for pulls in (USUAL, TINY, HUGE):
         rows = _fit(doubled, pulls).rows
         for one, other in ((0, 3), (1, 4), (2, 5), (-1, -2)):
             worst.see(float(not np.array_equal(rows[one], rows[other])), f"columns {one} and {other}, pulls {pulls}")
-    return worst.finding()
+    return worst
 
 
 def _pairs(full: bool) -> Iterator[Finding]:
     """Yield the same for tables of pairs of joints, with types separable only by two joints together, or not at all."""
-    at_rest = Worst("largest derivative with pairs of joints", REFERENCE, 1.0, "x tolerance and rounding")
-    overflow = Worst("largest sum of integer tables with pairs", "the proven bound of the tables", LIMIT, "steps")
-    wrong = Worst("frames of crossed joints predicted wrongly by integers", "their labels", 0.0, "frames")
-    changed = Worst("tables of pairs that change with the order of rows", "themselves", 0.0, "tables")
+    at_rest = Finding.of("largest derivative with pairs of joints", REFERENCE, 1.0, "x tolerance and rounding")
+    overflow = Finding.of("largest sum of integer tables with pairs", "the proven bound of the tables", LIMIT, "steps")
+    wrong = Finding.of("frames of crossed joints predicted wrongly by integers", "their labels", 0.0, "frames")
+    changed = Finding.of("tables of pairs that change with the order of rows", "themselves", 0.0, "tables")
     for apart, (penalty, smoothness) in product((1, 1000), (USUAL, TINY, HUGE)):
         random = np.random.default_rng(apart)
         codes = random.integers(0, 4, (160 if full else 60, 4)).astype(np.uint16) * np.uint16(apart)
@@ -141,23 +139,15 @@ def _pairs(full: bool) -> Iterator[Finding]:
             if is_separable:
                 named = integers.scores(none, codes).argmax(axis=1)
                 wrong.see(float(np.count_nonzero(named != targets)), at, len(codes))
-            same = zip(_numbers(tables), _numbers(again), strict=True)
-            changed.see(float(not all(np.array_equal(one, other) for one, other in same)), at)
-    yield from (worst.finding() for worst in (at_rest, overflow, wrong, changed))
+            both = ([one.bias, *one.joint_rows, *(pair.rows for pair in one.grids)] for one in (tables, again))
+            changed.see(float(not all(np.array_equal(*numbers) for numbers in zip(*both, strict=True))), at)
+    yield from (at_rest, overflow, wrong, changed)
 
 
-def _numbers(tables: ScoreTables) -> list[np.ndarray]:
-    return [tables.bias, *tables.joint_rows, *(pair.rows for pair in tables.grids)]
-
-
-@precisely()
 def _pairs_unrest(
-    tables: ScoreTables, codes: np.ndarray, labels: np.ndarray, penalty: float, smoothness: float
+    tables: ScoreTables, codes: NDArray[np.uint16], labels: NDArray[np.intp], penalty: float, smoothness: float
 ) -> float:
-    columns, pull = (
-        [ReferenceColumn([0] * len(codes), [tables.bias.tolist()], [BIAS_SHARE * penalty], [])],
-        BIN_SHARE * penalty,
-    )
+    columns, pull = [_bias(tables.bias, penalty, len(codes))], BIN_SHARE * penalty
     for steps, rows, x in zip(tables.thresholds, tables.joint_rows, codes.T, strict=True):
         between = [(bin_, bin_ + 1, smoothness) for bin_ in range(len(steps))]
         columns.append(ReferenceColumn(np.searchsorted(steps, x).tolist(), rows.tolist(), [pull] * len(rows), between))
@@ -169,5 +159,4 @@ def _pairs_unrest(
         between = [(int(b), int(a), smoothness) for a, b in both]
         flat = pair.rows.reshape(down * across, -1).tolist()
         columns.append(ReferenceColumn((one * across + other).tolist(), flat, [pull] * len(flat), between))
-    largest = largest_derivative(columns, labels.tolist(), [1.0] * len(codes))
-    return float(largest / ((TOLERANCE + 22 * 2 * ROUNDING) * len(codes)))
+    return _share_of_allowed(columns, labels, np.ones(len(codes)), 2)

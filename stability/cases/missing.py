@@ -12,17 +12,12 @@ from thenar.runtime.model.proof import furthest
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.scores import LANE_OFFSET
 
-from ..finding import Case, Finding, Worst
-from ..inputs.hard_tables import Bits, Codes, first_best
+from ..finding import Finding
+from ..inputs.hard_tables import Bits, Codes
 from ..inputs.small_sets import SmallBuild, small_build, small_set
 from ..reference.numbers import precisely
 from ..reference.standing_in import Kind, stand_ins
-from ..reference.tables import balanced, mean_row, mean_switch
-
-CASE = Case(
-    title="Missing ports and silent joints",
-    danger="with fitted rows for missing inputs a sum overflows, or the loss is not reported",
-)
+from ..reference.tables import balanced, mean_row
 
 
 class Lost(NamedTuple):
@@ -69,19 +64,22 @@ def every_loss(build: Build, width: int, bits: Bits, codes: Codes) -> Iterator[L
 
 def _fitted(small: SmallBuild) -> Finding:
     """Compare the replacement of each input with the same fit at 60 digits, whose numbers are integers as well."""
-    worst = Worst("the replacement of each input", "the fit at 60 digits", 0, "steps")
+    worst = Finding.of("the replacement of each input", "the fit at 60 digits", 0, "steps")
     tables, integers = small.tables, small.build.tables
     _, joint_rows = balanced(tables.bias.tolist(), [rows.tolist() for rows in tables.joint_rows])
-    of_switches = zip(tables.switch_rows.tolist(), small.bits.T.tolist(), strict=True)
+    of_switches = zip(tables.switch_rows, small.bits.T.tolist(), strict=True)
     of_joints = zip(map(np.ndarray.tolist, tables.thresholds), joint_rows, small.codes.T.tolist(), strict=True)
-    means = [mean_switch(row, bits) for row, bits in of_switches], [mean_row(*joint) for joint in of_joints]
+    means = (
+        [mean_row([0], [(0 * row).tolist(), row.tolist()], bits) for row, bits in of_switches],
+        [mean_row(*joint) for joint in of_joints],
+    )
     got = integers.switch_means.tolist(), integers.joint_means.tolist()
     for what, kind, of_kind, rows in zip(("switch", "joint"), _kinds(small), means, got, strict=True):
         with precisely():
             in_steps = [[value * integers.scale for value in row] for row in of_kind]
         for number, (one, other) in enumerate(zip(stand_ins(kind, in_steps), rows, strict=True)):
             worst.see(max(abs(a - b) for a, b in zip(one, other, strict=True)), f"{what} {number}")
-    return worst.finding()
+    return worst
 
 
 def _kinds(small: SmallBuild) -> tuple[Kind, Kind]:
@@ -106,7 +104,7 @@ def _kinds(small: SmallBuild) -> tuple[Kind, Kind]:
 def _sums(small: SmallBuild, cases: list[Lost]) -> Finding:
     """No running sum, in the order of the inputs, may exceed the bound of the build."""
     tables = small.build.tables
-    worst = Worst(
+    worst = Finding.of(
         "running sums, every subset of ports and joints lost", "the build's bound, at most 32767", tables.bound, "steps"
     )
     for case in cases:
@@ -119,21 +117,20 @@ def _sums(small: SmallBuild, cases: list[Lost]) -> Finding:
         # The running sums must end at the scores of the scorer.
         differs = not np.array_equal(running[-1], case.scores)
         worst.see(float("inf") if differs else float(np.abs(running).max()), case.name, len(case.bits))
-    return worst.finding()
+    return worst
 
 
 def _reported(small: SmallBuild, cases: list[Lost]) -> Iterator[Finding]:
-    degraded = Worst("frames reported as degraded", "those that lost a kept switch or a joint", 0, "frames")
-    unread = Worst("outputs that depend on the value of a lost input", "the output without it", 0, "frames")
+    degraded = Finding.of("frames reported as degraded", "those that lost a kept switch or a joint", 0, "frames")
+    unread = Finding.of("outputs that depend on the value of a lost input", "the output without it", 0, "frames")
     build, grasps = small.build, small.build.grasps
     for case in cases:
         lost = case.switches, case.joints
         any_lost = any(part.any() for part in lost)
         for bits, codes, scores in zip(case.bits, case.codes, case.scores.tolist(), strict=True):
             found = build.recognise(bits, codes, *lost)
-            right = found.degraded == any_lost and found.grasp == grasps[first_best(scores)]
+            right = found.degraded == any_lost and found.grasp == grasps[scores.index(max(scores))]
             degraded.see(float(not right), case.name)
             other = bits ^ case.switches, np.where(case.joints, HIGHEST_CODE - codes, codes)
             unread.see(float(build.recognise(*other, *lost) != found), case.name)
-    yield degraded.finding()
-    yield unread.finding()
+    yield from (degraded, unread)

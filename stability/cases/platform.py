@@ -26,16 +26,12 @@ from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import simulate
 
-from ..finding import Case, Finding, Worst
+from ..finding import Finding
 from ..pythons import made
 
 with optional():
     from threadpoolctl import threadpool_info
 
-CASE = Case(
-    title="The platform",
-    danger="the same recordings give another build with other threads, processor instructions or Python",
-)
 
 # Variables that may be set outside, and would make the settings less different than intended.
 _OURS = (
@@ -76,7 +72,13 @@ def build() -> Built:
     """Simulate a set, compile it, and return the digests of the files. Warnings are errors."""
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
         warnings.simplefilter("error")
-        files = _files(Path(folder))
+        # 160 switches, 16 joints, 14 grasp types, two hands: about half a second.
+        found = simulate(msgspec.structs.replace(load_scene("quick"), repetitions=3), jobs=1).grasp_set
+        recorded = Path(folder) / "set.grasps"
+        found.save(recorded)
+        compiled = compile_build(found, Path(folder) / "build", rounds=20, folds=2).folder
+        paths = recorded, *(compiled / name for name in (MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME))
+        files = tuple((path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in paths)
     simd = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     return Built(
         python=platform.python_version(),
@@ -87,19 +89,8 @@ def build() -> Built:
         ),
         simd=tuple(simd),
         files=files,
-        plain=_digest(_plain()),
+        plain=hashlib.sha256(_plain()).hexdigest(),
     )
-
-
-def _files(folder: Path) -> tuple[tuple[str, str], ...]:
-    # 160 switches, 16 joints, 14 grasp types, two hands: about half a second.
-    scene = msgspec.structs.replace(load_scene("quick"), repetitions=3)
-    found = simulate(scene, jobs=1).grasp_set
-    recorded = folder / "set.grasps"
-    found.save(recorded)
-    made = compile_build(found, folder / "build", rounds=20, folds=2).folder
-    files = recorded, *(made / name for name in (MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME))
-    return tuple((file.name, _digest(file.read_bytes())) for file in files)
 
 
 def _plain() -> bytes:
@@ -107,10 +98,6 @@ def _plain() -> bytes:
     numbers = (np.arange(300 * 500) % 99_991 / 33_331.0).reshape(300, 500)
     products = numbers @ numbers.T / 10_000
     return np.exp(products).tobytes() + np.array([math.exp(number) for number in numbers.flat]).tobytes()
-
-
-def _digest(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
 
 
 class PlatformSetting(NamedTuple):
@@ -122,25 +109,15 @@ class PlatformSetting(NamedTuple):
 
 
 AS_IT_IS = PlatformSetting("as it is")
+_FAILED = ("a build as it is", "a process that succeeds", 1, 0, "processes", 1)
 
 
 def findings(full: bool) -> Iterator[Finding]:
     """Compare the files of every setting with those of this Python without settings."""
     here = run(AS_IT_IS)
     if isinstance(here, str):
-        yield _failed(here)
+        yield Finding(*_FAILED, here)
         return
-    yield _compared("threads, kernels, SIMD, libm, hash order", here, _settings(here, full))
-    for python in made() if full else ():
-        there = run(AS_IT_IS._replace(python=python))
-        if isinstance(there, str):
-            yield _failed(there)
-        else:
-            check = f"Python {there.python} with numpy {there.numpy}"
-            yield _compared(check, here, [AS_IT_IS._replace(python=python), plainest(there)._replace(python=python)])
-
-
-def _settings(here: Built, full: bool) -> list[PlatformSetting]:
     settings = [plainest(here), _set("OPENBLAS_NUM_THREADS", "2")]
     if full:
         settings += [_set("OPENBLAS_CORETYPE", kernel) for kernel in _kernels(here)]
@@ -148,16 +125,19 @@ def _settings(here: Built, full: bool) -> list[PlatformSetting]:
         settings += [_set("NPY_DISABLE_CPU_FEATURES", " ".join(here.simd[kept:])) for kept in range(len(here.simd))]
         settings += [_set("GLIBC_TUNABLES", _PLAIN_LIBM)]
         settings += [_set("PYTHONHASHSEED", seed) for seed in ("0", "1", "4294967295")]
-    return settings
-
-
-def _failed(ending: str) -> Finding:
-    return Finding("a build as it is", "a process that succeeds", 1, 0, "processes", 1, ending)
+    yield _compared("threads, kernels, SIMD, libm, hash order", here, settings)
+    for python in made() if full else ():
+        there = run(AS_IT_IS._replace(python=python))
+        if isinstance(there, str):
+            yield Finding(*_FAILED, there)
+        else:
+            check = f"Python {there.python} with numpy {there.numpy}"
+            yield _compared(check, here, [AS_IT_IS._replace(python=python), plainest(there)._replace(python=python)])
 
 
 def _compared(check: str, here: Built, settings: list[PlatformSetting]) -> Finding:
     """Count the files that differ from this process's. The bound is 0: bytes of files are not rounded."""
-    worst = Worst(check, "bytes of a plain run", 0, "files")
+    worst = Finding.of(check, "bytes of a plain run", 0, "files")
     moved = 0
     for setting in settings:
         there = run(setting)
@@ -166,9 +146,8 @@ def _compared(check: str, here: Built, settings: list[PlatformSetting]) -> Findi
         at = there if isinstance(there, str) else ", ".join(wrong)
         worst.see(len(wrong), f"{setting.name}: {at}", tried=len(here.files))
         moved += not isinstance(there, str) and there.plain != here.plain
-    found = worst.finding()
-    note = f"{found.reference} (numpy's exp or products differ in {moved} of {len(settings)})"
-    return msgspec.structs.replace(found, reference=note)
+    worst.reference += f" (numpy's exp or products differ in {moved} of {len(settings)})"
+    return worst
 
 
 def _set(name: str, value: str) -> PlatformSetting:

@@ -16,24 +16,17 @@ import numpy as np
 
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.trainers.logitboost import boost
-from thenar.compiler.trainers.stumps import Stumps
-from thenar.runtime.model.integers import LIMIT, IntegerTables
+from thenar.runtime.model.integers import LIMIT
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners
 
-from ..checks.roundings import ROUNDING, loss_error, part_of
-from ..checks.rounds import RoundState, loss_rounding, moments, rise_rounding
-from ..finding import REFERENCE, Case, Finding, Worst
+from ..checks.rounds import ROUNDING, RoundState, loss_error, loss_rounding, moments, part_of, rise_rounding
+from ..finding import REFERENCE, Finding
 from ..inputs.hard_data import HardSet, intervals, separable, words
-from ..inputs.hard_tables import largest_sum, rows_of
+from ..inputs.hard_tables import largest_sum, listed, rows_of
 from ..reference.boosting import mean_loss
 from ..reference.numbers import distance
-from ..reference.tables import table_scores
-
-CASE = Case(
-    title="Separable classes",
-    danger="P goes to 0 and 1, 1/P to infinity, weights to 0; training goes on forever, and tables overflow",
-)
+from ..reference.tables import rows_of_frame
 
 
 def findings(full: bool) -> Iterator[Finding]:
@@ -53,13 +46,13 @@ def _trained(runs: list[tuple[HardSet, int, bool]]) -> Iterator[Finding]:
 
     Checks at 60 digits come after rounds 1, 2, 4, 8 and so on.
     """
-    outside = Worst("P, w, w z and outputs finite and in range", "the rules themselves", 0.0, "rounds")
-    sums = Worst("shares of a row add up to 1", "exact sums", 1.0, "x rounding")
-    rises = Worst("rise of the loss where it must fall", "convexity", 1.0, "x rounding")
-    reported = Worst("reported losses that are not the ensemble's", "the ensemble", 0.0, "losses")
-    losses = Worst("losses, even tiny ones", REFERENCE, 1.0, "x rounding")
-    overflow = Worst("largest sum of the integer tables, any order", "all rows' extremes", LIMIT, "steps")
-    wrong = Worst("frames predicted wrongly by ensemble and integers", "their labels", 0.0, "frames")
+    outside = Finding.of("P, w, w z and outputs finite and in range", "the rules themselves", 0.0, "rounds")
+    sums = Finding.of("shares of a row add up to 1", "exact sums", 1.0, "x rounding")
+    rises = Finding.of("rise of the loss where it must fall", "convexity", 1.0, "x rounding")
+    reported = Finding.of("reported losses that are not the ensemble's", "the ensemble", 0.0, "losses")
+    losses = Finding.of("losses, even tiny ones", REFERENCE, 1.0, "x rounding")
+    overflow = Finding.of("largest sum of the integer tables, any order", "all rows' extremes", LIMIT, "steps")
+    wrong = Finding.of("frames predicted wrongly by ensemble and integers", "their labels", 0.0, "frames")
     for hard, rounds, must_fall in runs:
         stumps, fallen = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds)
         before: RoundState | None = None
@@ -74,11 +67,19 @@ def _trained(runs: list[tuple[HardSet, int, bool]]) -> Iterator[Finding]:
                 rise = max(0.0, moment.loss - before.loss)
                 rises.see(rise / rise_rounding(hard.n_classes, before, moment), at)
             if number & (number - 1) == 0:
-                losses.see(_loss_error(hard, moment), at)
+                rows, labels = moment.scores.T.tolist(), hard.labels.tolist()
+                allowed = loss_error(rows, labels, [1.0] * len(labels))
+                losses.see(part_of(moment.loss, mean_loss(rows, labels), allowed), at)
             before = moment
         outside.see(float(not (np.abs(stumps.values) <= 3.0).all()), hard.name)
-        _see_tables(hard, stumps, overflow, wrong)
-    yield from (worst.finding() for worst in (outside, sums, rises, reported, losses, overflow, wrong))
+        for first in (1, 10, stumps.n_rounds):
+            integers = quantise(collapse(stumps.first(first), hard.n_switches), hard.bits, hard.codes)
+            overflow.see(largest_sum(rows_of(integers)), f"{hard.name}, {first} rounds")
+        by_stumps, tables = winners(stumps.scores(hard.X)), listed(integers)
+        for label, bits, codes, winner in zip(hard.labels, hard.bits, hard.codes.tolist(), by_stumps, strict=True):
+            steps = list(map(sum, zip(*rows_of_frame(*tables, bits, codes), strict=True)))
+            wrong.see(float(not label == winner == steps.index(max(steps))), hard.name)
+    yield from (outside, sums, rises, reported, losses, overflow, wrong)
 
 
 def _in_range(hard: HardSet, moment: RoundState) -> bool:
@@ -97,33 +98,9 @@ def _in_range(hard: HardSet, moment: RoundState) -> bool:
     )
 
 
-def _loss_error(hard: HardSet, moment: RoundState) -> float:
-    rows, labels = moment.scores.T.tolist(), hard.labels.tolist()
-    return part_of(moment.loss, mean_loss(rows, labels), loss_error(rows, labels, [1.0] * len(labels)))
-
-
-def _see_tables(hard: HardSet, stumps: Stumps, overflow: Worst, wrong: Worst) -> None:
-    for rounds in (1, 10, stumps.n_rounds):
-        integers = quantise(collapse(stumps.first(rounds), hard.n_switches), hard.bits, hard.codes)
-        overflow.see(largest_sum(rows_of(integers)), f"{hard.name}, {rounds} rounds")
-    steps = [_steps(integers, row) for row in hard.X.tolist()]
-    by_stumps = winners(stumps.scores(hard.X))
-    for label, row, winner in zip(hard.labels.tolist(), steps, by_stumps.tolist(), strict=True):
-        wrong.see(float(not label == winner == row.index(max(row))), hard.name)
-
-
-def _steps(tables: IntegerTables, row: list[int]) -> list[int]:
-    """Return the integer scores (K,) of one frame, by definition."""
-    n, (bias, *switches) = len(tables.switch_rows), rows_of(tables)
-    thresholds = [steps.tolist() for steps in tables.thresholds]
-    switch_rows = [of_closed for (of_closed,) in switches[:n]]
-    scores = table_scores(bias[0], switch_rows, thresholds, switches[n:], list(map(bool, row[:n])), row[n:])
-    return list(map(int, scores))
-
-
 def _rising() -> Finding:
     """Check that a rise of the loss is real: before and after it the loss is that of the scores."""
-    worst = Worst("the loss if it may rise (2 of 20 declared classes)", REFERENCE, 1.0, "x rounding")
+    worst = Finding.of("the loss if it may rise (2 of 20 declared classes)", REFERENCE, 1.0, "x rounding")
     X, labels = np.array([[0, 0], [0, 1], [0, 2], [1, 1], [2, 0]]), np.array([0, 1, 0, 0, 1])
     stumps, losses = boost(X, labels, 20, rounds=40)
     scores = [np.zeros((len(X), 20)), *stumps.staged_scores(X)]
@@ -131,4 +108,4 @@ def _rising() -> Finding:
     for number in (rise, rise + 1):
         truth = mean_loss(scores[number].tolist(), labels.tolist())
         worst.see(distance(losses[number], truth) / loss_rounding(20, float(truth)), f"round {number}")
-    return worst.finding()
+    return worst

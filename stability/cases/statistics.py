@@ -6,35 +6,13 @@ from itertools import product
 import numpy as np
 from mpmath import mpf
 
-from thenar.compiler.evaluation.folds import Scheme
 from thenar.compiler.evaluation.rates import ALIKE, UNITS, WEIGHT, Rate, clustered
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.manifest import Unit
 
-from ..checks.roundings import ROUNDING
-from ..finding import REFERENCE, Case, Finding, Worst
-from ..inputs.small_sets import make_set
+from ..checks.rounds import ROUNDING
+from ..finding import REFERENCE, Finding
 from ..reference.intervals import Interval, student, student_quantile, wilson, wilson_of
 from ..reference.numbers import distance, precisely
-
-
-def lopsided() -> dict[str, tuple[GraspSet, Scheme]]:
-    """Return sets, by description, that lack something on one side of a split, each with the scheme of the split."""
-    frames = [[0, 0], [0, 1], [1, 0], [1, 1]] * 4
-    subjects = ["A"] * 8 + ["B"] * 8
-    apart, lacking = ["a"] * 8 + ["b"] * 8, ["a", "b"] * 4 + ["a", "b", "c", "c"] * 2
-    return {
-        "subjects of one class each": (make_set(apart, frames, subjects=subjects), "subject"),
-        "a subject that lacks a class": (make_set(lacking, frames, subjects=subjects), "subject"),
-        "a class of one row in four folds": (make_set(["a", "b"] * 7 + ["a", "c"], frames), "trial"),
-        "a class in one block of four": (make_set(["a", "b"] * 6 + ["c"] * 4, frames), "block"),
-    }
-
-
-CASE = Case(
-    title="Rates at their ends",
-    danger="an interval leaves 0 to 1, has no width, or is too narrow for trials that are alike",
-)
 
 # Wilson's ends are (centre -+ reach) / shrink, where neither centre nor reach exceeds shrink, so that their errors
 # count no more than an error of the end. Relative roundings of 2^-53: centre 5 (the rate, z^2 twice, quotient, sum),
@@ -55,8 +33,10 @@ def findings(full: bool) -> Iterator[Finding]:
 
 def _wilson(totals: range) -> Iterator[Finding]:
     """One repeat: every count of small totals, and counts near both ends of large ones."""
-    off = Worst("ends of Wilson's interval", REFERENCE, WILSON_BOUND, "rate")
-    odd = Worst("rates of 0 and 1 whose interval does not end there or has no width", "the rule itself", 0, "rates")
+    off = Finding.of("ends of Wilson's interval", REFERENCE, WILSON_BOUND, "rate")
+    odd = Finding.of(
+        "rates of 0 and 1 whose interval does not end there or has no width", "the rule itself", 0, "rates"
+    )
     counts = [(correct, total) for total in totals for correct in range(total + 1)]
     counts += [(correct, n) for n in _TOTALS for correct in {0, 1, n // 2, n - 1, n}]
     for correct, total in counts:
@@ -65,8 +45,7 @@ def _wilson(totals: range) -> Iterator[Finding]:
         if correct in (0, total):
             ends = rate.low == 0 if correct == 0 else rate.high == 1
             odd.see(not (ends and rate.low < rate.high), f"{correct} of {total}")
-    yield off.finding()
-    yield odd.finding()
+    yield from (off, odd)
 
 
 def _repeated(repeats: int) -> Iterator[Finding]:
@@ -76,23 +55,18 @@ def _repeated(repeats: int) -> Iterator[Finding]:
     """
     worst_t = float(student_quantile(1, mpf("0.975")))
     bound = WILSON_BOUND + (STUDENT_ROUNDINGS * worst_t + 2 * worst_t) * ROUNDING
-    off = Worst("ends of the interval of repeats", REFERENCE, bound, "rate")
-    outside = Worst("intervals that leave 0 to 1 or exclude their mean", "the rule itself", 0, "rates")
+    off = Finding.of("ends of the interval of repeats", REFERENCE, bound, "rate")
+    outside = Finding.of("intervals that leave 0 to 1 or exclude their mean", "the rule itself", 0, "rates")
     for n in range(2, repeats + 1):
         for total in (1, 2, 7, 1000):
             for correct in product(sorted({0, 1, total // 2, total - 1, total}), repeat=n):
                 rate = Rate.counted(correct, total, of="pooled")
-                off.see(_apart((rate.low, rate.high), _hull(correct, total)), f"{correct} of {total}")
+                with precisely():
+                    both = wilson(mpf(sum(correct)) / n, total), student([mpf(count) / total for count in correct])
+                    hull = max(min(low for low, _ in both), mpf(0)), min(max(high for _, high in both), mpf(1))
+                off.see(_apart((rate.low, rate.high), hull), f"{correct} of {total}")
                 outside.see(not 0 <= rate.low <= rate.mean <= rate.high <= 1, f"{correct} of {total}")
-    yield off.finding()
-    yield outside.finding()
-
-
-@precisely()
-def _hull(correct: tuple[int, ...], total: int) -> Interval:
-    mean = mpf(sum(correct)) / len(correct)
-    both = wilson(mean, total), student([mpf(count) / total for count in correct])
-    return max(min(low for low, _ in both), mpf(0)), min(max(high for _, high in both), mpf(1))
+    yield from (off, outside)
 
 
 def _apart(found: tuple[float, float], truth: Interval) -> float:
@@ -106,10 +80,12 @@ def _clusters(draws: int) -> Iterator[Finding]:
     of the weight, 7 of the average of both, and one more of n; scipy's t is off by up to 64 (checked by a test of the
     rates). They change an end by no more than their size, since it lies within 0 to 1; Wilson's roundings add up.
     """
-    off = Worst(
+    off = Finding.of(
         "ends of the interval over clusters", REFERENCE, WILSON_BOUND + (4 + 2 + 2 + 7 + 1 + 64) * ROUNDING, "rate"
     )
-    outside = Worst("intervals over clusters that leave 0 to 1 or exclude their mean", "the rule itself", 0, "rates")
+    outside = Finding.of(
+        "intervals over clusters that leave 0 to 1 or exclude their mean", "the rule itself", 0, "rates"
+    )
     random = np.random.default_rng(10)
     for number in range(draws):
         sizes = random.integers(1, [3, 13, 500][number % 3], random.integers(2, 40))
@@ -121,8 +97,7 @@ def _clusters(draws: int) -> Iterator[Finding]:
         mean = recognised.sum() / sizes.sum()
         outside.see(not (-WILSON_BOUND <= found[0] <= mean + WILSON_BOUND), what)
         outside.see(not (mean - WILSON_BOUND <= found[1] <= 1 + WILSON_BOUND), what)
-    yield off.finding()
-    yield outside.finding()
+    yield from (off, outside)
 
 
 @precisely()

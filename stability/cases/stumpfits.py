@@ -12,10 +12,12 @@ from thenar.compiler.elementary import Floats
 from thenar.compiler.trainers.binning import bin_columns, midpoints
 from thenar.compiler.trainers.stumps import FittedStumps, Targets, fit_stumps
 
-from ..checks.class_rounds import ClassRound, branches
-from ..finding import REFERENCE, Case, Finding, Worst
+from ..checks.rounds import ClassRound
+from ..finding import REFERENCE, Finding
 from ..reference import boosting as truth
-from ..reference.numbers import precisely
+from ..reference.numbers import exact
+
+Z_MAX = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,13 +102,6 @@ KINDS: dict[str, Callable[[np.random.Generator, int, float], tuple[Floats, Float
 }
 
 
-CASE = Case(
-    title="Stump fits",
-    danger="a branch's output is the residue of rounding its weight, and rounding breaks ties between columns",
-)
-Z_MAX = 3.0
-
-
 def findings(full: bool) -> Iterator[Finding]:
     """Yield errors of thresholds, of the choice of stumps, and of their outputs."""
     rng, more = np.random.default_rng(4), 12 if full else 1
@@ -125,47 +120,42 @@ def fit(problem: Problem) -> FittedStumps:
 
 def thresholds_of(sets: Iterable[list[float]]) -> Finding:
     """Count thresholds that are not the once-rounded middle of their neighbours, or equal the upper one."""
-    worst = Worst("thresholds between neighbours", "fractions", 0.0, "thresholds")
+    worst = Finding.of("thresholds between neighbours", "fractions", 0.0, "thresholds")
     for values in sets:
         for lower, upper, got in zip(values[:-1], values[1:], midpoints(np.array(values)).tolist(), strict=True):
             # The sum rounds to half of its last place, which its half keeps; so do the halves of the largest doubles.
             off = abs(Fraction(got) - (Fraction(lower) + Fraction(upper)) / 2)
             parts = lower <= got < upper and off <= Fraction(math.ulp(max(abs(lower), abs(upper)))) / 2
             worst.see(float(not parts), f"between {lower!r} and {upper!r}")
-    return worst.finding()
+    return worst
 
 
 def choices_of(fits: Iterable[tuple[Problem, FittedStumps]]) -> Finding:
     """Return how much less variation the chosen stump explains than the best one."""
-    worst = Worst("variation explained by the chosen stump", REFERENCE, 1.0, "x rounding")
+    worst = Finding.of("variation explained by the chosen stump", REFERENCE, 1.0, "x rounding")
     for problem, fitted in fits:
-        given = _given(problem)
-        with precisely():
-            short = given.best(problem.X) - given.explained(problem.X, *_place(fitted))
-            allowed = given.doubt(Z_MAX)
-            worst.see(float(short / allowed) if allowed else 0.0, problem.name)
-    return worst.finding()
+        worst.see(_given(problem).lost(*_place(fitted)), problem.name)
+    return worst
 
 
 def outputs_of(fits: Iterable[tuple[Problem, FittedStumps]]) -> Iterator[Finding]:
     """Check the outputs of branches: their mean, or for almost empty ones the mean of all rows."""
-    means = Worst("outputs of branches", REFERENCE, 1.0, "x rounding")
-    empty = Worst("outputs of almost empty branches", REFERENCE, 1.0, "x rounding")
-    outside = Worst("outputs within the clamp", "the rule itself", 0.0, "outputs")
+    means = Finding.of("outputs of branches", REFERENCE, 1.0, "x rounding")
+    empty = Finding.of("outputs of almost empty branches", REFERENCE, 1.0, "x rounding")
+    outside = Finding.of("outputs within the clamp", "the rule itself", 0.0, "outputs")
     for problem, fitted in fits:
-        given, (column, threshold) = _given(problem), _place(fitted)
-        parts = branches(problem.X[:, column], threshold)
-        for value, rows in zip(fitted.values[0].tolist(), parts, strict=True):
-            of = given.branch(rows)
-            (empty if of.is_light else means).see(of.error(value, Z_MAX), problem.name)
+        values = fitted.values[0].tolist()
+        for error, is_light in _given(problem).errors(*_place(fitted), values):
+            (empty if is_light else means).see(error, problem.name)
+        for value in values:
             outside.see(float(not abs(value) <= Z_MAX), problem.name)
-    yield from (means.finding(), empty.finding(), outside.finding())
+    yield from (means, empty, outside)
 
 
 def _given(problem: Problem) -> ClassRound:
     """Return the problem as a round of one class with exact weights and responses."""
-    exact = [mpf(0)] * len(problem.weights)
-    return ClassRound(0, problem.weights.tolist(), problem.responses.tolist(), exact)
+    weights, responses = ([exact(x) for x in part.tolist()] for part in (problem.weights, problem.responses))
+    return ClassRound(problem.X.T.tolist(), weights, responses, [mpf(0)] * len(weights), Z_MAX)
 
 
 def _place(fitted: FittedStumps) -> tuple[int, float]:
@@ -174,10 +164,10 @@ def _place(fitted: FittedStumps) -> tuple[int, float]:
 
 def ties_of(sets: Iterable[Problem]) -> Finding:
     """Count problems with equal stumps in which the lowest column and value is not chosen."""
-    worst = Worst("which of equal stumps is chosen", REFERENCE, 0.0, "stumps")
+    worst = Finding.of("which of equal stumps is chosen", REFERENCE, 0.0, "stumps")
     for problem in sets:
         fitted, w, r = fit(problem), problem.weights.tolist(), problem.responses.tolist()
         _, column, lower, upper = truth.best_splits(problem.X.T.tolist(), w, r)[0]
         agrees = fitted.columns[0] == column and lower <= fitted.thresholds[0] < upper
         worst.see(float(not agrees), problem.name)
-    return worst.finding()
+    return worst

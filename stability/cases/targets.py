@@ -9,16 +9,12 @@ from mpmath import mpf
 from thenar.compiler.elementary import Floats, on_grids, softmax
 from thenar.compiler.trainers.logitboost import weights_and_responses
 
-from ..checks.roundings import ROUNDING, SMALLEST, share_error
-from ..finding import REFERENCE, Case, Finding, Worst
+from ..checks.rounds import ROUNDING, SMALLEST, share_error
+from ..finding import REFERENCE, Finding
 from ..inputs.hard_data import hard_scores
 from ..reference import boosting as logistic
 from ..reference.numbers import precisely
 
-CASE = Case(
-    title="Weights and working responses",
-    danger="1/P for P = 0, weights that underflow or turn negative, responses beyond their clamp",
-)
 Z_MAXES = (1.5, 2.0, 3.0, 4.0, 10.0, 100.0)
 
 
@@ -43,9 +39,9 @@ def given_probabilities(sets: Iterable[tuple[float, Floats]]) -> Iterator[Findin
     """Compare w and w z of probabilities, for a z_max, with the reference."""
     # 1 - P rounds once, and 1/z_max, the product with it and that with the row's weight: 4 roundings of w. The response
     # w z = u (Y - P) has two of them.
-    weights = Worst("weights w, given P", REFERENCE, 4.0, "x 2^-53")
-    responses = Worst("responses w z, given P", REFERENCE, 2.0, "x 2^-53")
-    outside = Worst("0 <= w, 1 <= |z| <= z_max", "the rule itself", 0.0, "rows")
+    weights = Finding.of("weights w, given P", REFERENCE, 4.0, "x 2^-53")
+    responses = Finding.of("responses w z, given P", REFERENCE, 2.0, "x 2^-53")
+    outside = Finding.of("0 <= w, 1 <= |z| <= z_max", "the rule itself", 0.0, "rows")
     for z_max, p in sets:
         for row_weight in (1.0, 3.0, 2.0**-300 / 3, 1e300):
             for is_member in (True, False):
@@ -54,10 +50,14 @@ def given_probabilities(sets: Iterable[tuple[float, Floats]]) -> Iterator[Findin
                     with precisely():
                         w, z = logistic.target(probability, is_member, z_max, row_weight)
                         response = w * z
+                        # |z| is in its range but for the 6 roundings of w and w z, or half a subnormal each.
+                        weight, size = got[0], abs(got[1])
+                        room = 6 * ROUNDING * size + (z_max + 1) * SMALLEST
+                        is_outside = weight < 0 or size > z_max * weight + room or size < weight - room
                     weights.see(_roundings(got[0], w), at)
                     responses.see(_roundings(got[1], response), at)
-                    outside.see(float(_is_outside(*got, z_max)), at)
-    yield from (weights.finding(), responses.finding(), outside.finding())
+                    outside.see(float(is_outside), at)
+    yield from (weights, responses, outside)
 
 
 def _ours(p: Floats, is_member: bool, z_max: float, row_weight: float) -> Iterator[tuple[mpf, mpf]]:
@@ -74,38 +74,31 @@ def _roundings(got: mpf, truth: mpf) -> float:
     return float(doubt / (ROUNDING * abs(truth))) if truth else float(doubt > 0)
 
 
-@precisely()
-def _is_outside(weight: mpf, response: mpf, z_max: float) -> bool:
-    """Whether w < 0, or |z| leaves its range by more than the 6 roundings of w and w z, or half a subnormal each."""
-    room = 6 * ROUNDING * abs(response) + (z_max + 1) * SMALLEST
-    return bool(weight < 0 or abs(response) > z_max * weight + room or abs(response) < weight - room)
-
-
 def given_scores(matrices: Iterable[Floats]) -> Finding:
     """Compare w and w z of scores (K, n) with the reference."""
     # |d(w z)/dP| = 1 and |dw/dP| <= 1 if z is not clamped, 1/z_max if it is: the error of P, plus 4 roundings. So near
     # P = 1 the bound is a multiple of 2^-53, not of the weight.
-    worst = Worst("weights and responses, given scores", REFERENCE, 1.0, "x rounding")
+    worst = Finding.of("weights and responses, given scores", REFERENCE, 1.0, "x rounding")
     for scores in matrices:
         shares = softmax(scores)
         for column in range(scores.shape[1]):
             row = scores[:, column].tolist()
             for is_member in (True, False):
                 ours = _ours(shares[:, column], is_member, 3.0, 1.0)
-                for k, (share, got) in enumerate(zip(logistic.softmax(row), ours, strict=True)):
+                for k, (share, got) in enumerate(zip(logistic.softmax(tuple(row)), ours, strict=True)):
                     w, z = logistic.target(share, is_member, 3.0)
                     with precisely():
                         allowed = share_error(row, k, share) + 4 * ROUNDING * abs(w * z)
                         error = max(abs(got[0] - w), abs(got[1] - w * z))
                         worst.see(float(error / allowed), f"P = {float(share)!r} of {len(row)} classes")
-    return worst.finding()
+    return worst
 
 
 def grids_of(sets: Iterable[Floats]) -> Iterator[Finding]:
     """Check the units of rows of numbers (K, n), and the loss of both grids together."""
-    overfull = Worst("any sum of a row is a whole number below 2^53", "whole numbers", 0.0, "rows")
+    overfull = Finding.of("any sum of a row is a whole number below 2^53", "whole numbers", 0.0, "rows")
     # A unit is at most 2^-50 of the row's sum; the second grid is 52 - log2(2 n) bits finer, and rounds by half a unit.
-    lost = Worst("loss of a number on two grids", "60 digits", 1.0, "x rounding")
+    lost = Finding.of("loss of a number on two grids", "60 digits", 1.0, "x rounding")
     for values in sets:
         coarse, fine = on_grids(values)
         for k, row in enumerate(values.tolist()):
@@ -120,7 +113,7 @@ def grids_of(sets: Iterable[Floats]) -> Iterator[Finding]:
                 for value, unit, rest in zip(row, *parts, strict=True):
                     held = mpmath.ldexp(unit, -int(coarse.exponents[k])) + mpmath.ldexp(rest, -int(fine.exponents[k]))
                     lost.see(float(abs(value - held) / allowed) if total else float(held != 0), at)
-    yield from (overfull.finding(), lost.finding())
+    yield from (overfull, lost)
 
 
 def _spread(rng: np.random.Generator) -> Floats:

@@ -12,16 +12,9 @@ import numpy as np
 
 from thenar.compiler.trainers.logitboost import boost
 
-from ..checks.class_rounds import see_round
-from ..checks.roundings import ROUNDING
-from ..checks.rounds import RoundState, moments
-from ..finding import REFERENCE, Case, Finding, Worst
+from ..checks.rounds import ROUNDING, RoundState, moments, see_round
+from ..finding import REFERENCE, Finding
 from ..inputs.hard_data import HardSet, contradictory, imbalanced, intervals, noisy, separable
-
-CASE = Case(
-    title="Weights",
-    danger="weights underflow, or one holds everything, and outputs are rounding residue",
-)
 
 
 def findings(full: bool) -> Iterator[Finding]:
@@ -51,37 +44,31 @@ def extreme_sets() -> Iterator[HardSet]:
 
 def _extreme(rounds: int) -> Iterator[Finding]:
     """Check every round from the scores before it, and that all values stay in range."""
-    chosen = Worst("stumps chosen under extreme weights", REFERENCE, 1.0, "x rounding")
-    outputs = Worst("outputs of branches under extreme weights", REFERENCE, 1.0, "x rounding")
-    outside = Worst("P, scores, losses and outputs in range", "the rules themselves", 0.0, "rounds")
+    chosen = Finding.of("stumps chosen under extreme weights", REFERENCE, 1.0, "x rounding")
+    outputs = Finding.of("outputs of branches under extreme weights", REFERENCE, 1.0, "x rounding")
+    outside = Finding.of("P, scores, losses and outputs in range", "the rules themselves", 0.0, "rounds")
     # The score of an empty class falls forever if two others contradict each other: P underflows to 0.
     sinking = contradictory([[2, 1, 0], [1, 1, 0]])
-    for hard, first in [(hard, 0) for hard in extreme_sets()] + [
-        (separable(3), 0),
-        (imbalanced(10**6), 0),
-        (sinking, 1100),
-    ]:
+    for hard in (*extreme_sets(), separable(3), imbalanced(10**6), sinking):
+        first = 1100 if hard is sinking else 0
         stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=first + rounds, weights=hard.weights)
         for number, moment in enumerate(moments(hard, stumps)):
-            outside.see(float(not _in_range(moment, falling[number])), f"{hard.name}, round {number}")
+            shares, is_finite = moment.shares, np.isfinite(moment.scores).all() and math.isfinite(moment.loss)
+            in_range = ((shares >= 0) & (shares <= 1)).all() and (moment.weights >= 0).all()
+            is_right = is_finite and in_range and moment.loss == falling[number]
+            outside.see(float(not is_right), f"{hard.name}, round {number}")
             if first <= number < stumps.n_rounds and (number < first + 12 or number % 10 == 0):
                 see_round(hard, stumps, number, moment.scores, 3.0, chosen, outputs)
         outside.see(float(not (np.abs(stumps.values) <= 3.0).all()), hard.name)
-    yield from (worst.finding() for worst in (chosen, outputs, outside))
-
-
-def _in_range(moment: RoundState, loss: float) -> bool:
-    finite = np.isfinite(moment.scores).all() and math.isfinite(loss)
-    shares, weights = moment.shares, moment.weights
-    return bool(finite and moment.loss == loss and ((shares >= 0) & (shares <= 1)).all() and (weights >= 0).all())
+    yield from (chosen, outputs, outside)
 
 
 def _settled(rounds: int) -> Iterator[Finding]:
     """Rows whose P is 1 have weight exactly 0 for their class; once all are settled, scores stay constant."""
-    weigh = Worst("settled rows with a nonzero weight", "zero", 0.0, "rows")
+    weigh = Finding.of("settled rows with a nonzero weight", "zero", 0.0, "rows")
     # Only the others' z = -1/(1 - P) are left, and if all members' P round to 1, P is below 2^-52: outputs lie between
     # -1 and -1 - 2^-52, up to 3 roundings, and a step is less than twice their difference.
-    moved = Worst(
+    moved = Finding.of(
         "change of scores once all rows are settled", "nothing left to learn", 2 * 5 * ROUNDING, "score a round"
     )
     for hard in (separable(2), separable(14), intervals(5)):
@@ -97,12 +84,12 @@ def _settled(rounds: int) -> Iterator[Finding]:
                 first, rest = number, moment
         if rest is not None:
             moved.see(float(np.abs(moment.scores - rest.scores).max() / (rounds - first)), f"{hard.name} since {first}")
-    yield from (weigh.finding(), moved.finding())
+    yield from (weigh, moved)
 
 
 def _underflow(rounds: int) -> Finding:
     """A class whose weights have all underflown has output 0: its score is constant, and it does not affect others."""
-    worst = Worst("nonzero outputs of a class without weight", "nothing left to learn", 0.0, "outputs")
+    worst = Finding.of("nonzero outputs of a class without weight", "nothing left to learn", 0.0, "outputs")
     empty_classes = [contradictory(counts) for counts in ([[2, 1, 0], [1, 1, 0]], [[3, 2, 0, 0, 0], [1, 5, 0, 0, 0]])]
     # Once the first class of both frames is certain, the others' rows remain: a third of their weight rounds to 0.
     heavy = contradictory([[1, 1], [1, 1]])
@@ -114,4 +101,4 @@ def _underflow(rounds: int) -> Finding:
             if number < rounds and gone.any():
                 outputs = stumps.values[number, gone]
                 worst.see(float(np.count_nonzero(outputs)), f"{hard.name}, round {number + 1}", outputs.size)
-    return worst.finding()
+    return worst

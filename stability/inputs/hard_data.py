@@ -1,13 +1,12 @@
-"""Numerically hard training sets, counts and scores, constructed by rule or random from a seed."""
+"""Numerically hard training sets and scores, constructed by rule or random from a seed."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
-from thenar.compiler.placement.gain import NodeCounts
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 
 
@@ -33,24 +32,32 @@ class HardSet:
         return self.X[:, self.n_switches :].astype(np.uint16)
 
     @property
-    def scale(self) -> float:
-        """The power of two by which training divides row weights, so that all are below 1."""
-        return 1.0 if self.weights is None else float(np.ldexp(1.0, np.frexp(self.weights.max())[1]))
+    def row_weights(self) -> Floats:
+        """The weights (n,), also if all are 1."""
+        return np.ones(len(self.labels)) if self.weights is None else self.weights
 
     @property
     def scaled_weights(self) -> Floats:
-        """(n,) the scaled row weights used in training."""
-        return (
-            np.ones(len(self.labels))
-            if self.weights is None
-            else np.ldexp(self.weights, -np.frexp(self.weights.max())[1])
-        )
+        """The row weights (n,) used in training: divided by a power of two, so that all are below 1."""
+        return self.row_weights if self.weights is None else np.ldexp(self.weights, -np.frexp(self.weights.max())[1])
 
     @property
     def member(self) -> NDArray[np.bool_]:
         """(K, n) whether a row is of a class."""
         member: NDArray[np.bool_] = self.labels == np.arange(self.n_classes)[:, np.newaxis]
         return member
+
+    def rows(self, rows: NDArray[np.intp]) -> "HardSet":
+        """Return the set of the rows at these indices."""
+        weights = None if self.weights is None else self.weights[rows]
+        return replace(self, X=self.X[rows], labels=self.labels[rows], weights=weights)
+
+    def counts(self) -> dict[tuple[int, ...], list[int]]:
+        """Return the count of each class on each frame; weights are integers."""
+        counts: dict[tuple[int, ...], list[int]] = {}
+        for row, label, weight in zip(map(tuple, self.X.tolist()), self.labels, self.row_weights, strict=True):
+            counts.setdefault(row, [0] * self.n_classes)[label] += int(weight)
+        return counts
 
 
 def separable(classes: int, rows_a_class: int = 2) -> HardSet:
@@ -105,67 +112,6 @@ def contradictory(counts: Sequence[Sequence[int]]) -> HardSet:
 def imbalanced(ratio: int) -> HardSet:
     """Return two frames: on one the ratio of the classes is `ratio` to 1, on the other 1 to 1."""
     return contradictory([[ratio, 1], [1, 1]])
-
-
-Counts = NDArray[np.int64]
-BitSet = tuple[NDArray[np.bool_], NDArray[np.intp], int]  # X (n, d), labels (n,), number of classes
-
-
-def random_table(rng: np.random.Generator) -> Counts:
-    """Return counts of all magnitudes up to 10^9, some of them 0."""
-    shape = int(rng.integers(2, 15)), int(rng.integers(2, 5))
-    counts = np.floor(10.0 ** rng.uniform(-1, 9, shape)).astype(np.int64)
-    counts[0, 0] += 1
-    return counts
-
-
-def node_of(*tables: Counts) -> NodeCounts:
-    """Return the node at which inputs have these tables (K, values), each of the same classes."""
-    cells = np.concatenate([table[:, 1:] for table in tables], axis=1)
-    starts = np.cumsum([0] + [table.shape[1] - 1 for table in tables])[:-1]
-    return NodeCounts(tables[0].sum(axis=1), cells, starts)
-
-
-def hand_made() -> Iterator[Counts]:
-    """Yield tables close to independence, close to certainty, and with one row in 10^9."""
-    for m in (1, 10, 10**3, 10**6, 10**9):
-        yield np.array([[m + 1, m - 1], [m, m]])
-        yield np.array([[m, 0], [0, m]])
-        yield np.array([[m, 1], [1, m]])
-        yield np.array([[m, 0], [m, 1]])
-        yield np.array([[m, m], [m, m]])
-
-
-def equal_pairs() -> Iterator[tuple[Counts, Counts]]:
-    """Yield tables of equal gains with different terms."""
-    for one, other in (
-        ([[8, 0], [4, 4]], [[7, 1], [2, 6]]),
-        ([[6, 0], [3, 3], [3, 3]], [[5, 1], [4, 2], [1, 5]]),
-        ([[12, 0], [6, 6]], [[12, 0, 0], [6, 6, 0]]),
-    ):
-        for factor in (1, 10**3, 10**8):
-            yield np.array(one) * factor, np.array(other) * factor
-
-
-def close_pairs(rng: np.random.Generator, n: int) -> Iterator[tuple[Counts, Counts]]:
-    """Yield tables of up to 10^9 rows a cell and the same class counts that differ by the cell of one row."""
-    for _ in range(n):
-        one = rng.integers(1, 10 ** int(rng.integers(1, 10)) + 1, (3, 2))
-        other = one[:, ::-1].copy()
-        if rng.random() < 0.8:
-            row, moved = int(rng.integers(3)), int(rng.choice([-1, 1]))
-            moved = min(max(moved, -int(other[row, 0])), int(other[row, 1]))
-            other[row] += (moved, -moved)
-        yield one, other
-
-
-def bit_set(rng: np.random.Generator) -> BitSet:
-    """Return 7 bits, some of them equal, opposite, constant and almost constant, of 2 to 8 classes."""
-    n, classes = int(rng.integers(30, 3000)), int(rng.integers(2, 9))
-    labels = rng.integers(0, classes, n)
-    one, other = rng.random(n) < 0.3 + 0.1 * labels % 0.7, rng.random(n) < 0.5
-    rare = np.arange(n) == n // 2
-    return np.column_stack([one, ~one, one, other, one ^ other, rare, np.ones(n, bool)]), labels, classes
 
 
 def hard_scores(rng: np.random.Generator, n: int) -> Iterator[Floats]:

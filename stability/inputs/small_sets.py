@@ -1,4 +1,4 @@
-"""Small sets of grasps: rows given one by one, one-hot types, an XOR, recordings of a small glove, and its build."""
+"""Small sets of grasps: rows given one by one, an XOR, recordings of a small glove, and its build."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -45,11 +45,6 @@ def make_set(
     )
 
 
-def one_hot(rows: int) -> GraspSet:
-    """Return as many grasp types as rows: each closes its own switch."""
-    return make_set([f"type {row:02}" for row in range(rows)], np.eye(rows, dtype=int).tolist())
-
-
 def parity(inputs: int) -> GraspSet:
     """Return every frame of `inputs` switches, of type odd or even by the number of closed ones: their XOR."""
     frames = [[number >> bit & 1 for bit in range(inputs)] for number in range(1 << inputs)]
@@ -79,10 +74,10 @@ def small_set(seed: int, rows: int, switches: int, joints: int, types: int, nois
     return make_set([names[label] for label in labels], bits.tolist(), codes.clip(0, 255).tolist(), types=names)
 
 
-def small_build(grasps: GraspSet, rounds: int, prune: int = 0) -> SmallBuild:
+def small_build(grasps: GraspSet, rounds: int) -> SmallBuild:
     """Return the build of `grasps`, compiled into a folder and loaded from it."""
     with TemporaryDirectory() as folder:
-        where = compile_build(grasps, Path(folder) / "build", rounds=rounds, prune=prune, folds=0, refuse=0).folder
+        where = compile_build(grasps, Path(folder) / "build", rounds=rounds, prune=0, folds=0, refuse=0).folder
         build = Build.load(where)
         stumps = ensemble_from_bytes((where / ENSEMBLE_NAME).read_bytes())
     bits, codes = select_inputs(grasps, build.manifest)

@@ -12,7 +12,8 @@ Hastie and Tibshirani 2000, algorithm 6, step 2b).
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from itertools import accumulate
 
 import mpmath
@@ -20,30 +21,41 @@ from mpmath import mpf
 
 from .numbers import DIGITS, added, precisely
 
+Numbers = Sequence[float]
+Branch = tuple[mpf, mpf]  # W, C
+Sums = dict[tuple[int, int, float], list[mpf]]  # by column, class and threshold: left, right, missing
+Split = tuple[mpf, int, float, float]  # explained, column, the values on both sides of the threshold
+
+# Equal values differ by at most a few 10^-60, in any order of summation.
+EQUAL = mpf(10) ** (10 - DIGITS)
+
 exp, log = precisely()(mpmath.exp), precisely()(mpmath.log)
 
 
+@lru_cache(maxsize=1 << 12)
 @precisely()
-def softmax(scores: Sequence[float]) -> list[mpf]:
+def softmax(scores: tuple[float, ...]) -> list[mpf]:
     """Return P_k = e^F_k / sum_j e^F_j; no F is too large here."""
-    powers = [mpmath.exp(mpf(score)) for score in scores]
-    total = mpmath.fsum(powers)
-    return [power / total for power in powers]
+    powers = {score: mpmath.exp(mpf(score)) for score in set(scores)}
+    total = mpmath.fsum(powers[score] for score in scores)
+    shares = {score: power / total for score, power in powers.items()}
+    return [shares[score] for score in scores]
 
 
+@lru_cache(maxsize=1 << 12)
 @precisely()
-def loss(scores: Sequence[float], label: int) -> mpf:
+def loss(scores: tuple[float, ...], label: int) -> mpf:
     """Return -ln P of class `label`, = ln(1 + sum over the others of e^(F_k - F_label)), even if tiny."""
     own = mpf(scores[label])
-    others = (mpmath.exp(mpf(score) - own) for k, score in enumerate(scores) if k != label)
-    return mpmath.log1p(mpmath.fsum(others))
+    powers = {score: mpmath.exp(mpf(score) - own) for score in set(scores)}
+    return mpmath.log1p(mpmath.fsum(powers[score] for k, score in enumerate(scores) if k != label))
 
 
 @precisely()
 def mean_loss(scores: Sequence[Sequence[float]], labels: Sequence[int], weights: Sequence[float] | None = None) -> mpf:
     """Return the mean of -ln P(label) over n rows of scores (n, K), weighted by `weights` (None: all 1)."""
     shares = [mpf(weight) for weight in ([1] * len(labels) if weights is None else weights)]
-    losses = [loss(row, label) for row, label in zip(scores, labels, strict=True)]
+    losses = [loss(tuple(row), label) for row, label in zip(scores, labels, strict=True)]
     return mpmath.fsum(share * each for share, each in zip(shares, losses, strict=True)) / mpmath.fsum(shares)
 
 
@@ -56,21 +68,17 @@ def target(probability: float, is_member: bool, z_max: float, row_weight: float 
     return row_weight * (int(is_member) - mpf(probability)) / z, z
 
 
-Numbers = Sequence[float]
-Sums = tuple[mpf, mpf]  # W, C
-Split = tuple[mpf, int, float, float]  # explained, column, the values on both sides of the threshold
-
-# Equal values differ by at most a few 10^-60, in any order of summation.
-EQUAL = mpf(10) ** (10 - DIGITS)
-
-
 @precisely()
 def explained(x: Numbers, weights: Numbers, responses: Numbers, threshold: float) -> mpf:
     """Return the sum of C^2/W over the branches that have weight."""
+    return _explained([_sums(rows, weights, responses) for rows in branches(x, threshold)])
+
+
+def branches(x: Numbers, threshold: float) -> tuple[list[int], list[int], list[int]]:
+    """Return the rows that a stump sends left and right, and the missing ones."""
     left = [row for row, value in enumerate(x) if value <= threshold]
     right = [row for row, value in enumerate(x) if value > threshold]
-    missing = [row for row, value in enumerate(x) if math.isnan(value)]
-    return _explained([_sums(rows, weights, responses) for rows in (left, right, missing)])
+    return left, right, [row for row, value in enumerate(x) if math.isnan(value)]
 
 
 @precisely()
@@ -100,40 +108,34 @@ def _splits(number: int, x: Numbers, weights: Numbers, responses: Numbers) -> It
         yield _explained([left[i], right[i + 1], missing]), number, values[i], values[i + 1]
 
 
-def _sums(rows: Sequence[int], weights: Numbers, responses: Numbers) -> Sums:
+def _sums(rows: Sequence[int], weights: Numbers, responses: Numbers) -> Branch:
     return mpmath.fsum(weights[row] for row in rows), mpmath.fsum(responses[row] for row in rows)
 
 
-def _explained(branches: Sequence[Sums]) -> mpf:
+def _explained(branches: Sequence[Branch]) -> mpf:
     return mpmath.fsum(response**2 / weight for weight, response in branches if weight)
 
 
 @precisely()
-def step(outputs: Sequence[float], shrinkage: float) -> list[mpf]:
-    """Return the step of a round for the K scores of a row."""
-    g = [mpf(output) * shrinkage for output in outputs]
-    mean = mpmath.fsum(g) / len(g)
-    return [(each - mean) * (len(g) - 1) / len(g) for each in g]
+def branch_sums(
+    columns: Sequence[Sequence[int]], thresholds: Sequence[Sequence[float]], values: Sequence[Sequence[Sequence[float]]]
+) -> Sums:
+    """Return the sums of the branches' outputs of equal stumps; columns and thresholds (M, K), values (M, K, 3)."""
+    outputs: dict[tuple[int, int, float], list[Sequence[float]]] = defaultdict(list)
+    for of_round in zip(columns, thresholds, values, strict=True):
+        for k, (column, threshold, branches) in enumerate(zip(*of_round, strict=True)):
+            outputs[column, k, threshold].append(branches)
+    return {stump: [added(of) for of in zip(*branches, strict=True)] for stump, branches in outputs.items()}
 
 
 @precisely()
-def scores(
-    columns: Sequence[Sequence[int]],
-    thresholds: Sequence[Sequence[float]],
-    values: Sequence[Sequence[Sequence[float]]],
-    shrinkage: float,
-    row: Sequence[float],
-) -> list[mpf]:
-    """Return F (K,) of one row; columns and thresholds (M, K), values (M, K, 3). A step is linear: one of all sums."""
-    outputs = [
-        [output(row[column], threshold, branches) for column, threshold, branches in zip(*stumps, strict=True)]
-        for stumps in zip(columns, thresholds, values, strict=True)
-    ]
-    return step([added(own) for own in zip(*outputs, strict=True)], shrinkage)
-
-
-def output(x: float, threshold: float, branches: Sequence[float]) -> float:
-    """Return the output of a stump for x: its value left, right, or for missing x."""
-    if math.isnan(x):
-        return branches[2]
-    return branches[0] if x <= threshold else branches[1]
+def scores(sums: Sums, n_classes: int, shrinkage: float, row: Mapping[int, float]) -> list[mpf]:
+    """Return the part of F (K,) of the stumps on the columns of a row. A step is linear: it is one of all sums."""
+    outputs: list[list[mpf]] = [[] for _ in range(n_classes)]
+    for (column, k, threshold), (left, right, missing) in sums.items():
+        if column in row:
+            x = row[column]
+            outputs[k].append(missing if math.isnan(x) else left if x <= threshold else right)
+    g = [mpmath.fsum(of_class) * shrinkage for of_class in outputs]
+    mean = mpmath.fsum(g) / n_classes
+    return [(each - mean) * (n_classes - 1) / n_classes for each in g]

@@ -5,7 +5,7 @@ value are independent (Shannon 1948).
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import mpmath
@@ -50,21 +50,19 @@ def compare_gains(one: Table, other: Table) -> int:
 
 
 def compare_conditional_gains(one: Sequence[Table], other: Sequence[Table]) -> int:
-    """Return the sign of the difference of two conditional gains, of one table for every given value."""
+    """Return the sign of the difference of two conditional gains, of one table for every given value.
+
+    With f(m) = m ln m, n I(C; V) is f(n) + sum f(n_cv) - sum f(n_c) - sum f(n_v).
+    """
     sizes = [sum(m for table in tables for row in table for m in row) for tables in (one, other)]
     multiples: Counter[int] = Counter()
     for tables, times in ((one, sizes[1]), (other, -sizes[0])):
-        for sign, m in (term for table in tables for term in _terms(table)):
-            multiples[m] += sign * times * m
+        for table in tables:
+            for m in (sum(map(sum, table)), *(m for row in table for m in row)):
+                multiples[m] += times * m
+            for m in (*map(sum, table), *map(sum, zip(*table, strict=True))):
+                multiples[m] -= times * m
     return sign_of_log_sum(multiples)
-
-
-def _terms(table: Table) -> Iterator[tuple[int, int]]:
-    """Yield sign and m of the terms m ln m of n I(C; V) = f(n) + sum f(n_cv) - sum f(n_c) - sum f(n_v)."""
-    yield 1, sum(map(sum, table))
-    yield from ((1, m) for row in table for m in row)
-    yield from ((-1, sum(row)) for row in table)
-    yield from ((-1, sum(column)) for column in zip(*table, strict=True))
 
 
 def sign_of_log_sum(multiples: Mapping[int, int]) -> int:

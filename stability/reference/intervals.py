@@ -54,12 +54,10 @@ def normal_quantile(p: float) -> mpf:
 @precisely()
 def student_quantile(freedom: int, p: mpf) -> mpf:
     """Return t with P(T <= t) = p > 1/2 at `freedom` degrees: 2 (1 - p) = I_x(freedom/2, 1/2), x = v/(v + t^2)."""
-    tail = 2 * (1 - p)
-    low, high = mpf(0), mpf(1)
-    while high - low > mpf(2) ** -190:
-        middle = (low + high) / 2
-        if mpmath.betainc(mpf(freedom) / 2, mpf(1) / 2, 0, middle, regularized=True) < tail:
-            low = middle
-        else:
-            high = middle
-    return mpmath.sqrt(freedom * (1 - low) / low)
+    half = mpf(1) / 2
+
+    def beyond(x: mpf) -> mpf:
+        return mpmath.betainc(freedom * half, half, 0, x, regularized=True) - 2 * (1 - p)
+
+    x = mpmath.findroot(beyond, (mpf(0), mpf(1)), solver="illinois", maxsteps=200)
+    return mpmath.sqrt(freedom * (1 - x) / x)

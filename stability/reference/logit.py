@@ -1,25 +1,29 @@
 """The derivatives of a multinomial logit's penalised loss at 60 digits, from the formula alone.
 
 loss = sum over frames i of u_i (log sum_k e^F_ik - F_iy) + 1/2 sum of pull |row|^2 + 1/2 smoothness |next - row|^2
+
+Sums are exact, in whole units of 2^-256; only probabilities are rounded before.
 """
 
+from collections import Counter
 from collections.abc import Sequence
+from functools import lru_cache
+from operator import add
 from typing import NamedTuple
 
 import mpmath
 from mpmath import mpf
 
-from .boosting import softmax
 from .numbers import precisely
 
-Rows = Sequence[Sequence[float]]
+UNIT_BITS = 256
 
 
 class ReferenceColumn(NamedTuple):
     """The row of each frame (n,), -1: none; rows (r, K), the penalty of each (r,), and their smoothness."""
 
     added: Sequence[int]
-    rows: Rows
+    rows: Sequence[Sequence[float]]
     pulls: Sequence[float]
     smoothness: Sequence[tuple[int, int, float]]
 
@@ -27,32 +31,43 @@ class ReferenceColumn(NamedTuple):
 @precisely()
 def largest_derivative(columns: Sequence[ReferenceColumn], labels: Sequence[int], weights: Sequence[float]) -> mpf:
     """Return the largest derivative with respect to any entry of any column's rows; one column may be the bias."""
-    n_classes = len(columns[0].rows[0])
-    residuals: list[list[mpf]] = []
-    known: dict[tuple[int, ...], list[mpf]] = {}
-    for frame, (label, weight) in enumerate(zip(labels, weights, strict=True)):
-        where = tuple(column.added[frame] for column in columns)
-        if where not in known:
-            rows = [column.rows[row] for column, row in zip(columns, where, strict=True) if row >= 0]
-            known[where] = softmax([mpmath.fsum(map(mpf, entries)) for entries in zip(*rows, strict=True)])
-        residuals.append([mpf(weight) * (p - (k == label)) for k, p in enumerate(known[where])])
-    largest = mpf(0)
-    for column in columns:
-        sums = [[mpf(0)] * n_classes for _ in column.rows]
-        for frame, row in enumerate(column.added):
-            if row >= 0:
-                sums[row] = [total + own for total, own in zip(sums[row], residuals[frame], strict=True)]
-        largest = max([largest, *(abs(each) for row in _held(column, sums) for each in row)])
-    return largest
+    rows = [[list(map(_units, row)) for row in column.rows] for column in columns]
+    sums = [list(map(_pulled, of, column.pulls)) for of, column in zip(rows, columns, strict=True)]
+    for column, entries, totals in zip(columns, rows, sums, strict=True):
+        for one, other, smoothness in column.smoothness:
+            step = _pulled([b - a for a, b in zip(entries[one], entries[other], strict=True)], smoothness)
+            totals[one] = [total - part for total, part in zip(totals[one], step, strict=True)]
+            totals[other] = list(map(add, totals[other], step))
+    residuals: dict[tuple[object, ...], list[int]] = {}
+    nothing = [0] * len(columns[0].rows[0])
+    for *where, label, weight in zip(*(column.added for column in columns), labels, weights, strict=True):
+        frame, places = (*where, label, weight), [(number, row) for number, row in enumerate(where) if row >= 0]
+        if frame not in residuals:
+            scores = list(map(sum, zip(nothing, *(rows[number][row] for number, row in places), strict=True)))
+            residuals[frame] = _residual(scores, label, weight)
+        for number, row in places:
+            sums[number][row] = list(map(add, sums[number][row], residuals[frame]))
+    largest = max(abs(total) for totals in sums for row in totals for total in row)
+    return mpmath.ldexp(mpf(largest), -UNIT_BITS)
 
 
-def _held(column: ReferenceColumn, sums: list[list[mpf]]) -> list[list[mpf]]:
-    """Return the sums plus the derivatives of the penalties."""
-    rows = [[mpf(entry) for entry in row] for row in column.rows]
-    for row, pull, own in zip(rows, column.pulls, sums, strict=True):
-        own[:] = [total + mpf(pull) * entry for total, entry in zip(own, row, strict=True)]
-    for one, other, smoothness in column.smoothness:
-        steps = [mpf(smoothness) * (b - a) for a, b in zip(rows[one], rows[other], strict=True)]
-        sums[one] = [total - step for total, step in zip(sums[one], steps, strict=True)]
-        sums[other] = [total + step for total, step in zip(sums[other], steps, strict=True)]
-    return sums
+@lru_cache(maxsize=1 << 16)
+def _units(number: float) -> int:
+    numerator, denominator = number.as_integer_ratio()
+    return (numerator << UNIT_BITS) // denominator
+
+
+def _pulled(row: Sequence[int], pull: float) -> list[int]:
+    """Return the derivatives of 1/2 pull |row|^2."""
+    return [_units(pull) * entry >> UNIT_BITS for entry in row]
+
+
+def _residual(scores: Sequence[int], label: int, weight: float) -> list[int]:
+    """Return u (P_k - Y_k) of a frame's scores (K,)."""
+    counts = Counter(scores)
+    powers = {score: mpmath.exp(mpmath.ldexp(mpf(score), -UNIT_BITS)) for score in counts}
+    total = mpmath.fsum(count * powers[score] for score, count in counts.items())
+    shares = {score: int(mpmath.ldexp(weight * power / total, UNIT_BITS)) for score, power in powers.items()}
+    residual = [shares[score] for score in scores]
+    residual[label] -= _units(weight)
+    return residual

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from fractions import Fraction
 
 import mpmath
 from mpmath import mpf
@@ -22,16 +21,14 @@ def precisely() -> Iterator[None]:
         yield
 
 
+# Of one number, in radians.
+sin, cos = precisely()(mpmath.sin), precisely()(mpmath.cos)
+
+
 @precisely()
 def exact(x: float) -> mpf:
     """Return the exact value of the double `x`."""
     return mpf(float(x))
-
-
-@precisely()
-def ratio(of: Fraction) -> mpf:
-    """Return a fraction; exact if the denominator is a power of two and the numerator below 2^199."""
-    return mpf(of.numerator) / of.denominator
 
 
 @precisely()
@@ -60,15 +57,8 @@ def added(doubles: Sequence[float]) -> mpf:
     return -mpmath.fsum(parts)
 
 
-Vector = Sequence[float]
-
-
-# Of one number, in radians.
-sin, cos = precisely()(mpmath.sin), precisely()(mpmath.cos)
-
-
 @precisely()
-def turn(axis: Vector, angle: float) -> list[list[mpf]]:
+def turn(axis: Sequence[float], angle: float) -> list[list[mpf]]:
     """Return the rotation (3, 3) by `angle` radians about `axis`, of any length (Rodrigues).
 
     R = cos a I + sin a [u]x + (1 - cos a) u u^T, u the unit vector along the axis.

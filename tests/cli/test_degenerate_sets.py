@@ -11,18 +11,27 @@ import pytest
 
 from thenar.cli import run
 from thenar.stability.cases import degenerate
-from thenar.stability.cases.statistics import lopsided
-from thenar.stability.inputs.small_sets import parity
+from thenar.stability.inputs.small_sets import make_set, parity
+
+FRAMES = [[0, 0], [0, 1], [1, 0], [1, 1]] * 4
+SUBJECTS = ["A"] * 8 + ["B"] * 8
+# Each lacks something on one side of a split.
+LOPSIDED = {
+    "subjects of one class each": make_set(["a"] * 8 + ["b"] * 8, FRAMES, subjects=SUBJECTS),
+    "a subject that lacks a class": make_set(["a", "b"] * 4 + ["a", "b", "c", "c"] * 2, FRAMES, subjects=SUBJECTS),
+    "a class of one row in four folds": make_set(["a", "b"] * 7 + ["a", "c"], FRAMES),
+    "a class in one block of four": make_set(["a", "b"] * 6 + ["c"] * 4, FRAMES),
+}
 
 SETS = {
     **degenerate.UNSOLVABLE,
     **degenerate.SOLVABLE,
     "no row": degenerate.SOLVABLE["a class of one row"].rows([]),
     "XOR": parity(2),
-    **{name: grasp_set for name, (grasp_set, _) in lopsided().items()},
+    **LOPSIDED,
 }
 SOLVED = set(degenerate.SOLVABLE)
-TRAINABLE = SOLVED | {"XOR", *lopsided()}
+TRAINABLE = SOLVED | {"XOR", *LOPSIDED}
 
 
 def command(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:

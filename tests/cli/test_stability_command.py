@@ -12,13 +12,13 @@ import pytest
 from thenar.cli import run
 from thenar.stability import cases
 from thenar.stability import report as catalogue
-from thenar.stability.report import NAMES
+from thenar.stability.finding import Case
+from thenar.stability.report import CASES
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 
 CASE = """
-from thenar.stability.finding import Case, Finding
-CASE = Case("a {name} case", "the {name} danger")
+from thenar.stability.finding import Finding
 def findings(full):
     yield Finding("sums", "the rule itself", {error}, 1.0, "ulp", 3, "the {name} row")
 """
@@ -34,9 +34,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     (folder / "exceeding.py").write_text(CASE.format(name="exceeding", error=1.5))
     (folder / "raising.py").write_text(RAISING.format(name="raising", error=0.5))
     monkeypatch.setattr(cases, "__path__", [str(folder)])
-    monkeypatch.setattr(catalogue, "NAMES", ("sound", "exceeding", "raising"))
+    names = ("sound", "exceeding", "raising")
+    shown = {name: Case(f"a {name} case", f"the {name} danger") for name in names}
+    monkeypatch.setattr(catalogue, "CASES", shown)
     yield folder
-    for name in catalogue.NAMES:
+    for name in names:
         sys.modules.pop(f"{cases.__name__}.{name}", None)
 
 
@@ -53,7 +55,7 @@ def here(folder: Path, capsys: pytest.CaptureFixture[str]) -> Thenar:
 
 def test_the_list_names_every_case_with_what_could_go_wrong(thenar: Thenar) -> None:
     listed = json.loads(thenar("stability", "--list", "--json").stdout)
-    assert tuple(case["name"] for case in listed) == NAMES
+    assert tuple(case["name"] for case in listed) == tuple(CASES)
     assert all(case["title"] and case["danger"] for case in listed)
 
 
@@ -89,7 +91,7 @@ def test_a_bound_that_does_not_hold_exits_with_1_and_says_where(here: Thenar) ->
 def test_a_case_that_raises_is_a_line_and_hides_no_other(here: Thenar) -> None:
     done = here("raising", "sound")
     assert done.returncode == 1
-    assert "FAILED: ArithmeticError in raising.py, line 6: lost" in done.stdout
+    assert "FAILED: ArithmeticError in raising.py, line 5: lost" in done.stdout
     assert "Traceback" not in done.stdout + done.stderr
     assert "a sound case" in done.stdout
 
@@ -138,7 +140,9 @@ def test_ctrl_c_exits_with_130_and_leaves_nothing(folder: Path, tmp_path: Path) 
     (folder / "endless.py").write_text(endless)
     program = (
         "import sys; from thenar.stability import cases, report as catalogue; from thenar.cli import run; "
-        f"cases.__path__ = [{str(folder)!r}]; catalogue.NAMES = ('endless',); sys.exit(run(sys.argv[1:]))"
+        "from thenar.stability.finding import Case; "
+        f"cases.__path__ = [{str(folder)!r}]; catalogue.CASES = {{'endless': Case('', '')}}; "
+        "sys.exit(run(sys.argv[1:]))"
     )
     command = [sys.executable, "-c", program, "stability", "--jobs", "1"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:

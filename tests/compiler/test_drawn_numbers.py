@@ -12,10 +12,9 @@ from thenar.compiler.trainers.logitboost import boost
 from thenar.stability.cases import elementary, information, scoretables, stumpfits, targets
 from thenar.stability.cases.statistics import WILSON_BOUND
 from thenar.stability.cases.stumpfits import Problem
-from thenar.stability.checks.class_rounds import see_round
-from thenar.stability.checks.rounds import moments
-from thenar.stability.finding import Worst
-from thenar.stability.inputs.hard_data import bit_set, noisy
+from thenar.stability.checks.rounds import moments, see_round
+from thenar.stability.finding import Finding
+from thenar.stability.inputs.hard_data import noisy
 from thenar.stability.reference.intervals import wilson
 from thenar.stability.reference.numbers import distance
 
@@ -101,7 +100,7 @@ def test_one_count_in_a_billion_decides_as_whole_numbers_do(pair: tuple[np.ndarr
 @given(st.integers(0, 2**32))
 def test_what_a_bit_tells_given_another_is_within_what_rounding_allows(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    drawn = bit_set(rng)
+    drawn = information.bit_set(rng)
     assert information.given_of([drawn]).holds
     assert information.given_comparisons_of([drawn], rng).holds
 
@@ -155,22 +154,22 @@ def test_scores_tables_and_balanced_tables_are_within_what_rounding_allows(seed:
 def test_whole_steps_are_within_half_a_step(seed: int) -> None:
     rng = np.random.default_rng(seed)
     hard = list(scoretables.ensembles(rng, 1, 20))
-    assert all(finding.holds for finding in scoretables.whole_steps_of(rng, hard))
+    assert scoretables.whole_steps_of(rng, hard).holds
 
 
 @given(st.lists(ROW_WEIGHTS, min_size=12, max_size=12), st.integers(0, 2**32))
 @settings(max_examples=20, deadline=None)
 def test_every_round_is_that_of_60_digits_whatever_the_rows_weigh(weights: list[float], seed: int) -> None:
     hard = replace(noisy(3, 12, 0.3, seed), weights=np.array(weights))
-    chosen, answers = Worst("stumps", "", 1.0, ""), Worst("answers", "", 1.0, "")
+    chosen, answers = Finding.of("stumps", "", 1.0, ""), Finding.of("answers", "", 1.0, "")
     stumps, losses = boost(hard.X, hard.labels, 3, rounds=6, weights=hard.weights)
     assert np.isfinite(losses).all()
     for number, moment in enumerate(moments(hard, stumps)):
         assert np.isfinite(moment.scores).all()
         if number < stumps.n_rounds:
             see_round(hard, stumps, number, moment.scores, 3.0, chosen, answers)
-    assert chosen.finding().holds
-    assert answers.finding().holds
+    assert chosen.holds
+    assert answers.holds
 
 
 @given(st.integers(1, 10**15), st.floats(0, 1))

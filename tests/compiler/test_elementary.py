@@ -42,7 +42,7 @@ def test_the_loss_of_an_almost_certain_class_keeps_its_bits(lead: float, classes
     scores = np.zeros((classes, 1))
     scores[1:] = -lead
     _, loss = softmax_and_loss(scores, np.array([0]), None)
-    assert ulps(loss, logistic.loss(scores[:, 0].tolist(), 0)) <= classes + 5
+    assert ulps(loss, logistic.loss(tuple(scores[:, 0].tolist()), 0)) <= classes + 5
 
 
 @given(SCORES)

@@ -9,12 +9,11 @@ from pathlib import Path
 import pytest
 
 from thenar.stability import cases, report
-from thenar.stability.finding import Case, Finding, Worst
+from thenar.stability.finding import Case, Finding
 from thenar.stability.report import CaseReport, Check, Report, failures, legend, run, run_case
 
 SOUND = """
-from thenar.stability.finding import Case, Finding
-CASE = Case("a sound case", "nothing")
+from thenar.stability.finding import Finding
 def findings(full):
     yield Finding("one", "the rule itself", 1.0 if full else 0.5, 1.0, "ulp", 3)
 """
@@ -34,7 +33,9 @@ def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
     (tmp_path / "sound.py").write_text(SOUND)
     for name, fault in FAULTS.items():
         (tmp_path / f"{name}.py").write_text(SOUND + fault)
-    (tmp_path / "finds_nothing.py").write_text(SOUND.replace("yield Finding", "if not CASE: yield Finding"))
+    (tmp_path / "finds_nothing.py").write_text(SOUND.replace("yield Finding", "if full is None: yield Finding"))
+    names = ("sound", "finds_nothing", *FAULTS)
+    monkeypatch.setattr(report, "CASES", dict.fromkeys(names, Case("a sound case", "nothing")))
     yield tmp_path
     for path in tmp_path.iterdir():
         sys.modules.pop(f"{cases.__name__}.{path.stem}", None)
@@ -63,15 +64,15 @@ def test_a_killed_workers_unfinished_cases_fail_finished_ones_stay(
 
 
 def test_the_worst_is_kept_with_its_place_nan_worst() -> None:
-    worst = Worst("sums", "60 digits", 2.0, "ulp")
+    worst = Finding.of("sums", "60 digits", 2.0, "ulp")
     for error, at in ((0.5, "a"), (1.5, "b"), (1.0, "c")):
         worst.see(error, at)
-    assert worst.finding() == Finding("sums", "60 digits", 1.5, 2.0, "ulp", 3, "b")
+    assert worst == Finding("sums", "60 digits", 1.5, 2.0, "ulp", 3, "b")
     worst.see(2.5, "too much")
     worst.see(math.nan, "d", tried=4)
     worst.see(1.75, "e")
-    assert (worst.finding().error, worst.finding().worst, worst.finding().tried) == (math.inf, "d", 9)
-    assert worst.finding().beyond == 2
+    assert (worst.error, worst.worst, worst.tried) == (math.inf, "d", 9)
+    assert worst.beyond == 2
 
 
 def reported(*findings: Finding, failure: str | None = None) -> Report:

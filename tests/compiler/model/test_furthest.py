@@ -1,11 +1,27 @@
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.proof import furthest
+from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.scores import LANE_OFFSET, Scorer
-from thenar.stability.inputs.hard_tables import every_frame, whole_numbers
+from thenar.stability.inputs.hard_tables import every_frame
+
+
+def whole_numbers(seed: int, classes: int, switches: int, bins: tuple[int, ...], most: int) -> IntegerTables:
+    """Return integer tables of random numbers up to `most`, in which a mean may lie outside its rows."""
+    random = np.random.default_rng(seed)
+
+    def rows(*shape: int) -> NDArray[np.int16]:
+        return random.integers(-most, most + 1, shape).astype(np.int16)
+
+    thresholds = [np.sort(random.choice(HIGHEST_CODE, n - 1, replace=False)).astype(np.uint16) for n in bins]
+    joints = tuple(rows(n, classes) for n in bins)
+    means = rows(switches, classes), rows(len(bins), classes)
+    return IntegerTables.of(rows(classes), rows(switches, classes), tuple(thresholds), joints, *means, 1.0)
+
 
 tables = st.builds(
     whole_numbers,

@@ -20,6 +20,7 @@ from thenar.simulator.contact.settle import Rest
 
 from ..reference.numbers import precisely
 
+_DIGITS, _SPHERES = 5, 7
 Vector = NDArray[Any]  # (3,) of mpf
 Matrix = NDArray[Any]  # (3, 3) of mpf
 
@@ -125,9 +126,6 @@ def _grip(case: SolverCase, frame: Matrix) -> Vector:
     for pad in case.condition.held.pads:
         pushes[pad.sphere] -= normals[pad.sphere] * mpf(pad.share) * grip
     return _moments(skeleton, centres, pushes)
-
-
-_DIGITS, _SPHERES = 5, 7
 
 
 def _moments(skeleton: Skeleton, points: Matrix, forces: Matrix) -> Vector:

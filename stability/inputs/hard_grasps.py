@@ -4,8 +4,7 @@ No contact, or all contact at one point or on one line; extreme sizes, masses an
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +12,9 @@ from thenar.compiler.elementary import Floats
 from thenar.simulator.body.condition import Condition, Pad, PlannedGrasp, Thing
 from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.contact.balance import SolverCase
 from thenar.simulator.contact.model import Load
 from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import conditions_of
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.scenes.scene import SURVEYS
 
@@ -31,33 +30,41 @@ _TIPS = tuple(Pad(7 * digit + 6, 0.2) for digit in range(5))
 _THUMB_TIP, _INDEX_TIP, _MIDDLE = 6, 13, 16
 _FLAT = np.zeros(20)
 
-
-class Grasp(NamedTuple):
-    """A load of one repetition, and a description of its difficulty."""
-
-    name: str
-    load: Load
+Grasp = tuple[str, Load]  # a description of its difficulty, and a load of one repetition
 
 
-def held(shape: Shape = BAR, mass_kg: float = 0.1, grip_n: float = 15.0, hand: Hand = HAND, **changes: object) -> Grasp:
-    """Return a hand that holds `shape`; `changes` of posture_deg, pose, pads or down."""
-    usual = {"posture_deg": _ROUND_IT_DEG, "pose": _BESIDE_THE_PALM, "pads": _TIPS}
-    holds = PlannedGrasp(grip_n=grip_n, **(usual | changes))  # type: ignore[arg-type]
-    condition = Condition("A", hand, "PoS", Thing("thing", shape, mass_kg), holds)
-    return Grasp("", Load(condition, holds.posture_deg[None], holds.pose[None], np.array([grip_n])))
-
-
-def hard(full: bool) -> Iterator[Grasp]:
+def hard_grasps(full: bool) -> Iterator[Grasp]:
     """Yield the hard grasps, with many hands and objects only in the full run."""
     masses, grips = (0.0, _SMALLEST, 1e-9, 5.0, 1e3, 1e12), (0.0, _SMALLEST, 1e-9, 1e3, 1e12)
-    of_masses = ((f"{mass:g} kg", held(mass_kg=mass)) for mass in masses)
-    of_grips = ((f"a grip of {grip:g} N", held(grip_n=grip)) for grip in grips)
-    for name, grasp in (*_touching(), *_of_sizes(), *of_masses, *of_grips, *_of_hands()):
-        yield Grasp(name, grasp.load)
+    yield from _touching()
+    for size in (_SMALLEST, 1e-160, 1e-15, 1e-9, 1.0, 2000.0):
+        yield f"a ball of {size:g} mm", held(Sphere(size))
+        yield f"a disk {size:g} mm thick", held(Cylinder(40.0, size, 0.0))
+        yield f"a card {size:g} mm thick", held(Box(80.0, 50.0, size, 0.0))
+    yield from ((f"{mass:g} kg", held(mass_kg=mass)) for mass in masses)
+    yield from ((f"a grip of {grip:g} N", held(grip_n=grip)) for grip in grips)
+    # Hands of 1 % and 99 % of the usual size, with objects scaled in size and mass.
+    for scale in (0.01, 0.99):
+        hand = Hand(Size(185.0 * scale, 83.0 * scale))
+        pose = _BESIDE_THE_PALM * ([scale] * 3 + [1.0] * 3)
+        small = Cylinder(40.0 * scale, 120.0 * scale, 0.5 * scale)
+        yield f"a hand of {scale:.0%}", held(small, 0.1 * scale**3, 15.0 * scale**2, hand, pose=pose)
     yield from planned(1 if full else 14)
 
 
-def _touching() -> Iterator[tuple[str, Grasp]]:
+def held(shape: Shape = BAR, mass_kg: float = 0.1, grip_n: float = 15.0, hand: Hand = HAND, **changes: object) -> Load:
+    """Return a hand that holds `shape`; `changes` of posture_deg, pose, pads or down."""
+    usual = {"posture_deg": _ROUND_IT_DEG, "pose": _BESIDE_THE_PALM, "pads": _TIPS}
+    holds = PlannedGrasp(grip_n=grip_n, **(usual | changes))  # type: ignore[arg-type]
+    return _load(Condition("A", hand, "PoS", Thing("thing", shape, mass_kg), holds))
+
+
+def _load(condition: Condition) -> Load:
+    target = condition.held
+    return Load(condition, target.posture_deg[None], target.pose[None], np.array([target.grip_n]))
+
+
+def _touching() -> Iterator[Grasp]:
     """Yield contacts that leave a degree of freedom, or coincide."""
     straight = HAND.spheres(HAND.skeleton(np.zeros((20, 1))))[..., 0]
     meeting_deg = _meeting()
@@ -73,31 +80,13 @@ def _touching() -> Iterator[tuple[str, Grasp]]:
         pose = _at(point - [0.0, 0.0, off])
         bead = held(Sphere(8.0), pose=pose, posture_deg=meeting_deg, pads=_TIPS[:2])
         yield f"two fingertips at one point {name}", bead
-    yield (
-        "a ball whose middle is on a finger's axis",
-        held(Sphere(30.0), pose=_at(straight[_MIDDLE]), posture_deg=_FLAT),
-    )
-    yield "a bar on a finger's own axis", held(Cylinder(14.0, 90.0), pose=_at(straight[_MIDDLE]), posture_deg=_FLAT)
+    on_axis: dict[str, Any] = {"pose": _at(straight[_MIDDLE]), "posture_deg": _FLAT}
+    yield "a ball whose middle is on a finger's axis", held(Sphere(30.0), **on_axis)
+    yield "a bar on a finger's own axis", held(Cylinder(14.0, 90.0), **on_axis)
     under = straight[_MIDDLE] - [0.0, 0.0, 11.0]
     needle = np.concatenate([under, [0.0, 0.0, np.pi / 2]])
     yield "all contacts on one line", held(Cylinder(2.0, 200.0), pose=needle, posture_deg=_FLAT)
     yield "a flat hand on a flat object", held(Box(200.0, 200.0, 10.0), pose=_at(under), posture_deg=_FLAT)
-
-
-def _of_sizes() -> Iterator[tuple[str, Grasp]]:
-    for size in (_SMALLEST, 1e-160, 1e-15, 1e-9, 1.0, 2000.0):
-        yield f"a ball of {size:g} mm", held(Sphere(size))
-        yield f"a disk {size:g} mm thick", held(Cylinder(40.0, size, 0.0))
-        yield f"a card {size:g} mm thick", held(Box(80.0, 50.0, size, 0.0))
-
-
-def _of_hands() -> Iterator[tuple[str, Grasp]]:
-    """Yield hands of 1 % and 99 % of the usual size, with objects scaled in size and mass."""
-    for scale in (0.01, 0.99):
-        hand = Hand(Size(185.0 * scale, 83.0 * scale))
-        pose = _BESIDE_THE_PALM * ([scale] * 3 + [1.0] * 3)
-        small = Cylinder(40.0 * scale, 120.0 * scale, 0.5 * scale)
-        yield f"a hand of {scale:.0%}", held(small, 0.1 * scale**3, 15.0 * scale**2, hand, pose=pose)
 
 
 def planned(every: int) -> Iterator[Grasp]:
@@ -110,19 +99,17 @@ def planned(every: int) -> Iterator[Grasp]:
         for item in scene.objects[::every]:
             target = postures.held(Hand(size), item.grasp, item.thing())
             condition = Condition("A", Hand(size), item.grasp, item.thing(), target)
-            load = Load(condition, target.posture_deg[None], target.pose[None], np.array([target.grip_n]))
-            yield Grasp(f"a hand of {share} %, {item.name}", load)
+            yield f"a hand of {share} %, {item.name}", _load(condition)
 
 
-def otherwise(load: Load, **changes: object) -> Load:
-    """Return a load with changes in its condition's `PlannedGrasp`."""
-    changed = replace(load.condition.held, **changes)  # type: ignore[arg-type]
-    return replace(load, condition=replace(load.condition, held=changed))
-
-
-def case_of(load: Load) -> SolverCase:
-    """Return a load in the form of the quasistatic model."""
-    return SolverCase(load.condition, load.posture_deg.T * (np.pi / 180.0), load.pose.T, load.grip_n)
+def shipped(repetitions: int) -> Iterator[Load]:
+    """Yield the grasps of the shipped scene's first subject, varied by its effects."""
+    scene, rng = load_scene("kamakura"), np.random.default_rng(14)
+    for condition in conditions_of(scene, scene.subjects[0], Postures.shipped(scene.taxonomy)):
+        target, n = condition.held, repetitions
+        pose = target.pose + rng.normal(size=(n, 6)) * ([1.5] * 3 + [np.radians(2.5)] * 3)
+        posture_deg = target.posture_deg + 1.5 * rng.normal(size=(n, 20))
+        yield Load(condition, posture_deg, pose, target.grip_n * np.exp(0.25 * rng.normal(size=n)))
 
 
 def _at(position: Floats | list[float]) -> Floats:
@@ -131,18 +118,17 @@ def _at(position: Floats | list[float]) -> Floats:
 
 def _meeting() -> Floats:
     """Return joint angles (20,) in degrees at which the tips of thumb and index coincide, by Gauss-Newton."""
+
+    def apart(angles: Floats) -> Floats:
+        centres = HAND.spheres(HAND.skeleton(angles))
+        between: Floats = centres[_THUMB_TIP] - centres[_INDEX_TIP]
+        return between
+
     angles = np.radians(_ROUND_IT_DEG)
     own = np.arange(8)  # the joints of thumb and index
     for _ in range(40):
-        apart = _apart(angles[:, None])[:, 0]
-        moved = angles[:, None] + 1e-6 * np.eye(20)[:, own]
-        slopes = (_apart(moved) - apart[:, None]) / 1e-6
-        angles[own] -= np.linalg.lstsq(slopes, apart)[0]
+        here = apart(angles[:, None])[:, 0]
+        slopes = (apart(angles[:, None] + 1e-6 * np.eye(20)[:, own]) - here[:, None]) / 1e-6
+        angles[own] -= np.linalg.lstsq(slopes, here)[0]
     degrees: Floats = np.degrees(angles)
     return degrees
-
-
-def _apart(angles: Floats) -> Floats:
-    centres = HAND.spheres(HAND.skeleton(angles))
-    apart: Floats = centres[_THUMB_TIP] - centres[_INDEX_TIP]
-    return apart

@@ -1,1 +1,0 @@
-"""Grasps that are hard to bring to rest, checks of their rest at 60 digits, and halved steps."""
