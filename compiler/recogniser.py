@@ -307,8 +307,10 @@ class _Limits:
         """Return these limits with the slack of each deviation."""
         least = np.floor(np.maximum(self.least - score, -LIMIT / self._tables.scale) * self._tables.scale)
         ranges = self.ranges.copy()
-        if _byte_codes(self._tables):
-            # Boards that send bytes send 255 for all codes above it.
+        tables = self._tables
+        steps = [int(steps[-1]) + 1 for steps in map(tables.steps_of, range(tables.n_joints)) if len(steps)]
+        if max([0, *steps, *(slope.high for slope in tables.slopes)]) <= 255:
+            # No code above 254 is distinguished, and boards that send bytes send 255 for all codes above it.
             ranges[:, :, 0] = np.minimum(ranges[:, :, 0], 255)
             ranges[:, :, 1][ranges[:, :, 1] >= 255] = HIGHEST_CODE
         fewest, most = np.maximum(0, self.closed[:, 0] - int(closed)), self.closed[:, 1] + int(closed)
@@ -319,12 +321,6 @@ class _Limits:
             ranges=tuple(tuple((low, high) for low, high in each) for each in ranges.tolist()),
             outside=int(outside),
         )
-
-
-def _byte_codes(tables: IntegerTables) -> bool:
-    """Return whether no joint's thresholds or slope distinguish codes above 254."""
-    steps = [int(steps[-1]) + 1 for steps in map(tables.steps_of, range(tables.n_joints)) if len(steps)]
-    return max([0, *steps, *(slope.high for slope in tables.slopes)]) <= 255
 
 
 def _slacks(deviations: Scores, share: float) -> tuple[float, float, float]:

@@ -341,7 +341,10 @@ def check_labels(y: ArrayLike, n_rows: int) -> tuple[NDArray[Any], NDArray[np.in
         raise PlacementError(f"y has shape {labels.shape}, one label for each of the {n_rows} rows of X is needed")
     if not n_rows:
         raise PlacementError("there are no rows: a placement needs at least one labelled grasp")
-    if (strange := _not_finite(labels)).any():
+    strange = ~np.isfinite(labels) if labels.dtype.kind == "f" else np.zeros(n_rows, np.bool_)
+    if labels.dtype.kind == "O":
+        strange = np.array([isinstance(label, float) and not math.isfinite(label) for label in labels.tolist()])
+    if strange.any():
         row = int(strange.argmax())
         raise PlacementError(f"y is {labels[row]} in row {row}: every row needs a label")
     try:
@@ -349,9 +352,3 @@ def check_labels(y: ArrayLike, n_rows: int) -> tuple[NDArray[Any], NDArray[np.in
     except TypeError as mixed:
         raise PlacementError(f"the labels in y cannot be sorted ({mixed}): use text or numbers, not both") from None
     return classes, numbers
-
-
-def _not_finite(labels: NDArray[Any]) -> NDArray[np.bool_]:
-    if labels.dtype.kind == "O":
-        return np.array([isinstance(label, float) and not math.isfinite(label) for label in labels.tolist()])
-    return ~np.isfinite(labels) if labels.dtype.kind == "f" else np.zeros(len(labels), np.bool_)

@@ -5,10 +5,8 @@ Ties of information, exactly compared, go to the lowest number.
 
 from collections.abc import Iterator
 from functools import cmp_to_key
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...elementary import Floats, add_up, log
 from ...samples import Columns
@@ -144,7 +142,8 @@ def sspoc_order(bits: Bits, labels: Labels) -> Columns:
     centred = bits - bits.mean(axis=0)
     model = SSPOC(basis=SVD(n_basis_modes=modes, random_state=_SEED), l1_penalty=_PENALTY)
     model.fit(centred, labels, quiet=True, refit=False)
-    weights = np.abs(_by_input(model.sensor_coef_, bits.shape[1])).max(axis=1)
+    # SSPOC's weights are (inputs, classes); for two classes it has one column, without an axis.
+    weights = np.abs(np.asarray(model.sensor_coef_, np.float64).reshape(bits.shape[1], -1)).max(axis=1)
     return tuple(np.argsort(-weights, kind="stable").tolist())
 
 
@@ -158,11 +157,6 @@ def qr_order(bits: Bits, _: Labels) -> Columns:
     model = SSPOR()
     model.fit(bits.astype(np.float64), quiet=True, seed=_SEED, mode="economic")
     return tuple(int(column) for column in model.get_all_sensors())
-
-
-def _by_input(weights: Any, n_inputs: int) -> NDArray[np.float64]:
-    """Return SSPOC's weights as (inputs, classes); for two classes it returns one column, without an axis."""
-    return np.asarray(weights, dtype=np.float64).reshape(n_inputs, -1)
 
 
 MEMBER = (
