@@ -69,11 +69,7 @@ def recognition_so_far(grasp_set: GraspSet) -> InterimAccuracy:
     if len(classes) < 2:
         raise EvaluationError("all trials are of one grasp type: there is nothing to distinguish")
     _, first, trial = np.unique(grasp_set.trial_ids, return_index=True, return_inverse=True)
-    # Switches, joints and taxels, centred and scaled by the standard deviation; constant ones are 0.
-    inputs = np.hstack([grasp_set.switches, grasp_set.codes, grasp_set.taxels]).astype(np.float64)
-    spread = inputs.std(axis=0)
-    inputs = (inputs - inputs.mean(axis=0)) / np.where(spread > 0, spread, 1.0)
-    scores = left_out_scores(inputs, labels, trial)
+    scores = left_out_scores(_inputs(grasp_set), labels, trial)
     predicted, truth = decided(scores.argmax(axis=1)[np.newaxis], trial)[0], labels[first]
     types = []
     for number, label in enumerate(classes):
@@ -121,3 +117,12 @@ def recording_so_far(recording: Path) -> InterimAccuracy | None:
     """Return the accuracy for the trials of a recording so far; None while they have fewer than two types."""
     grasp_set, _ = import_recordings([recording])
     return recognition_so_far(grasp_set) if len(np.unique(grasp_set.labels)) > 1 else None
+
+
+def _inputs(grasp_set: GraspSet) -> Floats:
+    """Return switches, joints and taxels (n, p), centred and scaled by the standard deviation; constant ones are 0."""
+    columns = np.hstack([grasp_set.switches, grasp_set.codes, grasp_set.taxels.reshape(len(grasp_set), -1)]).astype(
+        np.float64
+    )
+    spread = columns.std(axis=0)
+    return np.asarray((columns - columns.mean(axis=0)) / np.where(spread > 0, spread, 1.0))

@@ -91,7 +91,8 @@ def sign_of_log_sum(multiples: Mapping[int, int]) -> int:
     coprime numbers decide. Otherwise decimal arithmetic of rising precision finds the sign after finitely many steps.
     """
     terms = {m: times for m, times in multiples.items() if times and m > 1}
-    if not terms or _product_is_one(terms):
+    base = _coprime_base(list(terms))
+    if all(sum(times * _multiplicity(m, factor) for m, times in terms.items()) == 0 for factor in base):
         return 0
     digits = _FIRST_DIGITS
     while True:
@@ -99,11 +100,6 @@ def sign_of_log_sum(multiples: Mapping[int, int]) -> int:
         if total.copy_abs() > bound:
             return 1 if total > 0 else -1
         digits *= 2
-
-
-def _product_is_one(terms: Mapping[int, int]) -> bool:
-    base = _coprime_base(list(terms))
-    return all(sum(times * _multiplicity(m, factor) for m, times in terms.items()) == 0 for factor in base)
 
 
 def _coprime_base(numbers: list[int]) -> list[int]:
