@@ -101,10 +101,12 @@ def _accuracy(manifest: Manifest) -> Iterator[Fact]:
     if manifest.grasps[-1] == NONE:
         yield Fact("accuracy", "nothing held", "a class of the tables")
     elif manifest.rejection is not None:
+        levels = [switch.threshold is not None for switch in manifest.switches]
+        kinds = {"closed switches": not all(levels), "pressed pads": any(levels), "joints": bool(manifest.joints)}
         yield Fact(
             "accuracy",
             "nothing held",
-            f"refused by {listed(_judged_by(manifest))}, with at most "
+            f"refused by {listed(['score', *(kind for kind, read in kinds.items() if read)])}, with at most "
             f"{100 * manifest.rejection.share:g} % of the grasps of inner folds; no row shows an empty hand, so how "
             "many of those are refused is not known",
         )
@@ -119,13 +121,6 @@ def _accuracy(manifest: Manifest) -> Iterator[Fact]:
         if each.held.protocol != "training":
             title = each.held.title
             yield Fact("accuracy", f"nothing held, {title}", str(each).removeprefix(f"{title}: "))
-
-
-def _judged_by(manifest: Manifest) -> list[str]:
-    """Return the inputs of the rejection rule, in words."""
-    levels = [switch.threshold is not None for switch in manifest.switches]
-    kinds = {"closed switches": not all(levels), "pressed pads": any(levels), "joints": bool(manifest.joints)}
-    return ["score", *(kind for kind, read in kinds.items() if read)]
 
 
 def _cautions(manifest: Manifest, harness: Harness | None) -> Iterator[Fact]:

@@ -172,18 +172,27 @@ def compile_build(
     target = check_target(Path(folder))
     recipe = _sound(changed(options or Recipe(), changes))
     samples = samples_of(grasp_set, recipe)
-    steps = _Steps(progress, sum(len(cut.folds) for cut in cuts_of(grasp_set, recipe)))
+    folds, steps = sum(len(cut.folds) for cut in cuts_of(grasp_set, recipe)), 1
+
+    # Work is counted in steps of training: as many for each fold as for all rows.
+    def trained(done: int, total: int) -> None:
+        nonlocal steps
+        steps = total
+        if progress is not None:
+            progress(done, steps * (1 + folds))
+
+    def tested(done: int, _folds: int) -> None:
+        trained(steps * (1 + done), steps)
+
     ports = ports or ports_of_whole_glove(None, grasp_set.element_names, len(grasp_set.taxel_columns))
     hand = hand or (None if documents is None else documents.hand)
     glove = harness.cyberglove if isinstance(harness, Harness) else None
     limits = Limits.of(recipe, grasp_set, {} if hand is None else hand.by_name, glove)
     groups = groups_for(grasp_set, recipe)
-    recogniser = Recogniser.fit(
-        samples, recipe, ports=ports, limits=limits, groups=groups, jobs=jobs, report=steps.trained
-    )
+    recogniser = Recogniser.fit(samples, recipe, ports=ports, limits=limits, groups=groups, jobs=jobs, report=trained)
     made = BuildAssembly(grasp_set, recogniser, harness, hand)
-    tested = fold_results(grasp_set, samples, recipe, ports=ports, limits=limits, jobs=jobs, report=steps.tested)
-    return made.publish(target, tested, documents, jobs, progress)
+    results = fold_results(grasp_set, samples, recipe, ports=ports, limits=limits, jobs=jobs, report=tested)
+    return made.publish(target, results, documents, jobs, progress)
 
 
 def _sound(options: Recipe) -> Recipe:
@@ -211,21 +220,6 @@ def _sound(options: Recipe) -> Recipe:
     usual_share = Recipe().refuse
     refuse = usual_share if options.refuse == usual_share else float(options.refuse)
     return replace(options, **shared, **names, settings=unusual, refuse=refuse)
-
-
-class _Steps:
-    """Count the work done in training steps: one training on all rows, and one for each fold."""
-
-    def __init__(self, report: Report | None, folds: int) -> None:
-        self._report, self._folds, self._steps = report, folds, 1
-
-    def trained(self, done: int, steps: int) -> None:
-        self._steps = steps
-        if self._report is not None:
-            self._report(done, steps * (1 + self._folds))
-
-    def tested(self, done: int, _folds: int) -> None:
-        self.trained(self._steps * (1 + done), self._steps)
 
 
 class BuildAssembly:
@@ -275,7 +269,7 @@ class BuildAssembly:
         manifest = manifest_from_bytes(described)
         firmware, note = made_firmware(manifest, self.integers)
         hand = hand_from_bytes(files[HAND_NAME], manifest)
-        page = try_html(manifest, files[TABLES_NAME], hand, (kept.switches, kept.codes, kept.labels))
+        page = try_html(manifest, files[TABLES_NAME], hand, kept)
         if page is not None:
             files[TRY_NAME] = page
         predicted = np.unique(self.comparison.deployed)

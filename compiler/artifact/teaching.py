@@ -245,8 +245,14 @@ def demonstrations(folder: Path, recordings: Sequence[Path]) -> Iterator[Demonst
     for path in recordings:
         timelines = segment(folder, path, Policy().lag_us)
         if path.suffix.lower() == MCAP:
+            # The codes of the joints, and when they were read, on the clock of the run's timelines.
+            read = [
+                (moment.grasp.unix_us, moment.codes) for moment in recognised(build, path) if moment.codes is not None
+            ]
+            codes = np.array([row for _, row in read], np.uint16).reshape(len(read), len(build.manifest.joints))
+            times_us = np.array([time_us for time_us, _ in read], np.int64)
             # A gap in the readings splits a run into several timelines.
-            yield _shown(build, path.name, timelines, [_codes_of_run(build, path)] * len(timelines))
+            yield _shown(build, path.name, timelines, [(times_us, codes)] * len(timelines))
             continue
         grasp_set = GraspSet.load(path)
         _, codes = select_inputs(grasp_set, build.manifest)
@@ -255,13 +261,6 @@ def demonstrations(folder: Path, recordings: Sequence[Path]) -> Iterator[Demonst
             times = stream.start_us + tick_us * np.arange(len(stream.rows))
             name = path.name if len(timelines) == 1 else f"{path.name} {number} ({timeline.name})"
             yield _shown(build, name, [timeline], [(times, codes[stream.rows])])
-
-
-def _codes_of_run(build: Build, path: Path) -> Codes:
-    """Return the times at which the joints were read in a run, on the clock of its timelines, and their codes."""
-    readings = [(moment.grasp.unix_us, moment.codes) for moment in recognised(build, path) if moment.codes is not None]
-    codes = np.array([codes for _, codes in readings], np.uint16).reshape(len(readings), len(build.manifest.joints))
-    return np.array([time_us for time_us, _ in readings], np.int64), codes
 
 
 def _shown(build: Build, name: str, timelines: Sequence[Timeline], read: Sequence[Codes]) -> Demonstration:

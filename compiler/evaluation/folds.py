@@ -108,8 +108,7 @@ def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed:
     def expanded(chosen: Rows) -> Rows:
         return np.concatenate([rows[starts[trial] : starts[trial + 1]] for trial in chosen.tolist()])
 
-    labels = smallest[order]
-    folds = weka_folds(labels, n_folds, seed)
+    folds = weka_folds(smallest[order], n_folds, seed)
     return [Fold(expanded(fold.train), expanded(fold.test), fold.name) for fold in folds]
 
 

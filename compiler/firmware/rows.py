@@ -172,7 +172,7 @@ def _chips(board: BoardWiring, numbers: dict[str, int]) -> Iterator[dict[str, ob
     The steps of the setup, and the conditions of a reading, are expressions in C++.
     """
     harness = Harness(name="board", buses=(BusWiring(device="bus", chips=board.chips),))
-    ports = ports_of(harness, numbers)
+    ports = ports_of(harness, numbers, {})
     names = dict(enumerate(numbers))
     for place, wired in enumerate(board.chips):
         own = [(port, reading_of(port, harness)) for port in ports if port.chip == place]

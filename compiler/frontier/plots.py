@@ -86,7 +86,7 @@ _SWITCHES = _Cost(
 _LATENCY = _Cost(
     title="From the hand's arrival to the decision",
     axis="time until a grasp is decided on: its mean, and a line to the 99th percentile",
-    # Where every grasp was missed, there is no mean.
+    # A point that misses every grasp has no mean.
     of_point=lambda point: point.latency.mean_us if "latency" in point.fronts and point.latency.missed < 1 else None,
     of_mark=lambda _: None,
     of_tried=lambda _: None,
@@ -112,9 +112,9 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     points = [(max(x, _LOWEST), point) for point in frontier.points if (x := cost.of_point(point)) is not None]
     ends = [(x, end, point) for x, point in points if (end := cost.end(point)) is not None]
     curves = () if cost.is_time else frontier.curves
-    _scale_rates(
-        axes, [*(point.rate for _, point in points), *(mark.rate for _, mark in marks), *_shown(curves)], frontier.by
-    )
+    pairs = [pair for curve in curves for pair in zip(curve.sizes, curve.rates, strict=True)]
+    shown = [rate for size, rate in pairs if size >= _FEW] or [rate for _, rate in pairs]
+    _scale_rates(axes, [*(point.rate for _, point in points), *(mark.rate for _, mark in marks), *shown], frontier.by)
     lowest = axes.get_ylim()[0]
     tried = [
         (max(x, _LOWEST), each)
@@ -318,11 +318,6 @@ def _draw_ends(axes: "Axes", ends: Iterable[tuple[float, float, FrontierPoint]])
 def _draw_whiskers(axes: "Axes", shown: Sequence[tuple[float, Rate]], colour: str) -> None:
     xs, lows, highs = [x for x, _ in shown], [rate.low for _, rate in shown], [rate.high for _, rate in shown]
     axes.vlines(xs, lows, highs, color=colour, lw=1.1, alpha=0.8, zorder=3)
-
-
-def _shown(curves: tuple[Curve, ...]) -> list[Rate]:
-    pairs = [pair for curve in curves for pair in zip(curve.sizes, curve.rates, strict=True)]
-    return [rate for size, rate in pairs if size >= _FEW] or [rate for _, rate in pairs]
 
 
 def _draw_curves(axes: "Axes", curves: Sequence[Curve]) -> None:

@@ -104,11 +104,10 @@ def wirings(
     print rows, are not among its candidates.
     """
     avr = is_avr(target)
-    found = (
-        []
-        if given is None or not (given.switches or given.taxel_names) or (avr and not _of_an_avr(given))
-        else [_as_wired(given)]
-    )
+    found = []
+    if given is not None and (given.switches or given.taxel_names) and (not avr or _of_an_avr(given)):
+        clocks_hz = [bus.clock_hz for bus in given.buses if bus.chips] or [chip.clock_hz for chip in given.spi]
+        found.append(WiringOption(AS_WIRED, min(clocks_hz or [stream.baud for stream in given.streams]), given))
     for chip in expanders().values() if switches else (CHIPS[CONVERTER],) if taxels else ():
         if (chip.tried or not switches) and (chip.registers or not avr):
             clocks = (hz for hz in CLOCKS_HZ if hz <= chip.clock_hz and (not avr or hz in _AVR_HZ))
@@ -122,12 +121,6 @@ def wirings(
 def is_avr(target: str) -> bool:
     """Return whether `target` is an AVR, which reads the glove without a computer."""
     return target in TARGETS and TARGETS[target].avr
-
-
-def _as_wired(given: Harness) -> WiringOption:
-    clocks = [bus.clock_hz for bus in given.buses if bus.chips]
-    lines = [chip.clock_hz for chip in given.spi] or [stream.baud for stream in given.streams]
-    return WiringOption(AS_WIRED, min(clocks or lines), given)
 
 
 def _of_an_avr(given: Harness) -> bool:

@@ -47,6 +47,7 @@ Found = tuple[int, ...]
 _HELD, _MOST = 1 << 23, 1 << 37
 # Steps from the mean rows; the number of distinct rows used.
 STEPS, ROWS = 20, 1000
+_BIT = ("open", "closed")
 # A type without rows, or with probability zero, is neither impossible nor certain.
 _DOUBT = 0.5
 
@@ -67,7 +68,12 @@ def fit_lost(
     labels : array of int, shape (n,)
         The number of each row's class.
     """
-    rows, often = _distinct(bits, codes, labels)
+    # Distinct rows, at most ROWS, and how often each occurs: the same rows for any row order.
+    distinct = np.column_stack([labels, np.packbits(bits, axis=1), codes])
+    _, rows, counts = np.unique(distinct, axis=0, return_index=True, return_counts=True)
+    number = min(len(rows), ROWS)
+    some = np.arange(number) * len(rows) // max(number, 1)
+    rows, often = rows[some], counts[some].astype(np.float64)
     bits, codes, labels = bits[rows], codes[rows], labels[rows]
     wanted = np.asarray(np.bincount(labels, often, tables.n_classes) + _DOUBT, np.float64)
     switch_rows = tables.switch_rows.astype(np.int64)
@@ -110,17 +116,6 @@ def fit_lost(
         switch_means=fitted(tables.switch_means, of_switches, switches, ends),
         joint_means=fitted(tables.joint_means, of_joints, each, spans),
     )
-
-
-def _distinct(
-    bits: NDArray[np.bool_], codes: NDArray[np.uint16], labels: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], Floats]:
-    """Return the indices of distinct rows, at most ROWS, and how often each occurs: the same rows for any row order."""
-    held = np.column_stack([labels, np.packbits(bits, axis=1), codes])
-    _, rows, often = np.unique(held, axis=0, return_index=True, return_counts=True)
-    number = min(len(rows), ROWS)
-    some = np.arange(number) * len(rows) // max(number, 1)
-    return rows[some], often[some].astype(np.float64)
 
 
 def _without(tables: IntegerTables, codes: NDArray[np.uint16], joints: Sequence[int]) -> Steps:
@@ -174,14 +169,17 @@ def count_faults(
     Rows are kept switches (n, s), codes (n, j), labels and trials (n,). Labels outside the tables' classes are never
     correct. `groups` are indices of inputs that fail together, switches first, then joints.
     """
-    terms = [*_terms(tables)]
+    terms = _terms(tables)
     joined = [_Joined.of(tables, grid) for grid in tables.grids]
     bins = (np.searchsorted(_steps(tables, joint), codes[:, joint]) for joint in range(tables.n_joints))
     at = np.vstack([bits.T.astype(np.intp), *(column[np.newaxis] for column in bins)])
     order, trial = np.argsort(trials, kind="stable"), np.unique(np.sort(trials), return_inverse=True)[1]
     together = [(), *((element,) for element in range(len(terms))), *map(tuple, groups)]
     few = len(terms) ** 2 * len(labels) * tables.n_classes <= _MOST
-    cuts, found = _cuts(trial, max(1, _HELD // (tables.n_classes * (len(terms) + 1)))), np.zeros(0, np.int64)
+    # Blocks of about as many rows as are kept at a time, which split no trial.
+    size, starts = max(1, _HELD // (tables.n_classes * (len(terms) + 1))), np.flatnonzero(np.diff(trial, prepend=-1))
+    cuts = [*starts[np.flatnonzero(np.diff(starts // size, prepend=-1))].tolist(), len(trial)]
+    found = np.zeros(0, np.int64)
     for number, (first, end) in enumerate(pairwise(cuts), 1):
         rows = order[first:end]
         block = _Block(tables, terms, joined, at[:, rows], labels[rows], trial[first:end])
@@ -199,12 +197,6 @@ def count_faults(
     return FaultCounts(int(trial[-1]) + 1, whole, lost, tuple(stuck), dead, pairs, tuple(term.values for term in terms))
 
 
-def _cuts(trial: Numbers, size: int) -> list[int]:
-    """Return where to cut rows of ascending trials into blocks of about `size` rows without splitting a trial."""
-    starts = np.flatnonzero(np.diff(trial, prepend=-1))
-    return [*starts[np.flatnonzero(np.diff(starts // size, prepend=-1))].tolist(), len(trial)]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Term:
     """An input: the rows of its values, (values, K), its substitute row (K,), and descriptions of its values."""
@@ -214,16 +206,19 @@ class _Term:
     values: tuple[str, ...]
 
 
-def _terms(tables: IntegerTables) -> Iterator[_Term]:
-    """Yield the switches, then the joints."""
-    for bit, mean in zip(tables.bits, tables.switch_means.astype(np.int32), strict=True):
-        yield _Term(bit.of(np.arange(2)).astype(np.int32), mean, _BIT)
+def _terms(tables: IntegerTables) -> list[_Term]:
+    terms = [
+        _Term(bit.of(np.arange(2)).astype(np.int32), mean, _BIT)
+        for bit, mean in zip(tables.bits, tables.switch_means.astype(np.int32), strict=True)
+    ]
     for joint, mean in enumerate(tables.joint_means.astype(np.int32)):
         steps = _steps(tables, joint)
         ends = [-1, *steps.tolist()]
         words = [f"codes {low + 1} to {high}" for low, high in pairwise(ends)]
+        words.append(f"codes above {ends[-1]}" if len(ends) > 1 else "any code")
         rows = tables.binned(joint).of(np.append(0, steps + 1))
-        yield _Term(rows.astype(np.int32), mean, (*words, f"codes above {ends[-1]}" if len(ends) > 1 else "any code"))
+        terms.append(_Term(rows.astype(np.int32), mean, tuple(words)))
+    return terms
 
 
 def _steps(tables: IntegerTables, joint: int) -> Steps:
@@ -384,8 +379,5 @@ def worst_faults(counts: FaultCounts, names: Sequence[str], groups: Mapping[str,
         worst = int(np.argmin(counts.pairs))
         both = next(islice(combinations(names, 2), worst, None))
         pair = [Faulty("both lost", both, counts.pairs[worst])]
-    worst_of = (min(kind, key=lambda each: each.correct, default=None) for kind in (lost, stuck, dead, pair))
-    return Faults(counts.total, counts.correct, *worst_of)
-
-
-_BIT = ("open", "closed")
+    kinds = (min(faults, key=lambda fault: fault.correct, default=None) for faults in (lost, stuck, dead, pair))
+    return Faults(counts.total, counts.correct, *kinds)

@@ -341,11 +341,9 @@ def check_labels(y: ArrayLike, n_rows: int) -> tuple[NDArray[Any], NDArray[np.in
         raise PlacementError(f"y has shape {labels.shape}, one label for each of the {n_rows} rows of X is needed")
     if not n_rows:
         raise PlacementError("there are no rows: a placement needs at least one labelled grasp")
-    strange = np.zeros(n_rows, np.bool_)
+    strange = ~np.isfinite(labels) if labels.dtype.kind == "f" else np.zeros(n_rows, np.bool_)
     if labels.dtype.kind == "O":
         strange = np.array([isinstance(label, float) and not math.isfinite(label) for label in labels.tolist()])
-    elif labels.dtype.kind == "f":
-        strange = ~np.isfinite(labels)
     if strange.any():
         row = int(strange.argmax())
         raise PlacementError(f"y is {labels[row]} in row {row}: every row needs a label")

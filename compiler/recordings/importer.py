@@ -89,7 +89,6 @@ def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportRe
         for column, (name, entry) in enumerate(selection.coded)
     ]
     costs = tuple(cost for _, _, cost in coded)
-    inputs = zip((name for name, _ in selection.coded), readings.joints.T, strict=True)
     count = sum(not isinstance(entry, TaxelColumns) for _, entry in selection.coded)
     joints, taxels = coded[:count], coded[count:]
     empty = np.zeros((len(grasps), 0), np.uint16)
@@ -120,7 +119,9 @@ def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportRe
         *aliases,
         *coarse(zip(costs, readings.joints.T, strict=True)),
         *find_oddities(grasp_set, readings.rows),
-        *possible_clocks(inputs, _course(readings, columns)),
+        *possible_clocks(
+            zip((name for name, _ in selection.coded), readings.joints.T, strict=True), _course(readings, columns)
+        ),
     ]
     if taxels:
         notes.append(
@@ -167,15 +168,15 @@ def _course(readings: Readings, columns: ColumnRoles) -> Course:
 
 
 def report_of(
-    what: str,
+    table: str,
     grasp_set: GraspSet,
     costs: tuple[CodingCost, ...],
     warnings: Iterable[Oddity],
     notes: Iterable[str] = (),
 ) -> ImportReport:
-    """Return the report on `grasp_set`, which was imported from `what`."""
+    """Return the report on `grasp_set`, which was imported from `table`."""
     return ImportReport(
-        table=what,
+        table=table,
         frames=len(grasp_set),
         trials=grasp_set.n_trials,
         rests=grasp_set.rests,
@@ -271,7 +272,7 @@ def code_joint(
     if isinstance(entry, TaxelColumns) and not entry.is_coded:
         whole = bool((values == np.rint(values)).all()) and values.min() >= 0 and values.max() < CODES
         entry = structs.replace(entry, codes=True) if whole else structs.replace(entry, grid=sound_grid(values))
-    joint = _joint(name, entry, float(values.min()))
+    joint = _joint(name, entry, values)
     if isinstance(entry, TaxelColumns) and entry.bits is not None:
         # Calibrated at the ends of the converter's range.
         least, most = joint.value([0, top := 2**entry.bits - 1]).tolist()
@@ -298,15 +299,15 @@ def code_joint(
     return codes.astype(np.uint16), joint, cost
 
 
-def _joint(name: str, entry: JointColumns, least: float) -> Joint:
+def _joint(name: str, entry: JointColumns, values: NDArray[np.float64]) -> Joint:
     if entry.calibration is not None:
         points = entry.calibration
         return Joint(name, entry.unit, points.code_a, points.value_a, points.code_b, points.value_b)
     if entry.is_counts:
         return Joint(name, entry.unit, 0, 0.0, 1, 1.0)
-    steps = least / entry.step
+    steps = float(values.min()) / entry.step
     # If the grid is too fine to count, a Joint cannot have it either.
-    floor = math.floor(steps) * entry.step if math.isfinite(steps) else least
+    floor = math.floor(steps) * entry.step if math.isfinite(steps) else float(values.min())
     origin = floor if entry.origin is None else entry.origin
     return Joint(name, entry.unit, 0, origin, _FAR, origin + _FAR * entry.step)
 

@@ -7,6 +7,7 @@ one trial to the next, or takes the same course in all of them.
 
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from operator import itemgetter
 from typing import NamedTuple
@@ -80,6 +81,7 @@ def is_count(words: frozenset[str]) -> bool:
 Sign = tuple[str, bool]
 
 
+@dataclass(eq=False)
 class Course:
     """The order of the rows of a table: which ones make a trial, which trials are alike, and the time if there is one.
 
@@ -95,32 +97,29 @@ class Course:
         A recognised clock, and its name.
     """
 
+    owner: NDArray[np.intp]
+    group: NDArray[np.intp]
+    trial_ids: NDArray[np.intp]
+    time: Values | None = None
+    time_name: str = ""
+
     @np.errstate(over="ignore", invalid="ignore")
-    def __init__(
-        self,
-        owner: NDArray[np.intp],
-        group: NDArray[np.intp],
-        trial_ids: NDArray[np.intp],
-        time: Values | None = None,
-        time_name: str = "",
-    ) -> None:
-        begins = np.diff(trial_ids, prepend=-1) != 0
-        if time is not None:
-            begins[1:] |= np.diff(time) < 0
+    def __post_init__(self) -> None:
+        begins = np.diff(self.trial_ids, prepend=-1) != 0
+        if self.time is not None:
+            begins[1:] |= np.diff(self.time) < 0
         self.first = np.flatnonzero(begins)
         self.within = ~begins[1:]
         self.run = np.cumsum(begins) - 1
         self.sizes = np.bincount(self.run)
-        self.time, self.time_name = time, time_name
         # Where each label and object comes once, the first values may rise because the labels are sorted.
-        self.sorted = len(self.first) == len(np.unique(group))
-        self._owner, self._group = owner, group
+        self.sorted = len(self.first) == len(np.unique(self.group))
 
     @cached_property
     def orders(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """The first rows of trials, and of the next trial: in the file, of one owner, and of one group."""
         # Only when a column changes: a table of a million equal rows has a million trials.
-        return [_successors(self.first, of) for of in (np.zeros_like(self._owner), self._owner, self._group)]
+        return [_successors(self.first, of) for of in (np.zeros_like(self.owner), self.owner, self.group)]
 
     @np.errstate(over="ignore", invalid="ignore")
     def sign(self, values: Values) -> Sign | None:
@@ -240,10 +239,10 @@ def numbers_trials(values: Values, group: NDArray[np.intp]) -> bool:
     return bool((values == np.rint(values)).all() and ((steps == 0) | next_one | anew).all())
 
 
-def possible_clocks(columns: Iterable[tuple[str, Values]], course: Course) -> list[Oddity]:
-    """Return a finding about those of the inputs `columns` that may be clocks, counters or trial numbers."""
+def possible_clocks(inputs: Iterable[tuple[str, Values]], course: Course) -> list[Oddity]:
+    """Return a finding about those of the `inputs` that may be clocks, counters or trial numbers."""
     found = {}
-    for name, values in columns:
+    for name, values in inputs:
         words = words_of(name)
         if is_time(words) or is_count(words):
             found[name] = "its name is that of a clock or a counter"

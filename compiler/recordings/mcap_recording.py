@@ -130,7 +130,12 @@ def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[Gras
     what = ", ".join(path.name for path in paths)
     _check_alike(parts)
     grasps = [(part, grasp) for part in parts for grasp in part.grasps if grasp.whole(part.session)]
-    findings += _left_out(parts, stream)
+    if left_out := [grasp.label.trial for part in parts for grasp in part.grasps if not grasp.whole(part.session)]:
+        message = (
+            f"{len(left_out)} {'rows' if stream else 'trials'} in which not everything was read were left out: "
+            f"{list_rows(np.array(left_out))}"
+        )
+        findings.append(Oddity("dropped rows", len(left_out), message, tuple(left_out[:SHOWN])))
     if not grasps:
         raise TableError(f"{what}: no trial was accepted; `thenar record` makes recordings with labelled trials")
     # A row of a stream takes as much memory as any other.
@@ -322,14 +327,6 @@ def _taxels(reader: Reader) -> Taxels:
     session = reader.session
     settings = parse_harness(session.harness, reader.path.name).taxel_settings if session.taxels else None
     return Taxels(session.taxels, [[]] * len(session.taxels), session.taxel_calibration, settings)
-
-
-def _left_out(parts: Sequence[_Part], stream: bool) -> Iterator[Oddity]:
-    trials = [grasp.label.trial for part in parts for grasp in part.grasps if not grasp.whole(part.session)]
-    if trials:
-        what = f"{len(trials)} {'rows' if stream else 'trials'} in which not everything was read"
-        message = f"{what} were left out: {list_rows(np.array(trials))}"
-        yield Oddity("dropped rows", len(trials), message, tuple(trials[:SHOWN]))
 
 
 def _check_alike(parts: Sequence[_Part]) -> None:

@@ -410,7 +410,12 @@ class _Search:
 def _may_be(key: str, column: Facts) -> bool:
     """Return whether name and values of a column fit the role `key`."""
     if key == "time":
-        return column.values is not None and column.distinct > 1 and is_time(column.words) and _dates(column)
+        if column.values is None or column.distinct < 2 or not is_time(column.words):
+            return False
+        # Whole seconds date no rows, nor does what wraps every second.
+        steps = np.diff(column.values)
+        wraps = column.values.max() < 1e9 and unit_of_time(column.name, column.values) == "ns"
+        return bool(2 * np.count_nonzero(steps) > len(steps) and not (wraps and (steps < 0).any()))
     named = column.words <= WORDS[key] | WORDS["number"] if column.bits else True
     fits = named and column.nominal and (key != "label" or 1 < column.distinct <= _TYPES)
     return fits and bool(column.words & WORDS[key])
@@ -423,14 +428,6 @@ def _doubts(key: str, column: Facts) -> tuple[int, bool, bool]:
         vague = 1 if unit_of_time(column.name, column.values) else 2
     other = key != "time" and not column.words <= WORDS[key] | WORDS["number"]
     return vague, other, column.distinct == column.rows
-
-
-def _dates(column: Facts) -> bool:
-    """Return whether a column with the name of a time dates rows: whole seconds do not, nor what wraps every second."""
-    assert column.values is not None
-    steps = np.diff(column.values)
-    wraps = column.values.max() < 1e9 and unit_of_time(column.name, column.values) == "ns"
-    return bool(2 * np.count_nonzero(steps) > len(steps) and not (wraps and (steps < 0).any()))
 
 
 def _none(labels: NDArray[np.str_]) -> tuple[str, ...]:

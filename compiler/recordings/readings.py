@@ -68,14 +68,14 @@ def read_cells(
         sessions=reader.names(columns.parts("session")),
         trials=reader.trials(columns.parts("trial"), notes),
         time=reader.time(columns.time),
-        switches=_switches(reader, selection, notes),
-        joints=_joints(reader, selection),
+        switches=reader.switches(selection, notes),
+        joints=reader.joints(selection),
     )
     none = nothing_held(columns, labels)
-    _fill_from_next_grasp(readings, none, columns, reader)
+    reader.fill_from_next_grasp(readings, none, columns)
     keep = reader.complete(columns.missing)
-    warnings = _dropped(readings, keep, reader.missing)
-    missing = {name: _kept(mask, keep) for name, mask in reader.missing.items()}
+    warnings = reader.dropped(readings, keep)
+    missing = {name: mask[keep] for name, mask in reader.missing.items()}
     readings, none = readings.kept(keep), none[keep]
     untold = columns.frames is None and not columns.parts("trial")
     if untold and none.any() and in_runs(readings.labels, readings.subjects, readings.objects, readings.sessions):
@@ -85,20 +85,24 @@ def read_cells(
         readings = replace(readings, trials=_runs(readings, none, columns.time is None))
     independent = columns.frames == "independent"
     trial_ids = np.arange(len(readings.rows)) if independent else readings.trial_ids()
-    if untold:
-        _require_trial_column(table.what, trial_ids)
+    if untold and (shared := int((np.bincount(trial_ids)[trial_ids] > 1).sum())):
+        raise ColumnsError(
+            f"{table.what}: {shared} rows share subject, grasp type, object and session with others, and nothing says "
+            "which of them are frames of one trial: name the column that does (`trial = ...`, or a list of them), or "
+            'state that each row is a separate trial (`frames = "independent"`)'
+        )
     if columns.time is not None:
         order = in_time(trial_ids, readings.time)
         readings = readings.kept(order)
         missing = {name: mask[order] for name, mask in missing.items()}
-    warnings += _filled(table.what, readings, selection, missing, trial_ids)
-    micros = _micros(table.what, columns, readings.time, notes)
+    warnings += _filled(table, readings, selection, missing, trial_ids)
+    micros = _micros(table, columns, readings.time, notes)
     readings = _reduced(readings, columns.reduce, trial_ids, notes)
     times_us = np.rint(readings.time * micros).astype(np.int64) if micros else np.empty(0, np.int64)
     return readings, times_us, warnings, notes
 
 
-def _micros(what: str, columns: ColumnRoles, time: NDArray[np.float64], notes: list[str]) -> float:
+def _micros(table: Table, columns: ColumnRoles, time: NDArray[np.float64], notes: list[str]) -> float:
     """Return the number of microseconds in the unit of `time`, 0.0 if there is no time or its unit is unknown.
 
     Raises TableError if a time is too large.
@@ -112,7 +116,7 @@ def _micros(what: str, columns: ColumnRoles, time: NDArray[np.float64], notes: l
         return 0.0
     micros = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}[unit]
     if np.abs(time).max(initial=0) * micros > 2**62:
-        raise TableError(f"{what}: column {shortened(repr(columns.time))} holds times of more than 100,000 years")
+        raise TableError(f"{table.what}: column {shortened(repr(columns.time))} holds times of more than 100,000 years")
     return micros
 
 
@@ -126,24 +130,6 @@ def nothing_held(columns: ColumnRoles, labels: NDArray[np.str_]) -> NDArray[np.b
     aliases = dict(zip(found.tolist(), found.tolist(), strict=True)) | columns.labels
     none = [not meant.isdisjoint(map(plain, (label, aliases[label]))) for label in found.tolist()]
     return np.array(none, np.bool_)[where]
-
-
-def _fill_from_next_grasp(readings: Readings, none: NDArray[np.bool_], columns: ColumnRoles, reader: "_Reader") -> None:
-    """Allow cells to be empty in rows in which nothing is held.
-
-    This applies to the label, if an empty one means none, and to object, session and trial, which are taken from the
-    next row in which something is held, or the last.
-    """
-    if "" in columns.parts("none"):
-        reader.excuse(columns.parts("label"), none)
-    held = np.flatnonzero(~none)
-    if not held.size:
-        return
-    nearest = held[np.minimum(np.searchsorted(held, np.arange(len(none))), len(held) - 1)]
-    for key in ("object", "session", "trial"):
-        if (lacking := reader.excuse(columns.parts(key), none)).any():
-            column = getattr(readings, f"{key}s")
-            column[lacking] = column[nearest[lacking]]
 
 
 def _runs(readings: Readings, none: NDArray[np.bool_], timeless: bool) -> NDArray[np.int64]:
@@ -161,43 +147,6 @@ def _runs(readings: Readings, none: NDArray[np.bool_], timeless: bool) -> NDArra
     return np.unique(number + np.pad(leads, (0, 1))[number - 1], return_inverse=True)[1] + 1
 
 
-def _switches(reader: "_Reader", selection: Selection, notes: list[str]) -> NDArray[np.bool_]:
-    """Return the switches, with those made by thresholds last."""
-    switches = np.empty((len(reader.table.rows), len(selection.switches)), np.bool_, order="F")
-    shown = []
-    for number, (name, taxel) in enumerate(selection.switches):
-        if taxel is None:
-            switches[:, number] = reader.read(name, bits, "0 or 1")
-            continue
-        values = reader.read(name, numbers, "finite numbers")
-        threshold = otsu(values) if isinstance(taxel.threshold, str) else taxel.threshold
-        switches[:, number] = values > threshold
-        shown.append(f"{shortened(name)} above {threshold:g}")
-    if shown:
-        notes.append(f"{len(shown)} analog columns became switches, closed {list_names(shown)}")
-    return switches
-
-
-def _joints(reader: "_Reader", selection: Selection) -> NDArray[np.float64]:
-    """Return the columns that become codes: the joints, then the analog taxels."""
-    joints = np.empty((len(reader.table.rows), len(selection.coded)), order="F")
-    for number, (name, entry) in enumerate(selection.coded):
-        parse, expected = (codes, "codes 0..65535") if entry.is_counts else (numbers, "finite numbers")
-        joints[:, number] = reader.read(name, parse, expected)
-    return joints
-
-
-def _require_trial_column(what: str, trial_ids: NDArray[np.intp]) -> None:
-    """Raise ColumnsError if rows may be frames of one trial, and nothing says whether they are."""
-    shared = np.bincount(trial_ids)[trial_ids] > 1
-    if shared.any():
-        raise ColumnsError(
-            f"{what}: {int(shared.sum())} rows share subject, grasp type, object and session with others, and nothing "
-            "says which of them are frames of one trial: name the column that does (`trial = ...`, or a list of them), "
-            'or state that each row is a separate trial (`frames = "independent"`)'
-        )
-
-
 def _kept(values: NDArray[Value], keep: NDArray[np.bool_] | NDArray[np.intp]) -> NDArray[Value]:
     """Return the rows of 1-D or 2-D `values` selected by `keep`; the array itself if a mask selects all."""
     if keep.dtype == np.bool_ and keep.all():
@@ -210,24 +159,8 @@ def _kept(values: NDArray[Value], keep: NDArray[np.bool_] | NDArray[np.intp]) ->
     return values[:count]
 
 
-def _dropped(readings: Readings, keep: NDArray[np.bool_], missing: dict[str, NDArray[np.bool_]]) -> list[Oddity]:
-    """Return the findings about leaving out all rows except those to `keep`."""
-    rows = readings.rows[~keep]
-    if not rows.size:
-        return []
-    trial_ids = readings.trial_ids()
-    lost = len(np.unique(trial_ids)) - len(np.unique(trial_ids[keep]))
-    labels = sorted({*readings.labels[~keep].tolist()} - {*readings.labels[keep].tolist(), ""})
-    lack = list_names([name for name, mask in missing.items() if mask[~keep].any()])
-    message = f"{rows.size} rows with missing values were left out: {list_rows(rows)} (columns {lack})"
-    shown = [f"{lost} of {len(np.unique(trial_ids))} trials"] * bool(lost)
-    shown += [f"grasp type{'s' if len(labels) > 1 else ''} {list_names(labels)}"] * bool(labels)
-    message += f"; so {' and '.join(shown)} are lost" if shown else ""
-    return [Oddity("dropped rows", int(rows.size), message, tuple(rows[:SHOWN].tolist()), tuple(missing))]
-
-
 def _filled(
-    what: str,
+    table: Table,
     readings: Readings,
     selection: Selection,
     missing: dict[str, NDArray[np.bool_]],
@@ -236,19 +169,19 @@ def _filled(
     """Fill the cells of inputs that are `missing`, in place, and return a finding about them."""
     inputs = [name for name, _ in (*selection.switches, *selection.coded)]
     values = dict(zip(inputs, (*readings.switches.T, *readings.joints.T), strict=True))
-    masks = {name: mask for name, mask in missing.items() if name in values and mask.any()}
-    if not masks:
+    missing = {name: mask for name, mask in missing.items() if name in values and mask.any()}
+    if not missing:
         return []
-    if empty := [name for name, mask in masks.items() if mask.all()]:
-        raise TableError(f"{what}: column {shortened(repr(empty[0]))} has no values: leave it out")
-    cells = sum(int(mask.sum()) for mask in masks.values())
-    strange = sum(fill(values[name], mask, trial_ids) for name, mask in masks.items())
-    rows = readings.rows[np.logical_or.reduce([*masks.values()])]
+    if empty := [name for name, mask in missing.items() if mask.all()]:
+        raise TableError(f"{table.what}: column {shortened(repr(empty[0]))} has no values: leave it out")
+    cells = sum(int(mask.sum()) for mask in missing.values())
+    strange = sum(fill(values[name], missing[name], trial_ids) for name in missing)
+    rows = readings.rows[np.logical_or.reduce([*missing.values()])]
     message = (
         f"{cells} missing cells in {rows.size} rows were filled: {cells - strange} from the nearest frame of their "
-        f"trial, {strange} with their column's median ({list_rows(rows)}; columns {list_names([*masks])})"
+        f"trial, {strange} with their column's median ({list_rows(rows)}; columns {list_names([*missing])})"
     )
-    return [Oddity("filled cells", cells, message, tuple(rows[:SHOWN].tolist()), tuple(masks))]
+    return [Oddity("filled cells", cells, message, tuple(rows[:SHOWN].tolist()), tuple(missing))]
 
 
 def _reduced(readings: Readings, how: str, trial_ids: NDArray[np.intp], notes: list[str]) -> Readings:
@@ -288,7 +221,7 @@ class _Reader:
         self.missing: dict[str, NDArray[np.bool_]] = {}
         self.wrong: dict[str, dict[str, NDArray[np.bool_]]] = {}
 
-    def read(self, name: str, parse: "Callable[..., Parsed[Value]]", expected: str) -> NDArray[Value]:
+    def _read(self, name: str, parse: "Callable[..., Parsed[Value]]", expected: str) -> NDArray[Value]:
         return self._noted(name, parse(self.table.columns[name], self.table.decimal), expected)
 
     def _noted(self, name: str, parsed: Parsed[Value], expected: str) -> NDArray[Value]:
@@ -297,6 +230,30 @@ class _Reader:
         if parsed.wrong.any():
             self.wrong.setdefault(expected, {})[name] = parsed.wrong
         return parsed.values
+
+    def switches(self, selection: Selection, notes: list[str]) -> NDArray[np.bool_]:
+        """Return the switches, with those made by thresholds last."""
+        switches = np.empty((len(self.table.rows), len(selection.switches)), np.bool_, order="F")
+        shown = []
+        for number, (name, taxel) in enumerate(selection.switches):
+            if taxel is None:
+                switches[:, number] = self._read(name, bits, "0 or 1")
+                continue
+            values = self._read(name, numbers, "finite numbers")
+            threshold = otsu(values) if isinstance(taxel.threshold, str) else taxel.threshold
+            switches[:, number] = values > threshold
+            shown.append(f"{shortened(name)} above {threshold:g}")
+        if shown:
+            notes.append(f"{len(shown)} analog columns became switches, closed {list_names(shown)}")
+        return switches
+
+    def joints(self, selection: Selection) -> NDArray[np.float64]:
+        """Return the columns that become codes: the joints, then the analog taxels."""
+        joints = np.empty((len(self.table.rows), len(selection.coded)), order="F")
+        for number, (name, entry) in enumerate(selection.coded):
+            parse, expected = (codes, "codes 0..65535") if entry.is_counts else (numbers, "finite numbers")
+            joints[:, number] = self._read(name, parse, expected)
+        return joints
 
     def names(self, columns: tuple[str, ...]) -> NDArray[np.str_]:
         """Return the text of `columns`, joined with blanks; "1" if there are none."""
@@ -318,7 +275,7 @@ class _Reader:
         """Return the values of `column`, 0 throughout without one."""
         if column is None:
             return np.zeros(len(self.table.rows))
-        return self.read(column, times, "finite numbers, or dates with times")
+        return self._read(column, times, "finite numbers, or dates with times")
 
     def trials(self, columns: tuple[str, ...], notes: list[str]) -> NDArray[np.int64]:
         """Return the trial number of each row: one column of integers as it is, otherwise counted from 1."""
@@ -335,7 +292,24 @@ class _Reader:
         notes.append(f"the texts of {what} were numbered as trials in natural order: {list_names(shown, len(texts))}")
         return trials
 
-    def excuse(self, columns: tuple[str, ...], rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def fill_from_next_grasp(self, readings: Readings, none: NDArray[np.bool_], columns: ColumnRoles) -> None:
+        """Allow cells to be empty in rows in which nothing is held.
+
+        This applies to the label, if an empty one means none, and to object, session and trial, which are taken from
+        the next row in which something is held, or the last.
+        """
+        if "" in columns.parts("none"):
+            self._excuse(columns.parts("label"), none)
+        held = np.flatnonzero(~none)
+        if not held.size:
+            return
+        nearest = held[np.minimum(np.searchsorted(held, np.arange(len(none))), len(held) - 1)]
+        for key in ("object", "session", "trial"):
+            if (lacking := self._excuse(columns.parts(key), none)).any():
+                column = getattr(readings, f"{key}s")
+                column[lacking] = column[nearest[lacking]]
+
+    def _excuse(self, columns: tuple[str, ...], rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Do not count cells of `columns` in `rows` (n,) as missing; return in which rows (n,) some were."""
         lacking = np.zeros(len(rows), np.bool_)
         for name in columns:
@@ -360,6 +334,21 @@ class _Reader:
         if not keep.any():
             raise TableError(f"{self.table.what}: every row misses a value: {self._list(self.missing)}")
         return keep
+
+    def dropped(self, readings: Readings, keep: NDArray[np.bool_]) -> list[Oddity]:
+        """Return the findings about leaving out all rows except those to `keep`."""
+        rows = readings.rows[~keep]
+        if not rows.size:
+            return []
+        trial_ids = readings.trial_ids()
+        lost = len(np.unique(trial_ids)) - len(np.unique(trial_ids[keep]))
+        labels = sorted({*readings.labels[~keep].tolist()} - {*readings.labels[keep].tolist(), ""})
+        lack = list_names([name for name, mask in self.missing.items() if mask[~keep].any()])
+        message = f"{rows.size} rows with missing values were left out: {list_rows(rows)} (columns {lack})"
+        shown = [f"{lost} of {len(np.unique(trial_ids))} trials"] * bool(lost)
+        shown += [f"grasp type{'s' if len(labels) > 1 else ''} {list_names(labels)}"] * bool(labels)
+        message += f"; so {' and '.join(shown)} are lost" if shown else ""
+        return [Oddity("dropped rows", int(rows.size), message, tuple(rows[:SHOWN].tolist()), tuple(self.missing))]
 
     def _list(self, columns: dict[str, NDArray[np.bool_]]) -> str:
         """Return "3 cells, ...": how many cells, and the first of them in the order of rows, then of columns."""

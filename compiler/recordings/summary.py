@@ -68,18 +68,19 @@ def duplicate_columns(columns: NDArray[np.generic], names: Sequence[str]) -> tup
     return tuple(pairs)
 
 
-def frame_numbers(switches: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.intp]:
+def frame_numbers(grasp_set: GraspSet) -> NDArray[np.intp]:
     """Return numbers (n,) that are equal exactly if the frames are."""
-    frames = np.hstack([np.packbits(switches, axis=1), np.ascontiguousarray(codes).view(np.uint8)])
+    codes = np.ascontiguousarray(np.hstack([grasp_set.taxels, grasp_set.codes]))
+    frames = np.hstack([np.packbits(grasp_set.switches, axis=1), codes.view(np.uint8)])
     if not frames.shape[1]:
         return np.zeros(len(frames), np.intp)
     keys = np.ascontiguousarray(frames).view(np.dtype((np.void, frames.shape[1]))).ravel()
     return np.unique(keys, return_inverse=True)[1]
 
 
-def disagreeing(frames: NDArray[np.intp], what: NDArray[np.generic]) -> NDArray[np.bool_]:
-    """Return (n,) whether the row's frame also occurs with another value of `what` (n,)."""
-    found, numbers = np.unique(what, return_inverse=True)
+def disagreeing(frames: NDArray[np.intp], values: NDArray[np.generic]) -> NDArray[np.bool_]:
+    """Return (n,) whether the row's frame also occurs with another one of `values` (n,)."""
+    found, numbers = np.unique(values, return_inverse=True)
     # Pairs encoded as numbers need a fraction of the memory. Done in place, as a large set is in memory already.
     numbers += frames * len(found)
     pairs = np.unique(numbers)
@@ -105,15 +106,15 @@ def _odd_columns(grasp_set: GraspSet) -> Iterator[Oddity]:
 
 
 def _odd_frames(grasp_set: GraspSet, rows: NDArray[np.int64]) -> Iterator[Oddity]:
-    frames = frame_numbers(grasp_set.switches, np.hstack([grasp_set.taxels, grasp_set.codes]))
-    for kind, what, sentence in (
+    frames = frame_numbers(grasp_set)
+    for kind, values, sentence in (
         ("frames shared by subjects", grasp_set.subjects, "have a frame that another subject has as well"),
         ("contradictory frames", grasp_set.grasps, "have a frame that another grasp type has as well"),
     ):
-        found = rows[disagreeing(frames, what)]
-        if found.size:
-            message = f"{found.size} rows {sentence}: {list_rows(found)}"
-            yield Oddity(kind, int(found.size), message, tuple(found[:SHOWN].tolist()))
+        odd = disagreeing(frames, values)
+        if count := int(np.count_nonzero(odd)):
+            message = f"{count} rows {sentence}: {list_rows(rows[odd])}"
+            yield Oddity(kind, count, message, tuple(rows[odd][:SHOWN].tolist()))
 
 
 def _gaps(grasp_set: GraspSet) -> Iterator[Oddity]:
@@ -179,13 +180,17 @@ def summarise(grasp_set: GraspSet) -> Summary:
     grasps = dict(zip(grasp_set.taxonomy.types, counts.tolist(), strict=True))
     closed = grasp_set.switches.sum(axis=0) / max(len(grasp_set), 1)
     present = counts[counts > 0]
+    seconds = None
+    if grasp_set.times_us.size:
+        steps = np.diff(grasp_set.times_us)[np.diff(groups(grasp_set.subjects, grasp_set.sessions)) == 0]
+        seconds = float(steps[steps > 0].sum() / 1e6)
     return Summary(
         frames=len(grasp_set),
         trials=grasp_set.n_trials,
         rests=grasp_set.rests,
         none=int(grasp_set.is_none.sum()),
         movements=int(grasp_set.movement_ids.max(initial=-1)) + 1,
-        seconds=_seconds(grasp_set),
+        seconds=seconds,
         simulated=grasp_set.simulated,
         independent=grasp_set.independent,
         fingerprint=grasp_set.fingerprint(),
@@ -200,15 +205,6 @@ def summarise(grasp_set: GraspSet) -> Summary:
         joints=_ranges(grasp_set.joints, grasp_set.codes),
         warnings=find_oddities(grasp_set, np.arange(1, len(grasp_set) + 1)),
     )
-
-
-def _seconds(grasp_set: GraspSet) -> float | None:
-    """Return the total duration of the recordings of all subjects and sessions."""
-    if not grasp_set.times_us.size:
-        return None
-    recording = groups(grasp_set.subjects, grasp_set.sessions)
-    steps = np.diff(grasp_set.times_us)[np.diff(recording) == 0]
-    return float(steps[steps > 0].sum() / 1e6)
 
 
 def _counts(names: NDArray[np.str_]) -> dict[str, int]:
@@ -280,20 +276,23 @@ def _likeness(grasp_set: GraspSet) -> tuple[str, str] | None:
     is not simulated. Rows in which nothing is held are ignored: no rate counts them.
     """
     grasp_set = grasp_set.without_none()
-    order, group = _units(grasp_set)
-    sizes = np.bincount(group) if len(group) else group
-    starts = np.cumsum(sizes) - sizes
-    place = np.arange(len(order)) - np.repeat(starts, sizes)
-    size = np.repeat(sizes, sizes)
+    rows, group = _units(grasp_set)
     # A scene without noise repeats itself, and its repetitions are numbered correctly.
-    if not grasp_set.simulated and (reason := _copies(grasp_set, order, place, starts)):
+    if not grasp_set.simulated and (reason := _copies(grasp_set, rows, group)):
         return reason, _NUMBER.format("the trials") + _STATE
+    sizes = np.bincount(group) if len(group) else group
+    place = np.arange(len(rows)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    size = np.repeat(sizes, sizes)
     this = np.flatnonzero((place + 1 < size) & (size >= 4))
     if not len(this):
         return None
-    random = np.random.default_rng(_SEED)
-    far, other = (_far(place[this], size[this], random) + this for _ in range(2))
-    near, away, chance = _distances(grasp_set, order[this], [order[this + 1], order[far], order[other]])
+    # Two others of the group for each row, drawn from those that are a third of it away or more, at least two.
+    random, place, size = np.random.default_rng(_SEED), place[this], size[this]
+    least = np.maximum(2, -(-size // 3))
+    before, after = np.maximum(place - least + 1, 0), np.maximum(size - place - least, 0)
+    drawn = random.integers(0, before + after, (2, len(this)))
+    far = rows[this + np.where(drawn < before, -least - drawn, least + drawn - before)]
+    near, away, chance = _distances(grasp_set, rows[this], [rows[this + 1], *far])
     closer, by_chance = float(np.mean(near < _ALIKE * away)), float(np.mean(chance < _ALIKE * away))
     excess = closer - by_chance
     if excess < max(_EXCESS, _ERRORS * (0.5 / len(this)) ** 0.5):
@@ -302,7 +301,7 @@ def _likeness(grasp_set: GraspSet) -> tuple[str, str] | None:
         f"within a subject, grasp type, object and session, {100 * closer:.0f} % of the rows that count as trials are "
         f"less than a quarter as far from the next as from one further away ({100 * by_chance:.0f} % by chance)"
     )
-    single = len(order) == len(grasp_set)
+    single = len(rows) == len(grasp_set)
     if _are_apart(grasp_set) or (single and excess < _REFUSED):
         return f"trials resemble the trial before: {shares}", ""
     remedy = _NUMBER.format("the trials") + _STATE if single else _NUMBER.format("whole trials")
@@ -335,28 +334,20 @@ def _units(grasp_set: GraspSet) -> tuple[Rows, Rows]:
     return order[middle], group[order[middle]]
 
 
-def _copies(grasp_set: GraspSet, order: Rows, place: Rows, starts: Rows) -> str | None:
+def _copies(grasp_set: GraspSet, rows: Rows, group: Rows) -> str | None:
     """Return why rows look like copies, if most equal the previous row while groups rarely start with the same row."""
+    begins = np.diff(group, prepend=-1) != 0
+    starts, later = np.flatnonzero(begins), np.flatnonzero(~begins)
     if not grasp_set.joints or len(starts) < 3:
         return None
-    rows = np.hstack([grasp_set.codes, grasp_set.switches])[order]
-    later = np.flatnonzero(place > 0)
-    equal = (rows[later] == rows[later - 1]).all(axis=1)
-    if 2 * np.count_nonzero(equal) <= len(later) or len(np.unique(rows[starts], axis=0)) < 0.9 * len(starts):
+    frames = np.hstack([grasp_set.codes, grasp_set.switches])[rows]
+    equal = (frames[later] == frames[later - 1]).all(axis=1)
+    if 2 * np.count_nonzero(equal) <= len(later) or len(np.unique(frames[starts], axis=0)) < 0.9 * len(starts):
         return None
     return (
         f"{100 * equal.mean():.0f} % of the rows that count as trials equal the one before in every joint and switch: "
         "they look like copies of fewer trials"
     )
-
-
-def _far(place: Rows, size: Rows, random: np.random.Generator) -> Rows:
-    """Return a row offset (m,) for each row, drawn from those of the group a third of it away or more, at least two."""
-    least = np.maximum(2, -(-size // 3))
-    before, after = np.maximum(place - least + 1, 0), np.maximum(size - place - least, 0)
-    drawn = random.integers(0, before + after)
-    away: Rows = np.where(drawn < before, -least - drawn, least + drawn - before)
-    return away
 
 
 def _distances(grasp_set: GraspSet, rows: Rows, others: list[Rows]) -> list[NDArray[np.float64]]:

@@ -17,6 +17,7 @@ from thenar.runtime.scores import none_leads
 
 from ..facts import SensorCount
 from ..pictures import embedded, policy_hash, templates
+from ..samples import Samples
 
 with optional():
     from jinja2 import Environment
@@ -33,26 +34,29 @@ _EXPORT = re.compile(r"^export (?:function|class) (\w+)", re.MULTILINE)
 Json = Mapping[str, object]
 
 
-def try_html(
-    manifest: Manifest,
-    tables: bytes,
-    hand: HandDrawing,
-    rows: tuple[NDArray[np.bool_], NDArray[np.uint16], NDArray[np.intp]],
-) -> bytes | None:
+def try_html(manifest: Manifest, tables: bytes, hand: HandDrawing, samples: Samples) -> bytes | None:
     """Return the page in UTF-8, at most MOST_BYTES; None where tables and hand alone are larger.
 
     Parameters
     ----------
     manifest, tables, hand : Manifest, bytes, HandDrawing
         The contents of `build.json`, `tables.bin` and `hand.json`.
-    rows : bits (n, s), codes (n, j), labels (n,)
-        The training rows, as the build reads them; a sample of each grasp type goes into the page.
+    samples : Samples
+        The training rows, as the build reads them; some of each grasp type go into the page.
     """
-    bits, codes, labels = rows
+    codes, labels, rejection = samples.codes, samples.labels, manifest.rejection
     data = {
         "classes": manifest.classes,
         "tables": base64.b64encode(tables).decode(),
-        "refusal": _refusal(manifest),
+        "refusal": None
+        if rejection is None
+        else {
+            "least": rejection.least_scores,
+            "closed": rejection.closed,
+            "ranges": rejection.ranges,
+            "outside": rejection.outside,
+            "leads": none_leads(rejection, manifest.proof.scale),
+        },
         "switches": [_switch(switch.name, switch.threshold) for switch in manifest.switches],
         "joints": [_joint(joint, codes[:, number]) for number, joint in enumerate(manifest.joints)],
         "hand": hand,
@@ -63,7 +67,10 @@ def try_html(
     if left < 0:
         return None
     for row in sample(labels, len(manifest.grasps)):
-        each = [int(labels[row]), _hexadecimal(bits[row]), codes[row].tolist()]
+        # A digit for every four switches, the first of them in its lowest bit.
+        padded = np.append(samples.switches[row], np.zeros(-samples.n_switches % 4, np.bool_)).reshape(-1, 4)
+        closed = "".join(f"{digit:x}" for digit in (padded @ np.array([1, 2, 4, 8])).tolist())
+        each = [int(labels[row]), closed, codes[row].tolist()]
         left -= len(msgspec.json.encode(each)) + 1
         if left < 0:
             break
@@ -81,25 +88,6 @@ def sample(labels: NDArray[np.intp], classes: int) -> list[int]:
     # If there is room for only a few, they cover all types.
     turns = max(map(len, found), default=0)
     return [mine[turn] for turn in range(turns) for mine in found if turn < len(mine)]
-
-
-def _hexadecimal(bits: NDArray[np.bool_]) -> str:
-    """Return a digit for every four switches, the first of them in its lowest bit."""
-    padded = np.append(bits, np.zeros(-len(bits) % 4, np.bool_)).reshape(-1, 4)
-    return "".join(f"{digit:x}" for digit in (padded @ np.array([1, 2, 4, 8])).tolist())
-
-
-def _refusal(manifest: Manifest) -> Json | None:
-    held = manifest.rejection
-    if held is None:
-        return None
-    return {
-        "least": held.least_scores,
-        "closed": held.closed,
-        "ranges": held.ranges,
-        "outside": held.outside,
-        "leads": none_leads(held, manifest.proof.scale),
-    }
 
 
 def _line(joint: Calibration) -> dict[str, object]:

@@ -138,7 +138,7 @@ def sspoc_order(bits: Bits, labels: Labels) -> Columns:
     centred = bits - bits.mean(axis=0)
     model = SSPOC(basis=SVD(n_basis_modes=modes, random_state=_SEED), l1_penalty=_PENALTY)
     model.fit(centred, labels, quiet=True, refit=False)
-    # Of two classes the weights are one column, without an axis.
+    # SSPOC's weights are (inputs, classes); for two classes it has one column, without an axis.
     weights = np.abs(np.asarray(model.sensor_coef_, np.float64).reshape(bits.shape[1], -1)).max(axis=1)
     return tuple(np.argsort(-weights, kind="stable").tolist())
 

@@ -41,10 +41,9 @@ def test_frames_have_one_number_exactly_where_they_are_equal(
 ) -> None:
     drawn = data.draw(grasp_sets)
     grasp_set = drawn.rows(data.draw(st.lists(st.integers(0, len(drawn) - 1), min_size=1, max_size=8)))
-    numbers = frame_numbers(grasp_set.switches, grasp_set.codes)
-    frames = [
-        (*bits, *codes) for bits, codes in zip(grasp_set.switches.tolist(), grasp_set.codes.tolist(), strict=True)
-    ]
+    numbers = frame_numbers(grasp_set)
+    inputs = np.hstack([grasp_set.switches, grasp_set.codes, grasp_set.taxels])
+    frames = [tuple(row) for row in inputs.tolist()]
     for (one, frame), (other, other_frame) in product(zip(numbers, frames, strict=True), repeat=2):
         assert (one == other) == (frame == other_frame)
 
