@@ -23,8 +23,6 @@ from .frames import PERIODS, GloveFrame, Mask, Newest
 from .manifest import Calibration
 from .names import nearest
 from .published import JointAngles
-from .toml_source import read_source
-from .toml_struct import convert
 
 _BYTES = 256
 # The unit of recorded bytes that are not calibrated.
@@ -35,6 +33,9 @@ _RAW_CODES = range(1, _BYTES)
 
 def load_calibration(path: Path) -> GloveCalibration:
     """Return the calibration written by `thenar calibrate`. Raises SettingError with file, line and key."""
+    from .toml_source import read_source  # not every glove is calibrated
+    from .toml_struct import convert
+
     source = read_source(path, SettingError)
     return convert(source, (), source.tables(), GloveCalibration)
 

@@ -27,8 +27,6 @@ from .frames import Mask
 from .manifest import Calibration, Switch, Threshold
 from .names import fault, list_names, shortened
 from .scanning.scanmap import ScanMap, StreamLevel
-from .toml_source import read_source
-from .toml_struct import convert
 
 COUNTS = 65536
 Raw = Annotated[int, Meta(ge=0, lt=COUNTS)]
@@ -140,6 +138,9 @@ def calibration_of(settings: TaxelSettings) -> TaxelCalibration | None:
 
 def load_taxel_calibration(path: Path) -> TaxelCalibration:
     """Return the calibration that `thenar calibrate --taxels` wrote. Raises SettingError with file, line and key."""
+    from .toml_source import read_source  # not every glove has taxels
+    from .toml_struct import convert
+
     source = read_source(path, SettingError)
     return convert(source, (), source.tables(), TaxelCalibration)
 

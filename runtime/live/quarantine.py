@@ -203,22 +203,23 @@ class Chattering:
         self._closed: Mask = 0
         self._paid_us = [0] * switches
         self.switches: Mask = 0
+        # No switch recovers before.
+        self._next_us = 0
 
     def frame(self, time_us: int, closed: Mask, read: Mask) -> None:
         """Take a frame in which the switches `read` were read; `switches` are then those that chatter."""
         changed = (closed ^ self._closed) & read
-        if not changed | self.switches:
-            return
         self._closed ^= changed
-        for number in numbers(changed | self.switches):
+        for number in numbers(changed):
             paid_us = max(self._paid_us[number], time_us)
-            if changed >> number & 1:
-                paid_us = min(paid_us + 1_000_000 // MOST_CHANGES, time_us + 2_000_000)
-            self._paid_us[number] = paid_us
+            self._paid_us[number] = paid_us = min(paid_us + 1_000_000 // MOST_CHANGES, time_us + 2_000_000)
             if paid_us - time_us > 1_000_000:
                 self.switches |= 1 << number
-            elif paid_us == time_us:
-                self.switches &= ~(1 << number)
+                self._next_us = min(self._next_us, paid_us)
+        if self.switches and time_us >= self._next_us:
+            in_debt = [number for number in numbers(self.switches) if self._paid_us[number] > time_us]
+            self.switches = sum(1 << number for number in in_debt)
+            self._next_us = min((self._paid_us[number] for number in in_debt), default=0)
 
 
 class JointDrift:
