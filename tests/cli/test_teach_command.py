@@ -2,7 +2,7 @@
 
 import json
 import subprocess
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
 from threading import Event
 
@@ -22,8 +22,8 @@ from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.sinks import GraspLine, HealthLine, ProgressLine
 
 from ..sets import grasp_set_of
+from .conftest import thenar
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
 TYPES = ("cup", "pen", "rod")
 GLOVE = """
 [cyberglove]
@@ -124,9 +124,7 @@ def progress_of(done: subprocess.CompletedProcess[str]) -> list[ProgressLine]:
     return [line for line in lines if isinstance(line, ProgressLine)]
 
 
-def test_a_demonstration_follows_its_own_task_to_the_end(
-    thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path
-) -> None:
+def test_a_demonstration_follows_its_own_task_to_the_end(build: Path, demos: list[Path], tmp_path: Path) -> None:
     (tmp_path / "gripper.toml").write_text(GRIPPER)
     task = tmp_path / "task.json"
     done = thenar("teach", *demos, "-b", build, "-o", task, "--preshape", tmp_path / "gripper.toml")
@@ -173,7 +171,7 @@ def test_a_demonstration_follows_its_own_task_to_the_end(
     assert (sent.returncode, (tmp_path / "lines").read_text()) == (0, done.stdout)
 
 
-def test_what_deviates_is_said(thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path) -> None:
+def test_what_deviates_is_said(build: Path, demos: list[Path], tmp_path: Path) -> None:
     task = tmp_path / "task.json"
     assert thenar("teach", *demos[:2], "-b", build, "-o", task).returncode == 0
     for types, held, deviations, last in (
@@ -188,7 +186,7 @@ def test_what_deviates_is_said(thenar: Thenar, build: Path, demos: list[Path], t
         assert last in done.stderr
 
 
-def test_what_teaches_nothing_is_refused(thenar: Thenar, build: Path, set_file: Path, tmp_path: Path) -> None:
+def test_what_teaches_nothing_is_refused(build: Path, set_file: Path, tmp_path: Path) -> None:
     empty = record(build, tmp_path / "empty.mcap", [3] * 80)
     grasps_of(np.array([0])).save(static := tmp_path / "static.grasps")
     task = ("-b", build, "-o", tmp_path / "task.json")
@@ -226,9 +224,7 @@ class Played:
         return Snapshot(time_us, switches, glove, (), glove)
 
 
-def test_a_live_glove_reports_task_steps_to_view_and_sinks(
-    thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path
-) -> None:
+def test_a_live_glove_reports_task_steps_to_view_and_sinks(build: Path, demos: list[Path], tmp_path: Path) -> None:
     assert thenar("teach", *demos[:1], "-b", build, "-o", tmp_path / "task.json").returncode == 0
     stop, lines = Event(), tmp_path / "lines"
     harness = parse_harness(GLOVE, "glove.toml")
@@ -254,7 +250,7 @@ def _without_pens() -> GraspSet:
 
 @pytest.mark.parametrize("lag", [(), ("--lag-ms", "150")])
 def test_a_recorded_run_is_cut_into_its_grasps(
-    thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path, lag: tuple[str, ...]
+    build: Path, demos: list[Path], tmp_path: Path, lag: tuple[str, ...]
 ) -> None:
     done = thenar("segment", demos[0], "-b", build, "-o", tmp_path / "s.csv", "--json", *lag)
     assert done.returncode == 0, done.stderr
@@ -281,7 +277,7 @@ _FRAMES = range(len(states("cpr")))
     ids=["repeats", "jitters", "jumps ahead", "unread frames"],
 )
 def test_the_clock_of_a_run_and_unread_frames_divide_no_grasp(
-    thenar: Thenar, build: Path, tmp_path: Path, clock_us: list[int], unread: Container[int]
+    build: Path, tmp_path: Path, clock_us: list[int], unread: Container[int]
 ) -> None:
     path = record(build, tmp_path / "run.mcap", states("cpr"), clock_us, unread)
     done = thenar("segment", path, "-b", build, "--json")
@@ -307,7 +303,7 @@ def collected(path: Path, held: list[int], switches: tuple[str, ...], joint: str
     return path
 
 
-def test_teach_cuts_recordings_of_any_build_into_the_same_grasps(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+def test_teach_cuts_recordings_of_any_build_into_the_same_grasps(build: Path, tmp_path: Path) -> None:
     types = "cprrpc"
     grasp_set = grasps_of(np.array(states("cprrpcpcr" * 2)))
     whole = compile_build(grasp_set, tmp_path / "whole", rounds=9, folds=0, placement="elimination", keep=3).folder
@@ -331,7 +327,7 @@ def test_teach_cuts_recordings_of_any_build_into_the_same_grasps(thenar: Thenar,
     assert len(json.loads((tmp_path / "task.json").read_bytes())["steps"]) == len(types)
 
 
-def test_a_recording_that_lacks_an_input_is_refused_by_name(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+def test_a_recording_that_lacks_an_input_is_refused_by_name(build: Path, tmp_path: Path) -> None:
     for switches, joint, lacking in (
         (("s0", "s2"), "bend", "s1"),
         (("s0", "s1", "s2"), "bent", "bend"),

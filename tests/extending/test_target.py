@@ -11,6 +11,8 @@ import pytest
 from thenar.compiler import GraspSet, compile_build
 from thenar.runtime.build import Build
 
+from ..conftest import tool
+
 TYPES = ("cup", "pen", "plate")
 MAIN = """\
 #define THENAR_GLOVE_IMPLEMENTATION
@@ -51,7 +53,7 @@ def build(sixty: Callable[..., GraspSet], tmp_path: Path) -> Build:
 
 
 def test_a_foreign_target_is_listed_and_its_firmware_matches_python(
-    install: Callable[[str, str], Any], tool: Callable[[str], str], build: Build, tmp_path: Path
+    install: Callable[[str, str], Any], build: Build, tmp_path: Path
 ) -> None:
     compiler = tool("g++")
     made = tmp_path / "made"

@@ -2,7 +2,6 @@
 
 import html
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,8 @@ from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.recordings.taxonomy import own
 from thenar.simulator.handmaps.handmap import hand_map
 
-Make = Callable[..., GraspSet]
+from ..conftest import make_set
+
 TAGS = re.compile(r"<[^>]*>")
 
 
@@ -68,15 +68,13 @@ def test_the_report_has_the_papers_tables_of_the_builds_own_folds(gloved: GraspS
     assert re.search(r"This build's recipe \(placement: .*; trainer: .*\), within subject, 3 nested folds", words)
 
 
-def test_the_report_of_very_many_subjects_has_no_column_for_each(make_set: Make, tmp_path: Path) -> None:
+def test_the_report_of_very_many_subjects_has_no_column_for_each(tmp_path: Path) -> None:
     words = _compile(make_set(rows=640, subjects=32), tmp_path / "build", folds=2)
     assert "have a column for each subject: 32 are too many for a page. thenar evaluate SET.grasps" in words
 
 
 @pytest.mark.parametrize(("types", "switches", "joints"), [(2, 1, 0), (2, 0, 1), (33, 12, 2), (33, 6, 0)])
-def test_sets_at_the_edges_have_a_report(
-    make_set: Make, tmp_path: Path, types: int, switches: int, joints: int
-) -> None:
+def test_sets_at_the_edges_have_a_report(tmp_path: Path, types: int, switches: int, joints: int) -> None:
     labels, random = np.arange(types * 6) % types, np.random.default_rng(3)
     names = tuple(f"</td><b>type {number} & 握り \u200d" for number in range(types))
     edge = replace(

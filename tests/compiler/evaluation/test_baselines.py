@@ -1,5 +1,3 @@
-from collections.abc import Callable
-
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 from sklearn.neighbors import KNeighborsClassifier
@@ -7,13 +5,12 @@ from sklearn.neighbors import KNeighborsClassifier
 from thenar.compiler.evaluation.folds import Fold
 from thenar.compiler.evaluation.plan import CLASSIFIERS, FoldFit, predictions
 from thenar.compiler.placement.elements import Element
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 
-Make = Callable[..., GraspSet]
+from .conftest import make_grasps
 
 
-def test_baselines_answer_as_scikit_learns_on_the_same_standardised_columns(make_grasps: Make) -> None:
+def test_baselines_answer_as_scikit_learns_on_the_same_standardised_columns() -> None:
     grasps = make_grasps(noise=0.3, per_type=10)
     samples, rows = Samples.of(grasps), np.arange(len(grasps))
     fold, columns = Fold(rows[::2], rows[1::2], "1"), (1, 3, 4, 12, 13)
@@ -32,7 +29,7 @@ def test_baselines_answer_as_scikit_learns_on_the_same_standardised_columns(make
         assert np.array_equal(predictions(samples, fit, {}), expected)
 
 
-def test_of_a_single_grasp_type_nothing_else_is_answered(make_grasps: Make) -> None:
+def test_of_a_single_grasp_type_nothing_else_is_answered() -> None:
     grasps = make_grasps(noise=0.3)
     rows = np.flatnonzero(grasps.labels == 2)
     for name in CLASSIFIERS:

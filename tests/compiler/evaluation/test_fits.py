@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,12 +11,13 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import Training
 
-Make = Callable[..., GraspSet]
+from .conftest import make_grasps
+
 QUICK = {"": (Training("logitboost", {"rounds": 5}),)}
 
 
 @pytest.fixture
-def fits(make_grasps: Make) -> tuple[GraspSet, list[FoldFit]]:
+def fits() -> tuple[GraspSet, list[FoldFit]]:
     grasps = make_grasps(noise=0.3)
     folds = weka_folds(grasps.labels, 4, 1)
     inputs = [(tuple(map(Element, columns)), joints) for columns, joints in [((0, 1, 2), ()), ((3, 4), (0,))]]
@@ -37,7 +37,7 @@ def test_a_fit_answers_as_the_classifier_does(fits: tuple[GraspSet, list[FoldFit
         assert np.array_equal(found, classifier.predict(part[fit.fold.test]))
 
 
-def test_labels_keep_their_numbers_where_some_do_not_occur(make_grasps: Make) -> None:
+def test_labels_keep_their_numbers_where_some_do_not_occur() -> None:
     grasps = make_grasps(noise=0.0)
     rows = np.flatnonzero(np.isin(grasps.labels, (1, 3)))
     fold = Fold(rows[::2], rows[1::2], "1")
@@ -45,7 +45,7 @@ def test_labels_keep_their_numbers_where_some_do_not_occur(make_grasps: Make) ->
     assert np.array_equal(found, grasps.labels[fold.test])
 
 
-def test_without_inputs_the_most_frequent_training_label_is_answered(make_grasps: Make) -> None:
+def test_without_inputs_the_most_frequent_training_label_is_answered() -> None:
     grasps = make_grasps()
     rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
     fold = Fold(rows, np.arange(6), "1")
@@ -53,7 +53,7 @@ def test_without_inputs_the_most_frequent_training_label_is_answered(make_grasps
     assert found.tolist() == [2] * 6
 
 
-def test_where_no_input_varies_the_most_frequent_training_label_is_answered(make_grasps: Make) -> None:
+def test_where_no_input_varies_the_most_frequent_training_label_is_answered() -> None:
     grasps = make_grasps()
     rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
     codes = grasps.codes.copy()

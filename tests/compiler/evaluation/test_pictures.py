@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -6,11 +5,12 @@ from matplotlib.figure import Figure
 
 from thenar.compiler.evaluation.study import StudyDesign, draw, evaluate
 from thenar.compiler.evaluation.tables import draw_matrix
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.recipe import Recipe
 
+from .conftest import make_grasps
 
-def test_every_composition_and_protocol_has_its_picture(make_grasps: Callable[..., GraspSet], tmp_path: Path) -> None:
+
+def test_every_composition_and_protocol_has_its_picture(tmp_path: Path) -> None:
     options = StudyDesign(Recipe(trainer="logitboost", rounds=2), repeats=1, tables=("compositions", "pruning"))
     study = evaluate(make_grasps(n_joints=0), options, jobs=1)
     drawn = draw(study, tmp_path / "new" / "folder")

@@ -22,6 +22,8 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.runtime.recipe import Recipe
 
+from .conftest import make_grasps
+
 OF_THE_PAPER = {
     "I": ("Angle + All-Co", True, (0, 1, 2, 3)),
     "II": ("Angle + Sel-Co", True, (1, 3)),
@@ -49,7 +51,6 @@ def test_a_set_gets_the_compositions_it_has_inputs_for(n_switches: int, n_joints
     assert [composition.name for composition in available(n_switches, n_joints)] == names
 
 
-Make = Callable[..., GraspSet]
 both_protocols = pytest.mark.parametrize("protocol", [PAPER, NESTED], ids=lambda protocol: protocol.name)
 
 
@@ -59,7 +60,7 @@ def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
 
 
 @pytest.fixture(scope="module")
-def planner(make_grasps: Make) -> Planner:
+def planner() -> Planner:
     return planner_of(make_grasps(noise=0.25))
 
 
@@ -140,7 +141,7 @@ def test_baselines_choose_from_the_rows_that_id3_may_choose_from(planner: Planne
                 assert fit.elements == tuple(sorted(planner.chosen(seen, placement=method, keep=len(fit.elements))))
 
 
-def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps: Make) -> None:
+def test_every_method_sees_exactly_the_rows_given_in_whatever_order() -> None:
     grasps, rows = make_grasps(noise=0.3), np.arange(5, 40)
     used, fresh = planner_of(grasps), planner_of(grasps)
     seen = Samples.of(grasps, "switches").rows(rows)
@@ -152,12 +153,12 @@ def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps:
         assert columns_of(used.chosen(rows, placement=name, keep=3)) == METHODS[name].chooser(seen)(3)
 
 
-def test_any_method_can_be_a_baseline(make_grasps: Make) -> None:
+def test_any_method_can_be_a_baseline() -> None:
     table = replace(planner_of(make_grasps()), baselines=("mrmr",)).table("baselines", NESTED)
     assert [line.name for line in table] == ["ID3", "mrmr", "random"]
 
 
-def test_what_differs_in_its_number_alone_is_chosen_together_and_once(make_grasps: Make) -> None:
+def test_what_differs_in_its_number_alone_is_chosen_together_and_once() -> None:
     asked: list[tuple[float, ...]] = []
 
     def ask(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:

@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -9,21 +8,22 @@ from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.model.integers import IntegerTables
 
-MakeTables = Callable[..., IntegerTables]
+from .conftest import make_tables
+
 SMALL = TARGETS["avr328p"]
 
 
 @pytest.fixture(scope="module")
-def tables(make_tables: MakeTables) -> IntegerTables:
+def tables() -> IntegerTables:
     return make_tables(1, classes=14, switches=33, joints=16, bins=16, reach=12)
 
 
 @pytest.fixture(scope="module")
-def wide_tables(make_tables: MakeTables) -> IntegerTables:
+def wide_tables() -> IntegerTables:
     return make_tables(1, classes=14, switches=33, joints=16, bins=16, reach=300)
 
 
-def test_switches_share_look_ups_where_there_is_flash_for_it(make_tables: MakeTables, tables: IntegerTables) -> None:
+def test_switches_share_look_ups_where_there_is_flash_for_it(tables: IntegerTables) -> None:
     small = make_tables(switches=8, joints=0)
     assert [fit_for(SMALL, each).layout.group for each in (small, tables)] == [4, 4]
     assert fit_for(TARGETS["avr2560"], tables).layout.group == 4
@@ -61,7 +61,7 @@ def test_no_more_flash_is_allowed_than_the_part_has(tables: IntegerTables) -> No
         fit_for(SMALL, tables, 32769)
 
 
-def test_the_smallest_part_that_holds_a_build_is_found(make_tables: MakeTables, tables: IntegerTables) -> None:
+def test_the_smallest_part_that_holds_a_build_is_found(tables: IntegerTables) -> None:
     assert smallest_fit(tables).target is SMALL
     large = make_tables(classes=20, switches=40, joints=16, bins=30, reach=20)
     assert smallest_fit(large, kind="avr").target is TARGETS["avr2560"]

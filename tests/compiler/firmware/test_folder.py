@@ -1,11 +1,12 @@
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.generate import SUMS, sums, write_folder
+
+from ...conftest import tool
 
 OLD = {"thenar_glove.c": "old\n", "examples/one/one.ino": "old\n", "gone.h": "old\n"}
 NEW = {"thenar_glove.c": "new\n", "examples/one/one.ino": "new\n", "Makefile": "all:\n"}
@@ -20,7 +21,7 @@ def folder(tmp_path: Path) -> Path:
     return write_folder(OLD, tmp_path / "firmware")
 
 
-def test_a_new_or_empty_folder_takes_the_files_and_their_sums(tmp_path: Path, tool: Callable[[str], str]) -> None:
+def test_a_new_or_empty_folder_takes_the_files_and_their_sums(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     for name in ("new", "empty"):
         folder = write_folder(NEW, tmp_path / name)

@@ -1,6 +1,5 @@
 import re
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,18 +11,16 @@ from thenar.compiler.firmware.generate import firmware_files, write_folder
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
-Tool = Callable[[str], str]
+from ...conftest import tool
+from ...tables import describe
+from .conftest import make_tables
 
 COMPILERS = {"avr": "avr-gcc", "host": "gcc"}
 
 
 @pytest.fixture(scope="session")
-def build(make_tables: MakeTables, describe: Describe) -> Build:
+def build() -> Build:
     tables = make_tables()
     return Build(describe(tables), tables)
 
@@ -42,7 +39,7 @@ def make(folder: Path, *arguments: str) -> str:
 
 @pytest.mark.parametrize("platform", [name for name in TARGETS if name.startswith(tuple(COMPILERS))])
 def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
-    build: Build, platform: str, tmp_path: Path, tool: Tool
+    build: Build, platform: str, tmp_path: Path
 ) -> None:
     tool(COMPILERS[next(kind for kind in COMPILERS if platform.startswith(kind))])
     folder = write_folder(classifier(build, platform), tmp_path / "firmware")
@@ -65,9 +62,7 @@ def test_files_are_called_by_the_name_and_no_name_is_rewritten(build: Build, pla
 
 
 @pytest.mark.parametrize(("switches", "joints", "words"), [(9, 0, "9 switches"), (0, 3, "3 joints")])
-def test_nobody_reads_of_inputs_that_there_are_none_of(
-    make_tables: MakeTables, describe: Describe, switches: int, joints: int, words: str
-) -> None:
+def test_nobody_reads_of_inputs_that_there_are_none_of(switches: int, joints: int, words: str) -> None:
     tables = make_tables(switches=switches, joints=joints)
     files = classifier(Build(describe(tables), tables), "arduino")
     for path in ("src/thenar_glove.h", "README.md", "library.properties"):
@@ -106,7 +101,7 @@ def test_too_little_flash_is_refused(build: Build, platform: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_build_too_large_for_an_uno_gets_a_larger_part(make_tables: MakeTables, describe: Describe) -> None:
+def test_a_build_too_large_for_an_uno_gets_a_larger_part() -> None:
     tables = make_tables(classes=40, switches=40, joints=12, bins=30)
     build = Build(describe(tables), tables)
     assert fit_for(TARGETS["arduino"], build.tables).target.part == "atmega2560"

@@ -1,6 +1,5 @@
 """Latencies beside the live recogniser on the same frames, beside their definition, and where all can be said ahead."""
 
-import hashlib
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import structs
 
 from thenar.compiler.frontier.latency import POLICIES, decided_on, latency
 from thenar.compiler.frontier.points import FrontierError
@@ -20,11 +20,12 @@ from thenar.compiler.movements.streams import Stream
 from thenar.runtime.build import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.recogniser import LiveRecognizer
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
-from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
+from thenar.runtime.manifest import Calibration
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import UNKNOWN
-from thenar.runtime.recipe import Recipe
+
+from ...tables import describe
 
 CLASSES, SWITCHES, JOINTS = 4, 7, 3
 KINDS = ("single", "dwell", "sequential", "segments")
@@ -71,21 +72,8 @@ def make_random_replay(seed: int, grasps: int = 12) -> Replay:
 
 
 def make_build(tables: IntegerTables) -> Build:
-    manifest = Manifest(
-        schema=SCHEMA,
-        checksum="",
-        thenar="0.1.0",
-        tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
-        ensemble_sha256="0" * 64,
-        source=Origin("1" * 64, 10, "own", 20, joints=22),
-        options=Recipe(0, 100, "both", 1.0, 4, 1),
-        grasps=tuple(f"grasp {number}" for number in range(CLASSES)),
-        switches=tuple(Switch(column, f"s{column}", 0.5) for column in range(SWITCHES)),
-        joints=tuple(Calibration(n, f"j{n}", "raw", 1, 1.0, 255, 255.0) for n in range(tables.n_joints)),
-        proof=Proof(16, tables.scale, tables.bound, 6.5, 13.0, 10, 0),
-        rates=(Recognised("training", 0, 1, 10, 10),),
-    )
-    return Build(manifest, tables)
+    joints = tuple(Calibration(n, f"j{n}", "raw", 1, 1.0, 255, 255.0) for n in range(tables.n_joints))
+    return Build(structs.replace(describe(tables), joints=joints), tables)
 
 
 def policy_of(

@@ -1,6 +1,5 @@
 """What is measured of tables: simulated once, and kept in the store."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,6 +7,8 @@ import pytest
 from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.price import ClassifyModel, measured, random_tables
 from thenar.runtime.model.integers import tables_to_bytes
+
+from ...conftest import tool
 
 TABLES = random_tables(6, 0, 4)
 CONTENT = tables_to_bytes(TABLES)
@@ -27,7 +28,7 @@ def test_on_a_host_the_runtime_is_timed_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_on_an_avr_the_time_is_what_was_simulated(tmp_path: Path, tool: Callable[[str], str]) -> None:
+def test_on_an_avr_the_time_is_what_was_simulated(tmp_path: Path) -> None:
     tool("avr-gcc")
     model = ClassifyModel("avr328p")
     assert not model.unmeasured

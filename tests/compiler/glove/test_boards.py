@@ -1,6 +1,5 @@
 """Boards whose wiring is known: pins, matrices with and without diodes, expanders behind a board."""
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import pytest
@@ -8,13 +7,12 @@ import pytest
 from thenar.compiler.glove.files import spec_files
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import BoardMatrix, BoardWiring, ChipWiring, Harness, StreamWiring
-from thenar.runtime.manifest import Manifest
+
+from .conftest import manifest_of, read_netlist
 
 if TYPE_CHECKING:
     from .conftest import Netlist
 
-Reader = Callable[[bytes], "Netlist"]
-Manifests = Callable[..., Manifest]
 NAMES = ("a", "b", "c")
 
 
@@ -22,7 +20,7 @@ def wired_by(board: BoardWiring) -> Harness:
     return Harness(name="h", streams=(StreamWiring(port="/dev/ttyACM0", switches=NAMES, board=board),))
 
 
-def test_switches_on_pins_go_to_ground(read_netlist: Reader, manifest_of: Manifests) -> None:
+def test_switches_on_pins_go_to_ground() -> None:
     board = BoardWiring(pins={"a": "2", "b": "3", "c": "A0"})
     netlist = read_netlist(spec_files(manifest_of(NAMES), None, wired_by(board))["glove.net"])
     for number, pin in enumerate(("2", "3", "A0"), start=1):
@@ -31,9 +29,7 @@ def test_switches_on_pins_go_to_ground(read_netlist: Reader, manifest_of: Manife
 
 
 @pytest.mark.parametrize("diodes", [True, False])
-def test_in_a_matrix_each_switch_joins_its_column_to_its_row(
-    read_netlist: Reader, manifest_of: Manifests, diodes: bool
-) -> None:
+def test_in_a_matrix_each_switch_joins_its_column_to_its_row(diodes: bool) -> None:
     matrix = BoardMatrix(rows=("2", "3"), columns=("8", "9"), keys=(("a", "b"), ("c", "")), diodes=diodes)
     netlist = read_netlist(spec_files(manifest_of(NAMES), None, wired_by(BoardWiring(matrix=matrix)))["glove.net"])
     for number, (column, row) in enumerate([("8", "2"), ("9", "2"), ("8", "3")], start=1):
@@ -54,7 +50,7 @@ def column_of(netlist: "Netlist", switch: int, diodes: bool) -> str:
     return netlist.net_of(diode, netlist.pin_of(diode, "A"))
 
 
-def test_the_host_reads_the_board_in_front_of_expanders(read_netlist: Reader, manifest_of: Manifests) -> None:
+def test_the_host_reads_the_board_in_front_of_expanders() -> None:
     chip = ChipWiring(kind="mcp23017", address=0x21, pins={"GPA0": "a", "GPB0": "b"})
     harness = wired_by(BoardWiring(pins={"c": "4"}, chips=(chip,)))
     files = spec_files(manifest_of(NAMES), None, harness)

@@ -4,7 +4,6 @@ import csv
 import io
 import subprocess
 import sys
-from collections.abc import Callable
 
 import msgspec
 import pytest
@@ -12,9 +11,9 @@ import pytest
 from thenar.compiler.glove.files import NAMES, spec_files
 from thenar.compiler.glove.spec import SpecSummary
 from thenar.compiler.hand import HandShape
-from thenar.runtime.manifest import Manifest
 
-Manifests = Callable[..., Manifest]
+from .conftest import manifest_of
+
 ALWAYS = {"README.txt", "bom.csv", "glove.net", "glove.toml", "spec.json", "sensors.csv", "wiring.csv"}
 
 DIGEST = """
@@ -33,12 +32,12 @@ def rows(data: bytes) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(data.decode())))
 
 
-def test_there_is_a_pattern_where_the_places_are_known(manifest_of: Manifests, hand: HandShape) -> None:
+def test_there_is_a_pattern_where_the_places_are_known(hand: HandShape) -> None:
     assert spec_files(manifest_of(hand.names[:5]), hand=hand).keys() == NAMES == ALWAYS | {"cutting.svg", "cutting.dxf"}
     assert spec_files(manifest_of(["a"]), hand=hand).keys() == ALWAYS
 
 
-def test_the_same_build_gives_the_same_bytes_in_any_process(manifest_of: Manifests, hand: HandShape) -> None:
+def test_the_same_build_gives_the_same_bytes_in_any_process(hand: HandShape) -> None:
     asked = msgspec.json.encode(manifest_of(hand.names[:20]))
     told = {
         subprocess.run(
@@ -53,7 +52,7 @@ def test_the_same_build_gives_the_same_bytes_in_any_process(manifest_of: Manifes
     assert len(told) == 1
 
 
-def test_lists_summary_and_netlist_agree(manifest_of: Manifests, hand: HandShape) -> None:
+def test_lists_summary_and_netlist_agree(hand: HandShape) -> None:
     files = spec_files(manifest_of(hand.names[:40]), hand=hand)
     summary = msgspec.json.decode(files["spec.json"], type=SpecSummary)
     switches, wires = rows(files["sensors.csv"]), rows(files["wiring.csv"])
@@ -65,7 +64,7 @@ def test_lists_summary_and_netlist_agree(manifest_of: Manifests, hand: HandShape
     assert sum(float(row["quantity"]) for row in rows(files["bom.csv"])) > 40
 
 
-def test_places_in_the_list_are_those_of_the_hand(manifest_of: Manifests, hand: HandShape) -> None:
+def test_places_in_the_list_are_those_of_the_hand(hand: HandShape) -> None:
     for number, row in enumerate(rows(spec_files(manifest_of(hand.names), hand=hand)["sensors.csv"])):
         assert float(row["x_mm"]) == pytest.approx(hand.places[number, 0], abs=0.051)
         assert float(row["y_mm"]) == pytest.approx(hand.places[number, 1], abs=0.051)
@@ -73,7 +72,7 @@ def test_places_in_the_list_are_those_of_the_hand(manifest_of: Manifests, hand: 
         assert row["side"] == {-1: "left side", 0: "palm side", 1: "right side"}[int(hand.sides[number])]
 
 
-def test_the_readme_says_what_to_expect(manifest_of: Manifests, hand: HandShape) -> None:
+def test_the_readme_says_what_to_expect(hand: HandShape) -> None:
     text = " ".join(spec_files(manifest_of(hand.names[:14]), hand=hand)["README.txt"].decode().split())
     assert (
         "A whole scan: 1 transaction, 121.3 us on the wire, 100.0 % of the 121.3 us for all 14 wired switches." in text

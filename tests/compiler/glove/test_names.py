@@ -4,7 +4,6 @@ import csv
 import io
 import json
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given, settings
@@ -14,12 +13,10 @@ from thenar.compiler.glove.files import spec_files
 from thenar.compiler.text import text_of
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import GloveWiring
-from thenar.runtime.manifest import Manifest
 from thenar.runtime.names import fault
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 
-if TYPE_CHECKING:
-    from .conftest import Netlist
+from .conftest import manifest_of, read_netlist
 
 PIECES = [
     "=cmd|' /C calc'!A0",
@@ -53,11 +50,7 @@ NAMES = (
     wired=st.sampled_from([propose_board, propose_harness]),
 )
 def test_every_file_is_well_formed_and_gives_the_names_back(
-    read_netlist: "Callable[[bytes], Netlist]",
-    manifest_of: Callable[..., Manifest],
-    names: list[str],
-    glove: str,
-    wired: Callable[..., object],
+    names: list[str], glove: str, wired: Callable[..., object]
 ) -> None:
     harness = wired(names, name=glove, cyberglove=GloveWiring(port="/dev/ttyUSB0"))
     files = spec_files(manifest_of(names), None, harness)  # type: ignore[arg-type]  # both return a Harness

@@ -1,17 +1,14 @@
 """Segment models learnt from streams: what is counted, and what they decode."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
 from thenar.compiler.movements.segments import Counts, learnt, live_states, model_of, score
 from thenar.compiler.movements.streams import streams_of
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.segmenting.decoder import decode, emissions
 from thenar.runtime.segmenting.model import STEPS
 
-Make = Callable[..., GraspSet]
+from .conftest import make_movements
 
 
 def test_durations_and_changes_are_counted_without_what_is_cut_off() -> None:
@@ -50,7 +47,7 @@ def unsure(labels: np.ndarray, seed: int) -> np.ndarray:
     return 3.0 * np.eye(classes)[seen] + random.normal(0, 0.5, (len(labels), classes))
 
 
-def test_a_model_that_was_learnt_finds_segments_in_unsure_scores(make_movements: Make) -> None:
+def test_a_model_that_was_learnt_finds_segments_in_unsure_scores() -> None:
     grasp_set, other = make_movements(), make_movements("C", seed=2)
     streams = streams_of(grasp_set)
     model = learnt(streams, grasp_set.labels, unsure(grasp_set.labels, 1), 3, 100.0, 10_000)
@@ -64,7 +61,7 @@ def test_a_model_that_was_learnt_finds_segments_in_unsure_scores(make_movements:
 
 
 @pytest.mark.parametrize("lag", [0, 1, 15, 10_000])
-def test_live_states_are_one_a_tick_and_at_last_the_offline_ones(make_movements: Make, lag: int) -> None:
+def test_live_states_are_one_a_tick_and_at_last_the_offline_ones(lag: int) -> None:
     grasp_set = make_movements("A")
     model = model_of(Counts.of([grasp_set.labels], 3), 0.25, 0.0, 2.0, 100.0, 10_000)
     lanes = np.rint(100 * unsure(grasp_set.labels, 3)).astype(np.int64)

@@ -1,6 +1,5 @@
 import codecs
 import gzip
-from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
@@ -9,6 +8,8 @@ import pytest
 from thenar.compiler.recordings import TableError
 from thenar.compiler.recordings.columns import TextFormat
 from thenar.compiler.recordings.table import read_table, sniff
+
+from ...conftest import calls
 
 ROWS = [["Griff", "Person", "Daumen"], ["Größe", "Jörg", "1,5"], ["Haken", "Käthe", "12,25"], ["Haken", "Anna", "3"]]
 
@@ -86,9 +87,7 @@ def test_non_utf8_tables_are_windows_1252_if_python_agrees(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("signs", ["\",;\t| '\\ab1", "\"'~`,;|", '",a\\', "1.,- ", '"', ",", "*/ int x; /*,"])
-def test_a_hostile_sample_is_looked_at_quickly(
-    signs: str, tmp_path: Path, calls: Callable[[Callable[[], object]], int]
-) -> None:
+def test_a_hostile_sample_is_looked_at_quickly(signs: str, tmp_path: Path) -> None:
     """Long lines of whatever may be a delimiter, a quote or an escape, in two orders."""
     random = Random(1)
     lines = ["".join(random.choices(signs, k=20_000)) for _ in range(30)] + [signs * (20_000 // len(signs))] * 30

@@ -33,6 +33,8 @@ from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp
 from thenar.runtime.sinks import SinkError, open_sink
 from thenar.runtime.task import Progress
 
+from ...conftest import tool
+
 MakeGrasp = Callable[..., LiveGrasp]
 LAYOUT = Path(__file__).resolve().parents[3] / "examples" / "foxglove-layout.json"
 LONG_S = 60.0
@@ -67,7 +69,7 @@ def eventually(condition: Callable[[], bool]) -> None:
 
 
 @pytest.fixture(autouse=True)
-def _sdk(tool: Callable[[str], str]) -> None:
+def _sdk() -> None:
     if find_spec("foxglove") is None:
         tool("foxglove-sdk of PyPI")
 

@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -6,10 +5,11 @@ import pytest
 
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
-from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
+
+from ....conftest import tool
+from ....tables import describe
+from ..conftest import make_tables, probed, same_as_python
 
 UNITS = {
     "host": "",
@@ -22,15 +22,7 @@ UNITS = {
 
 
 @pytest.mark.parametrize("part", list(UNITS))
-def test_every_target_answers_as_python_does(
-    request: pytest.FixtureRequest,
-    tool: Callable[[str], str],
-    make_tables: Callable[..., IntegerTables],
-    describe: Callable[[IntegerTables], Manifest],
-    probed: Callable[[IntegerTables, int], Probes],
-    same_as_python: Callable[[Predictions, IntegerTables, Probes], None],
-    part: str,
-) -> None:
+def test_every_target_answers_as_python_does(request: pytest.FixtureRequest, part: str) -> None:
     target = TARGETS[part]
     runs = target if target.kind else request.getfixturevalue("cores")[part]
     if (missing := runs.missing()) is not None:

@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +7,8 @@ from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS, Target, kinds, timed
 from thenar.drivers.members import MemberError
-from thenar.runtime.model.integers import IntegerTables
+
+from ..conftest import make_tables
 
 
 @pytest.mark.parametrize("name", TARGETS)
@@ -37,7 +37,7 @@ def test_a_target_that_is_none_is_refused_with_those_that_are() -> None:
         TARGETS.named("attiny85")
 
 
-def test_a_target_without_a_simulator_says_so(make_tables: Callable[..., IntegerTables]) -> None:
+def test_a_target_without_a_simulator_says_so() -> None:
     core = Target(name="rv64", part="rv64gc", help="a core", flash=1 << 17, ram=1 << 14)
     layout = Layout(make_tables())
     assert core.missing() == "thenar has no simulator of an rv64gc"

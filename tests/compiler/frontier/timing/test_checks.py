@@ -1,19 +1,19 @@
 """The model of classify times, held beside layouts that are compiled and simulated."""
 
-from collections.abc import Callable
-
 import pytest
 
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.frontier.price import ClassifyModel, count_steps, fitting, random_tables
 from thenar.runtime.model.integers import tables_to_bytes
 
+from ....conftest import tool
+
 PYTHON = (2.0, 0.03, 0.15, 0.03, 0.0002, 0.0009, 10.0)
 TABLES = [random_tables(33, 16, 14), random_tables(20, 0, 14), random_tables(8, 0, 5)]
 
 
 @pytest.fixture
-def simavr(tool: Callable[[str], str]) -> None:
+def simavr() -> None:
     for name in ("avr-gcc", "make"):
         tool(name)
     if TARGETS["avr328p"].missing() is not None:
