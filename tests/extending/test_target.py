@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler import GraspSet, compile_build
+from thenar.compiler import compile_build
 from thenar.runtime.build import Build
 
 from ..conftest import tool
+from .conftest import sixty
 
 TYPES = ("cup", "pen", "plate")
 MAIN = """\
@@ -45,7 +46,7 @@ STRICT = (
 
 
 @pytest.fixture
-def build(sixty: Callable[..., GraspSet], tmp_path: Path) -> Build:
+def build(tmp_path: Path) -> Build:
     random, labels = np.random.default_rng(3), np.arange(60) % len(TYPES)
     closed = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 0]], bool)[labels] ^ (random.random((60, 4)) < 0.1)
     made = sixty(closed, 60 * labels[:, None] + random.integers(30, 90, (60, 1)), ("thumb",), TYPES)
