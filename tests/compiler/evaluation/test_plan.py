@@ -4,22 +4,28 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sklearn.linear_model import LogisticRegression
+from sklearn.neighbors import KNeighborsClassifier
 
-from thenar.compiler import grow_id3
+from thenar.compiler import LogitBoostClassifier, grow_id3
 from thenar.compiler.evaluation.choosing import InputChoices
-from thenar.compiler.evaluation.folds import NESTED, PAPER, Protocol, populations_of
+from thenar.compiler.evaluation.folds import NESTED, PAPER, Fold, Protocol, populations_of, weka_folds
 from thenar.compiler.evaluation.plan import (
+    CLASSIFIERS,
     COMPOSITIONS,
     DRAWS,
     Composition,
+    FoldFit,
     Planner,
     RowPlan,
     available,
+    predictions,
 )
 from thenar.compiler.placement.elements import Element, columns_of
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
+from thenar.compiler.trainers.base import Training
 from thenar.runtime.recipe import Recipe
 
 from .conftest import make_grasps
@@ -173,3 +179,83 @@ def test_what_differs_in_its_number_alone_is_chosen_together_and_once() -> None:
     for recipe in recipes:
         assert choices.elements(recipe, rows) == InputChoices(samples).elements(recipe, rows)
     assert len(asked) == 2
+
+
+def test_baselines_answer_as_scikit_learns_on_the_same_standardised_columns() -> None:
+    grasps = make_grasps(noise=0.3, per_type=10)
+    samples, rows = Samples.of(grasps), np.arange(len(grasps))
+    fold, columns = Fold(rows[::2], rows[1::2], "1"), (1, 3, 4, 12, 13)
+    X = samples.inputs
+    learnt = X[fold.train][:, columns].astype(float)
+    mean, spread = learnt.mean(axis=0), learnt.std(axis=0)
+    oracles = {
+        "logistic-regression": LogisticRegression(max_iter=10_000),
+        "5-nearest-neighbours": KNeighborsClassifier(5, weights="distance"),
+    }
+    assert oracles.keys() == {*CLASSIFIERS}
+    for name, oracle in oracles.items():
+        oracle.fit((learnt - mean) / spread, grasps.labels[fold.train])
+        expected = oracle.predict((X[fold.test][:, columns] - mean) / spread)
+        fit = FoldFit(fold, tuple(map(Element, columns[:3])), (0, 1), (0, 1, 2, 3), learner=name)
+        assert np.array_equal(predictions(samples, fit, {}), expected)
+
+
+def test_of_a_single_grasp_type_nothing_else_is_answered() -> None:
+    grasps = make_grasps(noise=0.3)
+    rows = np.flatnonzero(grasps.labels == 2)
+    for name in CLASSIFIERS:
+        fit = FoldFit(Fold(rows, np.arange(5), "1"), (Element(0), Element(1)), (0,), (0, 1, 2, 3), learner=name)
+        assert predictions(Samples.of(grasps), fit, {}).tolist() == [2] * 5
+
+
+QUICK = {"": (Training("logitboost", {"rounds": 5}),)}
+
+
+@pytest.fixture
+def fits() -> tuple[GraspSet, list[FoldFit]]:
+    grasps = make_grasps(noise=0.3)
+    folds = weka_folds(grasps.labels, 4, 1)
+    inputs = [(tuple(map(Element, columns)), joints) for columns, joints in [((0, 1, 2), ()), ((3, 4), (0,))]]
+    return grasps, [FoldFit(fold, *each, (0, 1, 2, 3)) for fold in folds for each in inputs]
+
+
+def test_a_fit_answers_as_the_classifier_does(fits: tuple[GraspSet, list[FoldFit]]) -> None:
+    grasps, todo = fits
+    samples = Samples.of(grasps)
+    training = Training("logitboost", {"rounds": 5, "shrinkage": 0.5})
+    for fit in todo:
+        columns = [*(element.column for element in fit.elements), *(12 + joint for joint in fit.joints)]
+        part = samples.inputs[:, columns]
+        classifier = LogitBoostClassifier(rounds=5, shrinkage=0.5)
+        classifier.fit(part[fit.fold.train], grasps.labels[fit.fold.train])
+        found = predictions(samples, fit, {"": (training,)})
+        assert np.array_equal(found, classifier.predict(part[fit.fold.test]))
+
+
+def test_labels_keep_their_numbers_where_some_do_not_occur() -> None:
+    grasps = make_grasps(noise=0.0)
+    rows = np.flatnonzero(np.isin(grasps.labels, (1, 3)))
+    fold = Fold(rows[::2], rows[1::2], "1")
+    found = predictions(Samples.of(grasps), FoldFit(fold, tuple(map(Element, range(12))), (), (1, 3)), QUICK)
+    assert np.array_equal(found, grasps.labels[fold.test])
+
+
+def test_without_inputs_the_most_frequent_training_label_is_answered() -> None:
+    grasps = make_grasps()
+    rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
+    fold = Fold(rows, np.arange(6), "1")
+    found = predictions(Samples.of(grasps), FoldFit(fold, (), (), (0, 1, 2, 3)), QUICK)
+    assert found.tolist() == [2] * 6
+
+
+def test_where_no_input_varies_the_most_frequent_training_label_is_answered() -> None:
+    grasps = make_grasps()
+    rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
+    codes = grasps.codes.copy()
+    codes[rows, :2] = 7, 65535
+    samples = Samples.of(replace(grasps, codes=codes))
+    fit = FoldFit(Fold(rows, np.arange(6), "1"), (), (0, 1), (0, 1, 2, 3))
+    assert fit.is_blind(samples)
+    assert predictions(samples, fit, QUICK).tolist() == [2] * 6
+    codes[rows[-1], 1] = 0
+    assert not fit.is_blind(Samples.of(replace(grasps, codes=codes)))
