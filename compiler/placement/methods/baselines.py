@@ -47,7 +47,7 @@ def most_informative(bits: Bits, labels: Labels) -> Columns:
     def order(one: int, other: int) -> int:
         return -_sign(counts, scores[[one, other]], (one, None), (other, None))
 
-    return tuple(sorted(counts.varying.tolist(), key=lambda bit: cmp_to_key(order)(int(firsts[kinds[bit]]))))
+    return tuple(sorted(counts.varying.tolist(), key=lambda bit: cmp_to_key(order)(int(firsts[kinds.flat[bit]]))))
 
 
 def cmim(bits: Bits, labels: Labels) -> Iterator[int]:
