@@ -62,7 +62,7 @@ def need(path: Path) -> Path:
     return path if path.exists() else lacking("/".join(path.parts[-2:]))
 
 
-def need_tool(name: str) -> str:
+def tool(name: str) -> str:
     """Return the path of program `name` if it is installed."""
     return shutil.which(name) or lacking(f"program {name}")
 
@@ -76,7 +76,7 @@ def cases() -> Path:
 @pytest.fixture(scope="session")
 def weka() -> Callable[..., str]:
     """Return a function that runs a class of the real Weka 3.6 with arguments and returns what it prints."""
-    command = [need_tool("java"), "-cp", str(need(WEKA_JAR))]
+    command = [tool("java"), "-cp", str(need(WEKA_JAR))]
 
     def run(*arguments: str) -> str:
         return subprocess.run([*command, *arguments], check=True, capture_output=True, text=True).stdout
@@ -84,42 +84,32 @@ def weka() -> Callable[..., str]:
     return run
 
 
-@pytest.fixture(scope="session")
-def calls() -> Callable[[Callable[[], object]], int]:
-    """Return what counts the calls of Python and C functions that some work makes: no other load changes them."""
+def calls(work: Callable[[], object]) -> int:
+    """Count the calls of Python and C functions that some work makes: no other load changes them."""
+    number = 0
 
-    def counted(work: Callable[[], object]) -> int:
-        number = 0
+    def count(_frame: FrameType, event: str, _what: object) -> None:
+        nonlocal number
+        number += event in {"call", "c_call"}
 
-        def count(_frame: FrameType, event: str, _what: object) -> None:
-            nonlocal number
-            number += event in {"call", "c_call"}
-
-        gc.disable()  # hypothesis watches every search for garbage
-        sys.setprofile(count)
-        try:
-            work()
-        finally:
-            sys.setprofile(None)
-            gc.enable()
-        return number
-
-    return counted
+    gc.disable()  # hypothesis watches every search for garbage
+    sys.setprofile(count)
+    try:
+        work()
+    finally:
+        sys.setprofile(None)
+        gc.enable()
+    return number
 
 
-@pytest.fixture(scope="session")
-def peak_bytes() -> Callable[[Callable[[], object]], int]:
-    """Return what tells the most memory that some work holds at a time, arrays included."""
-
-    def measured(work: Callable[[], object]) -> int:
-        tracemalloc.start()
-        try:
-            work()
-            return tracemalloc.get_traced_memory()[1]
-        finally:
-            tracemalloc.stop()
-
-    return measured
+def peak_bytes(work: Callable[[], object]) -> int:
+    """Return the most memory that some work holds at a time, arrays included."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.fixture
@@ -133,7 +123,7 @@ def one_way_to_train() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def c_compiler() -> str:
-    return need_tool("cc")
+    return tool("cc")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -224,13 +214,7 @@ def update_golden(request: pytest.FixtureRequest) -> bool:
 
 
 @pytest.fixture(scope="session")
-def tool() -> Callable[[str], str]:
-    """Return a function that finds an installed program by its name, or skips (fails under THENAR_REQUIRE_ALL=1)."""
-    return need_tool
-
-
-@pytest.fixture(scope="session")
-def new_chromium(tool: Callable[[str], str]) -> Callable[..., Any]:
+def new_chromium() -> Callable[..., Any]:
     """Return a function that starts a Chromium without a window, with `flags` of its own, that keeps these `logs`."""
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service

@@ -16,11 +16,13 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+from .conftest import tool
 
 ROOT = Path(__file__).resolve().parents[1]
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
@@ -122,7 +124,7 @@ class Clone:
 
 
 @pytest.fixture
-def clone(tmp_path: Path, tool: Callable[[str], str]) -> Clone:
+def clone(tmp_path: Path) -> Clone:
     for name in ("cc", "make"):
         tool(name)
     binaries, folder = tmp_path / "bin", tmp_path / "thenar"

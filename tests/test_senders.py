@@ -17,6 +17,8 @@ import pytest
 from thenar.drivers.lines import LineParser, Row
 from thenar.runtime.live.stream_probe import propose_stream
 
+from .conftest import tool
+
 SENDERS = Path(__file__).resolve().parents[1] / "examples" / "senders"
 COLUMNS = ("ms", "thumb", "index", "flex_index", "pad_palm")
 ARDUINO = Path("/usr/share/arduino/hardware/arduino/avr")
@@ -97,9 +99,7 @@ def test_the_python_sender_over_a_pty_is_proposed_as_what_it_is(started: Callabl
 
 
 @pytest.mark.slow
-def test_the_micropython_sender_runs_in_the_unix_port(
-    tool: Callable[[str], str], started: Callable[..., object], tmp_path: Path
-) -> None:
+def test_the_micropython_sender_runs_in_the_unix_port(started: Callable[..., object], tmp_path: Path) -> None:
     if find_spec("micropython_unix") is None:
         tool("micropython_unix of PyPI")
     (tmp_path / "machine.py").write_text(MACHINE)
@@ -113,9 +113,7 @@ def test_the_micropython_sender_runs_in_the_unix_port(
 
 
 @pytest.mark.slow
-def test_the_arduino_sender_runs_on_an_uno_in_simavr(
-    tool: Callable[[str], str], started: Callable[..., object], tmp_path: Path
-) -> None:
+def test_the_arduino_sender_runs_on_an_uno_in_simavr(started: Callable[..., object], tmp_path: Path) -> None:
     if not ARDUINO.is_dir():
         tool("arduino-core-avr")
     core, variant = ARDUINO / "cores" / "arduino", ARDUINO / "variants" / "standard"

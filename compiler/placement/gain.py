@@ -307,20 +307,20 @@ def _n_log_n(n: int) -> float:
 
 
 class Cooccurrence:
-    """Counts of all pairs of bits X (n, d) bool in each of n_classes classes `labels` (n,)."""
+    """Counts of all pairs of bits X (n, d) bool, and of each in `ones`, in every one of n_classes classes `labels`."""
 
     def __init__(self, X: NDArray[np.bool_], labels: NDArray[np.intp], n_classes: int) -> None:
         self._X, self._labels, self._counter = X, labels, CellCounter(X, labels, n_classes)
         self._totals = np.bincount(labels, minlength=n_classes)
-        self._ones = self._counter.count(np.arange(len(X)))
-        ones = self._ones.sum(axis=0)
+        self.ones = self._counter.count(np.arange(len(X)))
+        ones = self.ones.sum(axis=0)
         self.varying = np.flatnonzero((ones > 0) & (ones < len(X)))
         # Four sums, each of at most n ln n, of 6 (K + 1) terms together.
         self.error_bound = error_bound(len(X), 6 * (n_classes + 1), 4)
 
     def information(self, given: int | None = None) -> Floats:
         """Return n * I(class; a | given) for every bit a, (d,), in nats."""
-        ones = self._ones
+        ones = self.ones
         tables = np.stack([self._totals[:, np.newaxis] - ones, ones], axis=2)[..., np.newaxis]
         if given is not None:
             # The counts of rows in which the given bit is set, and of the others.

@@ -3,10 +3,11 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from shutil import copytree
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -15,8 +16,6 @@ from thenar.cli import run
 from thenar.compiler import GraspSet, compile_build
 
 from ..sets import grasp_set_of
-
-Thenar = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
 @contextmanager
@@ -35,20 +34,15 @@ def _redirected(name: str, number: int, path: Path) -> Iterator[None]:
         os.close(kept)
 
 
-@pytest.fixture(scope="session")
-def thenar(tmp_path_factory: pytest.TempPathFactory) -> Thenar:
+def thenar(*arguments: object) -> "subprocess.CompletedProcess[str]":
     """Run `thenar` in this process, which spares the start of Python and all imports."""
-    folder = tmp_path_factory.mktemp("printed")
-
-    def here(*arguments: object) -> "subprocess.CompletedProcess[str]":
-        words, out, err = list(map(str, arguments)), folder / "out", folder / "err"
-        with Path(os.devnull).open() as nothing, pytest.MonkeyPatch.context() as changed:
-            changed.setattr(sys, "stdin", nothing)
-            with _redirected("stdout", 1, out), _redirected("stderr", 2, err):
-                code = run(words)
+    words = list(map(str, arguments))
+    with TemporaryDirectory() as folder, Path(os.devnull).open() as nothing, pytest.MonkeyPatch.context() as changed:
+        out, err = Path(folder, "out"), Path(folder, "err")
+        changed.setattr(sys, "stdin", nothing)
+        with _redirected("stdout", 1, out), _redirected("stderr", 2, err):
+            code = run(words)
         return subprocess.CompletedProcess(words, code, out.read_text("utf-8"), err.read_text("utf-8"))
-
-    return here
 
 
 @pytest.fixture(scope="session")

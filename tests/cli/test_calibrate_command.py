@@ -17,10 +17,11 @@ from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.calibration import load_calibration
 
+from .conftest import thenar
+
 # Dialogues over a pty, in real time.
 pytestmark = pytest.mark.slow
 
-Thenar = Callable[..., "subprocess.CompletedProcess[str]"]
 Answer = Callable[[str], str | None]
 HANGING_S = 60.0
 ALL = (FLAT, *POSES)
@@ -222,7 +223,7 @@ def test_on_a_terminal_the_bytes_are_shown_live(line: PtyLine, tmp_path: Path) -
     assert b"interrupted" in shown
 
 
-def test_missing_port_and_wrong_baud_rate_are_reported_in_a_sentence(thenar: Thenar, tmp_path: Path) -> None:
+def test_missing_port_and_wrong_baud_rate_are_reported_in_a_sentence(tmp_path: Path) -> None:
     done = thenar("calibrate", tmp_path / "none", "-o", tmp_path / "a.toml")
     assert (done.returncode, done.stdout) == (2, "")
     assert re.fullmatch(r"thenar: .*/none: there is no such port: .*\n", done.stderr)

@@ -1,13 +1,16 @@
+import os
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from threading import Event
 
+import click
 import pytest
 
 from thenar.cli import run
+from thenar.cli.calibrate_command import TypedLines
 from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine, load_taxel_calibration
@@ -83,3 +86,25 @@ def test_presses_have_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert run([*asked, "127.0.0.1:0"]) == 2
     assert "leave out --web or --taxels" in capsys.readouterr().err
     assert not (tmp_path / "pads.toml").exists()
+
+
+@pytest.fixture
+def keyboard() -> Iterator[tuple[int, int]]:
+    ends = os.pipe()
+    yield ends
+    os.close(ends[0])
+
+
+def test_a_whole_line_is_taken_without_waiting(keyboard: tuple[int, int]) -> None:
+    reading, writing = keyboard
+    typed = TypedLines(reading)
+    assert typed.take() is None
+    os.write(writing, b"ye")
+    assert typed.take() is None
+    os.write(writing, b"s \r\n\nq\n")
+    assert [typed.take() for _ in range(4)] == ["yes", "", "q", None]
+    os.write(writing, b"\xff\n")
+    os.close(writing)
+    assert typed.take() == "\N{REPLACEMENT CHARACTER}"
+    with pytest.raises(click.ClickException, match="nothing is written"):
+        typed.take()

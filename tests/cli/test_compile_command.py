@@ -1,7 +1,5 @@
 import json
 import re
-import subprocess
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,10 +7,10 @@ import numpy as np
 
 from thenar.compiler import GraspSet
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from .conftest import thenar
 
 
-def test_compile_writes_a_build_and_says_what_it_is(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_compile_writes_a_build_and_says_what_it_is(set_file: Path, tmp_path: Path) -> None:
     done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 10)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -32,7 +30,7 @@ def test_compile_writes_a_build_and_says_what_it_is(thenar: Thenar, set_file: Pa
     assert made == {*core, *(f"thenar_{name}" for name in glove)}
 
 
-def test_json_prints_what_build_json_says(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_json_prints_what_build_json_says(set_file: Path, tmp_path: Path) -> None:
     given = ("--rounds", 3, "--inputs", "switches", "--no-report", "--json")
     done = thenar("compile", set_file, "-o", tmp_path / "build", *given)
     document = json.loads(done.stdout)
@@ -41,7 +39,7 @@ def test_json_prints_what_build_json_says(thenar: Thenar, set_file: Path, tmp_pa
     assert document["joints"] == []
 
 
-def test_every_option_reaches_the_build(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_every_option_reaches_the_build(set_file: Path, tmp_path: Path) -> None:
     options = {"prune": 2, "rounds": 3, "inputs": "both", "shrinkage": 0.5, "folds": 2, "seed": 7, "tolerance": 1e-9}
     options |= {"table_bits": 8, "max_bins": 4, "width": 15, "refuse": 0.125}
     given = [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", value)]
@@ -49,14 +47,14 @@ def test_every_option_reaches_the_build(thenar: Thenar, set_file: Path, tmp_path
     assert json.loads(done.stdout)["options"] == options
 
 
-def test_tables_have_8_or_16_bits(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_tables_have_8_or_16_bits(set_file: Path, tmp_path: Path) -> None:
     done = thenar("compile", set_file, "-o", tmp_path / "build", "--table-bits", 9)
     assert done.returncode == 2
     assert "'9' is not one of '16', '8'" in done.stderr
     assert not (tmp_path / "build").exists()
 
 
-def test_a_tolerance_ends_the_training_and_the_build_says_so(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_tolerance_ends_the_training_and_the_build_says_so(set_file: Path, tmp_path: Path) -> None:
     given = ("compile", set_file, "-o", tmp_path / "build", "--no-report", "--rounds", 500, "--folds", 0)
     done = thenar(*given, "--tolerance", 0.01)
     rounds = json.loads((tmp_path / "build" / "build.json").read_bytes())["stopped_after"]
@@ -65,7 +63,7 @@ def test_a_tolerance_ends_the_training_and_the_build_says_so(thenar: Thenar, set
     assert thenar(*given, "--tolerance", "nan").returncode == 2
 
 
-def test_a_training_that_no_tolerance_ends_says_nothing_of_it(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_training_that_no_tolerance_ends_says_nothing_of_it(set_file: Path, tmp_path: Path) -> None:
     done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 3, "--folds", 0, "--no-report")
     assert "stopped" not in done.stdout
     document = json.loads((tmp_path / "build" / "build.json").read_bytes())
@@ -73,7 +71,7 @@ def test_a_training_that_no_tolerance_ends_says_nothing_of_it(thenar: Thenar, se
     assert "tolerance" not in document["options"]
 
 
-def test_a_build_that_answers_one_grasp_type_only_says_so(thenar: Thenar, small_set: GraspSet, tmp_path: Path) -> None:
+def test_a_build_that_answers_one_grasp_type_only_says_so(small_set: GraspSet, tmp_path: Path) -> None:
     either, other = np.arange(60) % 2 == 1, np.arange(60) // 2 % 2 == 1
     exclusive_or = replace(
         small_set,

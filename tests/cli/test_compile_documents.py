@@ -5,7 +5,6 @@ import json
 import re
 import shlex
 import subprocess
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,8 @@ import pytest
 from thenar.compiler import GraspSet
 from thenar.simulator.handmaps.handmap import hand_map
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from .conftest import thenar
+
 pytestmark = pytest.mark.slow
 
 QUICK = ("--rounds", 3, "--folds", 0)
@@ -53,16 +53,14 @@ def gloved_file(gloved: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
     return path
 
 
-def test_no_report_leaves_out_the_report_and_the_spec(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+def test_no_report_leaves_out_the_report_and_the_spec(gloved_file: Path, tmp_path: Path) -> None:
     done(thenar("compile", gloved_file, "-o", tmp_path / "build", *QUICK, "--no-report"))
     made = sorted(path.name for path in (tmp_path / "build").iterdir())
     assert made == ["build.json", "ensemble.bin", "firmware", "hand.json", "tables.bin", "try.html"]
 
 
 @pytest.mark.parametrize("length", [None, 150])
-def test_the_spec_in_a_build_is_what_spec_writes_of_it(
-    thenar: Thenar, gloved_file: Path, tmp_path: Path, length: int | None
-) -> None:
+def test_the_spec_in_a_build_is_what_spec_writes_of_it(gloved_file: Path, tmp_path: Path, length: int | None) -> None:
     build, spec = tmp_path / "build", tmp_path / "spec"
     given = () if length is None else ("--hand-length", length)
     done(thenar("compile", gloved_file, "-o", build, *QUICK, *given))
@@ -72,7 +70,7 @@ def test_the_spec_in_a_build_is_what_spec_writes_of_it(
     assert f"right hand of {length or 190} mm" in files[0]["cutting.svg"].decode()
 
 
-def test_a_wiring_is_in_the_report_and_its_spec_agrees(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+def test_a_wiring_is_in_the_report_and_its_spec_agrees(gloved_file: Path, tmp_path: Path) -> None:
     build, spec, glove = tmp_path / "build", tmp_path / "spec", tmp_path / "glove.toml"
     done(thenar("compile", gloved_file, "-o", build, *QUICK, "--no-report", "--propose", glove))
     compiled = thenar("compile", gloved_file, "-o", build, *QUICK, "--glove", glove)
@@ -85,19 +83,19 @@ def test_a_wiring_is_in_the_report_and_its_spec_agrees(thenar: Thenar, gloved_fi
         assert path.read_bytes() == (build / "spec" / path.name).read_bytes(), path.name
 
 
-def test_a_hand_length_needs_a_spec_to_be_used_in(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+def test_a_hand_length_needs_a_spec_to_be_used_in(gloved_file: Path, tmp_path: Path) -> None:
     given = ("compile", gloved_file, "-o", tmp_path / "build", *QUICK, "--hand-length", 180, "--no-report")
     assert "--no-report omits" in refused(thenar(*given))
     assert not (tmp_path / "build").exists()
 
 
-def test_a_hand_length_needs_switches_whose_places_are_known(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_hand_length_needs_switches_whose_places_are_known(set_file: Path, tmp_path: Path) -> None:
     given = ("compile", set_file, "-o", tmp_path / "build", *QUICK, "--hand-length", 180)
     assert "these switches are not on it: use --layout instead" in refused(thenar(*given))
     assert not (tmp_path / "build").exists()
 
 
-def test_a_method_that_takes_a_number_keeps_it(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+def test_a_method_that_takes_a_number_keeps_it(gloved_file: Path, tmp_path: Path) -> None:
     build = tmp_path / "build"
     done(thenar("compile", gloved_file, "-o", build, *QUICK, "--method", "elimination", "--keep", 2))
     document = json.loads((build / "build.json").read_bytes())
@@ -117,14 +115,14 @@ def test_a_method_that_takes_a_number_keeps_it(thenar: Thenar, gloved_file: Path
     ],
 )
 def test_a_method_gets_its_own_parameter(
-    thenar: Thenar, gloved_file: Path, tmp_path: Path, given: tuple[object, ...], because: str
+    gloved_file: Path, tmp_path: Path, given: tuple[object, ...], because: str
 ) -> None:
     result = thenar("compile", gloved_file, "-o", tmp_path / "build", *QUICK, *given)
     assert because in refused(result)
     assert not (tmp_path / "build").exists()
 
 
-def test_a_width_bounds_every_sum(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+def test_a_width_bounds_every_sum(gloved_file: Path, tmp_path: Path) -> None:
     bounds = []
     for width in (6, 16):
         build = tmp_path / str(width)
@@ -135,7 +133,7 @@ def test_a_width_bounds_every_sum(thenar: Thenar, gloved_file: Path, tmp_path: P
     assert bounds[0] < bounds[1]
 
 
-def test_the_commands_of_a_report_make_the_build_again(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+def test_the_commands_of_a_report_make_the_build_again(gloved_file: Path, tmp_path: Path) -> None:
     build, again = tmp_path / "build", tmp_path / "again"
     given = ("--rounds", 3, "--folds", 2, "--method", "elimination", "--keep", 3, "--width", 12, "--max-bins", 5)
     done(thenar("compile", gloved_file, "-o", build, *given))

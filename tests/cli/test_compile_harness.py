@@ -1,7 +1,5 @@
 """`thenar compile` for a harness, and the harness that it proposes."""
 
-import subprocess
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,13 +9,12 @@ from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from .conftest import thenar
+
 FEW = ("--rounds", 3, "--folds", 0)
 
 
-def test_a_proposed_harness_loads_and_reads_every_kept_switch_at_once(
-    thenar: Thenar, set_file: Path, tmp_path: Path
-) -> None:
+def test_a_proposed_harness_loads_and_reads_every_kept_switch_at_once(set_file: Path, tmp_path: Path) -> None:
     build, glove = tmp_path / "build", tmp_path / "glove.toml"
     done = thenar("compile", set_file, "-o", build, *FEW, "--propose", glove)
     assert done.returncode == 0, done.stderr
@@ -41,7 +38,7 @@ def test_a_proposed_harness_loads_and_reads_every_kept_switch_at_once(
 
 
 def test_the_map_is_printed_by_chip_with_its_share_of_the_wiring(
-    thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
+    set_file: Path, small_set: GraspSet, tmp_path: Path
 ) -> None:
     names = [*small_set.switch_names, *(f"more {number}" for number in range(50))]
     glove = tmp_path / "full.toml"
@@ -52,7 +49,7 @@ def test_the_map_is_printed_by_chip_with_its_share_of_the_wiring(
     assert "20.4 % of the 485.2 us for all 56 wired switches" in " ".join(done.stdout.split())
 
 
-def test_a_board_is_proposed_with_a_key_for_every_kept_switch(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_board_is_proposed_with_a_key_for_every_kept_switch(set_file: Path, tmp_path: Path) -> None:
     build, glove = tmp_path / "build", tmp_path / "glove.toml"
     done = thenar("compile", set_file, "-o", build, *FEW, "--propose", glove, "--chip", "board")
     assert done.returncode == 0, done.stderr
@@ -62,9 +59,7 @@ def test_a_board_is_proposed_with_a_key_for_every_kept_switch(thenar: Thenar, se
     assert not harness.buses
 
 
-def test_streams_are_told_with_their_switches(
-    thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
-) -> None:
+def test_streams_are_told_with_their_switches(set_file: Path, small_set: GraspSet, tmp_path: Path) -> None:
     glove = tmp_path / "board.toml"
     names = ", ".join(f'"{name}"' for name in small_set.switch_names)
     glove.write_text(f'[[stream]]\nport = "/dev/ttyACM0"\nrate_hz = 200\nswitches = [{names}, "spare"]\n')
@@ -74,7 +69,7 @@ def test_streams_are_told_with_their_switches(
     assert f"stream /dev/ttyACM0: {kept} kept switches, a row every 5000 us" in " ".join(done.stdout.split())
 
 
-def test_a_file_is_replaced_only_if_asked(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_file_is_replaced_only_if_asked(set_file: Path, tmp_path: Path) -> None:
     glove = tmp_path / "glove.toml"
     glove.write_text("mine")
     given = ("compile", set_file, "-o", tmp_path / "build", *FEW, "--propose", glove, "--chip", "pcf8574")
@@ -87,7 +82,7 @@ def test_a_file_is_replaced_only_if_asked(thenar: Thenar, set_file: Path, tmp_pa
     assert load_harness(glove).buses[0].chips[0].kind == "pcf8574"
 
 
-def test_options_that_do_not_go_together_are_refused(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_options_that_do_not_go_together_are_refused(set_file: Path, tmp_path: Path) -> None:
     build, glove = ("compile", set_file, "-o", tmp_path / "build"), tmp_path / "glove.toml"
     glove.write_text("")
     refused = [
@@ -107,7 +102,7 @@ def test_options_that_do_not_go_together_are_refused(thenar: Thenar, set_file: P
     assert not (tmp_path / "build").exists()
 
 
-def test_a_wrong_harness_is_told_before_the_training(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_wrong_harness_is_told_before_the_training(set_file: Path, tmp_path: Path) -> None:
     glove = tmp_path / "glove.toml"
     glove.write_text('[[bus]]\ndevice = "d"\n[[bus.chip]]\nkind = "mcp23017"\naddress = 0x20\npins = { GPA7 = "s1" }\n')
     done = thenar("compile", set_file, "-o", tmp_path / "build", "--glove", glove)
@@ -115,7 +110,7 @@ def test_a_wrong_harness_is_told_before_the_training(thenar: Thenar, set_file: P
     assert "glove.toml, line 6: bus[0].chip[0].pins.GPA7: must not be an input" in done.stderr
 
 
-def test_a_harness_without_the_kept_switches_is_told_which(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_harness_without_the_kept_switches_is_told_which(set_file: Path, tmp_path: Path) -> None:
     glove = tmp_path / "glove.toml"
     glove.write_text("")
     done = thenar("compile", set_file, "-o", tmp_path / "build", *FEW, "--glove", glove)
@@ -123,7 +118,7 @@ def test_a_harness_without_the_kept_switches_is_told_which(thenar: Thenar, set_f
     assert "harness 'glove' has no pin or column for s" in done.stderr
 
 
-def test_a_preset_sets_options_and_explicit_ones_win(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_preset_sets_options_and_explicit_ones_win(set_file: Path, tmp_path: Path) -> None:
     given = ("compile", set_file, "-o", tmp_path / "build", "--folds", "0", "--no-report")
     for more, expected in (
         (("--preset", "smallest"), ("elimination", 8, None, 8)),
@@ -135,9 +130,7 @@ def test_a_preset_sets_options_and_explicit_ones_win(thenar: Thenar, set_file: P
         assert (options.placement, options.keep, options.rounds, options.table_bits) == expected
 
 
-def test_compile_and_run_refuse_a_glove_that_lacks_a_joint(
-    thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
-) -> None:
+def test_compile_and_run_refuse_a_glove_that_lacks_a_joint(set_file: Path, small_set: GraspSet, tmp_path: Path) -> None:
     names = list(small_set.switch_names)
     columns = ", ".join(f'"{name}"' for name in ["ms", *names, "j0"])
     glove, build = tmp_path / "glove.toml", tmp_path / "build"
@@ -155,7 +148,7 @@ def test_compile_and_run_refuse_a_glove_that_lacks_a_joint(
     assert (fewer.returncode, fewer.stderr) == (0, "")
 
 
-def test_a_glove_that_measures_no_joints_is_a_warning(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_glove_that_measures_no_joints_is_a_warning(set_file: Path, tmp_path: Path) -> None:
     build, glove = tmp_path / "build", tmp_path / "glove.toml"
     assert thenar("compile", set_file, "-o", build, *FEW, "--no-report", "--propose", glove).returncode == 0
     done = thenar("compile", set_file, "-o", build, *FEW, "--no-report", "--glove", glove)
@@ -164,7 +157,7 @@ def test_a_glove_that_measures_no_joints_is_a_warning(thenar: Thenar, set_file: 
 
 
 def test_verify_run_and_segment_report_missing_inputs_alike(
-    thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
+    set_file: Path, small_set: GraspSet, tmp_path: Path
 ) -> None:
     build, other = tmp_path / "build", tmp_path / "other.grasps"
     assert thenar("compile", set_file, "-o", build, *FEW, "--no-report").returncode == 0

@@ -1,6 +1,5 @@
 import json
-import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,7 @@ from thenar.drivers.emulated.cyberglove import Doubts, EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.live import checkup
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from .conftest import thenar
 
 NAMES = ["j0", "j1", *SENSORS_18[2:]]
 
@@ -37,7 +36,7 @@ def calibrated(harness: Path, *joints: str) -> None:
     harness.write_text(harness.read_text() + 'calibration = "anna.toml"\n')
 
 
-def test_doctor_reports_devices_scan_times_and_records_against_the_formula(thenar: Thenar, harness: Path) -> None:
+def test_doctor_reports_devices_scan_times_and_records_against_the_formula(harness: Path) -> None:
     before = harness.read_text() + "# mine\n"
     harness.write_text(before)
     done = thenar("doctor", harness, "--json", "--write")
@@ -53,14 +52,14 @@ def test_doctor_reports_devices_scan_times_and_records_against_the_formula(thena
     assert harness.read_text().count("record_us") == 1
 
 
-def test_a_box_without_a_mask_is_found(thenar: Thenar, harness: Path, glove: EmulatedCyberGlove) -> None:
+def test_a_box_without_a_mask_is_found(harness: Path, glove: EmulatedCyberGlove) -> None:
     glove.box.doubts = Doubts(mask="ignored")
     done = thenar("doctor", harness)
     assert done.returncode == 0, done.stderr
     assert "it accepts no sensor mask" in " ".join(done.stdout.split())
 
 
-def test_a_port_that_is_not_there_is_exit_code_1(thenar: Thenar, tmp_path: Path) -> None:
+def test_a_port_that_is_not_there_is_exit_code_1(tmp_path: Path) -> None:
     path = tmp_path / "glove.toml"
     path.write_text('[cyberglove]\nport = "/dev/none"\n')
     done = thenar("doctor", path)
@@ -70,7 +69,7 @@ def test_a_port_that_is_not_there_is_exit_code_1(thenar: Thenar, tmp_path: Path)
 
 
 @pytest.mark.parametrize("table", ["[cyberglove]\nport = {}", "[[stream]]\nswitches = ['s']\nport = {}"])
-def test_a_port_that_writes_to_a_file_is_refused(thenar: Thenar, tmp_path: Path, table: str) -> None:
+def test_a_port_that_writes_to_a_file_is_refused(tmp_path: Path, table: str) -> None:
     path, victim = tmp_path / "glove.toml", tmp_path / "victim"
     victim.write_text("kept")
     path.write_text(table.format(f'"spy:///dev/null?file={victim}"'))
@@ -82,16 +81,14 @@ def test_a_port_that_writes_to_a_file_is_refused(thenar: Thenar, tmp_path: Path,
     assert victim.read_text() == "kept"
 
 
-def test_a_calibration_that_cannot_be_read_is_found(thenar: Thenar, harness: Path) -> None:
+def test_a_calibration_that_cannot_be_read_is_found(harness: Path) -> None:
     harness.write_text(harness.read_text() + 'calibration = "anna.toml"\n')
     done = thenar("doctor", harness)
     assert done.returncode == 1
     assert "anna.toml: cannot be read" in done.stdout
 
 
-def test_what_a_build_needs_of_the_calibration_is_found(
-    thenar: Thenar, small_set: GraspSet, harness: Path, tmp_path: Path
-) -> None:
+def test_what_a_build_needs_of_the_calibration_is_found(small_set: GraspSet, harness: Path, tmp_path: Path) -> None:
     build = compile_build(small_set, tmp_path / "build", rounds=5, folds=0, inputs="joints").folder
     assert thenar("doctor", harness).returncode == 0
     done = thenar("doctor", harness, "--build", build)
@@ -102,7 +99,7 @@ def test_what_a_build_needs_of_the_calibration_is_found(
     assert done.returncode == 0, done.stdout
 
 
-def test_a_harness_without_devices_is_refused(thenar: Thenar, tmp_path: Path) -> None:
+def test_a_harness_without_devices_is_refused(tmp_path: Path) -> None:
     (tmp_path / "glove.toml").write_text("")
     done = thenar("doctor", tmp_path / "glove.toml")
     assert done.returncode == 2

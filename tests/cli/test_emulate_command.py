@@ -4,7 +4,6 @@ import pty
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,8 @@ from thenar.compiler import GraspSet
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.harness.loading import load_harness
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from .conftest import thenar
+
 LONG_S = 60
 
 SCENE = """
@@ -52,9 +52,7 @@ def glove(tmp_path: Path) -> Path:
     return path
 
 
-def test_emulate_runs_a_command_and_returns_its_exit_code(
-    thenar: Thenar, scene: Path, glove: Path, tmp_path: Path
-) -> None:
+def test_emulate_runs_a_command_and_returns_its_exit_code(scene: Path, glove: Path, tmp_path: Path) -> None:
     folder, log = tmp_path / "em", tmp_path / "played.jsonl"
     program = "import os, sys; print(os.path.realpath(sys.argv[2])); sys.exit(7)"
     done = thenar(
@@ -72,7 +70,7 @@ def test_emulate_runs_a_command_and_returns_its_exit_code(
     assert [line["row"] for line in lines[:14]] == list(range(len(lines[:14])))
 
 
-def test_the_command_is_ended_when_all_is_played(thenar: Thenar, scene: Path, glove: Path, tmp_path: Path) -> None:
+def test_the_command_is_ended_when_all_is_played(scene: Path, glove: Path, tmp_path: Path) -> None:
     program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\ntry: signal.pause()\n"
     program += "except KeyboardInterrupt: print('ended')"
     done = thenar(
@@ -82,7 +80,7 @@ def test_the_command_is_ended_when_all_is_played(thenar: Thenar, scene: Path, gl
     assert (done.returncode, done.stdout) == (0, "ended\n"), done.stderr
 
 
-def test_a_set_of_grasps_is_played_row_by_row(thenar: Thenar, scene: Path, tmp_path: Path) -> None:
+def test_a_set_of_grasps_is_played_row_by_row(scene: Path, tmp_path: Path) -> None:
     made, glove, log = tmp_path / "set.grasps", tmp_path / "glove.toml", tmp_path / "log.jsonl"
     assert thenar("simulate", scene, "-o", made).returncode == 0
     grasp_set = GraspSet.load(made)
@@ -92,9 +90,7 @@ def test_a_set_of_grasps_is_played_row_by_row(thenar: Thenar, scene: Path, tmp_p
     assert [json.loads(line)["grasp"] for line in log.read_text().splitlines()] == grasp_set.grasps.tolist()
 
 
-def test_between_grasps_the_hand_rests_and_the_log_says_none(
-    thenar: Thenar, scene: Path, glove: Path, tmp_path: Path
-) -> None:
+def test_between_grasps_the_hand_rests_and_the_log_says_none(scene: Path, glove: Path, tmp_path: Path) -> None:
     log = tmp_path / "log.jsonl"
     arguments = ("emulate", scene, "--glove", glove, "--dir", tmp_path / "em", "--period-ms", 4, "--rest-ms", 8)
     done = thenar(*arguments, "--log", log)
@@ -120,7 +116,7 @@ def test_ctrl_c_takes_the_ports_away_and_leaves_no_traceback(scene: Path, glove:
     assert not (folder / "cyberglove").is_symlink()
 
 
-def test_what_cannot_be_played_is_said(thenar: Thenar, glove: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_played_is_said(glove: Path, tmp_path: Path) -> None:
     (tmp_path / "run.mcap").touch()
     for arguments, reason in (
         ((tmp_path / "run.mcap", "--rest-ms", 8), "a recording has its rests: leave it out"),
@@ -137,7 +133,7 @@ def test_what_cannot_be_played_is_said(thenar: Thenar, glove: Path, tmp_path: Pa
     assert "no-such-program cannot be run" in done.stderr
 
 
-def test_nothing_that_it_reads_is_written_over(thenar: Thenar, scene: Path, glove: Path, tmp_path: Path) -> None:
+def test_nothing_that_it_reads_is_written_over(scene: Path, glove: Path, tmp_path: Path) -> None:
     before = glove.read_text()
     done = thenar("emulate", scene, "--glove", glove, "--dir", tmp_path)
     assert done.returncode == 2
@@ -148,9 +144,7 @@ def test_nothing_that_it_reads_is_written_over(thenar: Thenar, scene: Path, glov
     assert scene.read_text() == SCENE
 
 
-def test_a_command_ended_by_a_signal_gives_the_shells_exit_code(
-    thenar: Thenar, scene: Path, glove: Path, tmp_path: Path
-) -> None:
+def test_a_command_ended_by_a_signal_gives_the_shells_exit_code(scene: Path, glove: Path, tmp_path: Path) -> None:
     program = "import os, signal; os.kill(os.getpid(), signal.SIGTERM)"
     arguments = ("emulate", scene, "--glove", glove, "--dir", tmp_path / "em", "--repeat")
     assert thenar(*arguments, "--", sys.executable, "-c", program).returncode == 128 + signal.SIGTERM
@@ -196,7 +190,7 @@ def test_a_second_ctrl_c_leaves_no_command_behind(scene: Path, glove: Path, tmp_
     assert process.returncode == 130
 
 
-def test_a_switch_that_is_not_played_is_told(thenar: Thenar, scene: Path, tmp_path: Path) -> None:
+def test_a_switch_that_is_not_played_is_told(scene: Path, tmp_path: Path) -> None:
     path = tmp_path / "glove.toml"
     path.write_text('[[stream]]\nport = "/dev/ttyACM0"\nswitches = ["thumb_distal_1", "thumb_dorsal_1"]\n')
     done = thenar("emulate", scene, "--glove", path, "--dir", tmp_path / "em", "--", sys.executable, "-c", "pass")
@@ -204,7 +198,7 @@ def test_a_switch_that_is_not_played_is_told(thenar: Thenar, scene: Path, tmp_pa
     assert "has no switch thumb_dorsal_1: always open" in done.stderr
 
 
-def test_a_harness_without_devices_is_not_emulated(thenar: Thenar, scene: Path, tmp_path: Path) -> None:
+def test_a_harness_without_devices_is_not_emulated(scene: Path, tmp_path: Path) -> None:
     (tmp_path / "glove.toml").write_text("")
     done = thenar("emulate", scene, "--glove", tmp_path / "glove.toml", "--dir", tmp_path / "em")
     assert done.returncode == 2
@@ -238,9 +232,7 @@ def test_what_a_command_starts_ends_with_it(scene: Path, glove: Path, tmp_path: 
         assert process.communicate(timeout=LONG_S)[0] == ""
 
 
-def test_a_glove_toml_of_the_users_is_replaced_only_if_asked(
-    thenar: Thenar, scene: Path, glove: Path, tmp_path: Path
-) -> None:
+def test_a_glove_toml_of_the_users_is_replaced_only_if_asked(scene: Path, glove: Path, tmp_path: Path) -> None:
     folder = tmp_path / "mine"
     folder.mkdir()
     (folder / "glove.toml").write_text("mine")
@@ -256,7 +248,7 @@ def test_a_glove_toml_of_the_users_is_replaced_only_if_asked(
 
 
 @pytest.mark.slow
-def test_a_scene_with_taxels_is_recognised_live_from_a_board(thenar: Thenar, tmp_path: Path) -> None:
+def test_a_scene_with_taxels_is_recognised_live_from_a_board(tmp_path: Path) -> None:
     scene = tmp_path / "pads.toml"
     tables = '[glove]\ntaxels = ["thumb_distal", "index_distal", "middle_distal"]\n\n'
     tables += "[effects.taxel.noise]\n[effects.taxel.adc]\n"

@@ -5,7 +5,6 @@ import subprocess
 import sys
 import time
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,8 @@ import pytest
 from thenar.cli.group import COMMANDS
 from thenar.drivers.extras import EXTRAS
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from .conftest import thenar
+
 HEAVY = ("sklearn", "scipy", "joblib", "matplotlib", "numpy")
 
 
@@ -26,7 +26,7 @@ def _one_sentence(done: "subprocess.CompletedProcess[str]") -> str:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help_with_an_example(thenar: Thenar, command: str) -> None:
+def test_every_command_has_help_with_an_example(command: str) -> None:
     done = thenar(command, "--help")
     assert done.returncode == 0, done.stderr
     assert re.search(rf"^ +thenar {command} ", done.stdout.split("Example:")[1], re.MULTILINE)
@@ -49,21 +49,21 @@ def test_help_loads_no_heavy_library(lines: list[list[str]], allowed: str) -> No
     assert done.stderr.splitlines() == [f"{line} []" for line in lines]
 
 
-def test_no_command_at_all_shows_the_help(thenar: Thenar) -> None:
+def test_no_command_at_all_shows_the_help() -> None:
     done = thenar()
     assert done.returncode == 2
     assert "Choose and measure:" in done.stdout + done.stderr
 
 
-def test_an_unknown_command_is_one_sentence(thenar: Thenar) -> None:
+def test_an_unknown_command_is_one_sentence() -> None:
     assert "No such command 'fly'" in _one_sentence(thenar("fly"))
 
 
-def test_an_unknown_option_is_one_sentence(thenar: Thenar, set_file: Path) -> None:
+def test_an_unknown_option_is_one_sentence(set_file: Path) -> None:
     assert "--wings" in _one_sentence(thenar("compile", set_file, "--wings", "2"))
 
 
-def test_no_terminal_obeys_a_name_in_a_complaint(thenar: Thenar, tmp_path: Path) -> None:
+def test_no_terminal_obeys_a_name_in_a_complaint(tmp_path: Path) -> None:
     (tmp_path / "a\x1b[2J\u202e.grasps").write_bytes(b"")
     for name in ("a\x1b[2J\u202e.grasps", "none\x1b[2J\u202e"):
         said = thenar("info", tmp_path / name)
@@ -72,12 +72,12 @@ def test_no_terminal_obeys_a_name_in_a_complaint(thenar: Thenar, tmp_path: Path)
         assert said.stderr[:-1].isprintable()
 
 
-def test_a_missing_file_is_one_sentence(thenar: Thenar, tmp_path: Path) -> None:
+def test_a_missing_file_is_one_sentence(tmp_path: Path) -> None:
     assert "does not exist" in _one_sentence(thenar("compile", tmp_path / "no.grasps", "-o", tmp_path / "b"))
 
 
 @pytest.mark.parametrize("command", ["compile", "verify", "run"])
-def test_a_foreign_file_is_one_sentence(thenar: Thenar, tmp_path: Path, build_folder: Path, command: str) -> None:
+def test_a_foreign_file_is_one_sentence(tmp_path: Path, build_folder: Path, command: str) -> None:
     foreign = tmp_path / "foreign.grasps"
     foreign.write_text("not grasps")
     arguments = {
@@ -88,13 +88,13 @@ def test_a_foreign_file_is_one_sentence(thenar: Thenar, tmp_path: Path, build_fo
     assert "is not a thenar THNRGRSP file" in _one_sentence(thenar(command, *arguments[command]))
 
 
-def test_a_damaged_build_is_one_sentence(thenar: Thenar, set_file: Path, build_folder: Path) -> None:
+def test_a_damaged_build_is_one_sentence(set_file: Path, build_folder: Path) -> None:
     data = (build_folder / "tables.bin").read_bytes()
     (build_folder / "tables.bin").write_bytes(data[:-1])
     assert "tables.bin is not the one" in _one_sentence(thenar("run", build_folder, "--replay", set_file))
 
 
-def test_a_folder_of_the_users_is_one_sentence_and_untouched(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_folder_of_the_users_is_one_sentence_and_untouched(set_file: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("keep me")
     assert "not empty and not a build" in _one_sentence(thenar("compile", set_file, "-o", tmp_path))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
@@ -243,7 +243,7 @@ def test_a_base_install_does_what_needs_no_extra(set_file: Path, build_folder: P
     assert done.returncode == 0, done.stderr
 
 
-def test_ports_on_the_command_line_obey_the_rules_of_files(thenar: Thenar, tmp_path: Path) -> None:
+def test_ports_on_the_command_line_obey_the_rules_of_files(tmp_path: Path) -> None:
     victim = tmp_path / "victim"
     victim.write_text("kept")
     said = _one_sentence(thenar("calibrate", f"spy:///dev/null?file={victim}", "-o", tmp_path / "anna.toml"))

@@ -1,8 +1,6 @@
 import dataclasses
 import json
 import re
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,8 +8,8 @@ import pytest
 from thenar.compiler import GraspSet, compile_build
 from thenar.runtime.build import Build
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
-Tool = Callable[[str], str]
+from ..conftest import tool
+from .conftest import thenar
 
 
 @pytest.fixture(scope="module")
@@ -35,9 +33,7 @@ NEXT_STEP = {
 
 
 @pytest.mark.parametrize("target", NEXT_STEP)
-def test_firmware_writes_a_folder_and_reports_cost_and_next_steps(
-    thenar: Thenar, build: Path, tmp_path: Path, target: str
-) -> None:
+def test_firmware_writes_a_folder_and_reports_cost_and_next_steps(build: Path, tmp_path: Path, target: str) -> None:
     done = thenar("firmware", build, "--target", target, "-o", tmp_path / "made")
     assert done.returncode == 0, done.stderr
     cost = r"about \d+ (cycles|instructions) a frame, \d+ bytes of flash, \d+ of RAM$"
@@ -48,7 +44,7 @@ def test_firmware_writes_a_folder_and_reports_cost_and_next_steps(
     assert any(path.endswith("thenar_glove.h") for path in content(made))
 
 
-def test_on_this_machine_no_microcontroller_and_no_cost_is_told_of(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+def test_on_this_machine_no_microcontroller_and_no_cost_is_told_of(build: Path, tmp_path: Path) -> None:
     done = thenar("firmware", build, "--target", "host", "-o", tmp_path / "made")
     assert done.returncode == 0, done.stderr
     assert done.stdout == (
@@ -60,13 +56,13 @@ def test_on_this_machine_no_microcontroller_and_no_cost_is_told_of(thenar: Thena
     assert "atmega" not in (tmp_path / "made" / "thenar_glove.h").read_text()
 
 
-def test_a_cost_has_a_unit(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+def test_a_cost_has_a_unit(build: Path, tmp_path: Path) -> None:
     for target, unit in (("avr328p", "cycles"), ("cortex-m4", "instructions")):
         told = json.loads(thenar("firmware", build, "--target", target, "-o", tmp_path / target, "--json").stdout)
         assert told["cost"]["unit"] == unit
 
 
-def test_a_flash_limit_is_kept(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+def test_a_flash_limit_is_kept(build: Path, tmp_path: Path) -> None:
     limited = ("firmware", build, "--target", "avr328p", "-o", tmp_path / "made", "--json", "--overwrite")
     cost = json.loads(thenar(*limited).stdout)["cost"]
     assert json.loads(thenar(*limited, "--flash-limit", cost["flash"]).stdout)["cost"] == cost
@@ -81,7 +77,7 @@ def test_a_flash_limit_is_kept(thenar: Thenar, build: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_what_was_measured_stands_in_the_header(thenar: Thenar, build: Path, tmp_path: Path, tool: Tool) -> None:
+def test_what_was_measured_stands_in_the_header(build: Path, tmp_path: Path) -> None:
     for name in ("avr-gcc", "make"):
         tool(name)
     done = thenar("firmware", build, "--target", "avr328p", "-o", tmp_path / "made", "--measure", "--json")
@@ -94,7 +90,7 @@ def test_what_was_measured_stands_in_the_header(thenar: Thenar, build: Path, tmp
     assert f"{measured['flash']} bytes of flash; " in opening
 
 
-def test_on_this_machine_there_is_nothing_to_count(thenar: Thenar, build: Path) -> None:
+def test_on_this_machine_there_is_nothing_to_count(build: Path) -> None:
     done = thenar("firmware", build, "--target", "host", "--measure")
     assert done.returncode == 2
     assert "The host has no cycle counts" in done.stderr
@@ -126,7 +122,7 @@ def glove(build: Path, tmp_path: Path) -> Path:
     return tmp_path / "glove.toml"
 
 
-def test_a_sketch_that_prints_rows_is_written(thenar: Thenar, build: Path, glove: Path, tmp_path: Path) -> None:
+def test_a_sketch_that_prints_rows_is_written(build: Path, glove: Path, tmp_path: Path) -> None:
     made = tmp_path / "made"
     done = thenar("firmware", build, "--mode", "rows", "--glove", glove, "--name", "left", "-o", made)
     assert done.returncode == 0, done.stderr
@@ -136,7 +132,7 @@ def test_a_sketch_that_prints_rows_is_written(thenar: Thenar, build: Path, glove
     assert json.loads(thenar(*again).stdout) == {"files": ["README.md", "glove/glove.ino"]}
 
 
-def test_firmware_is_replaced_when_asked_and_the_users_files_stay(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+def test_firmware_is_replaced_when_asked_and_the_users_files_stay(build: Path, tmp_path: Path) -> None:
     made = ("firmware", build, "--target", "host", "-o", tmp_path / "made")
     assert thenar(*made).returncode == 0
     (tmp_path / "made" / "mine.c").write_text("int mine;\n")
@@ -148,7 +144,7 @@ def test_firmware_is_replaced_when_asked_and_the_users_files_stay(thenar: Thenar
     assert "thenar_glove.c" not in content(tmp_path / "made")
 
 
-def test_a_gloves_ranges_calibrate_its_pins(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+def test_a_gloves_ranges_calibrate_its_pins(build: Path, tmp_path: Path) -> None:
     joints = [joint.name for joint in Build.load(build).manifest.joints]
     ranges = ", ".join(f"{name} = [0, 1023]" for name in joints)
     glove = tmp_path / "glove.toml"
@@ -192,9 +188,7 @@ def test_a_gloves_ranges_calibrate_its_pins(thenar: Thenar, build: Path, tmp_pat
         (("--target", "avr328p", "-o", "nowhere/made"), "nowhere is no folder: make it first"),
     ],
 )
-def test_what_cannot_be_is_one_sentence(
-    thenar: Thenar, build: Path, glove: Path, arguments: tuple[str, ...], message: str
-) -> None:
+def test_what_cannot_be_is_one_sentence(build: Path, glove: Path, arguments: tuple[str, ...], message: str) -> None:
     done = thenar("firmware", build, *(argument.format(glove=glove) for argument in arguments))
     assert (done.returncode, done.stdout) == (2, "")
     assert message in done.stderr
@@ -217,7 +211,7 @@ GHOSTS = 'matrix = { rows = ["20", "21"], columns = ["22", "23"], keys = [["s0",
     ],
 )
 def test_a_board_that_cannot_read_a_kept_element_is_refused(
-    thenar: Thenar, build: Path, tmp_path: Path, glove: dict[str, str], message: str
+    build: Path, tmp_path: Path, glove: dict[str, str], message: str
 ) -> None:
     (tmp_path / "glove.toml").write_text(glove_toml(build, **glove))
     done = thenar("firmware", build, "--mode", "rows", "--glove", tmp_path / "glove.toml", "-o", tmp_path / "made")
@@ -226,14 +220,14 @@ def test_a_board_that_cannot_read_a_kept_element_is_refused(
     assert not (tmp_path / "made").exists()
 
 
-def test_a_stream_without_a_board_has_no_sketch(thenar: Thenar, build: Path, glove: Path, tmp_path: Path) -> None:
+def test_a_stream_without_a_board_has_no_sketch(build: Path, glove: Path, tmp_path: Path) -> None:
     glove.write_text(glove.read_text().partition("[stream.board]")[0])
     done = thenar("firmware", build, "--mode", "rows", "--glove", glove, "-o", tmp_path / "made")
     assert (done.returncode, done.stdout) == (2, "")
     assert "no stream of harness 'glove' has a board with elements of the build: describe the board's" in done.stderr
 
 
-def test_a_name_that_ends_a_column_is_refused(thenar: Thenar, small_set: GraspSet, tmp_path: Path) -> None:
+def test_a_name_that_ends_a_column_is_refused(small_set: GraspSet, tmp_path: Path) -> None:
     named = dataclasses.replace(small_set, switch_names=("tip, left", *small_set.switch_names[1:]))
     build = compile_build(named, tmp_path / "build", rounds=10, folds=0).folder
     (tmp_path / "glove.toml").write_text(glove_toml(build))
@@ -242,7 +236,7 @@ def test_a_name_that_ends_a_column_is_refused(thenar: Thenar, small_set: GraspSe
     assert "'tip, left' cannot be the name of a column, which ends at a comma or an asterisk" in done.stderr
 
 
-def test_a_folder_that_is_no_build_is_named(thenar: Thenar, tmp_path: Path) -> None:
+def test_a_folder_that_is_no_build_is_named(tmp_path: Path) -> None:
     done = thenar("firmware", tmp_path, "--target", "avr328p", "-o", tmp_path / "made")
     assert done.returncode == 2
     assert f"is {tmp_path} a build?" in done.stderr

@@ -3,8 +3,7 @@
 import csv
 import json
 import shutil
-import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -17,7 +16,8 @@ from thenar.compiler.frontier.points import Frontier, frontier_from_bytes
 from thenar.compiler.frontier.price import machine_name
 from thenar.runtime import Build
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from .conftest import thenar
+
 # A trainer of which nothing is left to choose.
 SETTLED = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536, "--ties", "least-used")
 QUICK = (
@@ -36,7 +36,7 @@ def _timed_once() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def found_folder(thenar: Thenar, set_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def found_folder(set_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("found") / "frontier"
     done = thenar("frontier", set_file, "-o", folder, *QUICK, "--rate", 0.5)
     assert done.returncode == 0, done.stderr
@@ -74,7 +74,7 @@ def test_the_picked_point_is_the_fastest_that_recognises_enough(found: Frontier)
 
 
 def test_running_again_asks_nothing_twice_and_json_is_the_frontier(
-    thenar: Thenar, set_file: Path, found_folder: Path, found: Frontier, tmp_path: Path
+    set_file: Path, found_folder: Path, found: Frontier, tmp_path: Path
 ) -> None:
     again = tmp_path / "again"
     shutil.copytree(found_folder, again)
@@ -87,7 +87,7 @@ def test_running_again_asks_nothing_twice_and_json_is_the_frontier(
 
 
 def test_every_time_names_its_machine_and_a_guess_says_so(
-    thenar: Thenar, set_file: Path, found_folder: Path, found: Frontier, tmp_path: Path
+    set_file: Path, found_folder: Path, found: Frontier, tmp_path: Path
 ) -> None:
     assert found.machine == machine_name()
     again = tmp_path / "again"
@@ -106,7 +106,7 @@ def test_every_time_names_its_machine_and_a_guess_says_so(
 
 @pytest.mark.parametrize("worth", ["best", "joints"])
 def test_a_point_becomes_a_build(
-    thenar: Thenar, set_file: Path, found_folder: Path, found: Frontier, tmp_path: Path, worth: str
+    set_file: Path, found_folder: Path, found: Frontier, tmp_path: Path, worth: str
 ) -> None:
     point = max(found.points, key=lambda each: (worth == "joints" and not each.switches, each.rate.mean))
     build = tmp_path / "build"
@@ -126,7 +126,7 @@ def test_a_point_becomes_a_build(
 
 
 def test_options_that_the_point_settles_cannot_be_given_as_well(
-    thenar: Thenar, set_file: Path, found_folder: Path, tmp_path: Path
+    set_file: Path, found_folder: Path, tmp_path: Path
 ) -> None:
     done = thenar(
         "compile", set_file, "-o", tmp_path / "b", "--from", found_folder / "frontier.json", "--point", 1, "--rounds", 5
@@ -135,9 +135,7 @@ def test_options_that_the_point_settles_cannot_be_given_as_well(
     assert "--rounds is set by the point" in done.stderr
 
 
-def test_a_frontier_of_other_recordings_is_refused(
-    thenar: Thenar, small_set: GraspSet, found_folder: Path, tmp_path: Path
-) -> None:
+def test_a_frontier_of_other_recordings_is_refused(small_set: GraspSet, found_folder: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.grasps"
     small_set.rows(list(range(50))).save(other)
     done = thenar("compile", other, "-o", tmp_path / "b", "--from", found_folder / "frontier.json", "--point", 1)
@@ -145,17 +143,13 @@ def test_a_frontier_of_other_recordings_is_refused(
     assert "found for other recordings" in done.stderr
 
 
-def test_a_point_that_does_not_exist_is_told(
-    thenar: Thenar, set_file: Path, found_folder: Path, tmp_path: Path
-) -> None:
+def test_a_point_that_does_not_exist_is_told(set_file: Path, found_folder: Path, tmp_path: Path) -> None:
     done = thenar("compile", set_file, "-o", tmp_path / "b", "--from", found_folder / "frontier.json", "--point", 999)
     assert done.returncode == 2
     assert "there is no point 999" in done.stderr
 
 
-def test_a_budget_that_nothing_meets_ends_with_a_code(
-    thenar: Thenar, set_file: Path, found_folder: Path, tmp_path: Path
-) -> None:
+def test_a_budget_that_nothing_meets_ends_with_a_code(set_file: Path, found_folder: Path, tmp_path: Path) -> None:
     again = tmp_path / "again"
     shutil.copytree(found_folder, again)
     done = thenar("frontier", set_file, "-o", again, *QUICK, "--budget-us", 0.001)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,6 +11,8 @@ from numpy.typing import NDArray
 from thenar.cli import run
 from thenar.compiler import ColumnRoles, GraspSet, from_dataframe
 from thenar.compiler.recordings.columns import JointColumns
+
+from .conftest import thenar
 
 Cells = Mapping[str, "list[str] | NDArray[np.generic]"]
 # Returns the set that a table becomes, and what was printed to stdout and stderr.
@@ -174,9 +175,7 @@ def test_true_trials_in_blocks_are_imported_with_a_warning(frames: int, import_c
     assert "name the blocks (`session`)" in warnings
 
 
-def test_true_trials_of_one_row_in_blocks_are_imported_with_a_warning(
-    import_cells: Import, thenar: Callable[..., Any], tmp_path: Path
-) -> None:
+def test_true_trials_of_one_row_in_blocks_are_imported_with_a_warning(import_cells: Import, tmp_path: Path) -> None:
     cells = dict(in_blocks(1))
     grasp_set, _, warnings = import_cells(cells)
     assert len(set(grasp_set.trial_ids.tolist())) == 60

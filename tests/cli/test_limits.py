@@ -4,15 +4,13 @@ import html
 import json
 import re
 import shlex
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from thenar.runtime.manifest_file import manifest_from_bytes
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from .conftest import thenar
 
 LAYOUT = """
 [places]
@@ -30,7 +28,7 @@ def layout(folder: Path) -> Path:
     return folder / "layout.toml"
 
 
-def test_a_placement_obeys_its_limits(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_placement_obeys_its_limits(set_file: Path, tmp_path: Path) -> None:
     asked = ["--method", "cmim", "--keep", 4, "--keep-these", "s4", "--never", "s2,s5", "--apart-mm", 6]
     done = thenar("place", set_file, *asked, "--layout", layout(tmp_path), "--json")
     assert done.returncode == 0, done.stderr
@@ -40,7 +38,7 @@ def test_a_placement_obeys_its_limits(thenar: Thenar, set_file: Path, tmp_path: 
     assert names in ({"s4", "s0"}, {"s4", "s1"})
 
 
-def test_what_contradicts_or_is_not_known_is_refused(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_what_contradicts_or_is_not_known_is_refused(set_file: Path, tmp_path: Path) -> None:
     where = ("--layout", layout(tmp_path))
     for asked, reason in (
         (("--keep-these", "s4,s3", "--apart-mm", 6, *where), "s4,s3 are 3.0 mm apart, --apart-mm requires 6"),
@@ -56,7 +54,7 @@ def test_what_contradicts_or_is_not_known_is_refused(thenar: Thenar, set_file: P
         assert reason in done.stderr
 
 
-def test_a_build_states_its_limits_and_its_report_the_command(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_build_states_its_limits_and_its_report_the_command(set_file: Path, tmp_path: Path) -> None:
     build = tmp_path / "build"
     asked = "--method elimination --keep 3 --never s2 --keep-these s5,s0 --at-most 4 taxels --budget-us 300 --robust"
     done = thenar("compile", set_file, "-o", build, "--rounds", 4, "--folds", 2, *asked.split())
@@ -76,7 +74,7 @@ def test_a_build_states_its_limits_and_its_report_the_command(thenar: Thenar, se
     assert (again / "build.json").read_bytes() == (build / "build.json").read_bytes()
 
 
-def test_rows_with_lost_inputs_are_trained_on_and_never_tested(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_rows_with_lost_inputs_are_trained_on_and_never_tested(set_file: Path, tmp_path: Path) -> None:
     rates = []
     for name, more in (("plain", ()), ("robust", ("--robust",))):
         done = thenar("compile", set_file, "-o", tmp_path / name, "--rounds", 6, "--folds", 2, "--no-report", *more)

@@ -1,6 +1,4 @@
 import json
-import subprocess
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +7,7 @@ import pytest
 
 from thenar.compiler import GraspSet, merge
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from .conftest import thenar
 
 
 @pytest.fixture
@@ -20,7 +18,7 @@ def files(small_set: GraspSet, tmp_path: Path) -> tuple[Path, Path]:
     return anna, ben
 
 
-def test_two_sets_become_one_and_part_again(thenar: Thenar, files: tuple[Path, Path], tmp_path: Path) -> None:
+def test_two_sets_become_one_and_part_again(files: tuple[Path, Path], tmp_path: Path) -> None:
     anna, ben = files
     whole = tmp_path / "all.grasps"
     done = thenar("merge", anna, ben, "-o", whole)
@@ -39,9 +37,7 @@ def test_two_sets_become_one_and_part_again(thenar: Thenar, files: tuple[Path, P
     assert thenar("split", whole, "--by", "subject", "-o", tmp_path / "people", "--overwrite").returncode == 0
 
 
-def test_files_of_one_name_of_trials_are_told_apart_by_their_session(
-    thenar: Thenar, files: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_files_of_one_name_of_trials_are_told_apart_by_their_session(files: tuple[Path, Path], tmp_path: Path) -> None:
     GraspSet.load(files[0]).save(tmp_path / "friday.grasps")
     both = (files[0], tmp_path / "friday.grasps", "-o", tmp_path / "all.grasps")
     done = thenar("merge", *both)
@@ -71,7 +67,7 @@ def test_files_of_one_name_of_trials_are_told_apart_by_their_session(
     ],
 )
 def test_what_cannot_be_done_is_one_sentence(
-    thenar: Thenar, files: tuple[Path, Path], tmp_path: Path, arguments: tuple[str, ...], sentence: str
+    files: tuple[Path, Path], tmp_path: Path, arguments: tuple[str, ...], sentence: str
 ) -> None:
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     filled = [each.format(anna=files[0], ben=files[1], folder=tmp_path) for each in arguments]

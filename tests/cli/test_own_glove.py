@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from shutil import copy
@@ -17,8 +16,8 @@ from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.manifest_file import manifest_from_bytes
 
 from ..sets import grasp_set_of
+from .conftest import thenar
 
-Thenar = Callable[..., Any]
 PADS = tuple(f"pad_{finger}_{number}" for finger in ("thumb", "index", "palm") for number in (1, 2, 3))
 FLEX = ("flex_thumb", "flex_index")
 QUICK = ("--rounds", 5, "--folds", 2)
@@ -69,9 +68,7 @@ def foreign(folder: Path) -> list[str]:
     return [path.name for path in files if FOREIGN.search(path.read_text(errors="replace"))]
 
 
-def test_a_build_its_report_and_its_spec_are_of_this_glove(
-    thenar: Thenar, grasps: Path, layout: Path, tmp_path: Path
-) -> None:
+def test_a_build_its_report_and_its_spec_are_of_this_glove(grasps: Path, layout: Path, tmp_path: Path) -> None:
     build, glove = tmp_path / "build", tmp_path / "glove.toml"
     said = worked(thenar("compile", grasps, "-o", build, *QUICK, "--layout", layout, "--propose", glove))
     assert "joints flex_thumb, flex_index need a source of your own" in said
@@ -90,7 +87,7 @@ def test_a_build_its_report_and_its_spec_are_of_this_glove(
     assert foreign(tmp_path) == []
 
 
-def test_pads_and_joints_are_counted_as_sensors_everywhere(thenar: Thenar, grasps: Path, tmp_path: Path) -> None:
+def test_pads_and_joints_are_counted_as_sensors_everywhere(grasps: Path, tmp_path: Path) -> None:
     """Each pad is analog, with several levels: what is bought is a pad, and a flex sensor for each joint."""
     plain = GraspSet.load(grasps)
     random = np.random.default_rng(4)
@@ -138,7 +135,7 @@ def _spec(folder: Path) -> str:
     return (folder / "spec" / "spec.json").read_text()
 
 
-def test_the_live_commands_say_that_nothing_reads_the_joints(thenar: Thenar, grasps: Path, tmp_path: Path) -> None:
+def test_the_live_commands_say_that_nothing_reads_the_joints(grasps: Path, tmp_path: Path) -> None:
     build, glove = tmp_path / "build", tmp_path / "glove.toml"
     worked(thenar("compile", grasps, "-o", build, *QUICK, "--no-report", "--propose", glove))
     looked = thenar("doctor", glove, "--build", build)
@@ -151,7 +148,7 @@ def test_the_live_commands_say_that_nothing_reads_the_joints(thenar: Thenar, gra
 
 
 def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
-    thenar: Thenar, grasps: Path, layout: Path, tmp_path: Path
+    grasps: Path, layout: Path, tmp_path: Path
 ) -> None:
     refused = thenar("draw", grasps, "-o", tmp_path / "no.svg")
     assert refused.returncode == 2
@@ -173,9 +170,7 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
 
 
 @pytest.mark.slow
-def test_a_frontier_omits_unknown_joint_times_unless_they_are_given(
-    thenar: Thenar, grasps: Path, tmp_path: Path
-) -> None:
+def test_a_frontier_omits_unknown_joint_times_unless_they_are_given(grasps: Path, tmp_path: Path) -> None:
     few = ("--methods", "id3", "--baselines", "none", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)
     # Nothing is left to choose.
     settled = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536, "--ties", "least-used")

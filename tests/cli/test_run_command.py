@@ -1,7 +1,6 @@
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,8 @@ from thenar.runtime.recording.session import Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.sinks import GraspLine
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from .conftest import thenar
+
 FORBIDDEN = """
 import sys
 class Forbidden:
@@ -34,7 +34,7 @@ sys.exit(run(sys.argv[1:]))
 """
 
 
-def test_every_frame_gives_one_line(thenar: Thenar, small_set: GraspSet, set_file: Path, build_folder: Path) -> None:
+def test_every_frame_gives_one_line(small_set: GraspSet, set_file: Path, build_folder: Path) -> None:
     done = thenar("run", build_folder, "--replay", set_file, "--period-us", 500)
     assert done.returncode == 0, done.stderr
     lines = [json.loads(line) for line in done.stdout.splitlines()]
@@ -52,7 +52,7 @@ def test_every_frame_gives_one_line(thenar: Thenar, small_set: GraspSet, set_fil
 
 
 def test_a_replay_counts_trials_where_they_have_several_frames(
-    thenar: Thenar, build_folder: Path, small_set: GraspSet, tmp_path: Path
+    build_folder: Path, small_set: GraspSet, tmp_path: Path
 ) -> None:
     small_set.rows([row for row in range(60) for _ in range(3)]).save(tmp_path / "framed.grasps")
     found = json.loads(thenar("verify", build_folder, tmp_path / "framed.grasps", "--json").stdout)["recognised"]
@@ -61,9 +61,7 @@ def test_a_replay_counts_trials_where_they_have_several_frames(
     assert f"{found[1]['integers']} of 180 frames predicted correctly" in done.stderr
 
 
-def test_the_last_line_of_a_replay_says_which_trials_were_trained_on(
-    thenar: Thenar, small_set: GraspSet, tmp_path: Path
-) -> None:
+def test_the_last_line_of_a_replay_says_which_trials_were_trained_on(small_set: GraspSet, tmp_path: Path) -> None:
     """Six frames a trial; the build knows the first six trials. Parts, other names and repeated rows change nothing."""
     whole = replace(
         small_set, trials=np.arange(60) // 18, codes=small_set.codes + np.arange(60, dtype=np.uint16)[:, None]
@@ -132,7 +130,7 @@ def test_a_reader_that_goes_away_leaves_no_traceback(set_file: Path, build_folde
     ],
 )
 def test_an_option_that_would_change_nothing_is_refused(
-    thenar: Thenar, build_folder: Path, tmp_path: Path, frames: str, option: str, values: tuple[str, ...]
+    build_folder: Path, tmp_path: Path, frames: str, option: str, values: tuple[str, ...]
 ) -> None:
     file = tmp_path / ("glove.toml" if frames == "--glove" else frames)
     file.touch()
@@ -181,7 +179,7 @@ def preshapes_of(gripper: Path, lines: list[dict[str, Any]], period_us: int) -> 
 
 
 def test_a_replayed_set_takes_sinks_and_preshapes_as_a_live_run_does(
-    thenar: Thenar, set_file: Path, build_folder: Path, gripper: Path, tmp_path: Path
+    set_file: Path, build_folder: Path, gripper: Path, tmp_path: Path
 ) -> None:
     run = ("run", build_folder, "--replay", set_file, "--preshape", gripper, "--period-us", 150_000, "--frames", 50)
     done = thenar(*run)
@@ -200,7 +198,7 @@ def test_a_replayed_set_takes_sinks_and_preshapes_as_a_live_run_does(
 
 
 def test_preshapes_follow_the_times_of_the_rows(
-    thenar: Thenar, small_set: GraspSet, build_folder: Path, gripper: Path, tmp_path: Path
+    small_set: GraspSet, build_folder: Path, gripper: Path, tmp_path: Path
 ) -> None:
     held = small_set.rows([*np.repeat(np.flatnonzero(small_set.labels == 0)[:1], 15), *[1] * 15])
     held.save(tmp_path / "held.grasps")
@@ -224,9 +222,7 @@ switches = ["s0", "s1", "s2", "s3", "s4", "s5"]
 """
 
 
-def test_a_replayed_recording_takes_preshapes_too(
-    thenar: Thenar, small_set: GraspSet, gripper: Path, tmp_path: Path
-) -> None:
+def test_a_replayed_recording_takes_preshapes_too(small_set: GraspSet, gripper: Path, tmp_path: Path) -> None:
     joints = tuple(Joint(name, "deg", 1, 0.5, 255, 127.5) for name in small_set.joint_names)
     folder = compile_build(replace(small_set, joints=joints), tmp_path / "build", rounds=10, folds=0).folder
     build, path = Build.load(folder), tmp_path / "run.mcap"
@@ -256,24 +252,20 @@ def test_a_replayed_recording_takes_preshapes_too(
     assert len(shapes) == 30
 
 
-def test_a_preshape_table_without_the_builds_grasp_types_is_refused(
-    thenar: Thenar, set_file: Path, build_folder: Path
-) -> None:
+def test_a_preshape_table_without_the_builds_grasp_types_is_refused(set_file: Path, build_folder: Path) -> None:
     done = thenar("run", build_folder, "--replay", set_file, "--preshape", "parallel_gripper")
     assert (done.returncode, done.stdout) == (2, "")
     assert "none of the build's grasp types (cup, pen, rod) is among the table's" in done.stderr
 
 
-def test_a_sequential_test_takes_no_settings_of_the_hysteresis(
-    thenar: Thenar, build_folder: Path, tmp_path: Path
-) -> None:
+def test_a_sequential_test_takes_no_settings_of_the_hysteresis(build_folder: Path, tmp_path: Path) -> None:
     (tmp_path / "run.mcap").touch()
     done = thenar("run", build_folder, "--replay", tmp_path / "run.mcap", "--error-rate", 0.1, "--dwell-ms", 20)
     assert done.returncode == 2
     assert "--dwell-ms has no effect with --error-rate" in done.stderr
 
 
-def test_a_recording_has_the_ending_that_replay_knows_it_by(thenar: Thenar, build_folder: Path, tmp_path: Path) -> None:
+def test_a_recording_has_the_ending_that_replay_knows_it_by(build_folder: Path, tmp_path: Path) -> None:
     (tmp_path / "glove.toml").write_text('[cyberglove]\nport = "none"\n')
     done = thenar("run", build_folder, "--glove", tmp_path / "glove.toml", "--record", tmp_path / "run.dat")
     assert done.returncode == 2

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +18,8 @@ from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator.handmaps.handmap import hand_map
 
 from ..sets import grasp_set_of
+from .conftest import thenar
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
 NAMES = ("thumb_distal_5", "palm_heel_6", "index_distal_3", "little_distal_8")
 
 
@@ -48,7 +47,7 @@ def refused(done: subprocess.CompletedProcess[str]) -> str:
     return " ".join(done.stderr.split())
 
 
-def test_a_spec_is_printed_and_written(thenar: Thenar, hand_build: Path, tmp_path: Path) -> None:
+def test_a_spec_is_printed_and_written(hand_build: Path, tmp_path: Path) -> None:
     folder = tmp_path / "a" / "spec"
     told = said(thenar("spec", hand_build, "-o", folder))
     manifest = Build.load(hand_build).manifest
@@ -73,13 +72,13 @@ def test_a_home_that_cannot_be_read_ends_nothing(hand_build: Path, tmp_path: Pat
     assert written == spec_files(Build.load(hand_build).manifest, hand=hand)
 
 
-def test_without_a_folder_nothing_is_written(thenar: Thenar, hand_build: Path) -> None:
+def test_without_a_folder_nothing_is_written(hand_build: Path) -> None:
     before = sorted(hand_build.rglob("*"))
     said(thenar("spec", hand_build))
     assert sorted(hand_build.rglob("*")) == before
 
 
-def test_machines_get_the_same_as_spec_json(thenar: Thenar, hand_build: Path, tmp_path: Path) -> None:
+def test_machines_get_the_same_as_spec_json(hand_build: Path, tmp_path: Path) -> None:
     done = thenar("spec", hand_build, "--json", "--hand-length", 171, "-o", tmp_path / "spec")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == json.loads((tmp_path / "spec" / "spec.json").read_bytes())
@@ -87,7 +86,7 @@ def test_machines_get_the_same_as_spec_json(thenar: Thenar, hand_build: Path, tm
 
 
 @pytest.mark.slow
-def test_a_glove_is_described_as_it_is_wired(thenar: Thenar, hand_set: GraspSet, tmp_path: Path) -> None:
+def test_a_glove_is_described_as_it_is_wired(hand_set: GraspSet, tmp_path: Path) -> None:
     glove = tmp_path / "bench.toml"
     glove.write_text(harness_to_toml(propose_harness(["spare", *NAMES], "pca9555", name="bench")))
     build = compile_build(hand_set, tmp_path / "build", rounds=3, folds=0, harness=load_harness(glove)).folder
@@ -98,7 +97,7 @@ def test_a_glove_is_described_as_it_is_wired(thenar: Thenar, hand_set: GraspSet,
     assert "wired as bench" in said(thenar("spec", build)), "the wiring that the build holds"
 
 
-def test_a_glove_of_ones_own_has_no_pattern_and_no_length(thenar: Thenar, build_folder: Path, tmp_path: Path) -> None:
+def test_a_glove_of_ones_own_has_no_pattern_and_no_length(build_folder: Path, tmp_path: Path) -> None:
     told = said(thenar("spec", build_folder, "-o", tmp_path / "spec"))
     assert "the positions of this glove's sensors are unknown" in told
     assert not (tmp_path / "spec" / "cutting.svg").exists()
@@ -106,7 +105,7 @@ def test_a_glove_of_ones_own_has_no_pattern_and_no_length(thenar: Thenar, build_
 
 
 def test_a_spec_is_replaced_whole_and_anything_else_is_kept(
-    thenar: Thenar, hand_build: Path, build_folder: Path, tmp_path: Path
+    hand_build: Path, build_folder: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "spec"
     said(thenar("spec", hand_build, "-o", folder))
@@ -120,6 +119,6 @@ def test_a_spec_is_replaced_whole_and_anything_else_is_kept(
     assert [path.name for path in other.iterdir()] == ["letter.txt"]
 
 
-def test_a_build_without_switches_is_refused(thenar: Thenar, small_set: GraspSet, tmp_path: Path) -> None:
+def test_a_build_without_switches_is_refused(small_set: GraspSet, tmp_path: Path) -> None:
     build = compile_build(small_set, tmp_path / "build", rounds=3, folds=0, inputs="joints").folder
     assert "keeps no switch" in refused(thenar("spec", build))

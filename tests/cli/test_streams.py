@@ -8,7 +8,7 @@ import pty
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
@@ -25,7 +25,7 @@ from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live import checkup
 from thenar.runtime.live.replay import replayed
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from .conftest import thenar
 
 STREAM = """name = "maker"
 [[stream]]
@@ -68,7 +68,7 @@ def moving(tmp_path: Path) -> Iterator[LineServer]:
 
 
 @pytest.mark.slow
-def test_doctor_shows_rows_and_proposes_a_sound_harness(thenar: Thenar, moving: LineServer, tmp_path: Path) -> None:
+def test_doctor_shows_rows_and_proposes_a_sound_harness(moving: LineServer, tmp_path: Path) -> None:
     path = tmp_path / "glove.toml"
     done = thenar("doctor", "--line", moving.port, "--seconds", "2", "--propose", path, "--json")
     assert done.returncode == 0, done.stderr
@@ -98,7 +98,7 @@ def test_doctor_shows_rows_and_proposes_a_sound_harness(thenar: Thenar, moving: 
     assert (done.returncode, "2 columns are named, but rows have 6" in done.stderr) == (2, True)
 
 
-def test_names_that_the_sender_gives_say_what_columns_are(thenar: Thenar, tmp_path: Path) -> None:
+def test_names_that_the_sender_gives_say_what_columns_are(tmp_path: Path) -> None:
     rows = "".join(
         json.dumps(
             {"t_ms": 20 * n, "fsr_palm": 80 * (n % 7), "flex_ring": 100 + 20 * (n % 9), "thumb": n % 2, "off": None}
@@ -210,7 +210,7 @@ def test_words_are_shown_and_rows_ending_in_carriage_returns_read(cases: Path, w
         assert json.loads(done.stdout)["stream"]["columns"] == ["c1", "c2", "c3", "c4", "c5", "c6"]
 
 
-def test_doctor_reports_two_senders_and_late_rows(thenar: Thenar, tmp_path: Path) -> None:
+def test_doctor_reports_two_senders_and_late_rows(tmp_path: Path) -> None:
     path, done = tmp_path / "glove.toml", Event()
     with DatagramLines() as first, DatagramLines() as second:
         second.to = first.to
@@ -256,7 +256,7 @@ def test_doctor_reports_two_senders_and_late_rows(thenar: Thenar, tmp_path: Path
     ],
 )
 def test_doctor_says_what_is_wrong_with_rows(
-    thenar: Thenar, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rate_hz: int, line: str, said: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rate_hz: int, line: str, said: str
 ) -> None:
     monkeypatch.setattr(checkup, "_STARTS_S", 0.0)  # no board is reset here
     path, done = tmp_path / "glove.toml", Event()
@@ -297,7 +297,7 @@ def test_rows_that_had_been_waiting_do_not_count_for_the_rate(tmp_path: Path) ->
     assert 0 < found["stream"]["rate_hz"] <= 110
 
 
-def test_a_line_where_nothing_comes_or_nothing_can_is_said(thenar: Thenar, tmp_path: Path) -> None:
+def test_a_line_where_nothing_comes_or_nothing_can_is_said(tmp_path: Path) -> None:
     for port, said in (
         ("spy://x", "is not a supported port"),
         ("/dev/none", "there is no such port"),
@@ -326,7 +326,7 @@ def right(log: Path, lines: Path) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("port", PORTS)
 def test_an_emulated_sender_is_recognised_by_every_way_and_replays_alike(
-    thenar: Thenar, build_folder: Path, set_file: Path, tmp_path: Path, port: str
+    build_folder: Path, set_file: Path, tmp_path: Path, port: str
 ) -> None:
     (tmp_path / "mine.toml").write_text(STREAM.format(port=port, joints="{ j0 = [0, 127.5], j1 = [127.5, 0] }"))
     out, log, recording = tmp_path / "out.jsonl", tmp_path / "log.jsonl", tmp_path / "run.mcap"
@@ -345,7 +345,7 @@ def test_an_emulated_sender_is_recognised_by_every_way_and_replays_alike(
 @pytest.mark.slow
 @pytest.mark.parametrize("inputs", ["both", "switches", "joints"])
 def test_a_board_printing_kept_elements_only_is_recognised_and_recorded(
-    thenar: Thenar, small_set: GraspSet, tmp_path: Path, inputs: str
+    small_set: GraspSet, tmp_path: Path, inputs: str
 ) -> None:
     folder = compile_build(small_set, tmp_path / "build", rounds=5, folds=0, inputs=inputs).folder
     build = Build.load(folder)
@@ -372,7 +372,7 @@ def test_a_board_printing_kept_elements_only_is_recognised_and_recorded(
 
 
 @pytest.mark.slow
-def test_a_broken_sender_spoils_no_answer_and_is_counted(thenar: Thenar, build_folder: Path, tmp_path: Path) -> None:
+def test_a_broken_sender_spoils_no_answer_and_is_counted(build_folder: Path, tmp_path: Path) -> None:
     odd = [
         b"\xff\xfe\x00\n",
         b"1,2\n",
@@ -413,7 +413,7 @@ def test_a_broken_sender_spoils_no_answer_and_is_counted(thenar: Thenar, build_f
 @pytest.mark.slow
 @pytest.mark.parametrize("named", [False, True])
 def test_a_second_board_on_the_port_and_impossible_clocks_change_no_answer(
-    thenar: Thenar, build_folder: Path, tmp_path: Path, named: bool
+    build_folder: Path, tmp_path: Path, named: bool
 ) -> None:
     out, done, path = tmp_path / "out.jsonl", Event(), tmp_path / "mine.toml"
     with DatagramLines() as first, DatagramLines() as second:
@@ -449,7 +449,7 @@ def test_a_second_board_on_the_port_and_impossible_clocks_change_no_answer(
 
 
 @pytest.mark.slow
-def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(thenar: Thenar, tmp_path: Path) -> None:
+def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(tmp_path: Path) -> None:
     high = {"cup": (200, 30), "pen": (30, 200), "rod": (200, 200)}
     labels = np.arange(60) % 3
     from thenar.compiler.recordings.taxonomy import own
@@ -478,9 +478,7 @@ def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(thenar: Then
 
 
 @pytest.mark.parametrize("options", [(), ("--taxels",)])
-def test_calibrate_refuses_rows_from_stdin_where_the_user_types(
-    thenar: Thenar, tmp_path: Path, options: tuple[str, ...]
-) -> None:
+def test_calibrate_refuses_rows_from_stdin_where_the_user_types(tmp_path: Path, options: tuple[str, ...]) -> None:
     path = tmp_path / "glove.toml"
     path.write_text('[[stream]]\nport = "-"\njoints = { flex = [0, 9] }\ntaxels = { pad = [0, 9] }\n')
     done = thenar("calibrate", path, "-o", tmp_path / "anna.toml", *options)

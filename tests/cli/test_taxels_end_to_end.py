@@ -5,9 +5,7 @@ import os
 import shutil
 import sys
 from bisect import bisect
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,11 +16,11 @@ from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recording.reader import Reader
 
 from ..sets import grasp_set_of
+from .conftest import thenar
 
 # In real time, over a pty.
 pytestmark = pytest.mark.slow
 
-Thenar = Callable[..., Any]
 ROWS, CODES = 60, {"cup": (800, 100, 400), "pen": (100, 820, 380), "rod": (420, 430, 60)}
 _BUS = """
 [[bus]]
@@ -83,7 +81,7 @@ def pads(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("wiring", GLOVES)
-def test_a_glove_of_pads_recognises_by_their_levels(thenar: Thenar, tmp_path: Path, wiring: str) -> None:
+def test_a_glove_of_pads_recognises_by_their_levels(tmp_path: Path, wiring: str) -> None:
     if wiring != "board" and shutil.which("umockdev-wrapper") is None:
         message = "program umockdev-wrapper is missing"
         (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
@@ -111,7 +109,7 @@ def test_a_glove_of_pads_recognises_by_their_levels(thenar: Thenar, tmp_path: Pa
     assert done.returncode == 0, done.stderr
 
 
-def test_doctor_finds_converters_and_what_is_wrong_with_them(thenar: Thenar, tmp_path: Path) -> None:
+def test_doctor_finds_converters_and_what_is_wrong_with_them(tmp_path: Path) -> None:
     if shutil.which("umockdev-wrapper") is None:
         message = "program umockdev-wrapper is missing"
         (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)

@@ -1,8 +1,7 @@
 """`thenar teach`: a task from recorded demonstrations."""
 
 import json
-import subprocess
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +16,8 @@ from thenar.runtime.recording.session import Session
 from thenar.runtime.recording.writer import Recorder
 
 from ..sets import grasp_set_of
+from .conftest import thenar
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
 TYPES = ("cup", "pen", "rod")
 GLOVE = """
 [cyberglove]
@@ -113,9 +112,7 @@ def demos(build: Path, tmp_path: Path) -> list[Path]:
     return [record(build, tmp_path / f"demo{number}.mcap", states(types)) for number, types in every]
 
 
-def test_demonstrations_have_their_steps_in_common(
-    thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path
-) -> None:
+def test_demonstrations_have_their_steps_in_common(build: Path, demos: list[Path], tmp_path: Path) -> None:
     (tmp_path / "gripper.toml").write_text(GRIPPER)
     task = tmp_path / "task.json"
     done = thenar("teach", *demos, "-b", build, "-o", task, "--preshape", tmp_path / "gripper.toml")
@@ -146,7 +143,7 @@ def test_demonstrations_have_their_steps_in_common(
     ]
 
 
-def test_what_teaches_nothing_is_refused(thenar: Thenar, build: Path, set_file: Path, tmp_path: Path) -> None:
+def test_what_teaches_nothing_is_refused(build: Path, set_file: Path, tmp_path: Path) -> None:
     empty = record(build, tmp_path / "empty.mcap", [3] * 80)
     grasps_of(np.array([0])).save(static := tmp_path / "static.grasps")
     task = ("-b", build, "-o", tmp_path / "task.json")
@@ -167,7 +164,7 @@ def test_what_teaches_nothing_is_refused(thenar: Thenar, build: Path, set_file: 
 
 @pytest.mark.parametrize("lag", [(), ("--lag-ms", "150")])
 def test_a_recorded_run_is_cut_into_its_grasps(
-    thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path, lag: tuple[str, ...]
+    build: Path, demos: list[Path], tmp_path: Path, lag: tuple[str, ...]
 ) -> None:
     done = thenar("segment", demos[0], "-b", build, "-o", tmp_path / "s.csv", "--json", *lag)
     assert done.returncode == 0, done.stderr
@@ -194,7 +191,7 @@ _FRAMES = range(len(states("cpr")))
     ids=["repeats", "jitters", "jumps ahead", "unread frames"],
 )
 def test_the_clock_of_a_run_and_unread_frames_divide_no_grasp(
-    thenar: Thenar, build: Path, tmp_path: Path, clock_us: list[int], unread: Container[int]
+    build: Path, tmp_path: Path, clock_us: list[int], unread: Container[int]
 ) -> None:
     path = record(build, tmp_path / "run.mcap", states("cpr"), clock_us, unread)
     done = thenar("segment", path, "-b", build, "--json")
@@ -220,7 +217,7 @@ def collected(path: Path, held: list[int], switches: tuple[str, ...], joint: str
     return path
 
 
-def test_teach_cuts_recordings_of_any_build_into_the_same_grasps(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+def test_teach_cuts_recordings_of_any_build_into_the_same_grasps(build: Path, tmp_path: Path) -> None:
     types = "cprrpc"
     grasp_set = grasps_of(np.array(states("cprrpcpcr" * 2)))
     whole = compile_build(grasp_set, tmp_path / "whole", rounds=9, folds=0, placement="elimination", keep=3).folder
@@ -244,7 +241,7 @@ def test_teach_cuts_recordings_of_any_build_into_the_same_grasps(thenar: Thenar,
     assert len(json.loads((tmp_path / "task.json").read_bytes())["steps"]) == len(types)
 
 
-def test_a_recording_that_lacks_an_input_is_refused_by_name(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+def test_a_recording_that_lacks_an_input_is_refused_by_name(build: Path, tmp_path: Path) -> None:
     for switches, joint, lacking in (
         (("s0", "s2"), "bend", "s1"),
         (("s0", "s1", "s2"), "bent", "bend"),

@@ -1,7 +1,5 @@
 import hashlib
 import json
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,7 +11,8 @@ from thenar.compiler.artifact.verify_firmware import Difference, FirmwareVerific
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import tables_from_bytes, tables_to_bytes
 
-Thenar = Callable[..., subprocess.CompletedProcess[str]]
+from ..conftest import tool
+from .conftest import thenar
 
 
 def _silence_joints(folder: Path) -> None:
@@ -28,16 +27,14 @@ def _silence_joints(folder: Path) -> None:
     (folder / "build.json").write_bytes(manifest_to_bytes(described))
 
 
-def test_a_sound_build_holds(thenar: Thenar, set_file: Path, build_folder: Path) -> None:
+def test_a_sound_build_holds(set_file: Path, build_folder: Path) -> None:
     done = thenar("verify", build_folder, set_file)
     assert done.returncode == 0, done.stderr
     assert "60 rows of 60 trials; the build was trained on 60 of these trials" in done.stdout
     assert done.stdout.endswith("holds\n")
 
 
-def test_the_worst_of_all_frames_is_printed_beside_its_bounds(
-    thenar: Thenar, set_file: Path, build_folder: Path
-) -> None:
+def test_the_worst_of_all_frames_is_printed_beside_its_bounds(set_file: Path, build_folder: Path) -> None:
     lines = thenar("verify", build_folder, set_file).stdout.splitlines()
     worst = json.loads(thenar("verify", build_folder, set_file, "--json").stdout)["worst"]
     codes = " ".join(map(str, worst["codes"]))
@@ -54,7 +51,7 @@ def test_the_worst_of_all_frames_is_printed_beside_its_bounds(
     ) in lines
 
 
-def test_a_broken_bound_exits_with_1_and_lists_rows(thenar: Thenar, set_file: Path, build_folder: Path) -> None:
+def test_a_broken_bound_exits_with_1_and_lists_rows(set_file: Path, build_folder: Path) -> None:
     _silence_joints(build_folder)
     done = thenar("verify", build_folder, set_file)
     assert done.returncode == 1
@@ -62,7 +59,7 @@ def test_a_broken_bound_exits_with_1_and_lists_rows(thenar: Thenar, set_file: Pa
     assert "  row " in done.stdout
 
 
-def test_json_lists_every_changed_row(thenar: Thenar, set_file: Path, build_folder: Path) -> None:
+def test_json_lists_every_changed_row(set_file: Path, build_folder: Path) -> None:
     _silence_joints(build_folder)
     done = thenar("verify", build_folder, set_file, "--json")
     found = json.loads(done.stdout)
@@ -73,9 +70,7 @@ def test_json_lists_every_changed_row(thenar: Thenar, set_file: Path, build_fold
 
 
 @pytest.mark.slow
-def test_firmware_is_compiled_and_held_against_python(
-    thenar: Thenar, set_file: Path, build_folder: Path, tool: Callable[[str], str]
-) -> None:
+def test_firmware_is_compiled_and_held_against_python(set_file: Path, build_folder: Path) -> None:
     tool("gcc")
     done = thenar("verify", build_folder, set_file, "--firmware", "host")
     assert done.returncode == 0, done.stderr
@@ -87,9 +82,7 @@ def test_firmware_is_compiled_and_held_against_python(
     assert found["holds"] is True
 
 
-def test_firmware_that_is_not_the_builds_is_exit_code_1(
-    thenar: Thenar, set_file: Path, build_folder: Path, tool: Callable[[str], str]
-) -> None:
+def test_firmware_that_is_not_the_builds_is_exit_code_1(set_file: Path, build_folder: Path) -> None:
     tool("gcc")
     (build_folder / "firmware" / "thenar_glove.h").write_text("")
     done = thenar("verify", build_folder, set_file, "--firmware", "host")
@@ -98,9 +91,7 @@ def test_firmware_that_is_not_the_builds_is_exit_code_1(
     assert done.stdout.endswith("DOES NOT HOLD: compile the build again\n")
 
 
-def test_firmware_for_what_there_is_not_is_refused_with_what_there_is(
-    thenar: Thenar, set_file: Path, build_folder: Path
-) -> None:
+def test_firmware_for_what_there_is_not_is_refused_with_what_there_is(set_file: Path, build_folder: Path) -> None:
     done = thenar("verify", build_folder, set_file, "--firmware", "host,pdp11")
     assert done.returncode == 2
     assert "there is no target 'pdp11': choose one of host, avr, micropython" in done.stderr
@@ -135,7 +126,7 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
     assert "compile the build again" not in verdict(found)
 
 
-def test_the_worst_faults_are_in_build_json_report_and_spec(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_the_worst_faults_are_in_build_json_report_and_spec(set_file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "build"
     done = thenar("compile", set_file, "-o", folder, "--rounds", "5", "--folds", "0")
     assert done.returncode == 0, done.stderr

@@ -18,7 +18,8 @@ from websockets.typing import Origin
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Mark
 
-Thenar = Callable[..., "subprocess.CompletedProcess[str]"]
+from .conftest import thenar
+
 PATIENCE_S = 30
 
 
@@ -184,16 +185,14 @@ def test_the_token_is_said_once_and_asked_for(start: Callable[..., Command], bui
         (("--recordings", "folder"), "--recordings has no effect without --web: leave it out"),
     ],
 )
-def test_what_cannot_be_is_one_sentence(
-    thenar: Thenar, build_folder: Path, glove: Path, options: tuple[str, ...], said: str
-) -> None:
+def test_what_cannot_be_is_one_sentence(build_folder: Path, glove: Path, options: tuple[str, ...], said: str) -> None:
     done = thenar("run", build_folder, "--glove", glove, *options)
     assert (done.returncode, done.stdout) == (2, "")
     assert said in done.stderr
     assert done.stderr.count("\n") == 1 or "nothing in" in done.stderr
 
 
-def test_a_port_that_is_taken_is_said_so(thenar: Thenar, build_folder: Path, glove: Path) -> None:
+def test_a_port_that_is_taken_is_said_so(build_folder: Path, glove: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         place = f"127.0.0.1:{taken.getsockname()[1]}"
         done = thenar("run", build_folder, "--glove", glove, "--web", place)
@@ -202,7 +201,7 @@ def test_a_port_that_is_taken_is_said_so(thenar: Thenar, build_folder: Path, glo
 
 
 @pytest.fixture
-def recording(thenar: Thenar, build_folder: Path, glove: Path, tmp_path: Path) -> Path:
+def recording(build_folder: Path, glove: Path, tmp_path: Path) -> Path:
     path = tmp_path / "run.mcap"
     done = thenar(
         "run", build_folder, "--glove", glove, "--frames", "20", "--record", path, "--sink", "jsonl:/dev/null"
@@ -239,7 +238,7 @@ def test_a_recording_is_shown_from_any_moment_of_it(
     assert monitor.end() == 0
 
 
-def test_what_is_no_recording_is_refused(thenar: Thenar, build_folder: Path, recording: Path, tmp_path: Path) -> None:
+def test_what_is_no_recording_is_refused(build_folder: Path, recording: Path, tmp_path: Path) -> None:
     (tmp_path / "text.mcap").write_text("no")
     for name, said in (("none.mcap", "does not exist"), ("text.mcap", "does not begin like an MCAP file")):
         done = thenar("monitor", tmp_path / name)

@@ -1,6 +1,5 @@
 """Small sets of grasps that can be learnt, with switches and joints."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from thenar.compiler.recordings.graspset import GraspSet
 from ..sets import grasp_set_of
 
 
-def _make_set(
+def make_set(
     seed: int = 0,
     rows: int = 96,
     switches: int = 14,
@@ -37,17 +36,11 @@ def _make_set(
 
 
 @pytest.fixture(scope="session")
-def make_set() -> Callable[..., GraspSet]:
-    """Return what makes a small set of grasps that can be learnt, with switches and joints."""
-    return _make_set
-
-
-@pytest.fixture(scope="session")
 def grasp_set() -> GraspSet:
-    return _make_set()
+    return make_set()
 
 
-def _with_none(grasp_set: GraspSet) -> GraspSet:
+def with_none(grasp_set: GraspSet) -> GraspSet:
     """Return the rows with others among them in which nothing is held, of the same trials and with other readings."""
     rows = np.sort(np.concatenate([np.arange(len(grasp_set)), np.arange(0, len(grasp_set), 3)]))
     more, nothing = grasp_set.rows(rows), np.diff(rows, prepend=-1) == 0
@@ -58,9 +51,3 @@ def _with_none(grasp_set: GraspSet) -> GraspSet:
         grasps=np.where(nothing, "none", more.grasps),
         times_us=10_000 * np.arange(len(rows)),
     )
-
-
-@pytest.fixture(scope="session")
-def with_none() -> Callable[[GraspSet], GraspSet]:
-    """Return what adds rows in which nothing is held."""
-    return _with_none

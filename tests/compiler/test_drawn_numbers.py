@@ -129,7 +129,6 @@ def problems(draw: st.DrawFn) -> Problem:
     return Problem("drawn", X, weights, weights * np.where(weights < 1e-300, np.rint(ratios), ratios))
 
 
-@settings(deadline=None)
 @given(problems())
 def test_no_stump_explains_more_and_branches_answer_with_their_means(problem: Problem) -> None:
     fits = [(problem, stumpfits.fit(problem))]

@@ -24,12 +24,12 @@ from thenar.compiler.workers import check_memory
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.recipe import Recipe
 
-Make = Callable[..., GraspSet]
-Measure = Callable[[Callable[[], object]], int]
+from ..conftest import calls, peak_bytes
+from .conftest import make_set
 
 
 @pytest.fixture(scope="module")
-def many_types(make_set: Make) -> GraspSet:
+def many_types() -> GraspSet:
     return make_set(rows=20_000, types=10_000, switches=64)
 
 
@@ -45,11 +45,7 @@ def many_types(make_set: Make) -> GraspSet:
     ids=["compile", "frontier", "evaluate", "place", "place --method"],
 )
 def test_more_grasp_types_than_a_build_holds_are_refused_before_the_work(
-    many_types: GraspSet,
-    tmp_path: Path,
-    work: Callable[[GraspSet, Path], object],
-    error: type[ThenarError],
-    calls: Measure,
+    many_types: GraspSet, tmp_path: Path, work: Callable[[GraspSet, Path], object], error: type[ThenarError]
 ) -> None:
     def refused() -> None:
         with pytest.raises(error, match="10000 grasp types, a build has at most 1024: join types"):
@@ -78,12 +74,12 @@ def test_the_largest_tables_that_there_is_room_for_are_not_refused() -> None:
     check_inputs(1000, 4096, 96, CompileError)
 
 
-def test_joints_beyond_what_a_build_holds_are_refused_before_the_training(make_set: Make, tmp_path: Path) -> None:
+def test_joints_beyond_what_a_build_holds_are_refused_before_the_training(tmp_path: Path) -> None:
     with pytest.raises(CompileError, match="300 joints, a build has at most 256"):
         compile_build(make_set(joints=300), tmp_path / "build", folds=0)
 
 
-def test_more_switches_than_a_build_holds_are_refused_early(make_set: Make, tmp_path: Path) -> None:
+def test_more_switches_than_a_build_holds_are_refused_early(tmp_path: Path) -> None:
     wide = make_set(switches=5000)
     with pytest.raises(FrontierError, match="5000 switches, a build has at most 4096"):
         find_frontier(wide)
@@ -110,7 +106,7 @@ def test_a_training_that_fits_into_memory_is_not_refused() -> None:
 
 
 @pytest.fixture(scope="module")
-def wide(make_set: Make) -> GraspSet:
+def wide() -> GraspSet:
     """All pairs of its switches, counted for each type, would be 1.6 GB."""
     few = make_set(rows=40, types=2, switches=1, joints=0)
     switches = np.random.default_rng(0).random((40, 9_999)) < 0.5
@@ -118,9 +114,7 @@ def wide(make_set: Make) -> GraspSet:
 
 
 @pytest.mark.parametrize("method", ["cmim", "mrmr", "mutual-information"])
-def test_of_many_switches_few_are_chosen_without_counting_all_pairs(
-    wide: GraspSet, method: str, peak_bytes: Measure
-) -> None:
+def test_of_many_switches_few_are_chosen_without_counting_all_pairs(wide: GraspSet, method: str) -> None:
     chooser, chosen = METHODS[method].chooser, list[tuple[int, ...]]()
     samples = Samples(wide.switches, wide.codes, wide.labels, tuple("01"))
     # 1 kB a switch; a byte for each pair would be 10 kB.
@@ -128,7 +122,7 @@ def test_of_many_switches_few_are_chosen_without_counting_all_pairs(
     assert len(set(chosen[0])) == 5
 
 
-def test_the_baselines_of_an_evaluation_take_a_set_of_many_switches(wide: GraspSet, peak_bytes: Measure) -> None:
+def test_the_baselines_of_an_evaluation_take_a_set_of_many_switches(wide: GraspSet) -> None:
     recipe, studies = Recipe(trainer="logitboost", folds=2, rounds=1), list[Study]()
     design = StudyDesign(recipe, repeats=1, protocols=("nested",), tables=("baselines",))
     assert peak_bytes(lambda: studies.append(evaluate(wide, design, jobs=1))) < 10_000 * wide.switches.shape[1]

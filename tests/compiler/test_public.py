@@ -2,7 +2,6 @@
 
 import doctest
 import inspect
-from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
@@ -29,6 +28,8 @@ from thenar.compiler import (
     verify,
 )
 from thenar.runtime.errors import ThenarError
+
+from .conftest import make_set
 
 NAMES = [name for name in thenar.compiler.__all__ if callable(getattr(thenar.compiler, name))]
 WITH_EXAMPLES = [name for name in NAMES if ">>>" in (getattr(thenar.compiler, name).__doc__ or "")]
@@ -105,9 +106,7 @@ def test_an_additive_logit_becomes_a_build_of_the_columns_that_it_gets(
 
 
 @pytest.mark.parametrize("subjects", [1, 3])
-def test_a_pipeline_and_compile_build_make_the_same_papers_recipe(
-    make_set: Callable[..., GraspSet], tmp_path: Path, subjects: int
-) -> None:
+def test_a_pipeline_and_compile_build_make_the_same_papers_recipe(tmp_path: Path, subjects: int) -> None:
     grasp_set = make_set(subjects=subjects, frames=2)
     X = Samples.of(grasp_set).inputs
     switches = slice(0, len(grasp_set.switch_names))

@@ -24,6 +24,8 @@ from thenar.drivers.cyberglove_protocol import (
 )
 from thenar.drivers.emulated.cyberglove import CyberGloveBox, Doubts
 
+from ..conftest import calls
+
 Feed = Callable[[bytes], list[Any]]
 
 
@@ -111,9 +113,7 @@ def test_after_any_damage_the_second_sound_frame_is_told(case: tuple[Parser, byt
 
 @pytest.mark.parametrize("name", sorted(PARSERS))
 @pytest.mark.parametrize("byte", [0, 1, ord("S"), 255])
-def test_a_megabyte_of_one_byte_costs_no_memory_or_calls(
-    name: str, byte: int, calls: Callable[[Callable[[], object]], int]
-) -> None:
+def test_a_megabyte_of_one_byte_costs_no_memory_or_calls(name: str, byte: int) -> None:
     feed, held = PARSERS[name].make()
     made = set[int]()
     for size in (1, 7, 255, 4096, 100_000, 1_000_000):

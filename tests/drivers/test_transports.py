@@ -19,12 +19,14 @@ from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.lines import LineReader, Row
 from thenar.drivers.transports import line_port_fault
 
+from ..conftest import tool
+
 LONG_S = 10.0
 Send = Callable[[bytes], None]
 
 
 @pytest.fixture(params=["serial", "tcp://h:1", "udp://h:1", "unix:x", "ws://h:1"])
-def way(request: pytest.FixtureRequest, tool: Callable[[str], str], tmp_path: Path) -> Iterator[tuple[str, Send]]:
+def way(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str, Send]]:
     if request.param.startswith("ws") and find_spec("websockets") is None:
         tool("websockets of PyPI")
     if request.param == "serial":

@@ -63,23 +63,18 @@ def scene() -> Callable[[int], str]:
     return lambda repetitions: SCENE.format(repetitions=repetitions)
 
 
-def _sixty(switches: Any, codes: Any = ((),) * 60, joints: tuple[str, ...] = (), names: Any = "") -> GraspSet:
+def sixty(switches: Any, codes: Any = ((),) * 60, joints: tuple[str, ...] = (), names: Any = "") -> GraspSet:
+    """Return sixty trials of three types in turn from their switches, codes and names of joints."""
     named = tuple(Joint(name, "deg", 0, 0.0, 255, 127.5) for name in joints)
     types = names or ("cup", "pen", "rod")
     return grasp_set_of(types, np.arange(60) % 3, switches=switches, codes=codes, joints=named)
 
 
 @pytest.fixture(scope="session")
-def sixty() -> Callable[..., GraspSet]:
-    """Return what makes sixty trials of three types in turn from their switches, codes and names of joints."""
-    return _sixty
-
-
-@pytest.fixture(scope="session")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with `set.grasps`, in which each type closes a switch of its own, and with `build`, made of it."""
     folder = tmp_path_factory.mktemp("recorded")
-    grasp_set = _sixty(np.eye(3)[np.arange(60) % 3])
+    grasp_set = sixty(np.eye(3)[np.arange(60) % 3])
     grasp_set.save(folder / "set.grasps")
     compile_build(grasp_set, folder / "build", rounds=10, folds=0, inputs="switches")
     return folder

@@ -11,12 +11,14 @@ from sklearn.feature_selection import chi2
 
 from thenar.compiler import GraspSet
 
+from .conftest import sixty
+
 pytestmark = pytest.mark.slow
 Install = Callable[[str, str], Any]
 
 
 @pytest.fixture(scope="module")
-def small_set(sixty: Callable[..., GraspSet]) -> GraspSet:
+def small_set() -> GraspSet:
     patterns = np.array([[0, 0, 1, 1, 0, 1], [0, 1, 0, 1, 1, 0], [1, 0, 0, 1, 1, 1]], bool)
     return sixty(patterns[np.arange(60) % 3] ^ (np.random.default_rng(4).random((60, 6)) < 0.1))
 

@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler import GraspSet, compile_build
+from thenar.compiler import compile_build
 from thenar.compiler.recordings.graspset import Joint
+
+from .conftest import sixty
 
 HIGH = {"cup": (200, 30), "pen": (30, 200), "rod": (200, 200)}
 
 
 def test_a_source_of_joints_of_ones_own_recognises_live(
-    install: Callable[[str, str], Any],
-    sixty: Callable[..., GraspSet],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    install: Callable[[str, str], Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     switches, codes = np.zeros((60, 0)), np.array(list(HIGH.values()))[np.arange(60) % 3]
     joints = tuple(Joint(f"flex_{number}", "raw", 1, 1.0, 255, 255.0) for number in (1, 2))

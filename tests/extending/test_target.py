@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler import GraspSet, compile_build
+from thenar.compiler import compile_build
 from thenar.runtime.build import Build
+
+from ..conftest import tool
+from .conftest import sixty
 
 TYPES = ("cup", "pen", "plate")
 MAIN = """\
@@ -43,7 +46,7 @@ STRICT = (
 
 
 @pytest.fixture
-def build(sixty: Callable[..., GraspSet], tmp_path: Path) -> Build:
+def build(tmp_path: Path) -> Build:
     random, labels = np.random.default_rng(3), np.arange(60) % len(TYPES)
     closed = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 0]], bool)[labels] ^ (random.random((60, 4)) < 0.1)
     made = sixty(closed, 60 * labels[:, None] + random.integers(30, 90, (60, 1)), ("thumb",), TYPES)
@@ -51,7 +54,7 @@ def build(sixty: Callable[..., GraspSet], tmp_path: Path) -> Build:
 
 
 def test_a_foreign_target_is_listed_and_its_firmware_matches_python(
-    install: Callable[[str, str], Any], tool: Callable[[str], str], build: Build, tmp_path: Path
+    install: Callable[[str, str], Any], build: Build, tmp_path: Path
 ) -> None:
     compiler = tool("g++")
     made = tmp_path / "made"

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler import GraspSet
 from thenar.runtime.model.integers import tables_from_bytes
+
+from .conftest import sixty
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def recordings(sixty: Callable[..., GraspSet], tmp_path: Path) -> Path:
+def recordings(tmp_path: Path) -> Path:
     """Return a set in which one type alone bends both joints, by which the others are bent one at a time."""
     random, labels = np.random.default_rng(5), np.arange(60) % 3
     bent = np.array([[1, 0], [0, 1], [1, 1]])[labels]

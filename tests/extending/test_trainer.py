@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler import GraspSet
+from .conftest import sixty
 
 pytestmark = pytest.mark.slow
 
@@ -17,7 +17,7 @@ TYPES = ("cup", "pen", "plate")
 
 
 @pytest.fixture
-def recordings(sixty: Callable[..., GraspSet], tmp_path: Path) -> Path:
+def recordings(tmp_path: Path) -> Path:
     random, labels = np.random.default_rng(5), np.arange(60) % len(TYPES)
     closed = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 0]], bool)[labels] ^ (random.random((60, 4)) < 0.1)
     codes = np.clip(60 * labels[:, None] + random.normal(60, 15, (60, 2)), 0, 255)

@@ -6,13 +6,15 @@ from collections.abc import Callable, Mapping
 
 import pytest
 
+from ..conftest import tool
+
 SharedLibrary = Callable[..., ctypes.CDLL]
 # What undefined behaviour does is to stop the test.
 FLAGS = ("-std=c99", "-O1", "-g", "-shared", "-fPIC", "-fsanitize=undefined", "-fno-sanitize-recover=all")
 
 
 @pytest.fixture(scope="session")
-def shared_library(tool: Callable[[str], str], tmp_path_factory: pytest.TempPathFactory) -> SharedLibrary:
+def shared_library(tmp_path_factory: pytest.TempPathFactory) -> SharedLibrary:
     """Return a function that compiles files, name -> text, with gcc and loads them; each call gives its own statics."""
 
     def load(files: Mapping[str, str], *flags: str) -> ctypes.CDLL:

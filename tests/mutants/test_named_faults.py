@@ -51,7 +51,7 @@ FAULTS = (
         "compiler/trainers/stumps.py",
         "EMPTY_SHARE = 2.0**-38",
         "EMPTY_SHARE = 0.0",
-        "tests/compiler/boosting/test_stumpfit.py",
+        "tests/compiler/boosting/test_stumps.py",
     ),
     Fault(
         "the grid of sums is four times too fine",

@@ -1,6 +1,5 @@
 """Integer tables of any size, and a build folder around them, without training anything; and results to publish."""
 
-import hashlib
 import os
 from collections.abc import Callable
 from importlib import import_module
@@ -13,13 +12,14 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME, Build
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
+from thenar.runtime.manifest import Calibration, Manifest
 from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.model.terms.line import Slope
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import Count, DeviceHealth, Drift, HealthReport, JointAngles, LiveGrasp
-from thenar.runtime.recipe import Recipe
+
+from ..tables import describe as _describe
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
@@ -52,24 +52,6 @@ def _slope(random: np.random.Generator, joint: int, classes: int) -> Slope:
     low, gain = int(random.integers(0, 200)), int(random.integers(-2, 3))
     high = low + int(random.integers(8, 254 / 2**gain))
     return Slope(joint, low, high, gain, random.integers(-9, 10, classes).astype(np.int8))
-
-
-def _describe(tables: IntegerTables) -> Manifest:
-    data = tables_to_bytes(tables)
-    return Manifest(
-        schema=SCHEMA,
-        checksum="",
-        thenar="0.1.0",
-        tables_sha256=hashlib.sha256(data).hexdigest(),
-        ensemble_sha256="0" * 64,
-        source=Origin("1" * 64, 10, "own", 20, joints=22),
-        options=Recipe(0, 100, "both", 1.0, 4, 1),
-        grasps=tuple(f"grasp {number}" for number in range(tables.n_classes)),
-        switches=tuple(Switch(number, f"s{number}", 0.5) for number in range(tables.n_switches)),
-        joints=tuple(Calibration(n, f"j{n}", "deg", 0, 0.0, 100, 50.0) for n in range(tables.n_joints)),
-        proof=Proof(16, tables.scale, tables.bound, 6.5, 13.0, 10, 0),
-        rates=(Recognised("training", 0, 1, 10, 10),),
-    )
 
 
 @pytest.fixture(scope="session")

@@ -9,11 +9,13 @@ import pytest
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.avr import harness
 
+from ..conftest import tool
+
 Compile = Callable[..., Path]
 
 
 @pytest.fixture(scope="session")
-def program(tool: Callable[[str], str]) -> Callable[[str], Path]:
+def program() -> Callable[[str], Path]:
     """Return what gives the path of a program of the harness."""
     for name in ("avr-gcc", "make"):
         tool(name)
@@ -24,7 +26,7 @@ def program(tool: Callable[[str], str]) -> Callable[[str], Path]:
 
 
 @pytest.fixture
-def compiled(tool: Callable[[str], str], tmp_path: Path) -> Compile:
+def compiled(tmp_path: Path) -> Compile:
     """Return what compiles a text, C or (suffix ".S") assembly, for a part."""
 
     def compiled(text: str, part: str, suffix: str = ".c") -> Path:

@@ -1,7 +1,6 @@
 import hashlib
 import json
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,8 @@ from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build
 from thenar.runtime.recipe import Inputs, Recipe
 
-Make = Callable[..., GraspSet]
+from ..conftest import make_set
+
 ROUNDS = 12
 
 
@@ -44,7 +44,7 @@ def test_a_build_knows_its_inputs_and_recognises_what_it_was_trained_on(grasp_se
     assert [joint.name for joint in build.manifest.joints] == ["j0", "j1", "j2"]
 
 
-def test_the_headline_of_several_subjects_is_the_new_subject_rate(make_set: Make, tmp_path: Path) -> None:
+def test_the_headline_of_several_subjects_is_the_new_subject_rate(tmp_path: Path) -> None:
     report = compile_build(make_set(subjects=3), tmp_path / "build", rounds=ROUNDS)
     rates = report.manifest.rates
     assert [(rate.protocol, rate.title, rate.unit, rate.folds, rate.total) for rate in rates] == [
@@ -63,7 +63,7 @@ def test_the_headline_of_several_subjects_is_the_new_subject_rate(make_set: Make
     assert "by" not in document["options"]
 
 
-def test_what_is_new_is_asked_for(make_set: Make, tmp_path: Path) -> None:
+def test_what_is_new_is_asked_for(tmp_path: Path) -> None:
     whole = make_set(subjects=12)
     number = np.arange(96)
     parted = replace(
@@ -86,7 +86,7 @@ def test_what_is_new_is_asked_for(make_set: Make, tmp_path: Path) -> None:
             compile_build(whole, tmp_path / "build", rounds=1, by=by)
 
 
-def test_left_out_subjects_have_no_say_in_what_is_tested_on_them(make_set: Make) -> None:
+def test_left_out_subjects_have_no_say_in_what_is_tested_on_them() -> None:
     for subjects in (3, 23):
         whole = make_set(subjects=subjects, rows=96, frames=2)
         cuts = cuts_of(whole, Recipe())
@@ -98,7 +98,7 @@ def test_left_out_subjects_have_no_say_in_what_is_tested_on_them(make_set: Make)
                 assert cut.of == "pooled" or not set(trained.subjects) & set(tested.subjects)
 
 
-def test_frames_of_a_trial_are_one_piece_of_evidence(make_set: Make, tmp_path: Path) -> None:
+def test_frames_of_a_trial_are_one_piece_of_evidence(tmp_path: Path) -> None:
     """Five equal frames a trial change no rate of trials, where random folds of frames would know all of them."""
     one = compile_build(make_set(rows=64), tmp_path / "one", rounds=ROUNDS, prune=1).manifest.rates
     five = compile_build(make_set(rows=64, frames=5), tmp_path / "five", rounds=ROUNDS, prune=1).manifest.rates
@@ -109,7 +109,7 @@ def test_frames_of_a_trial_are_one_piece_of_evidence(make_set: Make, tmp_path: P
     assert (five[3].high or 0) - (five[3].low or 0) > 0.6 * ((five[2].high or 0) - (five[2].low or 0))
 
 
-def test_frames_that_are_numbered_as_trials_are_refused_before_any_work(make_set: Make, tmp_path: Path) -> None:
+def test_frames_that_are_numbered_as_trials_are_refused_before_any_work(tmp_path: Path) -> None:
     framed = make_set(rows=64, frames=6)
     drift = np.random.default_rng(1).integers(0, 3, framed.codes.shape).astype(np.uint16)
     numbered = replace(framed, codes=framed.codes + drift, trials=np.arange(len(framed)))
@@ -132,9 +132,7 @@ OPEN: dict[str, Any] = {"trainer": "logit", "penalty": 1.0, "max_bins": 4, "line
         pytest.param({"width": 6}, marks=pytest.mark.slow),
     ],
 )
-def test_the_rates_are_those_of_builds_of_each_folds_training_rows(
-    make_set: Make, tmp_path: Path, options: dict[str, Any]
-) -> None:
+def test_the_rates_are_those_of_builds_of_each_folds_training_rows(tmp_path: Path, options: dict[str, Any]) -> None:
     """All of it anew: placement, fit, integers. What is tested are the integers, whatever they lose."""
     whole = make_set(subjects=3)
     manifest = compile_build(whole, tmp_path / "build", **options).manifest
@@ -172,7 +170,7 @@ def test_a_choice_is_recorded_and_made_again_from_the_recorded_options(grasp_set
 
 
 @pytest.mark.slow
-def test_any_number_of_workers_gives_the_same_bytes_and_counts_all_folds(make_set: Make, tmp_path: Path) -> None:
+def test_any_number_of_workers_gives_the_same_bytes_and_counts_all_folds(tmp_path: Path) -> None:
     whole, seen = make_set(subjects=3, rows=192), []
     for jobs in (1, 2):
         told: list[tuple[int, int]] = []
@@ -233,7 +231,7 @@ def test_either_kind_of_input_will_do(
     ],
 )
 def test_what_makes_no_build_is_refused_and_nothing_written(
-    make_set: Make, tmp_path: Path, shape: dict[str, int], options: dict[str, Any], reason: str
+    tmp_path: Path, shape: dict[str, int], options: dict[str, Any], reason: str
 ) -> None:
     with pytest.raises((ThenarError, EvaluationError), match=reason):
         compile_build(make_set(**shape), tmp_path / "build", **{"rounds": 2, **options})
@@ -272,7 +270,7 @@ def test_a_file_in_the_way_is_refused_before_any_work(grasp_set: GraspSet, tmp_p
         compile_build(grasp_set, tmp_path / "notes", progress=lambda *_: pytest.fail("worked in vain"))
 
 
-def test_joints_that_never_move_make_no_build(make_set: Make, tmp_path: Path) -> None:
+def test_joints_that_never_move_make_no_build(tmp_path: Path) -> None:
     still = replace(make_set(switches=0), codes=np.full((96, 3), 7, np.uint16))
     with pytest.raises(CompileError, match="no input differs between rows"):
         compile_build(still, tmp_path / "build")

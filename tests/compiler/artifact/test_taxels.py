@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,8 @@ from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.samples import Samples
 from thenar.runtime.recipe import Recipe
 
-Make = Callable[..., GraspSet]
+from ..conftest import make_set
+
 PADS = tuple(Joint(f"pad{number}", "N", 0, 0.0, 4095, 20.0) for number in range(3))
 FALLING = Joint("pull-up", "V", 0, 5.0, 4095, 0.0)
 
@@ -43,7 +43,7 @@ def with_pads(plain: GraspSet, n_switches: int = 2) -> GraspSet:
 
 
 @pytest.fixture(scope="module")
-def padded(make_set: Make) -> GraspSet:
+def padded() -> GraspSet:
     return with_pads(make_set(subjects=2))
 
 
@@ -122,7 +122,7 @@ def test_joints_alone_need_no_thresholds_and_estimators_take_none(padded: GraspS
         compile_estimator(LogitBoostClassifier(), padded, tmp_path / "estimator")
 
 
-def test_the_best_joints_are_chosen_inside_each_fold_and_read_alone(make_set: Make, tmp_path: Path) -> None:
+def test_the_best_joints_are_chosen_inside_each_fold_and_read_alone(tmp_path: Path) -> None:
     """A build reads the kept joints, by name; rates are those of builds of the training rows, which keep others."""
     recorded = make_set(subjects=2, joints=3)
     options: dict[str, Any] = {"rounds": 4, "keep_joints": 2}

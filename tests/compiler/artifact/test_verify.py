@@ -27,6 +27,9 @@ from thenar.runtime.scanning.plan import check_harness
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 
+from ...conftest import calls
+from ..conftest import make_set
+
 Make = Callable[..., GraspSet]
 
 
@@ -113,7 +116,7 @@ def test_a_fault_that_no_recorded_row_shows_does_not_hold(folder: Path, grasp_se
     assert not found.holds
 
 
-def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Path, make_set: Make) -> None:
+def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Path) -> None:
     other = make_set(seed=5)
     shuffled = replace(
         other,
@@ -162,7 +165,7 @@ def test_codes_that_mean_something_else_are_refused(folder: Path, grasp_set: Gra
             verify(folder, replace(grasp_set, joints=joints))
 
 
-def test_the_ensemble_of_another_build_is_refused(folder: Path, make_set: Make, tmp_path: Path) -> None:
+def test_the_ensemble_of_another_build_is_refused(folder: Path, tmp_path: Path) -> None:
     compile_build(make_set(seed=3), tmp_path / "other", rounds=15, folds=0)
     (folder / "ensemble.bin").write_bytes((tmp_path / "other" / "ensemble.bin").read_bytes())
     with pytest.raises(BuildError, match=r"ensemble\.bin is not the one"):
@@ -175,9 +178,7 @@ def test_recordings_without_rows_are_refused(folder: Path, grasp_set: GraspSet) 
 
 
 @pytest.mark.slow
-def test_verifying_hundreds_of_classes_is_no_more_work_than_compiling_them(
-    make_set: Make, tmp_path: Path, calls: Callable[[Callable[[], object]], int]
-) -> None:
+def test_verifying_hundreds_of_classes_is_no_more_work_than_compiling_them(tmp_path: Path) -> None:
     many, found = make_set(rows=1200, switches=40, types=400), list[Verification]()
     compiling = calls(lambda: compile_build(many, tmp_path / "build", rounds=10, folds=0))
     verifying = calls(lambda: found.append(verify(tmp_path / "build", many)))

@@ -20,7 +20,7 @@ from thenar.compiler.firmware.words import string
 from thenar.runtime.build import Build
 from thenar.runtime.segmenting.model import SegmentModel
 
-Tool = Callable[[str], str]
+from ...conftest import tool
 
 TOOLS: dict[str, tuple[str, ...]] = {
     "host": ("gcc",),
@@ -35,9 +35,7 @@ def build(grasp_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 
 @pytest.mark.parametrize("kind", ["host", "avr"])
-def test_every_score_and_type_of_every_frame_is_pythons(
-    build: Path, grasp_set: GraspSet, tool: Tool, kind: str
-) -> None:
+def test_every_score_and_type_of_every_frame_is_pythons(build: Path, grasp_set: GraspSet, kind: str) -> None:
     for name in TOOLS[kind]:
         tool(name)
     found = verify_firmware(build, grasp_set, (kind,))
@@ -74,7 +72,7 @@ def changed(monkeypatch: pytest.MonkeyPatch, path: str, change: Callable[[str], 
 
 @pytest.mark.usefixtures("few_frames")
 def test_one_wrong_entry_is_found_with_the_first_frame_that_shows_it(
-    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch
+    build: Path, grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tool("gcc")
 
@@ -103,7 +101,7 @@ def test_one_wrong_entry_is_found_with_the_first_frame_that_shows_it(
 @pytest.mark.usefixtures("few_frames")
 @pytest.mark.parametrize("kind", ["host", "avr"])
 def test_a_frame_that_the_compiled_code_does_not_refuse_is_found(
-    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: str
+    build: Path, grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     """On an AVR where inputs are missing: there the answers are those of decide()."""
     for name in TOOLS[kind]:
@@ -127,13 +125,7 @@ def test_a_frame_that_the_compiled_code_does_not_refuse_is_found(
     ids=["margin", "probability"],
 )
 def test_a_margin_or_a_probability_that_is_off_is_found(
-    build: Path,
-    grasp_set: GraspSet,
-    tool: Tool,
-    monkeypatch: pytest.MonkeyPatch,
-    kind: str,
-    right: str,
-    wrong: str,
+    build: Path, grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch, kind: str, right: str, wrong: str
 ) -> None:
     for name in TOOLS[kind]:
         tool(name)
@@ -147,9 +139,7 @@ def test_a_margin_or_a_probability_that_is_off_is_found(
 
 
 @pytest.mark.parametrize("wrong", [False, True], ids=["right", "wrong"])
-def test_a_state_of_a_segment_that_is_off_is_found(
-    build: Path, tool: Tool, monkeypatch: pytest.MonkeyPatch, wrong: bool
-) -> None:
+def test_a_state_of_a_segment_that_is_off_is_found(build: Path, monkeypatch: pytest.MonkeyPatch, wrong: bool) -> None:
     tool("gcc")
     loaded = Build.load(build)
     tables = loaded.tables
@@ -178,9 +168,7 @@ def test_a_state_of_a_segment_that_is_off_is_found(
 
 
 @pytest.mark.usefixtures("few_frames")
-def test_names_that_are_mixed_up_are_found(
-    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_names_that_are_mixed_up_are_found(build: Path, grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch) -> None:
     tool("gcc")
     one, two = (string(f"{grasp}\0") for grasp in Build.load(build).grasps[:2])
     changed(monkeypatch, "thenar_glove.c", lambda text: text.replace(one, "?").replace(two, one).replace("?", two))
@@ -191,7 +179,7 @@ def test_names_that_are_mixed_up_are_found(
 
 @pytest.mark.usefixtures("few_frames")
 def test_what_does_not_hold_of_firmware_does_not_hold_of_the_build(
-    build: Path, grasp_set: GraspSet, tool: Tool, tmp_path: Path
+    build: Path, grasp_set: GraspSet, tmp_path: Path
 ) -> None:
     tool("gcc")
     folder = compile_build(grasp_set, tmp_path / "build", rounds=10, folds=0).folder
@@ -208,7 +196,7 @@ def test_what_does_not_hold_of_firmware_does_not_hold_of_the_build(
 
 
 @pytest.mark.usefixtures("few_frames")
-def test_a_build_of_before_carries_no_firmware_and_holds(grasp_set: GraspSet, tool: Tool, tmp_path: Path) -> None:
+def test_a_build_of_before_carries_no_firmware_and_holds(grasp_set: GraspSet, tmp_path: Path) -> None:
     tool("gcc")
     folder = compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0).folder
     for path in (folder / "firmware").iterdir():

@@ -1,8 +1,156 @@
+"""The best stump of a round, against every stump written out in exact rational arithmetic; and sums of stumps."""
+
+from fractions import Fraction
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
-from thenar.compiler.trainers.stumps import Stumps
+from thenar.compiler.trainers.binning import bin_columns, midpoints
+from thenar.compiler.trainers.stumps import Stumps, Targets, fit_stumps
 from thenar.runtime.model.tables import TIE, winners
+
+NUMBERS = st.sampled_from([0.0, 1.0]) | st.integers(0, 6).map(float) | st.just(np.nan)
+Z_MAX = 3.0
+
+
+@st.composite
+def problems(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Inputs (n, d), true weights and responses (1, n) of ratios z, 1 <= |z| <= z_max."""
+    n, d = draw(st.integers(2, 9)), draw(st.integers(1, 4))
+    X = draw(arrays(np.float64, (n, d), elements=NUMBERS))
+    weights = draw(arrays(np.float64, (1, n), elements=st.floats(0.0, 1.0)))
+    ratios = draw(arrays(np.float64, (1, n), elements=st.floats(1.0, Z_MAX) | st.floats(-Z_MAX, -1.0)))
+    return X, weights, weights * ratios
+
+
+def explained(X: np.ndarray, column: int, threshold: float, w: list[Fraction], r: list[Fraction]) -> Fraction:
+    numbers = X[:, column]
+    total = Fraction(0)
+    for branch in (numbers <= threshold, numbers > threshold, np.isnan(numbers)):
+        weight = sum((w[i] for i in np.flatnonzero(branch)), Fraction(0))
+        response = sum((r[i] for i in np.flatnonzero(branch)), Fraction(0))
+        total += response**2 / weight if weight else Fraction(0)
+    return total
+
+
+@given(problems())
+def test_no_other_stump_explains_more(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    X, weights, responses = problem
+    binned = bin_columns(X)
+    if not binned.columns or weights.max() < 1e-6:
+        return
+    fitted = fit_stumps(binned, Targets(weights, responses), Z_MAX)
+    w = [Fraction(float(v)) for v in weights[0]]
+    r = [Fraction(float(v)) for v in responses[0]]
+    stumps = [
+        (explained(X, column, float(edge), w, r), column, float(edge))
+        for column in range(X.shape[1])
+        for edge in midpoints(np.unique(X[~np.isnan(X[:, column]), column]))
+    ]
+    best = max(stumps)[0]
+    chosen = explained(X, int(fitted.columns[0]), float(fitted.thresholds[0]), w, r)
+    # Rounding to the grid and an "empty" branch's share of 2^-40 of the weight, at most 9 * weight each.
+    slack = Fraction(40) * sum(w) / 2**38
+    assert chosen >= best - slack
+    # Among stumps that explain the same, the lowest column and then the lowest threshold.
+    same = [(column, edge) for part, column, edge in stumps if part == chosen]
+    clear = [part for part, _, _ in stumps if part > best - slack and part != chosen]
+    if not clear:
+        assert (int(fitted.columns[0]), float(fitted.thresholds[0])) == min(same)
+
+
+@given(problems())
+def test_values_are_weighted_means_within_the_clamp(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    X, weights, responses = problem
+    binned = bin_columns(X)
+    if not binned.columns or weights.max() < 1e-6:
+        return
+    fitted = fit_stumps(binned, Targets(weights, responses), Z_MAX)
+    assert (np.abs(fitted.values) <= Z_MAX).all()
+    numbers = X[:, fitted.columns[0]]
+    branches = (numbers <= fitted.thresholds[0], numbers > fitted.thresholds[0], np.isnan(numbers))
+    mean = responses.sum() / weights.sum()
+    for value, branch in zip(fitted.values[0], branches, strict=True):
+        weight = weights[0, branch].sum()
+        if weight > 1e-6 * weights.sum():
+            np.testing.assert_allclose(value, responses[0, branch].sum() / weight, atol=1e-9)
+            assert (fitted.outputs[0, branch] == value).all()
+        elif weight == 0.0:
+            np.testing.assert_allclose(value, mean, atol=1e-9)
+
+
+def test_a_nearly_weightless_branch_predicts_the_mean() -> None:
+    X = np.array([[0.0], [1.0], [1.0]])
+    fitted = fit_stumps(bin_columns(X), Targets(np.array([[1e-17, 0.5, 0.5]]), np.array([[-3e-17, 0.5, 0.75]])), Z_MAX)
+    np.testing.assert_allclose(fitted.values, [[1.25, 1.25, 1.25]], rtol=1e-12)
+
+
+def _equal_sums(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Weights and responses (1, 40): the first row has exactly what the next two have together."""
+    rng = np.random.default_rng(seed)
+    weights, ratios = rng.random((1, 40)), np.full((1, 40), -1.7)
+    weights[0, 1:3] = weights[0, 0] / 2
+    ratios[0, :3] = 1.9
+    responses = weights * ratios
+    responses[0, 1:3] = responses[0, 0] / 2
+    first, others = np.arange(40) == 0, np.isin(np.arange(40), (1, 2))
+    return np.stack([first, others]).astype(np.float64), weights, responses
+
+
+def test_columns_of_equal_sums_tie_however_the_grid_rounds_them() -> None:
+    for seed in range(40):
+        branches, weights, responses = _equal_sums(seed)
+        for columns in (branches.T, branches[::-1].T):
+            fitted = fit_stumps(bin_columns(columns), Targets(weights, responses), Z_MAX)
+            assert fitted.columns[0] == 0, seed
+
+
+def test_splits_of_equal_sums_tie_and_the_lowest_wins() -> None:
+    for seed in range(40):
+        (first, others), weights, responses = _equal_sums(seed)
+        for column in (1 + first - others, 1 - first + others):
+            fitted = fit_stumps(bin_columns(column[:, np.newaxis]), Targets(weights, responses), Z_MAX)
+            assert fitted.thresholds[0] == 0.5, seed
+
+
+def test_a_light_branch_keeps_the_bits_that_the_coarse_grid_drops() -> None:
+    weights = np.array([[1e-9 / 3, 0.7, 0.3]])
+    left = np.array([[1.0, 0.0, 0.0]])
+    targets = Targets(weights, weights * 1.3)
+    weight, response = np.ldexp(targets.branch_sums(left, None), -targets.weights.exponents)
+    np.testing.assert_allclose(weight[0], weights[:, 0], rtol=1e-15)
+    np.testing.assert_allclose(response[0], weights[:, 0] * 1.3, rtol=1e-15)
+
+
+@pytest.mark.parametrize("decades", [-323, -320, -308, -300, 300])
+def test_branch_values_do_not_depend_on_the_weights_scale(decades: int) -> None:
+    left = np.array([[1.0, 1.0, 0.0, 0.0]])
+    shares = np.array([[1.0, 3.0, 2.0, 2.0]])
+    weights = shares * 10.0**decades
+    weight, response = Targets(weights, weights * np.array([1.0, -1.0, 2.0, 3.0])).branch_sums(left, None)
+    exact = [(weights[0, 0] - weights[0, 1]) / (weights[0, :2].sum()), 2.5]
+    np.testing.assert_allclose(response[:2, 0] / weight[:2, 0], exact, rtol=1e-15)
+
+
+@pytest.mark.parametrize(("bits", "value"), [(38, 2.0), (39, -1.0)])
+def test_a_branch_of_exactly_the_least_share_is_not_empty(bits: int, value: float) -> None:
+    share = 2.0**-bits
+    weights = np.array([[share, 0.5 - share, 0.5]])
+    targets = Targets(weights, weights * [[2.0, -1.0, -1.0]])
+    fitted = fit_stumps(bin_columns(np.array([[0.0], [1.0], [1.0]])), targets, Z_MAX)
+    # An empty one answers with the mean of all, which is next to -1.
+    assert fitted.values[0, 0] == pytest.approx(value, abs=1e-9)
+
+
+@pytest.mark.parametrize("responses", [0.0, 5e-324])
+def test_a_class_without_weight_answers_nothing_and_harms_no_other(responses: float) -> None:
+    weights = np.array([[0.25, 0.25, 0.5], [0.0, 0.0, 0.0]])
+    targets = Targets(weights, np.array([[0.25, 0.25, -0.5], [responses, 0.0, responses]]))
+    fitted = fit_stumps(bin_columns(np.array([[0.0], [0.0], [1.0]])), targets, Z_MAX)
+    assert fitted.values.tolist() == [[1.0, -1.0, 0.0], [0.0, 0.0, 0.0]]
 
 
 def test_scores_within_a_billionth_are_a_tie_that_the_lowest_number_wins() -> None:

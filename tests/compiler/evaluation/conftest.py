@@ -1,6 +1,6 @@
 """Sets of grasps with a structure that the tests know."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from ...sets import grasp_set_of
 TYPES = ("hook", "pinch", "power", "tip")
 
 
-def _make(
+def make_grasps(
     n_switches: int = 12,
     n_joints: int = 2,
     subjects: str = "AB",
@@ -36,11 +36,6 @@ def _make(
         objects=np.tile(["cup", "pen"], len(labels) // 2),
         trials=np.tile(np.arange(per_type), len(subjects) * len(TYPES)),
     )
-
-
-@pytest.fixture(scope="session")
-def make_grasps() -> Callable[..., GraspSet]:
-    return _make
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -1,6 +1,6 @@
 """The fit is chosen inside the training rows: folds that part nothing, the rule, and what options leave open."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
@@ -16,6 +16,8 @@ from thenar.compiler.evaluation.choosing import choose_training, inner_folds
 from thenar.compiler.trainers.base import Training
 from thenar.runtime.manifest import fit_name
 from thenar.runtime.recipe import changed
+
+from ..conftest import make_set
 
 
 class Pointer(Trainer):
@@ -77,9 +79,7 @@ def test_inner_folds_part_no_trial_and_no_group(data: st.DataObject, n_groups: i
 
 
 @pytest.mark.parametrize("by", [None, "subject"])
-def test_every_candidate_is_scored_as_if_it_were_trained_alone(
-    make_set: Callable[..., GraspSet], by: str | None
-) -> None:
+def test_every_candidate_is_scored_as_if_it_were_trained_alone(by: str | None) -> None:
     """An oracle in a few lines, of trials with several frames; staged rounds are those of trainings of their own."""
     grasp_set = make_set(subjects=4, frames=3)
     samples = Samples.of(grasp_set)

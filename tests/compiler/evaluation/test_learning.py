@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,7 +17,8 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.runtime.recipe import Recipe
 
-Make = Callable[..., GraspSet]
+from .conftest import make_grasps
+
 N = np.array([2.0, 4.0, 8.0, 16.0])
 QUICK = StudyDesign(Recipe(trainer="logitboost", rounds=3), repeats=1, tables=(), protocols=("nested",), learning=True)
 
@@ -73,7 +73,7 @@ def test_where_nothing_is_missed_nothing_is_promised() -> None:
 
 
 @pytest.mark.parametrize("scheme", ["trial", "subject"])
-def test_so_many_trials_of_each_type_and_person_are_trained_on(make_grasps: Make, scheme: str) -> None:
+def test_so_many_trials_of_each_type_and_person_are_trained_on(scheme: str) -> None:
     grasps = make_grasps(per_type=16)
     frames = grasps.rows(np.repeat(np.arange(len(grasps)), 3))
     planner = planned(frames)
@@ -100,7 +100,7 @@ def test_so_many_trials_of_each_type_and_person_are_trained_on(make_grasps: Make
                 assert set(counts) == {size} if size < last else counts.mean() == last
 
 
-def test_curves_rise_and_say_what_to_expect(make_grasps: Make, tmp_path: Path) -> None:
+def test_curves_rise_and_say_what_to_expect(tmp_path: Path) -> None:
     study = evaluate(make_grasps(noise=0.2, per_type=16), QUICK, jobs=1)
     learning = study.learning
     assert learning is not None
@@ -114,7 +114,7 @@ def test_curves_rise_and_say_what_to_expect(make_grasps: Make, tmp_path: Path) -
     assert (tmp_path / LEARNING_NAME).read_bytes().startswith(b"<?xml")
 
 
-def test_other_cuts_and_single_repetitions_have_no_curve(make_grasps: Make) -> None:
+def test_other_cuts_and_single_repetitions_have_no_curve() -> None:
     with pytest.raises(EvaluationError, match="not objects left out"):
         evaluate(make_grasps(), QUICK.changed(scheme="object"), jobs=1)
     with pytest.raises(EvaluationError, match="needs more than 2 repetitions to train on, and there are 2"):

@@ -1,7 +1,6 @@
 """One nested evaluation, done once more with scikit-learn's own splitting, pipelines and predictions."""
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -15,11 +14,12 @@ from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.study import shuffled_labels
 from thenar.compiler.text import INDEPENDENT
 
-Make = Callable[..., GraspSet]
+from .conftest import make_grasps
+
 NESTED: dict[str, Any] = {"protocols": ("nested",), "tables": ("compositions",), "rounds": 10, "jobs": 1}
 
 
-def framed(make_grasps: Make, frames: int = 3) -> GraspSet:
+def framed(frames: int = 3) -> GraspSet:
     """Return three people's trials of several frames, each frame with a flipped switch or two of its own."""
     one = make_grasps(subjects="ABC", per_type=6, noise=0.2)
     rows = one.rows(np.repeat(np.arange(len(one)), frames))
@@ -36,8 +36,8 @@ def majorities(predicted: list[str], grasp_set: GraspSet) -> int:
     return sum(min(vote, key=lambda grasp: (-vote[grasp], grasp)) == trial[1] for trial, vote in votes.items())
 
 
-def test_leaving_subjects_out_matches_a_scikit_learn_pipeline(make_grasps: Make) -> None:
-    grasp_set = framed(make_grasps)
+def test_leaving_subjects_out_matches_a_scikit_learn_pipeline() -> None:
+    grasp_set = framed()
     study = evaluate(grasp_set, scheme="subject", **NESTED)
     selected = make_pipeline(SwitchSelector("id3"), LogitBoostClassifier(rounds=10))
     predicted = cross_val_predict(
@@ -54,8 +54,8 @@ def test_leaving_subjects_out_matches_a_scikit_learn_pipeline(make_grasps: Make)
         assert cell.rate.correct == (majorities(predicted[mine].tolist(), grasp_set.rows(mine)),)
 
 
-def test_sessions_left_out_are_those_of_scikit_learn_too(make_grasps: Make) -> None:
-    grasp_set = framed(make_grasps)
+def test_sessions_left_out_are_those_of_scikit_learn_too() -> None:
+    grasp_set = framed()
     study = evaluate(grasp_set, scheme="session", **NESTED)
     (row,) = (row for row in study.tables[0].rows if row.name == "V")
     for name, cell in zip("ABC", row.cells, strict=True):
@@ -69,7 +69,7 @@ def test_sessions_left_out_are_those_of_scikit_learn_too(make_grasps: Make) -> N
     assert row.rate.over == 6
 
 
-def test_frames_that_count_as_trials_are_refused(make_grasps: Make) -> None:
+def test_frames_that_count_as_trials_are_refused() -> None:
     one = make_grasps(per_type=4, noise=0.3)
     frames = one.rows(np.repeat(np.arange(len(one)), 5))
     wrong = replace(frames, trials=np.arange(len(frames)))
@@ -79,8 +79,8 @@ def test_frames_that_count_as_trials_are_refused(make_grasps: Make) -> None:
     assert claimed.warnings[0] == INDEPENDENT
 
 
-def test_shuffled_labels_stay_with_their_subject_and_trials_stay_whole(make_grasps: Make) -> None:
-    grasp_set = framed(make_grasps)
+def test_shuffled_labels_stay_with_their_subject_and_trials_stay_whole() -> None:
+    grasp_set = framed()
     made = shuffled_labels(grasp_set, (1, 1))
     assert made.trial_ids.tolist() == grasp_set.trial_ids.tolist()
     assert (made.grasps != grasp_set.grasps).any()
@@ -89,18 +89,18 @@ def test_shuffled_labels_stay_with_their_subject_and_trials_stay_whole(make_gras
         assert Counter(made.grasps[mine].tolist()) == Counter(grasp_set.grasps[mine].tolist())
 
 
-def test_a_permutation_test_knows_chance_and_does_not_depend_on_workers(make_grasps: Make) -> None:
+def test_a_permutation_test_knows_chance_and_does_not_depend_on_workers() -> None:
     asked = {**NESTED, "tables": (), "permute": 19, "folds": 2, "rounds": 3}
-    told = evaluate(framed(make_grasps), **asked).permuted
+    told = evaluate(framed(), **asked).permuted
     assert told is not None
     assert (told.permutations, told.p, told.composition) == (19, 0.05, "II Angle + Sel-Co")
     assert told.chance == pytest.approx(0.25, abs=0.07)
     assert told.rate > told.highest >= told.chance
-    assert evaluate(framed(make_grasps), **(asked | {"jobs": 2})).permuted == told
+    assert evaluate(framed(), **(asked | {"jobs": 2})).permuted == told
 
 
 @pytest.mark.slow
-def test_where_labels_say_nothing_p_values_are_spread_evenly(make_grasps: Make) -> None:
+def test_where_labels_say_nothing_p_values_are_spread_evenly() -> None:
     asked = {**NESTED, "tables": (), "permute": 9, "folds": 2, "rounds": 2}
     small = [make_grasps(n_switches=5, n_joints=0, subjects="A", per_type=6, noise=0.5, seed=s) for s in range(25)]
     found = [study.permuted for study in (evaluate(one, **asked) for one in small)]

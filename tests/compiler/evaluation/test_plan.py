@@ -4,23 +4,31 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sklearn.linear_model import LogisticRegression
+from sklearn.neighbors import KNeighborsClassifier
 
-from thenar.compiler import grow_id3
+from thenar.compiler import LogitBoostClassifier, grow_id3
 from thenar.compiler.evaluation.choosing import InputChoices
-from thenar.compiler.evaluation.folds import NESTED, PAPER, Protocol, populations_of
+from thenar.compiler.evaluation.folds import NESTED, PAPER, Fold, Protocol, populations_of, weka_folds
 from thenar.compiler.evaluation.plan import (
+    CLASSIFIERS,
     COMPOSITIONS,
     DRAWS,
     Composition,
+    FoldFit,
     Planner,
     RowPlan,
     available,
+    predictions,
 )
 from thenar.compiler.placement.elements import Element, columns_of
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
+from thenar.compiler.trainers.base import Training
 from thenar.runtime.recipe import Recipe
+
+from .conftest import make_grasps
 
 OF_THE_PAPER = {
     "I": ("Angle + All-Co", True, (0, 1, 2, 3)),
@@ -49,7 +57,6 @@ def test_a_set_gets_the_compositions_it_has_inputs_for(n_switches: int, n_joints
     assert [composition.name for composition in available(n_switches, n_joints)] == names
 
 
-Make = Callable[..., GraspSet]
 both_protocols = pytest.mark.parametrize("protocol", [PAPER, NESTED], ids=lambda protocol: protocol.name)
 
 
@@ -59,7 +66,7 @@ def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
 
 
 @pytest.fixture(scope="module")
-def planner(make_grasps: Make) -> Planner:
+def planner() -> Planner:
     return planner_of(make_grasps(noise=0.25))
 
 
@@ -140,7 +147,7 @@ def test_baselines_choose_from_the_rows_that_id3_may_choose_from(planner: Planne
                 assert fit.elements == tuple(sorted(planner.chosen(seen, placement=method, keep=len(fit.elements))))
 
 
-def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps: Make) -> None:
+def test_every_method_sees_exactly_the_rows_given_in_whatever_order() -> None:
     grasps, rows = make_grasps(noise=0.3), np.arange(5, 40)
     used, fresh = planner_of(grasps), planner_of(grasps)
     seen = Samples.of(grasps, "switches").rows(rows)
@@ -152,12 +159,12 @@ def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps:
         assert columns_of(used.chosen(rows, placement=name, keep=3)) == METHODS[name].chooser(seen)(3)
 
 
-def test_any_method_can_be_a_baseline(make_grasps: Make) -> None:
+def test_any_method_can_be_a_baseline() -> None:
     table = replace(planner_of(make_grasps()), baselines=("mrmr",)).table("baselines", NESTED)
     assert [line.name for line in table] == ["ID3", "mrmr", "random"]
 
 
-def test_what_differs_in_its_number_alone_is_chosen_together_and_once(make_grasps: Make) -> None:
+def test_what_differs_in_its_number_alone_is_chosen_together_and_once() -> None:
     asked: list[tuple[float, ...]] = []
 
     def ask(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
@@ -172,3 +179,83 @@ def test_what_differs_in_its_number_alone_is_chosen_together_and_once(make_grasp
     for recipe in recipes:
         assert choices.elements(recipe, rows) == InputChoices(samples).elements(recipe, rows)
     assert len(asked) == 2
+
+
+def test_baselines_answer_as_scikit_learns_on_the_same_standardised_columns() -> None:
+    grasps = make_grasps(noise=0.3, per_type=10)
+    samples, rows = Samples.of(grasps), np.arange(len(grasps))
+    fold, columns = Fold(rows[::2], rows[1::2], "1"), (1, 3, 4, 12, 13)
+    X = samples.inputs
+    learnt = X[fold.train][:, columns].astype(float)
+    mean, spread = learnt.mean(axis=0), learnt.std(axis=0)
+    oracles = {
+        "logistic-regression": LogisticRegression(max_iter=10_000),
+        "5-nearest-neighbours": KNeighborsClassifier(5, weights="distance"),
+    }
+    assert oracles.keys() == {*CLASSIFIERS}
+    for name, oracle in oracles.items():
+        oracle.fit((learnt - mean) / spread, grasps.labels[fold.train])
+        expected = oracle.predict((X[fold.test][:, columns] - mean) / spread)
+        fit = FoldFit(fold, tuple(map(Element, columns[:3])), (0, 1), (0, 1, 2, 3), learner=name)
+        assert np.array_equal(predictions(samples, fit, {}), expected)
+
+
+def test_of_a_single_grasp_type_nothing_else_is_answered() -> None:
+    grasps = make_grasps(noise=0.3)
+    rows = np.flatnonzero(grasps.labels == 2)
+    for name in CLASSIFIERS:
+        fit = FoldFit(Fold(rows, np.arange(5), "1"), (Element(0), Element(1)), (0,), (0, 1, 2, 3), learner=name)
+        assert predictions(Samples.of(grasps), fit, {}).tolist() == [2] * 5
+
+
+QUICK = {"": (Training("logitboost", {"rounds": 5}),)}
+
+
+@pytest.fixture
+def fits() -> tuple[GraspSet, list[FoldFit]]:
+    grasps = make_grasps(noise=0.3)
+    folds = weka_folds(grasps.labels, 4, 1)
+    inputs = [(tuple(map(Element, columns)), joints) for columns, joints in [((0, 1, 2), ()), ((3, 4), (0,))]]
+    return grasps, [FoldFit(fold, *each, (0, 1, 2, 3)) for fold in folds for each in inputs]
+
+
+def test_a_fit_answers_as_the_classifier_does(fits: tuple[GraspSet, list[FoldFit]]) -> None:
+    grasps, todo = fits
+    samples = Samples.of(grasps)
+    training = Training("logitboost", {"rounds": 5, "shrinkage": 0.5})
+    for fit in todo:
+        columns = [*(element.column for element in fit.elements), *(12 + joint for joint in fit.joints)]
+        part = samples.inputs[:, columns]
+        classifier = LogitBoostClassifier(rounds=5, shrinkage=0.5)
+        classifier.fit(part[fit.fold.train], grasps.labels[fit.fold.train])
+        found = predictions(samples, fit, {"": (training,)})
+        assert np.array_equal(found, classifier.predict(part[fit.fold.test]))
+
+
+def test_labels_keep_their_numbers_where_some_do_not_occur() -> None:
+    grasps = make_grasps(noise=0.0)
+    rows = np.flatnonzero(np.isin(grasps.labels, (1, 3)))
+    fold = Fold(rows[::2], rows[1::2], "1")
+    found = predictions(Samples.of(grasps), FoldFit(fold, tuple(map(Element, range(12))), (), (1, 3)), QUICK)
+    assert np.array_equal(found, grasps.labels[fold.test])
+
+
+def test_without_inputs_the_most_frequent_training_label_is_answered() -> None:
+    grasps = make_grasps()
+    rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
+    fold = Fold(rows, np.arange(6), "1")
+    found = predictions(Samples.of(grasps), FoldFit(fold, (), (), (0, 1, 2, 3)), QUICK)
+    assert found.tolist() == [2] * 6
+
+
+def test_where_no_input_varies_the_most_frequent_training_label_is_answered() -> None:
+    grasps = make_grasps()
+    rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
+    codes = grasps.codes.copy()
+    codes[rows, :2] = 7, 65535
+    samples = Samples.of(replace(grasps, codes=codes))
+    fit = FoldFit(Fold(rows, np.arange(6), "1"), (), (0, 1), (0, 1, 2, 3))
+    assert fit.is_blind(samples)
+    assert predictions(samples, fit, QUICK).tolist() == [2] * 6
+    codes[rows[-1], 1] = 0
+    assert not fit.is_blind(Samples.of(replace(grasps, codes=codes)))

@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,11 +14,11 @@ from thenar.compiler.evaluation.folds import (
 )
 from thenar.compiler.recordings.graspset import GraspSet
 
-Make = Callable[..., GraspSet]
+from .conftest import make_grasps
 
 
 @pytest.mark.parametrize("scheme", ["trial", "object", "block"])
-def test_a_subject_is_trained_and_tested_on_own_rows_alone(make_grasps: Make, scheme: Scheme) -> None:
+def test_a_subject_is_trained_and_tested_on_own_rows_alone(scheme: Scheme) -> None:
     grasps = make_grasps()
     populations = populations_of(grasps, scheme, n_folds=4, repeats=2, seed=1)
     assert [population.name for population in populations] == ["A", "B"]
@@ -30,7 +29,7 @@ def test_a_subject_is_trained_and_tested_on_own_rows_alone(make_grasps: Make, sc
             assert np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), own)
 
 
-def test_leaving_a_subject_out_trains_on_all_others(make_grasps: Make) -> None:
+def test_leaving_a_subject_out_trains_on_all_others() -> None:
     grasps = make_grasps(subjects="ABC")
     for population in populations_of(grasps, "subject", n_folds=4, repeats=3, seed=1):
         ((fold,),) = population.repeats
@@ -41,7 +40,7 @@ def test_leaving_a_subject_out_trains_on_all_others(make_grasps: Make) -> None:
 
 @pytest.mark.parametrize("scheme", ["trial", "subject", "object", "block"])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_no_scheme_parts_the_frames_of_a_trial(make_grasps: Make, scheme: Scheme, seed: int) -> None:
+def test_no_scheme_parts_the_frames_of_a_trial(scheme: Scheme, seed: int) -> None:
     """Each row comes three times, as frames of its trial do, and all rows are in another order."""
     order = np.random.default_rng(seed).permutation(3 * 96) % 96
     grasps = make_grasps().rows(order)
@@ -52,7 +51,7 @@ def test_no_scheme_parts_the_frames_of_a_trial(make_grasps: Make, scheme: Scheme
             assert not set(trials[fold.train]) & set(trials[fold.test])
 
 
-def test_repeats_are_wekas_folds_of_the_following_seeds(make_grasps: Make) -> None:
+def test_repeats_are_wekas_folds_of_the_following_seeds() -> None:
     grasps = make_grasps(subjects="A")
     (population,) = populations_of(grasps, "trial", n_folds=4, repeats=3, seed=5)
     for repeat, folds in enumerate(population.repeats):
@@ -62,25 +61,25 @@ def test_repeats_are_wekas_folds_of_the_following_seeds(make_grasps: Make) -> No
 
 
 @pytest.mark.parametrize("scheme", ["subject", "object", "block"])
-def test_a_cut_without_chance_is_not_repeated(make_grasps: Make, scheme: Scheme) -> None:
+def test_a_cut_without_chance_is_not_repeated(scheme: Scheme) -> None:
     assert all(len(population.repeats) == 1 for population in populations_of(make_grasps(), scheme, 4, 3, 1))
 
 
-def test_the_classes_are_those_that_the_subject_shows(make_grasps: Make) -> None:
+def test_the_classes_are_those_that_the_subject_shows() -> None:
     grasps = make_grasps(subjects="AB")
     without = grasps.rows((grasps.subjects == "A") | (grasps.grasps != "pinch"))
     shown = {population.name: population.grasps for population in populations_of(without, "trial", 4, 1, 1)}
     assert shown == {"A": (0, 1, 2, 3), "B": (0, 2, 3)}
 
 
-def test_a_subject_who_cannot_be_cut_is_named(make_grasps: Make) -> None:
+def test_a_subject_who_cannot_be_cut_is_named() -> None:
     grasps = make_grasps()
     few = grasps.rows([*np.flatnonzero(grasps.subjects == "A"), len(grasps) - 1])
     with pytest.raises(EvaluationError, match="subject B: 1 rows cannot be cut into 4 folds"):
         populations_of(few, "trial", 4, 1, 1)
 
 
-def test_the_paper_lets_test_rows_choose_and_honesty_does_not(make_grasps: Make) -> None:
+def test_the_paper_lets_test_rows_choose_and_honesty_does_not() -> None:
     grasps = make_grasps()
     everyone = np.arange(len(grasps))
     for scheme in ("trial", "object", "block"):
@@ -92,7 +91,7 @@ def test_the_paper_lets_test_rows_choose_and_honesty_does_not(make_grasps: Make)
                 assert set(NESTED.may_choose_pooled(everyone, fold)) == set(everyone) - set(fold.test)
 
 
-def test_a_left_out_subject_has_no_say_in_a_nested_placement(make_grasps: Make) -> None:
+def test_a_left_out_subject_has_no_say_in_a_nested_placement() -> None:
     grasps = make_grasps()
     for population in populations_of(grasps, "subject", 4, 1, 1):
         (fold,) = population.folds
@@ -105,18 +104,18 @@ def keep_some(grasps: GraspSet, grasp: str, n: int) -> GraspSet:
     return grasps.rows(np.setdiff1d(np.arange(len(grasps)), rows[n:]))
 
 
-def test_a_balanced_set_is_of_no_concern(make_grasps: Make) -> None:
+def test_a_balanced_set_is_of_no_concern() -> None:
     grasps = make_grasps()
     assert concerns(grasps, populations_of(grasps, "trial", 4, 1, 1), "trial", 4) == ()
 
 
-def test_a_grasp_type_with_fewer_rows_than_folds_is_named(make_grasps: Make) -> None:
+def test_a_grasp_type_with_fewer_rows_than_folds_is_named() -> None:
     grasps = keep_some(make_grasps(subjects="A"), "tip", 3)
     (text,) = concerns(grasps, populations_of(grasps, "trial", 4, 1, 1), "trial", 4)
     assert text.startswith("subject A has 3 trial(s) of tip: fewer than the 4 folds")
 
 
-def test_a_single_row_can_never_be_recognised_and_that_is_said(make_grasps: Make) -> None:
+def test_a_single_row_can_never_be_recognised_and_that_is_said() -> None:
     grasps = keep_some(make_grasps(subjects="A"), "tip", 1)
     texts = concerns(grasps, populations_of(grasps, "trial", 4, 1, 1), "trial", 4)
     assert any(
@@ -124,7 +123,7 @@ def test_a_single_row_can_never_be_recognised_and_that_is_said(make_grasps: Make
     )
 
 
-def test_leaving_objects_out_warns_of_types_with_one_object(make_grasps: Make) -> None:
+def test_leaving_objects_out_warns_of_types_with_one_object() -> None:
     grasps = make_grasps(subjects="A")
     own_object = np.where(grasps.grasps == "hook", "bag", grasps.objects)
     grasps = replace(grasps, objects=own_object)
@@ -132,14 +131,14 @@ def test_leaving_objects_out_warns_of_types_with_one_object(make_grasps: Make) -
     assert text.startswith("12 row(s) of hook of subject A")
 
 
-def test_a_subject_of_one_grasp_type_is_named(make_grasps: Make) -> None:
+def test_a_subject_of_one_grasp_type_is_named() -> None:
     grasps = make_grasps()
     only = grasps.rows(np.flatnonzero((grasps.subjects == "B") | (grasps.grasps == "tip")))
     (text,) = concerns(only, populations_of(only, "trial", 4, 1, 1), "trial", 4)
     assert text == "subject A: every row is of tip, the only type"
 
 
-def test_rates_of_simulated_grasps_are_called_that(make_grasps: Make) -> None:
+def test_rates_of_simulated_grasps_are_called_that() -> None:
     simulated = replace(make_grasps(), simulated="scene quick, seed 1")
     (text,) = concerns(simulated, populations_of(simulated, "trial", 4, 1, 1), "trial", 4)
     assert text.startswith("these grasps are simulated (scene quick, seed 1)")

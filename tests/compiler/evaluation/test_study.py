@@ -1,20 +1,23 @@
-from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from thenar.compiler.evaluation.folds import EvaluationError, Fold, Population, Scheme
 from thenar.compiler.evaluation.plan import CLASSIFIERS, REFERENCE, CellPlan, FoldFit, RowPlan, learners
 from thenar.compiler.evaluation.rates import Rate, RecipeWords
-from thenar.compiler.evaluation.study import TABLES, Study, StudyDesign, evaluate
-from thenar.compiler.evaluation.tables import RateReader, RateRow, RateTable
+from thenar.compiler.evaluation.study import TABLES, Study, StudyDesign, draw, evaluate
+from thenar.compiler.evaluation.tables import RateReader, RateRow, RateTable, draw_matrix
 from thenar.compiler.placement.elements import Element
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS
 from thenar.runtime.recipe import Recipe
+
+from ..conftest import with_none
+from .conftest import make_grasps
 
 # Six rows of two types, two folds, two repeats of the same folds; three switches, and a joint.
 SAMPLES = Samples(
@@ -80,12 +83,11 @@ def test_a_row_counts_all_its_subjects_and_only_compositions_carry_confusions() 
     assert reader.table("compositions", "paper", (row,), recipe).rows[0].cells[0].confusion is not None
 
 
-Make = Callable[..., GraspSet]
 QUICK = StudyDesign(Recipe(trainer="logitboost", rounds=5), repeats=2, prune_list=(0, 10))
 
 
 @pytest.fixture(scope="module")
-def study(make_grasps: Make) -> Study:
+def study() -> Study:
     return evaluate(make_grasps(noise=0.2), QUICK, jobs=1)
 
 
@@ -119,15 +121,13 @@ def test_confusion_matrices_count_every_row_and_agree_with_rates(study: Study) -
                 assert np.trace(counts) == sum(cell.rate.correct)
 
 
-def test_evaluations_are_identical_on_any_number_of_workers(make_grasps: Make, study: Study) -> None:
+def test_evaluations_are_identical_on_any_number_of_workers(study: Study) -> None:
     again = evaluate(make_grasps(noise=0.2), QUICK, jobs=2)
     assert msgspec.json.encode(again) == msgspec.json.encode(study)
 
 
 @pytest.mark.usefixtures("one_way_to_train")
-def test_rows_in_which_nothing_is_held_change_no_table(
-    make_grasps: Make, with_none: Callable[[GraspSet], GraspSet]
-) -> None:
+def test_rows_in_which_nothing_is_held_change_no_table() -> None:
     quick = QUICK.changed(rounds=2, repeats=1, folds=2, learning=True, permute=2, tables=("compositions", "trainers"))
     grasps = make_grasps(noise=0.2, per_type=8)
     without, among = (evaluate(found, quick, jobs=1) for found in (grasps, with_none(grasps)))
@@ -135,7 +135,7 @@ def test_rows_in_which_nothing_is_held_change_no_table(
     assert replace(among, fingerprint=without.fingerprint, rests=0) == without
 
 
-def test_choosing_from_test_rows_flatters_where_there_is_nothing_to_learn(make_grasps: Make) -> None:
+def test_choosing_from_test_rows_flatters_where_there_is_nothing_to_learn() -> None:
     # Coin flips say nothing about the grasp: a nested rate is about 1 in 4, and the paper's protocol is above it.
     grasps = make_grasps(n_switches=200, n_joints=0, subjects="A", noise=0.5, per_type=10)
     study = evaluate(grasps, QUICK.changed(rounds=20, repeats=3, tables=("compositions",)), jobs=1)
@@ -144,7 +144,7 @@ def test_choosing_from_test_rows_flatters_where_there_is_nothing_to_learn(make_g
     assert nested.low <= 0.25 <= nested.high
 
 
-def test_without_switches_there_are_the_joints_and_no_placements(make_grasps: Make) -> None:
+def test_without_switches_there_are_the_joints_and_no_placements() -> None:
     study = evaluate(make_grasps(n_switches=0), QUICK, jobs=1)
     tables = [("compositions", "paper"), ("compositions", "nested"), ("trainers", "nested")]
     assert [(t.name, t.protocol) for t in study.tables] == tables
@@ -154,7 +154,7 @@ def test_without_switches_there_are_the_joints_and_no_placements(make_grasps: Ma
     assert [line.name for line in study.tables[0].rows] == ["IV"]
 
 
-def test_a_composition_without_inputs_predicts_the_most_frequent_grasp(make_grasps: Make) -> None:
+def test_a_composition_without_inputs_predicts_the_most_frequent_grasp() -> None:
     grasps = make_grasps(n_joints=0, subjects="A")
     study = evaluate(grasps, QUICK.changed(prune=1000, tables=("compositions",), protocols=("nested",)), jobs=1)
     (cell,) = row(table(study, "compositions"), "VI").cells
@@ -164,7 +164,7 @@ def test_a_composition_without_inputs_predicts_the_most_frequent_grasp(make_gras
 
 
 @pytest.mark.usefixtures("one_way_to_train")
-def test_one_subject_alone_has_nobody_elses_placement(make_grasps: Make) -> None:
+def test_one_subject_alone_has_nobody_elses_placement() -> None:
     grasps = make_grasps(n_switches=5)
     study = evaluate(grasps, QUICK.changed(rounds=2, subjects=("B",)), jobs=1)
     assert study.fingerprint == grasps.fingerprint()
@@ -174,7 +174,7 @@ def test_one_subject_alone_has_nobody_elses_placement(make_grasps: Make) -> None
     assert study.rows == 48
 
 
-def test_one_subjects_pruning_at_equal_s_is_composition_six(make_grasps: Make) -> None:
+def test_one_subjects_pruning_at_equal_s_is_composition_six() -> None:
     options = QUICK.changed(subjects=("A",), prune=10, tables=("compositions", "pruning", "baselines"))
     study = evaluate(make_grasps(noise=0.2), options, jobs=1)
     for protocol in ("paper", "nested"):
@@ -185,7 +185,7 @@ def test_one_subjects_pruning_at_equal_s_is_composition_six(make_grasps: Make) -
 
 @pytest.mark.usefixtures("one_way_to_train")
 @pytest.mark.parametrize("scheme", ["subject", "object", "block"])
-def test_other_cuts_have_one_repeat_and_a_column_a_subject(make_grasps: Make, scheme: Scheme) -> None:
+def test_other_cuts_have_one_repeat_and_a_column_a_subject(scheme: Scheme) -> None:
     quick = QUICK.changed(rounds=2, scheme=scheme, protocols=("nested",))
     study = evaluate(make_grasps(n_switches=5, per_type=8), quick, jobs=1)
     assert ("generality" in {t.name for t in study.tables}) == (scheme != "subject")
@@ -212,17 +212,36 @@ def test_every_trainer_is_compared_on_the_same_folds_and_inputs_with_baselines(s
                 assert line.paired.difference == pytest.approx(line.rate.mean - first.rate.mean)
 
 
-def test_trainers_are_not_compared_where_test_rows_choose(make_grasps: Make) -> None:
+def test_trainers_are_not_compared_where_test_rows_choose() -> None:
     study = evaluate(make_grasps(), QUICK.changed(protocols=("paper",), tables=("trainers",)), jobs=1)
     assert study.tables == ()
     assert [left.reason for left in study.left_out] == ["trainers are compared under the nested protocol only"]
 
 
-def test_an_unknown_subject_is_refused_with_those_there_are(make_grasps: Make) -> None:
+def test_an_unknown_subject_is_refused_with_those_there_are() -> None:
     with pytest.raises(EvaluationError, match="no subject 'Z' in the set; its subjects are A, B"):
         evaluate(make_grasps(), QUICK.changed(subjects=("A", "Z")))
 
 
-def test_a_set_without_rows_is_refused(make_grasps: Make) -> None:
+def test_a_set_without_rows_is_refused() -> None:
     with pytest.raises(EvaluationError, match="no rows"):
         evaluate(make_grasps().rows([]), QUICK)
+
+
+def test_every_composition_and_protocol_has_its_picture(tmp_path: Path) -> None:
+    options = StudyDesign(Recipe(trainer="logitboost", rounds=2), repeats=1, tables=("compositions", "pruning"))
+    study = evaluate(make_grasps(n_joints=0), options, jobs=1)
+    drawn = draw(study, tmp_path / "new" / "folder")
+    names = [f"confusion-{protocol}-{name}.png" for protocol in ("paper", "nested") for name in ("V", "VI", "VII")]
+    assert [path.name for path in drawn] == names
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in drawn)
+
+
+def test_numbers_and_colours_are_shares_of_the_true_types_rows() -> None:
+    axes = Figure().subplots()
+    draw_matrix(axes, ("cup", "pen", "rod"), ((150, 50, 0), (1, 199, 0), (0, 0, 0)))
+    (image,) = axes.images
+    shares = np.array([[0.75, 0.25, 0.0], [0.005, 0.995, 0.0], [0.0, 0.0, 0.0]])
+    assert np.allclose(np.asarray(image.get_array()), shares)
+    written = {text.get_position(): text.get_text() for text in axes.texts}
+    assert written == {(0, 0): "75", (1, 0): "25", (1, 1): "100"}

@@ -1,6 +1,6 @@
 """Evaluation of analog pads: their thresholds, like their placement, are learnt inside each fold."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,13 @@ from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import Training
 from thenar.runtime.recipe import Recipe
 
-Make = Callable[..., GraspSet]
+from ..conftest import make_set
+
 TRAINING = {"": (Training("logitboost", {"rounds": 6}),)}
 
 
 @pytest.fixture(scope="module")
-def padded(make_set: Make) -> GraspSet:
+def padded() -> GraspSet:
     plain = make_set(joints=1)
     pads = np.where(plain.switches[:, 3:9], 900, 100) + np.random.default_rng(4).integers(-150, 400, (96, 6))
     return replace(
@@ -82,7 +83,7 @@ def test_evaluate_and_compile_agree_on_the_selected_switches_and_joints(padded: 
     assert row.rate.total == rates[1].total == 96
 
 
-def test_thresholds_of_all_rows_would_have_been_optimistic(make_set: Make) -> None:
+def test_thresholds_of_all_rows_would_have_been_optimistic() -> None:
     """Pads of noise tell nothing, if nobody looks at the rows that are tested."""
     random, noise = np.random.default_rng(2), make_set(joints=0)
     pads = random.integers(0, 4096, (96, 40)).astype(np.uint16)

@@ -1,8 +1,6 @@
 """Integer tables and manifests of any size, without training anything, and what Python answers by them."""
 
-import hashlib
 import sys
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -13,17 +11,15 @@ import pytest
 from thenar.compiler.firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, random_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
-from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
-from thenar.runtime.recipe import Recipe
+from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.softmax import Softmax
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
+from ...conftest import tool
+from ...tables import describe
 
 
-def _make_tables(
+def make_tables(
     seed: int = 0,
     classes: int = 5,
     switches: int = 9,
@@ -52,25 +48,8 @@ def _make_tables(
     )
 
 
-def _describe(tables: IntegerTables) -> Manifest:
-    return Manifest(
-        schema=SCHEMA,
-        checksum="",
-        thenar="0.1.0",
-        tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
-        ensemble_sha256="0" * 64,
-        source=Origin("1" * 64, 10, "own", 20, joints=22),
-        options=Recipe(0, 100, "both", 1.0, 4, 1),
-        grasps=tuple(f"grasp {number}" for number in range(tables.n_classes)),
-        switches=tuple(Switch(number, f"s{number}", 0.5) for number in range(tables.n_switches)),
-        joints=tuple(Calibration(n, f"j{n}", "deg", 0, 0.0, 100, 50.0) for n in range(tables.n_joints)),
-        proof=Proof(16, tables.scale, tables.bound, 6.5, 13.0, 10, 0),
-        rates=(Recognised("training", 0, 1, 10, 10),),
-    )
-
-
 @pytest.fixture(scope="session")
-def cores(tool: Callable[[str], str]) -> Any:
+def cores() -> Any:
     """Return the emulated cores of tests/qemu by the names of their targets."""
     for name in ("arm-none-eabi-gcc", "qemu-system-arm", "riscv64-unknown-elf-gcc", "qemu-system-riscv32"):
         tool(name)
@@ -78,46 +57,30 @@ def cores(tool: Callable[[str], str]) -> Any:
     return import_module("qemu").CORES
 
 
-@pytest.fixture(scope="session")
-def make_tables() -> MakeTables:
-    return _make_tables
+def probed(tables: IntegerTables, n: int) -> Probes:
+    """Return every extreme frame of tables and n random ones."""
+    return joined(extreme_frames(tables), random_frames(tables, n, seed=1))
 
 
-@pytest.fixture(scope="session")
-def describe() -> Describe:
-    return _describe
-
-
-@pytest.fixture(scope="session")
-def probed() -> Callable[[IntegerTables, int], Probes]:
-    """Return what gives every extreme frame of tables and n random ones."""
-    return lambda tables, n: joined(extreme_frames(tables), random_frames(tables, n, seed=1))
-
-
-@pytest.fixture(scope="session")
-def same_as_python() -> Callable[..., None]:
-    """Return what compares every score and class with those of a Build, which inputs are `lost` to."""
-
-    def compare(answers: Predictions, tables: IntegerTables, frames: Probes, lost: Lost | None = None) -> None:
-        without = Build(_describe(tables), tables).scorer.biased_scores_without
-        s = tables.n_switches
-        gone = np.zeros((len(frames), s + tables.n_joints), bool) if lost is None else lost
-        held = zip(frames.bits, frames.codes, gone, strict=True)
-        scores = np.array([without(bits, codes, row[:s], row[s:]) for bits, codes, row in held]) - LANE_OFFSET
-        assert np.array_equal(answers.scores, scores)
-        assert np.array_equal(answers.classes, scores.argmax(axis=1))
-        if answers.margins is not None and answers.shares is not None:
-            best, second = np.sort(scores, axis=1)[:, :-3:-1].T
-            assert np.array_equal(answers.margins, best - second)
-            softmax = Softmax(tables.scale)
-            shares = [softmax.probabilities(own)[n % len(own)] for n, own in enumerate(scores.tolist())]
-            assert answers.shares.tolist() == shares
-
-    return compare
+def same_as_python(answers: Predictions, tables: IntegerTables, frames: Probes, lost: Lost | None = None) -> None:
+    """Compare every score and class with those of a Build, which inputs are `lost` to."""
+    without = Build(describe(tables), tables).scorer.biased_scores_without
+    s = tables.n_switches
+    gone = np.zeros((len(frames), s + tables.n_joints), bool) if lost is None else lost
+    held = zip(frames.bits, frames.codes, gone, strict=True)
+    scores = np.array([without(bits, codes, row[:s], row[s:]) for bits, codes, row in held]) - LANE_OFFSET
+    assert np.array_equal(answers.scores, scores)
+    assert np.array_equal(answers.classes, scores.argmax(axis=1))
+    if answers.margins is not None and answers.shares is not None:
+        best, second = np.sort(scores, axis=1)[:, :-3:-1].T
+        assert np.array_equal(answers.margins, best - second)
+        softmax = Softmax(tables.scale)
+        shares = [softmax.probabilities(own)[n % len(own)] for n, own in enumerate(scores.tolist())]
+        assert answers.shares.tolist() == shares
 
 
 @pytest.fixture
-def avr(tool: Callable[[str], str]) -> None:
+def avr() -> None:
     """Need an AVR's compiler and simulator."""
     tool("avr-gcc")
     if TARGETS["avr328p"].missing() is not None:

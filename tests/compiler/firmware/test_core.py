@@ -1,6 +1,5 @@
 """The C core: every score, grasp type, margin and probability is Python's, on this machine and on every part."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +21,8 @@ from thenar.runtime.model.integers import COARSE, IntegerTables
 from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Slope
 
-MakeTables = Callable[..., IntegerTables]
-Probed = Callable[[IntegerTables, int], Probes]
-SameAsPython = Callable[..., None]
-Tool = Callable[[str], str]
+from ...conftest import tool
+from .conftest import make_tables, probed, same_as_python
 
 # Sizes of tables, and how their terms differ from a bit for each switch and bins for each joint.
 SHAPES: dict[str, dict[str, Any]] = {
@@ -63,7 +60,6 @@ EACH = pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 
 
 def made(
-    make_tables: MakeTables,
     seed: int = 0,
     *,
     lines: int = 0,
@@ -123,9 +119,7 @@ def with_missing(tables: IntegerTables, *whole: Probes) -> tuple[Probes, Lost]:
     return frames, lost
 
 
-def is_exact(
-    tables: IntegerTables, runs: Any, frames: Probes, same: SameAsPython, apart: bool = False, **given: Any
-) -> None:
+def is_exact(tables: IntegerTables, runs: Any, frames: Probes, apart: bool = False, **given: Any) -> None:
     """Compare all results on a target with Python's, those with missing inputs among them.
 
     apart  whole frames have a program of their own: on an AVR they go straight into the classifier's memory
@@ -134,44 +128,36 @@ def is_exact(
     files = Library("hand", numbered(tables), layout).files
     for some, lost in [(frames, None), with_missing(tables)] if apart else [with_missing(tables, frames)]:
         sent = layout.frame_bytes(some.bits, some.codes)
-        same(runs.run(files, "hand", layout, sent, lost=lost, **given), tables, some, lost)
+        same_as_python(runs.run(files, "hand", layout, sent, lost=lost, **given), tables, some, lost)
 
 
 @EACH
-def test_results_on_this_machine_are_pythons_without_warnings(
-    tool: Tool, make_tables: MakeTables, probed: Probed, same_as_python: SameAsPython, shape: dict[str, Any]
-) -> None:
+def test_results_on_this_machine_are_pythons_without_warnings(shape: dict[str, Any]) -> None:
     tool("gcc")
-    tables = made(make_tables, **shape)
-    is_exact(tables, HOST, probed(tables, 500), same_as_python)
+    tables = made(**shape)
+    is_exact(tables, HOST, probed(tables, 500))
 
 
 @pytest.mark.slow
 @EACH
-def test_so_they_are_by_clang(
-    tool: Tool, make_tables: MakeTables, probed: Probed, same_as_python: SameAsPython, shape: dict[str, Any]
-) -> None:
-    name, tables = Path(tool("clang")).name, made(make_tables, 1, **shape)
-    is_exact(tables, HOST, probed(tables, 500), same_as_python, compiler=name)
+def test_so_they_are_by_clang(shape: dict[str, Any]) -> None:
+    name, tables = Path(tool("clang")).name, made(1, **shape)
+    is_exact(tables, HOST, probed(tables, 500), compiler=name)
 
 
 @EACH
-def test_on_an_avr_results_are_python_s(
-    avr: None, make_tables: MakeTables, probed: Probed, same_as_python: SameAsPython, shape: dict[str, Any]
-) -> None:
-    tables = made(make_tables, 2, **shape)
+def test_on_an_avr_results_are_python_s(avr: None, shape: dict[str, Any]) -> None:
+    tables = made(2, **shape)
     part = TARGETS["avr2560" if tables.n_classes > 20 or tables.n_switches > 100 else "avr328p"]
-    is_exact(tables, part, probed(tables, 20), same_as_python, apart=True)
+    is_exact(tables, part, probed(tables, 20), apart=True)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", ["cortex-m0plus", "cortex-m4", "rv32imac"])
 @EACH
-def test_on_cores_of_32_bits_results_are_python_s(
-    cores: Any, make_tables: MakeTables, probed: Probed, same_as_python: SameAsPython, shape: dict[str, Any], part: str
-) -> None:
-    tables = made(make_tables, 3, **shape)
-    is_exact(tables, cores[part], probed(tables, 100), same_as_python)
+def test_on_cores_of_32_bits_results_are_python_s(cores: Any, shape: dict[str, Any], part: str) -> None:
+    tables = made(3, **shape)
+    is_exact(tables, cores[part], probed(tables, 100))
 
 
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -179,24 +165,16 @@ def test_on_cores_of_32_bits_results_are_python_s(
     st.integers(0, 1000), st.integers(2, 40), st.integers(0, 40), st.integers(0, 6), st.integers(0, 3), st.booleans()
 )
 def test_any_tables_give_python_s_results(
-    tool: Tool,
-    make_tables: MakeTables,
-    same_as_python: SameAsPython,
-    seed: int,
-    classes: int,
-    switches: int,
-    joints: int,
-    more: int,
-    paired: bool,
+    seed: int, classes: int, switches: int, joints: int, more: int, paired: bool
 ) -> None:
     tool("gcc")
     joints = max(joints, int(switches == 0))
     terms: dict[str, Any] = {"pairs": min(more, joints // 2)} if paired else {"lines": min(more, joints)}
-    tables = made(make_tables, seed, classes=classes, switches=switches, joints=joints, **terms)
-    is_exact(tables, HOST, random_frames(tables, 60, seed), same_as_python)
+    tables = made(seed, classes=classes, switches=switches, joints=joints, **terms)
+    is_exact(tables, HOST, random_frames(tables, 60, seed))
 
 
-def test_tables_at_the_16_bit_limit_borrow_and_carry_correctly(tool: Tool, same_as_python: SameAsPython) -> None:
+def test_tables_at_the_16_bit_limit_borrow_and_carry_correctly() -> None:
     # Neighbouring classes at opposite ends: whatever leaks from one half of a word into the other shows.
     tool("gcc")
     row = np.array([16383, -16383, -16383, 16383, 16383], np.int16)
@@ -204,15 +182,15 @@ def test_tables_at_the_16_bit_limit_borrow_and_carry_correctly(tool: Tool, same_
     zero = np.zeros((0, 5), np.int16)
     tables = IntegerTables.of(np.full(5, -1, np.int16), rows, (), (), 0 * rows, zero, 1.0)
     bits = np.array([[b >> i & 1 for i in range(4)] for b in range(16)], bool)
-    is_exact(tables, HOST, Probes(bits, np.zeros((16, 0), np.uint16)), same_as_python)
+    is_exact(tables, HOST, Probes(bits, np.zeros((16, 0), np.uint16)))
 
 
-def test_every_code_finds_its_row(avr: None, make_tables: MakeTables, same_as_python: SameAsPython) -> None:
+def test_every_code_finds_its_row(avr: None) -> None:
     tables = make_tables(seed=3, switches=2, joints=2, bins=12, highest=1000)
     every = np.arange(1024, dtype=np.uint16)
     frames = Probes(np.zeros((1024, 2), bool), np.stack([every, every[::-1]], axis=1))
     for target in (HOST, TARGETS["avr328p"]):
-        is_exact(tables, target, frames, same_as_python, apart=target is not HOST)
+        is_exact(tables, target, frames, apart=target is not HOST)
 
 
 # A hand beside another, in memory whose neighbours are watched; unknown inputs; names of every length of buffer.
@@ -257,7 +235,7 @@ int main(void)
 """
 
 
-def test_hands_share_nothing_and_unknown_numbers_do_nothing(tool: Tool, make_tables: MakeTables) -> None:
+def test_hands_share_nothing_and_unknown_numbers_do_nothing() -> None:
     tables = make_tables(switches=33, joints=3)
     names = replace(numbered(tables), grasps=('say "Ü"\\n??/', "abc", "", "12", "three"))
     sanitized = ("-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -270,7 +248,7 @@ def test_hands_share_nothing_and_unknown_numbers_do_nothing(tool: Tool, make_tab
     assert said[9:] == ["3 ...", "3 a..", "3 ab."]
 
 
-def test_the_core_is_the_same_for_every_build(make_tables: MakeTables) -> None:
+def test_the_core_is_the_same_for_every_build() -> None:
     texts = [Library("hand", numbered(t), Layout(t)).files for t in (make_tables(1), make_tables(2, classes=9))]
     assert [texts[0][name] == texts[1][name] for name in texts[0]] == [True, True, True, False, False]
     for name, text in texts[0].items():
@@ -281,14 +259,14 @@ def test_the_core_is_the_same_for_every_build(make_tables: MakeTables) -> None:
     assert len(texts[0]["thenar.c"].splitlines()) <= 350
 
 
-def test_tables_beyond_16_bits_are_refused(make_tables: MakeTables) -> None:
+def test_tables_beyond_16_bits_are_refused() -> None:
     with pytest.raises(FirmwareError, match=r"the tables have \d+ pairs of entries, but firmware has at most 65535"):
         Layout(make_tables(classes=400, switches=400, joints=0, reach=5))
     with pytest.raises(FirmwareError, match="no switch and no joint"):
         Layout(make_tables(switches=0, joints=0))
 
 
-def test_the_same_frame_costs_the_same_whatever_the_results_were(avr: None, make_tables: MakeTables) -> None:
+def test_the_same_frame_costs_the_same_whatever_the_results_were(avr: None) -> None:
     tables = make_tables(switches=9, joints=2)
     layout, frames = Layout(tables), Probes(np.ones((3, 9), bool), np.full((3, 2), 7, np.uint16))
     sent = layout.frame_bytes(frames.bits, frames.codes)

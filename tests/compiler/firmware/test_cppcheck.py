@@ -2,7 +2,7 @@
 
 import re
 import subprocess
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -15,13 +15,13 @@ from thenar.compiler.firmware.sensors import sensors_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.manifest import Calibration, Manifest, Threshold
-from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.manifest import Calibration, Threshold
 from thenar.runtime.segmenting.model import SegmentModel
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
-Tool = Callable[[str], str]
+from ...conftest import tool
+from ...tables import describe
+from .conftest import make_tables
+
 Finding = tuple[str, str]  # what cppcheck calls it, and the file's name
 
 pytestmark = pytest.mark.slow
@@ -58,7 +58,7 @@ CASES: dict[str, tuple[str, Mapping[str, int]]] = {
 }
 
 
-def files_of(case: str, make_tables: MakeTables, describe: Describe) -> dict[str, str]:
+def files_of(case: str) -> dict[str, str]:
     platform, shape = CASES[case]
     tables = make_tables(**shape)
     manifest = describe(tables)
@@ -90,14 +90,12 @@ def looked_at(program: str, files: Mapping[str, str], folder: Path, options: tup
 
 
 @pytest.fixture(scope="module")
-def findings(
-    tool: Tool, make_tables: MakeTables, describe: Describe, tmp_path_factory: pytest.TempPathFactory
-) -> dict[str, set[Finding]]:
+def findings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[Finding]]:
     """What cppcheck says of each case."""
     program, found = tool("cppcheck"), {}
     for case, (platform, *_) in CASES.items():
         folder, options = tmp_path_factory.mktemp("c"), DEFINED.get(platform, ())
-        found[case] = looked_at(program, files_of(case, make_tables, describe), folder, options)
+        found[case] = looked_at(program, files_of(case), folder, options)
     return found
 
 

@@ -1,6 +1,5 @@
 import re
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,22 +7,20 @@ import pytest
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import CORE_FILES, Library
 from thenar.compiler.firmware.costs import fit_for
-from thenar.compiler.firmware.generate import firmware_files, write_folder
+from thenar.compiler.firmware.generate import SUMS, firmware_files, sums, write_folder
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
-Tool = Callable[[str], str]
+from ...conftest import tool
+from ...tables import describe
+from .conftest import make_tables
 
 COMPILERS = {"avr": "avr-gcc", "host": "gcc"}
 
 
 @pytest.fixture(scope="session")
-def build(make_tables: MakeTables, describe: Describe) -> Build:
+def build() -> Build:
     tables = make_tables()
     return Build(describe(tables), tables)
 
@@ -42,7 +39,7 @@ def make(folder: Path, *arguments: str) -> str:
 
 @pytest.mark.parametrize("platform", [name for name in TARGETS if name.startswith(tuple(COMPILERS))])
 def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
-    build: Build, platform: str, tmp_path: Path, tool: Tool
+    build: Build, platform: str, tmp_path: Path
 ) -> None:
     tool(COMPILERS[next(kind for kind in COMPILERS if platform.startswith(kind))])
     folder = write_folder(classifier(build, platform), tmp_path / "firmware")
@@ -65,9 +62,7 @@ def test_files_are_called_by_the_name_and_no_name_is_rewritten(build: Build, pla
 
 
 @pytest.mark.parametrize(("switches", "joints", "words"), [(9, 0, "9 switches"), (0, 3, "3 joints")])
-def test_nobody_reads_of_inputs_that_there_are_none_of(
-    make_tables: MakeTables, describe: Describe, switches: int, joints: int, words: str
-) -> None:
+def test_nobody_reads_of_inputs_that_there_are_none_of(switches: int, joints: int, words: str) -> None:
     tables = make_tables(switches=switches, joints=joints)
     files = classifier(Build(describe(tables), tables), "arduino")
     for path in ("src/thenar_glove.h", "README.md", "library.properties"):
@@ -105,7 +100,7 @@ def test_too_little_flash_is_refused(build: Build, platform: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_build_too_large_for_an_uno_gets_a_larger_part(make_tables: MakeTables, describe: Describe) -> None:
+def test_a_build_too_large_for_an_uno_gets_a_larger_part() -> None:
     tables = make_tables(classes=40, switches=40, joints=12, bins=30)
     build = Build(describe(tables), tables)
     assert fit_for(TARGETS["arduino"], build.tables).target.part == "atmega2560"
@@ -115,3 +110,76 @@ def test_a_build_too_large_for_an_uno_gets_a_larger_part(make_tables: MakeTables
     huge = make_tables(classes=200, switches=60, joints=20, bins=60)
     with pytest.raises(FirmwareError, match="firmware has at most 65535"):
         _ = fit_for(TARGETS["arduino"], huge)
+
+
+OLD = {"thenar_glove.c": "old\n", "examples/one/one.ino": "old\n", "gone.h": "old\n"}
+NEW = {"thenar_glove.c": "new\n", "examples/one/one.ino": "new\n", "Makefile": "all:\n"}
+
+
+def content(folder: Path) -> dict[str, str]:
+    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return write_folder(OLD, tmp_path / "firmware")
+
+
+def test_a_new_or_empty_folder_takes_the_files_and_their_sums(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    for name in ("new", "empty"):
+        folder = write_folder(NEW, tmp_path / name)
+        assert content(folder) == {**NEW, SUMS: sums(NEW)}
+        subprocess.run([tool("sha256sum"), "--check", "--strict", "--quiet", SUMS], cwd=folder, check=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "new"]
+
+
+def test_firmware_is_replaced_only_where_that_is_asked_for(folder: Path) -> None:
+    with pytest.raises(FirmwareError, match="already holds firmware: name another folder, or add ``overwrite``"):
+        write_folder(NEW, folder)
+    assert content(folder) == {**OLD, SUMS: sums(OLD)}
+    write_folder(NEW, folder, overwrite=True)
+    assert content(folder) == {**NEW, SUMS: sums(NEW)}
+    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
+
+
+def test_what_the_user_put_there_stays(folder: Path) -> None:
+    mine = {"main.c": "int main(void)\n", "examples/one/notes": "mine", "build/thenar_glove.o": "object"}
+    (folder / "build").mkdir()
+    for path, text in mine.items():
+        (folder / path).write_text(text)
+    (folder / "link").symlink_to("main.c")
+    write_folder(NEW, folder, overwrite=True)
+    assert content(folder) == {**NEW, **mine, "link": "int main(void)\n", SUMS: sums(NEW)}
+    assert (folder / "link").is_symlink()
+
+
+def test_what_was_changed_since_is_not_replaced(folder: Path) -> None:
+    (folder / "thenar_glove.c").write_text("better\n")
+    with pytest.raises(FirmwareError, match=r"thenar_glove\.c was changed since thenar wrote it"):
+        write_folder(NEW, folder, overwrite=True)
+    assert (folder / "thenar_glove.c").read_text() == "better\n"
+
+
+@pytest.mark.parametrize("name", [SUMS, "thenar_glove.c"])
+def test_a_link_to_what_never_ends_is_refused_unread(folder: Path, name: str) -> None:
+    (folder / name).unlink()
+    (folder / name).symlink_to("/dev/zero")
+    with pytest.raises(FirmwareError, match="is a device or a pipe"):
+        write_folder(NEW, folder, overwrite=True)
+
+
+def test_a_folder_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "firmware").mkdir()
+    (tmp_path / "firmware" / "main.c").write_text("mine")
+    with pytest.raises(FirmwareError, match="is not empty and was not written by thenar"):
+        write_folder(NEW, tmp_path / "firmware", overwrite=True)
+    assert content(tmp_path / "firmware") == {"main.c": "mine"}
+
+
+def test_a_place_that_cannot_be_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(FirmwareError, match="file is a file: name a folder"):
+        write_folder(NEW, tmp_path / "file")
+    with pytest.raises(FirmwareError, match="nowhere is no folder: make it first"):
+        write_folder(NEW, tmp_path / "nowhere" / "firmware")

@@ -1,5 +1,3 @@
-from collections.abc import Callable
-
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
@@ -7,19 +5,17 @@ from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.costs import Measured, fit_for, measure
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
+
+from ...conftest import tool
+from ...tables import describe
+from .conftest import make_tables
 
 # Compilers and simulators of whole programs: minutes, together.
 pytestmark = pytest.mark.slow
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
-Tool = Callable[[str], str]
-
 
 @pytest.fixture
-def build(make_tables: MakeTables, describe: Describe) -> Build:
+def build() -> Build:
     tables = make_tables()
     return Build(describe(tables), tables)
 
@@ -30,7 +26,7 @@ def measured(build: Build, platform: str) -> Measured:
 
 
 @pytest.mark.parametrize("platform", ["avr328p", "avr2560"])
-def test_all_that_is_static_is_counted_and_said(build: Build, platform: str, tool: Tool) -> None:
+def test_all_that_is_static_is_counted_and_said(build: Build, platform: str) -> None:
     tool("avr-gcc")
     found = measured(build, platform)
     assert found.unit == "cycles"

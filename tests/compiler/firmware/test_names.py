@@ -1,7 +1,6 @@
 """Names of every kind that the one rule lets in, in all the C that is made of them."""
 
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,12 +11,11 @@ from msgspec.structs import replace
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.names import fault
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
+from ...conftest import tool
+from ...tables import describe
+from .conftest import make_tables
 
 PIECES = [
     "*/",
@@ -46,14 +44,7 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fsyntax-only
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(names=st.lists(NAMES, min_size=12, max_size=12, unique=True), thenar=NAMES)
-def test_whatever_names_hold_the_c_compiles_without_a_warning(
-    tool: Callable[[str], str],
-    make_tables: MakeTables,
-    describe: Describe,
-    tmp_path: Path,
-    names: list[str],
-    thenar: str,
-) -> None:
+def test_whatever_names_hold_the_c_compiles_without_a_warning(tmp_path: Path, names: list[str], thenar: str) -> None:
     tables = make_tables(classes=5, switches=5, joints=2)
     plain, layout = describe(tables), Layout(tables)
     manifest = replace(

@@ -20,9 +20,11 @@ from thenar.compiler.firmware.targets.avr import harness as simavr_program
 from thenar.drivers.i2c.chips import CHIPS, Device
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
-from thenar.runtime.model.integers import IntegerTables
 
-Tool = Callable[[str], str]
+from ...conftest import tool
+from ...tables import describe
+from .conftest import make_tables
+
 Named = Callable[[Sequence[str], Sequence[str], Sequence[str]], Manifest]
 
 SHIM = Path(__file__).with_name("arduino")
@@ -258,7 +260,7 @@ def row_of(line: str, switches: int) -> Row:
 
 
 @pytest.fixture
-def named(make_tables: Callable[..., IntegerTables], describe: Callable[[IntegerTables], Manifest]) -> Named:
+def named() -> Named:
     """Return what makes the names of a build: switches, joints, and taxels, each of which has two levels."""
 
     def named(switches: Sequence[str], joints: Sequence[str], taxels: Sequence[str]) -> Manifest:
@@ -275,7 +277,7 @@ def named(make_tables: Callable[..., IntegerTables], describe: Callable[[Integer
 
 
 @pytest.fixture
-def compiled(tool: Tool, tmp_path: Path) -> Callable[..., Path]:
+def compiled(tmp_path: Path) -> Callable[..., Path]:
     """Return what compiles the only sketch of a folder for this machine, strictly."""
 
     def compiled(files: dict[str, str], secrets: str = "") -> Path:
@@ -454,7 +456,7 @@ def cores_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def built(tool: Tool, tmp_path: Path, cores_folder: Path) -> Callable[..., Path]:
+def built(tmp_path: Path, cores_folder: Path) -> Callable[..., Path]:
     """Return what has Arduino's builder compile a sketch for an Uno, without a warning."""
     if not ARDUINO.is_dir():
         tool("arduino-core-avr")
@@ -497,9 +499,7 @@ def test_a_sketch_with_inputs_of_every_kind_compiles_for_an_uno(named: Named, bu
 
 
 @pytest.mark.slow
-def test_on_an_uno_rows_hold_the_levels_of_pins_and_analog_pins(
-    named: Named, built: Callable[..., Path], tool: Tool
-) -> None:
+def test_on_an_uno_rows_hold_the_levels_of_pins_and_analog_pins(named: Named, built: Callable[..., Path]) -> None:
     tool("avr-gcc")
     elf = built(rows_files("hand", named("abcde", "ik", ""), parse_harness(UNO, "glove.toml")))
     program, rng = simavr_program("simavr_rows"), random.Random(1)

@@ -1,6 +1,5 @@
 """The decoder of segments in C, of any costs: the same states as Python's, tick by tick, on every part."""
 
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,9 @@ from thenar.compiler.firmware.tools import call, workshop
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.segmenting.model import SegmentModel
+
+from ...tables import describe
+from .conftest import make_tables
 
 BENCHMARKS = Path(__file__).resolve().parents[3] / "benchmarks"
 LAG = 15
@@ -108,19 +110,14 @@ def test_the_segment_decoder_takes_the_documented_avr_cycles_and_memory(runs: An
         assert run.stack <= 44
 
 
-def _learnt(tables: IntegerTables, describe: Callable[[IntegerTables], Manifest]) -> Manifest:
+def _learnt(tables: IntegerTables) -> Manifest:
     return replace(describe(tables), segments=SegmentModel.usual(tables.n_classes, False, tables.scale))
 
 
 @pytest.mark.parametrize("target", sorted(TARGETS))
-def test_firmware_of_builds_with_segment_costs_includes_the_decoder(
-    make_tables: Callable[..., IntegerTables],
-    describe: Callable[[IntegerTables], Manifest],
-    avr: None,
-    target: str,
-) -> None:
+def test_firmware_of_builds_with_segment_costs_includes_the_decoder(avr: None, target: str) -> None:
     tables = make_tables()
-    manifest = _learnt(tables, describe)
+    manifest = _learnt(tables)
     files = firmware_files(tables, manifest, target)
     plain = firmware_files(tables, describe(tables), target)
     if target == "micropython":

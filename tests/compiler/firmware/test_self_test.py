@@ -14,10 +14,11 @@ from thenar.compiler.firmware.probes import CHECKS, check_header, self_test_fram
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
+from ...conftest import tool
+from ...tables import describe
+from .conftest import make_tables
+
 Make = Callable[..., "subprocess.CompletedProcess[str]"]
 
 AGREED = f"{CHECKS} frames, predicted as by Python\n"
@@ -38,7 +39,7 @@ def files_for(layout: Layout, manifest: Manifest) -> dict[str, str]:
 
 
 @pytest.fixture
-def make(tool: Callable[[str], str], tmp_path: Path) -> Make:
+def make(tmp_path: Path) -> Make:
     """Return what writes files into a folder and runs make there."""
 
     def make(files: Mapping[str, str], *arguments: str) -> "subprocess.CompletedProcess[str]":
@@ -53,9 +54,7 @@ def make(tool: Callable[[str], str], tmp_path: Path) -> Make:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", list(SHAPES))
-def test_a_folder_checks_itself_without_a_warning(
-    make: Make, make_tables: MakeTables, describe: Describe, shape: str
-) -> None:
+def test_a_folder_checks_itself_without_a_warning(make: Make, shape: str) -> None:
     tables = make_tables(**SHAPES[shape])
     files = files_for(Layout(tables), describe(tables))
     assert [line for text in files.values() for line in text.splitlines() if len(line) > 120] == []
@@ -63,9 +62,7 @@ def test_a_folder_checks_itself_without_a_warning(
     assert (done.returncode, done.stdout + done.stderr) == (0, AGREED)
 
 
-def test_a_classifier_with_a_wrong_entry_fails_its_check(
-    make: Make, make_tables: MakeTables, describe: Describe
-) -> None:
+def test_a_classifier_with_a_wrong_entry_fails_its_check(make: Make) -> None:
     tables = make_tables()
     files = files_for(Layout(tables), describe(tables))
     wrong = re.sub(r" START\((-?\d+), ", lambda found: f" START({int(found[1]) + 1}, ", files["thenar_hand.c"], count=1)
@@ -75,7 +72,7 @@ def test_a_classifier_with_a_wrong_entry_fails_its_check(
     assert "predictions differ from Python's\n" in done.stdout + done.stderr
 
 
-def test_a_wrong_switch_bit_fails_the_check(make: Make, make_tables: MakeTables, describe: Describe) -> None:
+def test_a_wrong_switch_bit_fails_the_check(make: Make) -> None:
     tables = make_tables()
     files = files_for(Layout(tables), describe(tables))
     assert "number / 8u]" in files["thenar.c"]
@@ -84,9 +81,7 @@ def test_a_wrong_switch_bit_fails_the_check(make: Make, make_tables: MakeTables,
     assert "predictions differ from Python's" in done.stdout + done.stderr
 
 
-def test_make_builds_says_the_size_and_cleans_up(
-    make: Make, make_tables: MakeTables, describe: Describe, tmp_path: Path
-) -> None:
+def test_make_builds_says_the_size_and_cleans_up(make: Make, tmp_path: Path) -> None:
     tables = make_tables()
     files = files_for(Layout(tables), describe(tables))
     assert make(files).returncode == 0
@@ -98,9 +93,7 @@ def test_make_builds_says_the_size_and_cleans_up(
 
 
 @pytest.mark.parametrize("changed", ["thenar_hand.c", "thenar_hand.h", "thenar_hand_check.h"])
-def test_what_a_changed_file_is_part_of_is_made_again(
-    make: Make, make_tables: MakeTables, describe: Describe, changed: str
-) -> None:
+def test_what_a_changed_file_is_part_of_is_made_again(make: Make, changed: str) -> None:
     tables = make_tables()
     assert make(files_for(Layout(tables), describe(tables)), "check").returncode == 0
     again = make({}, "-n", "-W", changed, "check").stdout
@@ -108,7 +101,7 @@ def test_what_a_changed_file_is_part_of_is_made_again(
     assert "check.c" in again
 
 
-def test_the_frames_are_the_extreme_ones_and_others_at_the_thresholds(make_tables: MakeTables) -> None:
+def test_the_frames_are_the_extreme_ones_and_others_at_the_thresholds() -> None:
     tables = make_tables(switches=9, joints=4)
     frames = self_test_frames(Layout(tables))
     assert frames.bits.shape == (CHECKS, 9)
@@ -120,7 +113,7 @@ def test_the_frames_are_the_extreme_ones_and_others_at_the_thresholds(make_table
     assert len(np.unique(frames.bits, axis=0)) == CHECKS
 
 
-def test_the_answers_in_the_check_are_those_of_the_build(make_tables: MakeTables, describe: Describe) -> None:
+def test_the_answers_in_the_check_are_those_of_the_build() -> None:
     tables = make_tables()
     layout = Layout(tables)
     frames, build = self_test_frames(layout), Build(describe(tables), tables)

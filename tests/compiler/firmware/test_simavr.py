@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,8 @@ from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.firmware_templates.rendering import file_text
 from thenar.runtime.model.integers import IntegerTables
+
+from ...conftest import tool
 
 SMALL, LARGE = TARGETS["avr328p"], TARGETS["avr2560"]
 TABLES = """
@@ -42,7 +43,7 @@ BOTH = pytest.mark.parametrize("target", [SMALL, LARGE], ids=["328P", "2560"])
 
 
 @pytest.fixture(autouse=True)
-def installed(tool: Callable[[str], str]) -> None:
+def installed() -> None:
     tool("avr-gcc")
     if (gone := SMALL.missing()) is not None:
         assert "libsimavr" in gone, gone

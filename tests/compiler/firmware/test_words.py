@@ -1,6 +1,5 @@
 import re
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -9,6 +8,8 @@ from hypothesis import strategies as st
 
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.words import check_name, comment, markdown, string
+
+from ...conftest import tool
 
 ANY_TEXT = st.text(max_size=60)
 
@@ -46,7 +47,7 @@ def test_a_version_stays_as_it_is_in_markdown() -> None:
     assert markdown("1 <img src=x> [a](b)") == r"1 \<img src=x\> \[a\]\(b\)"
 
 
-def test_a_literal_is_the_text_in_utf_8(tool: Callable[[str], str], tmp_path: Path) -> None:
+def test_a_literal_is_the_text_in_utf_8(tmp_path: Path) -> None:
     texts = ["Lat", 'quo"ted', "back\\slash", "手 grasp", "what??/", "tab\t1", "ü7", ""]
     source = "#include <stdio.h>\nint main(void)\n{\n" + "".join(f"    puts({string(t)});\n" for t in texts) + "}\n"
     (tmp_path / "say.c").write_text(source)

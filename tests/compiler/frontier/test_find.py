@@ -1,7 +1,7 @@
 """The whole of a frontier, over small sets: what every one must satisfy, sets with little in them, and going on."""
 
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace as replace_rows
 from functools import cache, partial
@@ -39,7 +39,8 @@ from thenar.runtime.model.quantise import quantise
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scores import Scorer
 
-Make = Callable[..., GraspSet]
+from ..conftest import make_set, with_none
+
 Rows = NDArray[np.intp]
 Request = dict[str, Any]
 
@@ -81,7 +82,7 @@ def keys_in(store: Path) -> list[bytes]:
 
 
 @pytest.fixture(scope="module")
-def first(tmp_path_factory: pytest.TempPathFactory, make_set: Make) -> tuple[Request, Frontier]:
+def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[Request, Frontier]:
     request = asked(tmp_path_factory.mktemp("survey"), make_set(subjects=2))
     return request, found_of(request)
 
@@ -91,9 +92,7 @@ def test_a_frame_is_reading_on_lines_of_their_own_and_classifying(first: tuple[R
         assert point.frame.us == pytest.approx(max(point.scan.us, point.transfer.us) + point.classify.us)
 
 
-def test_rows_in_which_nothing_is_held_change_no_rate(
-    tmp_path: Path, first: tuple[Request, Frontier], with_none: Callable[[GraspSet], GraspSet]
-) -> None:
+def test_rows_in_which_nothing_is_held_change_no_rate(tmp_path: Path, first: tuple[Request, Frontier]) -> None:
     more = with_none(first[0]["grasp_set"])
     found = found_of(first[0] | {"grasp_set": more, "output": tmp_path / "out"})
     assert found.fingerprint == more.fingerprint()
@@ -144,7 +143,7 @@ def rows_recognised(grasp_set: GraspSet, point: FrontierPoint, train: Rows, test
     return sum(lanes.index(max(lanes)) == labels[row] for lanes, row in zip(answers, test, strict=True))
 
 
-def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_path: Path, make_set: Make) -> None:
+def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_path: Path) -> None:
     """Stratified folds, and each subject from the others; all of it done here once more, one by one."""
     grasp_set = make_set(subjects=3)
     found = found_of(asked(tmp_path, grasp_set, repeats=2, baselines=()))
@@ -161,7 +160,7 @@ def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_pat
         assert point.rate.correct == (sum(alone),)
 
 
-def test_frames_of_a_trial_are_on_one_side_of_every_fold(tmp_path: Path, make_set: Make) -> None:
+def test_frames_of_a_trial_are_on_one_side_of_every_fold(tmp_path: Path) -> None:
     """Every row ten times: with copies on both sides of a fold every rate would be 100 %, over 960 units."""
     grasp_set = make_set(subjects=2)
     request = {"methods": ("id3",), "baselines": (), "by": "trial"}
@@ -182,13 +181,13 @@ def test_it_is_written_as_it_is_returned(first: tuple[Request, Frontier]) -> Non
     assert frontier_from_bytes((request["output"] / "frontier.json").read_bytes()) == found
 
 
-def test_without_a_folder_nothing_is_kept(tmp_path: Path, make_set: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_folder_nothing_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert found_of(asked(tmp_path, make_set(), output=None, methods=("id3",), baselines=())).points
     assert not list(tmp_path.iterdir())
 
 
-def test_a_run_that_is_interrupted_goes_on_without_repeating_anything(tmp_path: Path, make_set: Make) -> None:
+def test_a_run_that_is_interrupted_goes_on_without_repeating_anything(tmp_path: Path) -> None:
     request = asked(tmp_path, make_set())
     store, counts = request["output"] / "store.sqlite", [0]
 
@@ -206,7 +205,7 @@ def test_a_run_that_is_interrupted_goes_on_without_repeating_anything(tmp_path: 
     assert found_of(request).points
 
 
-def test_progress_grows_to_its_end(tmp_path: Path, make_set: Make) -> None:
+def test_progress_grows_to_its_end(tmp_path: Path) -> None:
     told = list[tuple[int, int]]()
     grasp_set = make_set(rows=400, subjects=3)
     found_of(asked(tmp_path, grasp_set, report=lambda done, total: told.append((done, total))))
@@ -219,9 +218,7 @@ def test_progress_grows_to_its_end(tmp_path: Path, make_set: Make) -> None:
     ("switches", "joints", "inputs"),
     [(14, 0, {"switches"}), (0, 3, {"joints"}), (1, 2, {"both", "switches", "joints"})],
 )
-def test_a_set_may_lack_switches_or_joints(
-    tmp_path: Path, make_set: Make, switches: int, joints: int, inputs: set[str]
-) -> None:
+def test_a_set_may_lack_switches_or_joints(tmp_path: Path, switches: int, joints: int, inputs: set[str]) -> None:
     found = found_of(asked(tmp_path, make_set(switches=switches, joints=joints)))
     assert {each.inputs for each in found.tried} == inputs
     assert found.points
@@ -231,7 +228,7 @@ def test_a_set_may_lack_switches_or_joints(
         assert "paper, S = 62" in [mark.name for mark in found.marks]
 
 
-def test_what_ports_cost_is_part_of_the_question(tmp_path: Path, make_set: Make) -> None:
+def test_what_ports_cost_is_part_of_the_question(tmp_path: Path) -> None:
     methods = ("id3-cost",)
     request = asked(tmp_path, make_set(), methods=methods, baselines=())
     names = [f"s{number}" for number in range(14)]
@@ -245,20 +242,20 @@ def test_what_ports_cost_is_part_of_the_question(tmp_path: Path, make_set: Make)
     assert len(keys_in(tmp_path / "out" / "store.sqlite")) > len(keys_in(tmp_path / "alone" / "store.sqlite"))
 
 
-def test_recordings_that_are_trained_on_are_no_stream(tmp_path: Path, make_set: Make) -> None:
+def test_recordings_that_are_trained_on_are_no_stream(tmp_path: Path) -> None:
     request = asked(tmp_path, make_set())
     with pytest.raises(FrontierError, match="equals the training set"):
         found_of({**request, "stream": make_set()})
 
 
-def test_a_build_is_marked_with_what_it_recognises(tmp_path: Path, make_set: Make) -> None:
+def test_a_build_is_marked_with_what_it_recognises(tmp_path: Path) -> None:
     grasp_set = make_set()
     build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=4).folder
     found = found_of(asked(tmp_path, grasp_set, build=build, methods=("id3",), baselines=()))
     assert found.marks[-1].name == "build mine"
 
 
-def test_a_build_that_does_not_say_what_it_recognises_is_refused(tmp_path: Path, make_set: Make) -> None:
+def test_a_build_that_does_not_say_what_it_recognises_is_refused(tmp_path: Path) -> None:
     grasp_set = make_set()
     build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=0).folder
     with pytest.raises(FrontierError, match="has no accuracy"):
@@ -266,7 +263,7 @@ def test_a_build_that_does_not_say_what_it_recognises_is_refused(tmp_path: Path,
     assert not (tmp_path / "not").exists()
 
 
-def test_a_build_of_other_switches_is_refused(tmp_path: Path, make_set: Make) -> None:
+def test_a_build_of_other_switches_is_refused(tmp_path: Path) -> None:
     build = compile_build(make_set(switches=40), tmp_path / "mine", rounds=5, folds=4, prune=0).folder
     (tmp_path / "out").mkdir()
     with pytest.raises(FrontierError, match="compiled from others"):
@@ -274,12 +271,12 @@ def test_a_build_of_other_switches_is_refused(tmp_path: Path, make_set: Make) ->
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_an_unknown_baseline_is_told(tmp_path: Path, make_set: Make) -> None:
+def test_an_unknown_baseline_is_told(tmp_path: Path) -> None:
     with pytest.raises(MemberError, match="there is no placement method 'nonsense'"):
         found_of(asked(tmp_path, make_set(), baselines=("nonsense",)))
 
 
-def test_compile_makes_what_a_point_of_each_trainer_says(tmp_path: Path, make_set: Make) -> None:
+def test_compile_makes_what_a_point_of_each_trainer_says(tmp_path: Path) -> None:
     request = asked(tmp_path, make_set(subjects=2), methods=("id3",), baselines=(), trainer="auto", settings={})
     found = found_of(request)
     assert set(found.trainers) == {name for name, trainer in TRAINERS.items() if trainer.tried}
@@ -308,7 +305,7 @@ def test_compile_makes_what_a_point_of_each_trainer_says(tmp_path: Path, make_se
             assert made.tables.n_switches == len(point.switches)
 
 
-def test_settings_are_chosen_inside_the_training_rows(make_set: Make) -> None:
+def test_settings_are_chosen_inside_the_training_rows() -> None:
     samples = Samples.of(make_set(subjects=2))
     cuts, candidates = Cuts.of(samples, Search()), Search().alone("logit").candidates
     fold = cuts.screening[0]
@@ -329,7 +326,7 @@ def with_sensors(grasp_set: GraspSet, sensors: int) -> GraspSet:
     return replace_rows(grasp_set, codes=codes, joints=joints)
 
 
-def test_builds_of_points_with_some_joints_read_these_joints(tmp_path: Path, make_set: Make) -> None:
+def test_builds_of_points_with_some_joints_read_these_joints(tmp_path: Path) -> None:
     grasp_set = with_sensors(make_set(switches=3, subjects=2), 5)
     found = found_of(asked(tmp_path, grasp_set, finalists=6, baselines=(), methods=("elimination",)))
     fewer = [point for point in found.points if point.joints]

@@ -1,6 +1,5 @@
 """Segments on the latency axis: learnt from the training movements alone, with tables that know nothing held."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -18,13 +17,14 @@ from thenar.runtime.published import NONE
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.segmenting.model import SegmentModel
 
-Make = Callable[..., GraspSet]
+from ..conftest import make_set
+
 BEFORE, HELD, AFTER = 20, 30, 10
 RECIPE = Recipe(rounds=5)
 KEPT = InputSelection.of(tuple(map(Element, range(14))), (0, 1, 2))
 
 
-def movements(make_set: Make, subjects: int = 2) -> GraspSet:
+def movements(subjects: int = 2) -> GraspSet:
     """Return twelve movements of three types, in turn by each subject: open, held, open again, 10 ms a frame."""
     random = np.random.default_rng(7)
     parts = np.tile(np.repeat([True, False, True], (BEFORE, HELD, AFTER)), 12)
@@ -45,8 +45,8 @@ def held_by(grasp_set: GraspSet, *subjects: str) -> np.ndarray:
     return np.flatnonzero(np.isin(held.subjects, subjects))
 
 
-def test_a_left_out_subject_takes_no_part_in_learning(make_set: Make) -> None:
-    grasp_set = movements(make_set)
+def test_a_left_out_subject_takes_no_part_in_learning() -> None:
+    grasp_set = movements()
     new = grasp_set.subjects == "S1"
     random = np.random.default_rng(1)
     changed = replace(
@@ -70,8 +70,8 @@ def test_a_left_out_subject_takes_no_part_in_learning(make_set: Make) -> None:
     assert model != SegmentModel.usual(3, has_none=True, scale=found[0][1])
 
 
-def test_no_stream_goes_over_a_movement_that_is_left_out(make_set: Make) -> None:
-    grasp_set = movements(make_set, subjects=1)
+def test_no_stream_goes_over_a_movement_that_is_left_out() -> None:
+    grasp_set = movements(subjects=1)
     trials = grasp_set.without_none().trials
     moving = movements_of(grasp_set, np.flatnonzero((trials != 3) & (trials != 4)))
     assert moving is not None
@@ -81,13 +81,13 @@ def test_no_stream_goes_over_a_movement_that_is_left_out(make_set: Make) -> None
 
 
 @pytest.mark.parametrize("change", [{"independent": True}, {"none": False}])
-def test_sets_without_streams_or_none_teach_no_segments(make_set: Make, change: dict[str, Any]) -> None:
-    grasp_set = make_set(rows=12) if "none" in change else replace(movements(make_set), **change)
+def test_sets_without_streams_or_none_teach_no_segments(change: dict[str, Any]) -> None:
+    grasp_set = make_set(rows=12) if "none" in change else replace(movements(), **change)
     assert movements_of(grasp_set, np.arange(6)) is None
 
 
-def test_only_segments_use_learnt_costs_and_the_class_none(make_set: Make) -> None:
-    grasp_set = movements(make_set)
+def test_only_segments_use_learnt_costs_and_the_class_none() -> None:
+    grasp_set = movements()
     held, training = Samples.of(grasp_set.without_none()), Training.of(RECIPE)
     train, new = held_by(grasp_set, "S0"), np.flatnonzero(grasp_set.subjects == "S1")
     labels = np.where(grasp_set.is_none, -1, np.searchsorted(np.unique(grasp_set.labels), grasp_set.labels))

@@ -1,6 +1,5 @@
 """One training serves all numbers of rounds, one path all parameters: each answer is that of doing it alone."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -24,6 +23,8 @@ from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.scores import Scorer
+
+from ..conftest import make_set
 
 COLUMNS = (3, 0, 7, 9)
 
@@ -119,7 +120,7 @@ def frames_of(grasp_set: GraspSet, each: int) -> GraspSet:
     return grasp_set.rows(rows)
 
 
-def test_left_out_subjects_are_untrained_and_grouped_into_ten_folds(make_set: Callable[..., GraspSet]) -> None:
+def test_left_out_subjects_are_untrained_and_grouped_into_ten_folds() -> None:
     for subjects, folds in ((3, 3), (10, 10), (24, 10)):
         grasp_set = make_set(rows=480, subjects=subjects)
         cuts = cuts_of(grasp_set)
@@ -129,7 +130,7 @@ def test_left_out_subjects_are_untrained_and_grouped_into_ten_folds(make_set: Ca
             assert set(grasp_set.subjects[fold.train]).isdisjoint(grasp_set.subjects[fold.test])
 
 
-def test_points_are_chosen_by_what_is_asked_for(make_set: Callable[..., GraspSet]) -> None:
+def test_points_are_chosen_by_what_is_asked_for() -> None:
     samples = Samples.of(make_set(subjects=3))
     by_trial = Cuts.of(samples, replace(SEARCH, by="trial"))
     assert (by_trial.by, by_trial.other, by_trial.screening) == ("pooled", "new subject", by_trial.repeats[0])
@@ -138,7 +139,7 @@ def test_points_are_chosen_by_what_is_asked_for(make_set: Callable[..., GraspSet
         Cuts.of(Samples.of(make_set()), replace(SEARCH, by="subject"))
 
 
-def test_every_fold_tests_rows_that_it_does_not_train_on(make_set: Callable[..., GraspSet]) -> None:
+def test_every_fold_tests_rows_that_it_does_not_train_on() -> None:
     grasp_set = make_set(subjects=2)
     # The rate by which points are not chosen is of one repeat.
     for search, repeats in ((replace(SEARCH, by="subject"), 1), (replace(SEARCH, by="trial"), SEARCH.repeats)):
@@ -148,7 +149,7 @@ def test_every_fold_tests_rows_that_it_does_not_train_on(make_set: Callable[...,
             assert np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), np.arange(len(grasp_set)))
 
 
-def test_no_trial_is_parted(make_set: Callable[..., GraspSet]) -> None:
+def test_no_trial_is_parted() -> None:
     grasp_set = frames_of(make_set(subjects=2), 5)
     cuts = cuts_of(grasp_set)
     assert (len(cuts.trials), len(cuts.people)) == (480, 96)
@@ -156,7 +157,7 @@ def test_no_trial_is_parted(make_set: Callable[..., GraspSet]) -> None:
         assert set(cuts.trials[fold.train]).isdisjoint(cuts.trials[fold.test])
 
 
-def test_a_trial_is_recognised_as_most_of_its_frames_are(make_set: Callable[..., GraspSet]) -> None:
+def test_a_trial_is_recognised_as_most_of_its_frames_are() -> None:
     """Counted here once more: each row's answer, and the label that most frames of a trial are given."""
     grasp_set = make_set(rows=288, subjects=3)
     grasp_set = replace(grasp_set, trials=np.arange(288) // 4 % 24 // 2, objects=np.array(["thing"] * 288))
@@ -182,7 +183,7 @@ def test_a_trial_is_recognised_as_most_of_its_frames_are(make_set: Callable[...,
     assert (frames.correct, frames.total, frames.what) == ((right_rows,), 288, "new subject, frames")
 
 
-def test_a_rate_is_of_the_repeats_that_were_fitted(make_set: Callable[..., GraspSet]) -> None:
+def test_a_rate_is_of_the_repeats_that_were_fitted() -> None:
     cuts = cuts_of(make_set())
     wrong = {fold: np.packbits(np.zeros(len(fold.test), bool)).tobytes() for fold in cuts.repeats[0]}
     right = {fold: np.packbits(np.ones(len(fold.test), bool)).tobytes() for fold in cuts.repeats[1]}

@@ -1,7 +1,7 @@
 """Manifests without builds, the shipped hand, and a reader of netlists that shares nothing with the writer."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import pytest
@@ -57,7 +57,7 @@ def text_of(tree: Tree, head: str) -> str:
     return child[1]
 
 
-def netlist_from(data: bytes) -> Netlist:
+def read_netlist(data: bytes) -> Netlist:
     tree = parse(data.decode())
     assert tree[0] == "export"
     assert text_of(tree, "version") == "E"
@@ -85,38 +85,28 @@ def netlist_from(data: bytes) -> Netlist:
 
 
 @pytest.fixture(scope="session")
-def read_netlist() -> Callable[[bytes], Netlist]:
-    return netlist_from
-
-
-@pytest.fixture(scope="session")
 def hand() -> HandShape:
     shape = hand_map().fitted(hand_map().names)
     assert shape is not None
     return shape
 
 
-@pytest.fixture(scope="session")
-def manifest_of() -> Callable[..., Manifest]:
+def manifest_of(names: Sequence[str], joints: bool = True) -> Manifest:
     """Return a build's manifest that keeps the switches of these names, and one joint unless told otherwise."""
-
-    def made(names: Sequence[str], joints: bool = True) -> Manifest:
-        return Manifest(
-            schema=1,
-            checksum="",
-            thenar="0",
-            tables_sha256="0" * 64,
-            ensemble_sha256="0" * 64,
-            source=Origin("0" * 64, 10, "own", 160, joints=22),
-            options=Recipe(0, 1, "both", 1.0, 0, 1),
-            grasps=("cup", "pen"),
-            switches=tuple(Switch(number, name, 0.1) for number, name in enumerate(names)),
-            joints=(Calibration(0, "thumb_mpj", "deg", 0, 0.0, 255, 90.0),) if joints else (),
-            proof=Proof(16, 1.0, 1, 0.5, 1.0, 10, 0),
-            rates=(
-                Recognised("training", 0, 1, 10, 10),
-                Recognised("nested", 4, 1, 9, 10, "new subject", "trials", 0.6, 0.98),
-            ),
-        )
-
-    return made
+    return Manifest(
+        schema=1,
+        checksum="",
+        thenar="0",
+        tables_sha256="0" * 64,
+        ensemble_sha256="0" * 64,
+        source=Origin("0" * 64, 10, "own", 160, joints=22),
+        options=Recipe(0, 1, "both", 1.0, 0, 1),
+        grasps=("cup", "pen"),
+        switches=tuple(Switch(number, name, 0.1) for number, name in enumerate(names)),
+        joints=(Calibration(0, "thumb_mpj", "deg", 0, 0.0, 255, 90.0),) if joints else (),
+        proof=Proof(16, 1.0, 1, 0.5, 1.0, 10, 0),
+        rates=(
+            Recognised("training", 0, 1, 10, 10),
+            Recognised("nested", 4, 1, 9, 10, "new subject", "trials", 0.6, 0.98),
+        ),
+    )

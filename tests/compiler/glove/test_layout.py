@@ -1,21 +1,19 @@
 """The bundles of wire: one signal a switch, colours that tell wires apart, lengths that reach."""
 
 from collections import Counter
-from collections.abc import Callable
 from math import dist
 
 import pytest
 
 from thenar.compiler.glove.spec import SpecSummary, glove_spec
 from thenar.compiler.hand import HandShape
-from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 
-Manifests = Callable[..., Manifest]
+from .conftest import manifest_of
 
 
 @pytest.fixture(scope="module", params=[1, 33, 160])
-def summary(request: pytest.FixtureRequest, manifest_of: Manifests, hand: HandShape) -> SpecSummary:
+def summary(request: pytest.FixtureRequest, hand: HandShape) -> SpecSummary:
     return glove_spec(manifest_of(hand.names[: request.param]), hand=hand).summary
 
 
@@ -26,7 +24,7 @@ def test_every_switch_has_one_signal_and_one_return(summary: SpecSummary) -> Non
     assert all(len(wire.switches) == 1 for wire in summary.wires if wire.unit)
 
 
-def test_the_signals_of_a_bundle_come_in_the_switches_order(manifest_of: Manifests, hand: HandShape) -> None:
+def test_the_signals_of_a_bundle_come_in_the_switches_order(hand: HandShape) -> None:
     """Pins are taken in the opposite order, so that the order of the chips' pins cannot stand in for it."""
     names = hand.names[:20]
     summary = glove_spec(manifest_of(names), None, propose_harness(names[::-1]), hand).summary
@@ -65,7 +63,7 @@ def test_a_wire_is_longer_than_the_way_to_its_farthest_switch(summary: SpecSumma
         assert len(places) > 1 or wire.length_mm < 1.25 * straight + 46
 
 
-def test_without_a_hand_there_are_bundles_by_chip_and_no_lengths(manifest_of: Manifests) -> None:
+def test_without_a_hand_there_are_bundles_by_chip_and_no_lengths() -> None:
     names = [f"s{number}" for number in range(20)]
     summary = glove_spec(manifest_of(names), None, propose_harness(names)).summary
     assert [wire.bundle for wire in summary.wires] == ["U1"] * 15 + ["U2"] * 7
@@ -73,7 +71,7 @@ def test_without_a_hand_there_are_bundles_by_chip_and_no_lengths(manifest_of: Ma
     assert not [line for line in summary.materials if line.unit == "m"]
 
 
-def test_a_large_bundle_has_several_connectors(manifest_of: Manifests) -> None:
+def test_a_large_bundle_has_several_connectors() -> None:
     names = [f"s{number}" for number in range(60)]
     wires = glove_spec(manifest_of(names), None, propose_board(names)).summary.wires
     assert [(wire.connector, wire.pin) for wire in wires] == [

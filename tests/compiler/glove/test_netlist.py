@@ -1,6 +1,5 @@
 """The netlist, read again: every kept switch reaches one input, the one of glove.toml, and the scan map reads it."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -15,15 +14,14 @@ from thenar.compiler.hand import HandShape
 from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, StreamWiring
-from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
+from thenar.runtime.manifest import Calibration, Switch, Threshold
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 
+from .conftest import manifest_of, read_netlist
+
 if TYPE_CHECKING:
     from .conftest import Netlist
-
-Reader = Callable[[bytes], "Netlist"]
-Manifests = Callable[..., Manifest]
 
 
 def reached(netlist: "Netlist", number: int, kind: str = "SW") -> list[tuple[str, str]]:
@@ -56,7 +54,7 @@ def check_address(netlist: "Netlist", ref: str, chip: ChipWiring) -> None:
 @settings(deadline=None, max_examples=25)
 @given(kind=st.sampled_from(sorted(expanders())), data=st.data())
 def test_every_kept_switch_reaches_one_input_and_the_scan_map_reads_it(
-    read_netlist: Reader, manifest_of: Manifests, hand: HandShape, kind: str, data: st.DataObject
+    hand: HandShape, kind: str, data: st.DataObject
 ) -> None:
     names = tuple(data.draw(st.lists(st.sampled_from(hand.names), min_size=1, max_size=40, unique=True)))
     spare = [f"spare {number}" for number in range(data.draw(st.integers(0, 20)))]
@@ -70,9 +68,7 @@ def test_every_kept_switch_reaches_one_input_and_the_scan_map_reads_it(
     assert glove_spec(manifest_of(names), None, harness, hand).scan == whole_scan(loaded, names)
 
 
-def test_a_proposed_glove_of_all_switches_is_wired_and_read(
-    read_netlist: Reader, manifest_of: Manifests, hand: HandShape, tmp_path: Path
-) -> None:
+def test_a_proposed_glove_of_all_switches_is_wired_and_read(hand: HandShape, tmp_path: Path) -> None:
     files = spec_files(manifest_of(hand.names), hand=hand)
     (tmp_path / "glove.toml").write_bytes(files["glove.toml"])
     loaded = load_harness(tmp_path / "glove.toml")
@@ -83,7 +79,7 @@ def test_a_proposed_glove_of_all_switches_is_wired_and_read(
     assert all(each["footprint"].count(":") == 1 for each in netlist.components.values())
 
 
-def test_chips_behind_a_mux_use_its_channels_wires_with_pull_ups(read_netlist: Reader, manifest_of: Manifests) -> None:
+def test_chips_behind_a_mux_use_its_channels_wires_with_pull_ups() -> None:
     near = ChipWiring(kind="pca9555", address=0x21, pins={"P00": "a"})
     far = ChipWiring(kind="mcp23017", address=0x20, mux=MuxChannel(address=0x71, channel=3), pins={"GPB2": "b"})
     harness = Harness(name="h", buses=(BusWiring(device="/dev/i2c-1", clock_hz=400_000, chips=(near, far)),))
@@ -113,13 +109,7 @@ def test_chips_behind_a_mux_use_its_channels_wires_with_pull_ups(read_netlist: R
     ],
 )
 def test_an_input_has_the_resistor_that_its_chip_lacks(
-    read_netlist: Reader,
-    manifest_of: Manifests,
-    kind: str,
-    closed: Literal["low", "high"],
-    other: str,
-    pull: str,
-    far: str,
+    kind: str, closed: Literal["low", "high"], other: str, pull: str, far: str
 ) -> None:
     pin = CHIPS[kind].pins[0]
     chip = ChipWiring(kind=kind, address=0x22, pins={pin: "a"}, closed=closed)
@@ -132,13 +122,13 @@ def test_an_input_has_the_resistor_that_its_chip_lacks(
     assert [netlist.net_of(ref, "2") for ref in resistors if far == "VCC"] == [far] * (far == "VCC")
 
 
-def test_unused_inputs_of_a_chip_without_pull_ups_do_not_float(read_netlist: Reader, manifest_of: Manifests) -> None:
+def test_unused_inputs_of_a_chip_without_pull_ups_do_not_float() -> None:
     netlist = read_netlist(spec_files(manifest_of(["a"]), None, propose_harness(["a"], "tca6424a"))["glove.net"])
     for pin in CHIPS["tca6424a"].pins[1:]:
         assert netlist.net_of("U1", netlist.pin_of("U1", pin)) == "GND"
 
 
-def test_every_supply_pin_has_its_capacitor(read_netlist: Reader, manifest_of: Manifests) -> None:
+def test_every_supply_pin_has_its_capacitor() -> None:
     netlist = read_netlist(spec_files(manifest_of(["a"]), None, propose_harness(["a"], "tca6424a"))["glove.net"])
     values = [each["value"] for ref, each in netlist.components.items() if ref[0] == "C"]
     assert sorted(values) == ["100n", "100n", "10u"]
@@ -146,7 +136,7 @@ def test_every_supply_pin_has_its_capacitor(read_netlist: Reader, manifest_of: M
         assert {netlist.net_of(ref, "1"), netlist.net_of(ref, "2")} == {"VCC", "GND"}
 
 
-def test_names_that_mean_something_to_the_netlist_are_only_names(read_netlist: Reader, manifest_of: Manifests) -> None:
+def test_names_that_mean_something_to_the_netlist_are_only_names() -> None:
     names = ("GND", "VCC", 'a "quoted" (one)', "back\\slash", "ß 指", "SDA0")
     harness = propose_harness(names)
     netlist = read_netlist(spec_files(manifest_of(names), None, harness)["glove.net"])
@@ -155,9 +145,7 @@ def test_names_that_mean_something_to_the_netlist_are_only_names(read_netlist: R
     assert [netlist.net_of(f"SW{number}", "1") for number in range(1, 7)] == [f"/{name}" for name in names]
 
 
-def test_every_wire_of_the_list_is_on_the_net_of_its_switches(
-    read_netlist: Reader, manifest_of: Manifests, hand: HandShape
-) -> None:
+def test_every_wire_of_the_list_is_on_the_net_of_its_switches(hand: HandShape) -> None:
     names = hand.names[:50]
     summary = glove_spec(manifest_of(names), hand=hand).summary
     netlist = read_netlist(spec_files(manifest_of(names), hand=hand)["glove.net"])
@@ -167,7 +155,7 @@ def test_every_wire_of_the_list_is_on_the_net_of_its_switches(
         assert nets == {netlist.net_of(wire.connector, str(wire.pin))} == {wire.net}
 
 
-def test_a_sender_has_pins_for_kept_columns_and_ground(read_netlist: Reader, manifest_of: Manifests) -> None:
+def test_a_sender_has_pins_for_kept_columns_and_ground() -> None:
     board = StreamWiring(port="/dev/ttyACM0", switches=("x", "b", "a"))
     harness = Harness(name="h", streams=(board,))
     netlist = read_netlist(spec_files(manifest_of(["a", "b"]), None, harness)["glove.net"])
@@ -219,9 +207,7 @@ CH3 = "t7"
 """
 
 
-def test_every_taxel_is_half_a_divider_at_the_channel_that_measures_it(
-    read_netlist: Reader, manifest_of: Manifests
-) -> None:
+def test_every_taxel_is_half_a_divider_at_the_channel_that_measures_it() -> None:
     """Two levels of a taxel are one pad; t3 is on the second multiplexer, on its second channel."""
     harness = parse_harness(_TAXELS, "glove.toml")
     coded = Calibration(0, "t0", "N", 0, 0.0, 1000, 5.0)

@@ -2,7 +2,7 @@
 
 import io
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import ezdxf.audit
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.glove.pattern import LAYERS, MARGIN_MM, page_for
 from thenar.compiler.hand import HandShape
-from thenar.runtime.manifest import Manifest
 
-Manifests = Callable[..., Manifest]
+from .conftest import manifest_of
+
 SVG = "{http://www.w3.org/2000/svg}"
 KEPT = 48
 # ISO 216.
@@ -33,7 +33,7 @@ def kept(hand: HandShape) -> tuple[str, ...]:
 
 
 @pytest.fixture(scope="module")
-def files(manifest_of: Manifests, hand: HandShape, kept: tuple[str, ...]) -> Mapping[str, bytes]:
+def files(hand: HandShape, kept: tuple[str, ...]) -> Mapping[str, bytes]:
     return spec_files(manifest_of(kept), hand=hand)
 
 
@@ -71,7 +71,7 @@ def test_holes_lie_to_each_other_as_the_switches_on_the_hand(
 
 
 def test_a_longer_hand_is_drawn_larger_with_holes_of_the_same_size(
-    files: Mapping[str, bytes], manifest_of: Manifests, hand: HandShape, kept: tuple[str, ...]
+    files: Mapping[str, bytes], hand: HandShape, kept: tuple[str, ...]
 ) -> None:
     longer = spec_files(manifest_of(kept), hand=hand.scaled(209.0))
     small, large = holes(files["cutting.svg"]), holes(longer["cutting.svg"])
@@ -116,7 +116,7 @@ def test_every_switch_is_named_on_the_drawing(files: Mapping[str, bytes], kept: 
 
 
 @pytest.mark.parametrize("count", [1, 48, 160])
-def test_nothing_is_drawn_off_the_page(manifest_of: Manifests, hand: HandShape, count: int) -> None:
+def test_nothing_is_drawn_off_the_page(hand: HandShape, count: int) -> None:
     files = spec_files(manifest_of(hand.names[:count]), hand=hand)
     svg = ET.fromstring(files["cutting.svg"])
     page = [float(svg.attrib[name].removesuffix("mm")) for name in ("width", "height")]
@@ -129,7 +129,7 @@ def test_nothing_is_drawn_off_the_page(manifest_of: Manifests, hand: HandShape, 
             assert 4.9 < float(shape.attrib["y"]) < page[1] - 4.0
 
 
-def test_a_hand_larger_than_a4_names_the_sheet_to_use(manifest_of: Manifests, hand: HandShape) -> None:
+def test_a_hand_larger_than_a4_names_the_sheet_to_use(hand: HandShape) -> None:
     readme = spec_files(manifest_of(hand.names), hand=hand)["README.txt"].decode()
     assert "A3 (297 x 420 mm), or 4 A4 sheets, 2 across and 2 down" in " ".join(readme.split())
 

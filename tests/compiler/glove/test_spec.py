@@ -1,7 +1,5 @@
 """What a spec decides: wiring, expectations, remarks; and what cannot be described."""
 
-from collections.abc import Callable
-
 import pytest
 from msgspec.structs import replace
 
@@ -10,15 +8,14 @@ from thenar.compiler.hand import HandShape
 from thenar.drivers.i2c.chips import expanders
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness, StreamWiring
-from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
 
-Manifests = Callable[..., Manifest]
+from .conftest import manifest_of
 
 
-def test_without_a_harness_one_is_proposed_with_a_cyberglove_for_joints(manifest_of: Manifests) -> None:
+def test_without_a_harness_one_is_proposed_with_a_cyberglove_for_joints() -> None:
     names = ["a", "b"]
     with_joints, without = (glove_spec(manifest_of(names, joints=joints)) for joints in (True, False))
     assert with_joints.summary.proposed
@@ -29,7 +26,7 @@ def test_without_a_harness_one_is_proposed_with_a_cyberglove_for_joints(manifest
     assert without.summary.expected.glove_us is None
 
 
-def test_the_scan_takes_what_the_wire_takes(manifest_of: Manifests) -> None:
+def test_the_scan_takes_what_the_wire_takes() -> None:
     names = [f"s{number}" for number in range(20)]
     harness = propose_harness([*names, "spare"], "pca9555")
     expected = glove_spec(manifest_of(names), None, harness).summary.expected
@@ -39,19 +36,19 @@ def test_the_scan_takes_what_the_wire_takes(manifest_of: Manifests) -> None:
     assert expected.rates == manifest_of(names).rates
 
 
-def test_a_board_with_kept_switches_takes_from_row_to_row(manifest_of: Manifests) -> None:
+def test_a_board_with_kept_switches_takes_from_row_to_row() -> None:
     idle = StreamWiring(port="/dev/ttyACM1", switches=("x",))
     board = StreamWiring(port="/dev/ttyACM0", switches=("a",), rate_hz=200.0)
     expected = glove_spec(manifest_of(["a"]), None, Harness(name="h", streams=(idle, board))).summary.expected
     assert (expected.transactions, expected.rows_us) == (0, (5000,))
 
 
-def test_a_build_without_switches_has_no_glove(manifest_of: Manifests) -> None:
+def test_a_build_without_switches_has_no_glove() -> None:
     with pytest.raises(SpecError, match="keeps no switch"):
         glove_spec(manifest_of([]))
 
 
-def test_a_scan_map_needs_its_own_harness(manifest_of: Manifests) -> None:
+def test_a_scan_map_needs_its_own_harness() -> None:
     harness = propose_harness(["a", "b"])
     scan = whole_scan(harness, ["a"])
     assert glove_spec(manifest_of(["a"]), scan, harness).scan is scan
@@ -61,13 +58,13 @@ def test_a_scan_map_needs_its_own_harness(manifest_of: Manifests) -> None:
         glove_spec(manifest_of(["a"]), scan, propose_harness(["b", "a"]))
 
 
-def test_a_harness_without_a_kept_switch_is_refused(manifest_of: Manifests) -> None:
+def test_a_harness_without_a_kept_switch_is_refused() -> None:
     with pytest.raises(HarnessError, match="no pin or column for b, which"):
         glove_spec(manifest_of(["a", "b"]), None, propose_harness(["a"]))
 
 
 @pytest.mark.parametrize("path", ["/home/anna/anna.toml", "anna.toml", "C:\\gloves\\anna.toml"])
-def test_the_calibrations_folder_stays_out_of_the_spec(manifest_of: Manifests, path: str) -> None:
+def test_the_calibrations_folder_stays_out_of_the_spec(path: str) -> None:
     glove = GloveWiring(port="/dev/ttyUSB0", calibration=path)
     harness = replace(propose_harness(["a"]), cyberglove=glove)
     written = glove_spec(manifest_of(["a"]), None, harness).harness
@@ -75,7 +72,7 @@ def test_the_calibrations_folder_stays_out_of_the_spec(manifest_of: Manifests, p
     assert written.fingerprint == harness.fingerprint
 
 
-def test_switches_closer_than_their_bodies_are_told(manifest_of: Manifests, hand: HandShape) -> None:
+def test_switches_closer_than_their_bodies_are_told(hand: HandShape) -> None:
     names = ["index_distal_2", "index_distal_4", "palm_heel_6"]
     assert glove_spec(manifest_of(names), hand=hand).summary.remarks == ()
     small = glove_spec(manifest_of(names), hand=hand.scaled(150.0)).summary.remarks
@@ -84,7 +81,7 @@ def test_switches_closer_than_their_bodies_are_told(manifest_of: Manifests, hand
     assert small[0].endswith("their bodies 4.9 mm wide: move one of them aside")
 
 
-def test_a_strange_glove_is_described_without_places(manifest_of: Manifests, hand: HandShape) -> None:
+def test_a_strange_glove_is_described_without_places(hand: HandShape) -> None:
     summary = glove_spec(manifest_of(["index_distal_2", "mine"]), hand=hand).summary
     assert summary.hand_length_mm is None
     assert {(s.part, s.side, s.x_mm, s.y_mm) for s in summary.sensors} == {(None, None, None, None)}
@@ -92,7 +89,7 @@ def test_a_strange_glove_is_described_without_places(manifest_of: Manifests, han
 
 
 @pytest.mark.parametrize("kind", sorted(expanders()))
-def test_the_bill_counts_what_the_circuit_holds(manifest_of: Manifests, hand: HandShape, kind: str) -> None:
+def test_the_bill_counts_what_the_circuit_holds(hand: HandShape, kind: str) -> None:
     names = hand.names[:30]
     spec = glove_spec(manifest_of(names), None, propose_harness(names, kind), hand)
     *pieces, joint = [line for line in spec.summary.materials if line.unit == "pcs"]

@@ -1,16 +1,11 @@
 """Random ensembles over switches and joints, harsher than trained ones: any threshold, any value."""
 
-from collections.abc import Callable
-
 import numpy as np
-import pytest
 
 from thenar.compiler.trainers.stumps import Stumps
 
-MakeStumps = Callable[..., Stumps]
 
-
-def _make_stumps(
+def make_stumps(
     seed: int = 0, rounds: int = 20, classes: int = 4, switches: int = 6, joints: int = 3, shrinkage: float = 1.0
 ) -> Stumps:
     random = np.random.default_rng(seed)
@@ -22,17 +17,8 @@ def _make_stumps(
     return Stumps(switches + joints, columns, thresholds, values, shrinkage)
 
 
-@pytest.fixture(scope="session")
-def make_stumps() -> MakeStumps:
-    return _make_stumps
-
-
-@pytest.fixture(scope="session")
-def make_rows() -> Callable[..., tuple[np.ndarray, np.ndarray]]:
-    def rows(seed: int = 0, n: int = 40, switches: int = 6, joints: int = 3) -> tuple[np.ndarray, np.ndarray]:
-        random = np.random.default_rng(seed)
-        codes = random.integers(0, 259, (n, joints)).astype(np.uint16)
-        codes[random.random(codes.shape) < 0.1] = 65535
-        return random.random((n, switches)) < 0.5, codes
-
-    return rows
+def make_rows(seed: int = 0, n: int = 40, switches: int = 6, joints: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(seed)
+    codes = random.integers(0, 259, (n, joints)).astype(np.uint16)
+    codes[random.random(codes.shape) < 0.1] = 65535
+    return random.random((n, switches)) < 0.5, codes

@@ -1,5 +1,4 @@
 import tracemalloc
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +14,7 @@ from thenar.runtime.model.terms.base import CoreTerm, Term
 from thenar.runtime.model.terms.bins import Bins
 from thenar.runtime.model.terms.line import Line
 
-MakeStumps = Callable[..., Stumps]
-MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
+from .conftest import make_rows, make_stumps
 
 
 @given(
@@ -28,14 +26,7 @@ MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
     shrinkage=st.sampled_from([1.0, 0.1]),
 )
 def test_tables_score_as_stumps_do(
-    make_stumps: MakeStumps,
-    make_rows: MakeRows,
-    seed: int,
-    rounds: int,
-    classes: int,
-    switches: int,
-    joints: int,
-    shrinkage: float,
+    seed: int, rounds: int, classes: int, switches: int, joints: int, shrinkage: float
 ) -> None:
     if switches + joints == 0:
         switches = 1
@@ -81,7 +72,7 @@ def test_a_threshold_that_no_code_passes_makes_no_bin() -> None:
         assert tables.joint_rows[0].tolist() == [[score, -score]]
 
 
-def test_scores_are_added_row_after_row_and_not_as_the_machine_likes(make_stumps: MakeStumps) -> None:
+def test_scores_are_added_row_after_row_and_not_as_the_machine_likes() -> None:
     tables = collapse(make_stumps(3, rounds=200, switches=90, joints=0), 90)
     bits = np.random.default_rng(3).random((50, 90)) < 0.5
     for frame, scores in zip(bits, tables.scores(bits, np.zeros((50, 0), np.uint16)), strict=True):
@@ -150,9 +141,7 @@ class Ramp(Term):
 
 
 @given(seed=st.integers(0, 10_000))
-def test_a_term_of_another_kind_becomes_the_terms_of_its_core(
-    make_stumps: MakeStumps, make_rows: MakeRows, seed: int
-) -> None:
+def test_a_term_of_another_kind_becomes_the_terms_of_its_core(seed: int) -> None:
     random, (bits, codes) = np.random.default_rng(seed), make_rows(seed)
     plain = collapse(make_stumps(seed), 6)
     ramps = [

@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 
@@ -11,8 +10,7 @@ from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.quantise import quantise, rounding_error
 from thenar.runtime.model.tables import ScoreTables, winners
 
-MakeStumps = Callable[..., Stumps]
-MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
+from .conftest import make_rows, make_stumps
 
 
 @pytest.fixture
@@ -43,7 +41,7 @@ def test_a_comparison_fails_beyond_bounds_or_on_changed_safe_rows(sound: Compari
     assert not replace(sound, deployed=np.array([0, 2, 1])).holds
 
 
-def test_the_ensembles_ties_are_its_own(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
+def test_the_ensembles_ties_are_its_own() -> None:
     stumps, (bits, codes) = make_stumps(1, shrinkage=1e-10), make_rows(1)
     found = compare(stumps, quantise(collapse(stumps, 6), bits, codes), bits, codes)
     scores = stumps.scores(np.hstack([bits, codes]))
@@ -52,7 +50,7 @@ def test_the_ensembles_ties_are_its_own(make_stumps: MakeStumps, make_rows: Make
 
 
 @pytest.mark.parametrize("size", [1.0, 1e3, 1e6, 1e9, 1e12])
-def test_the_slack_covers_what_doubles_lose_where_large_rows_cancel(make_rows: MakeRows, size: float) -> None:
+def test_the_slack_covers_what_doubles_lose_where_large_rows_cancel(size: float) -> None:
     random = np.random.default_rng(5)
     rows = tuple(random.normal(0, 1e-3, (2, 3)) - size for _ in range(3))
     tables = ScoreTables.of(np.full(3, 3 * size), np.zeros((6, 3)), (np.array([99], np.uint16),) * 3, rows)
@@ -75,9 +73,7 @@ def _at(rows: tuple[np.ndarray, ...], right: np.ndarray) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("classes", [2, 3, 5])
-def test_a_margin_is_the_lead_of_the_best_over_the_second(
-    make_stumps: MakeStumps, make_rows: MakeRows, classes: int
-) -> None:
+def test_a_margin_is_the_lead_of_the_best_over_the_second(classes: int) -> None:
     stumps, (bits, codes) = make_stumps(2, classes=classes), make_rows(2)
     integers = quantise(collapse(stumps, 6), bits, codes)
     steps = collapse(stumps, 6).scores(bits, codes) * integers.scale
@@ -86,7 +82,7 @@ def test_a_margin_is_the_lead_of_the_best_over_the_second(
         assert margin == best - second
 
 
-def test_a_margin_within_the_slack_is_not_covered(make_rows: MakeRows) -> None:
+def test_a_margin_within_the_slack_is_not_covered() -> None:
     # What a joint adds to a class in every bin, a switch takes away: large rows of which small scores are left.
     random, (bits, codes) = np.random.default_rng(6), make_rows(6, n=400, switches=6, joints=3)
     columns, values = random.integers(0, 9, (40, 3)), random.normal(0, 1e-3, (40, 3, 3))
@@ -99,7 +95,7 @@ def test_a_margin_within_the_slack_is_not_covered(make_rows: MakeRows) -> None:
     assert np.array_equal(found.covered, found.margins > edge)
 
 
-def test_progress_is_told_every_thousand_rows(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
+def test_progress_is_told_every_thousand_rows() -> None:
     stumps, (bits, codes) = make_stumps(2), make_rows(2, n=2001)
     told: list[tuple[int, int]] = []
     compare(stumps, quantise(collapse(stumps, 6), bits, codes), bits, codes, lambda *done: told.append(done))

@@ -87,7 +87,6 @@ entries = st.sampled_from([8, 16])
 
 
 @EACH
-@settings(deadline=None)
 @given(seed=seeds, entry_bits=entries)
 def test_integers_keep_their_bounds_on_every_row_and_are_read_again(make: Make, seed: int, entry_bits: int) -> None:
     tables, bits, codes = make(seed)
@@ -144,7 +143,6 @@ def test_of_all_codes_none_loses_more_and_the_witness_as_much(kind: str, seed: i
         assert worst.loss == own[leader] - own[competitor]
 
 
-@settings(deadline=None)
 @given(seed=seeds)
 def test_the_runtime_sums_as_arrays_do_without_lost_inputs(seed: int) -> None:
     tables, bits, codes = with_lines(seed)

@@ -1,5 +1,4 @@
 import math
-from collections.abc import Callable
 from itertools import combinations
 
 import numpy as np
@@ -9,7 +8,6 @@ from hypothesis import strategies as st
 
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import compare
-from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.integers import FINEST_SCALE, IntegerTables, tables_to_bytes
 from thenar.runtime.model.proof import Rounding
 from thenar.runtime.model.quantise import (
@@ -24,14 +22,11 @@ from thenar.runtime.model.quantise import (
 )
 from thenar.runtime.model.tables import ScoreTables, winners
 
-MakeStumps = Callable[..., Stumps]
-MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
+from .conftest import make_rows, make_stumps
 
 
 @given(seed=st.integers(0, 10_000), joints=st.integers(0, 3))
-def test_balancing_changes_no_score_and_never_coarsens(
-    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, joints: int
-) -> None:
+def test_balancing_changes_no_score_and_never_coarsens(seed: int, joints: int) -> None:
     tables = collapse(make_stumps(seed, joints=joints), 6)
     balanced = balance(tables)
     bits, codes = make_rows(seed, joints=joints)
@@ -63,9 +58,7 @@ def spans_by_counting(integers: IntegerTables, group_size: int) -> list[int]:
 
 
 @given(seed=seeds, shape=shapes)
-def test_every_lookup_of_five_switches_or_a_joint_fits_a_byte(
-    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, shape: tuple[int, int]
-) -> None:
+def test_every_lookup_of_five_switches_or_a_joint_fits_a_byte(seed: int, shape: tuple[int, int]) -> None:
     switches, joints = shape
     tables = collapse(make_stumps(seed, switches=switches, joints=joints), switches)
     integers = quantise(tables, *make_rows(seed, switches=switches, joints=joints), entry_bits=8)
@@ -75,9 +68,7 @@ def test_every_lookup_of_five_switches_or_a_joint_fits_a_byte(
 
 
 @given(seed=seeds, shape=shapes, entry_bits=st.sampled_from([4, 8, 16]))
-def test_the_next_finer_scale_would_not_do(
-    make_stumps: MakeStumps, seed: int, shape: tuple[int, int], entry_bits: int
-) -> None:
+def test_the_next_finer_scale_would_not_do(seed: int, shape: tuple[int, int], entry_bits: int) -> None:
     switches, joints = shape
     tables = balance(collapse(make_stumps(seed, switches=switches, joints=joints), switches))
     scale = finest_scale(tables, 32767, 2**entry_bits - 1)
@@ -88,9 +79,7 @@ def test_the_next_finer_scale_would_not_do(
 
 
 @given(seed=seeds, shape=shapes)
-def test_coarse_steps_are_those_that_change_the_fewest_rows(
-    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, shape: tuple[int, int]
-) -> None:
+def test_coarse_steps_are_those_that_change_the_fewest_rows(seed: int, shape: tuple[int, int]) -> None:
     switches, joints = shape
     stumps = make_stumps(seed, switches=switches, joints=joints)
     rows = make_rows(seed, n=60, switches=switches, joints=joints)
@@ -111,7 +100,7 @@ def test_coarse_steps_are_those_that_change_the_fewest_rows(
 
 
 @given(seed=seeds)
-def test_the_guarantee_is_the_same_in_coarser_steps(make_stumps: MakeStumps, make_rows: MakeRows, seed: int) -> None:
+def test_the_guarantee_is_the_same_in_coarser_steps(seed: int) -> None:
     stumps, (bits, codes) = make_stumps(seed), make_rows(seed, n=100)
     tables = collapse(stumps, 6)
     integers = quantise(tables, bits, codes, entry_bits=8)
@@ -136,7 +125,7 @@ def test_a_joint_spans_from_its_least_row_to_its_greatest_and_zero() -> None:
     assert span(tables, 2.0) == 13
 
 
-def test_tables_of_zeros_and_of_no_joint_stay_so(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
+def test_tables_of_zeros_and_of_no_joint_stay_so() -> None:
     integers = quantise(collapse(make_stumps(rounds=0), 6), *make_rows(), entry_bits=8)
     assert (integers.scale, integers.bound) == (1.0, 0)
     bias_alone = ScoreTables.of(np.array([3.0, -3.0]), np.zeros((6, 2)), (), ())
@@ -150,9 +139,7 @@ FLOATS = 8 * 32767 * 2.0**-53  # eight roundings, at most, of numbers within int
 
 
 @given(seed=st.integers(0, 10_000), width=widths)
-def test_no_score_is_off_by_more_than_the_guarantee(
-    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int
-) -> None:
+def test_no_score_is_off_by_more_than_the_guarantee(seed: int, width: int) -> None:
     stumps, (bits, codes) = make_stumps(seed), make_rows(seed)
     found = compare(stumps, quantise(collapse(stumps, 6), bits, codes, width), bits, codes)
     assert found.integer_bound == 5.0
@@ -160,20 +147,20 @@ def test_no_score_is_off_by_more_than_the_guarantee(
     assert found.holds
 
 
-def test_a_broken_table_does_not_hold(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
+def test_a_broken_table_does_not_hold() -> None:
     stumps, (bits, codes) = make_stumps(1), make_rows(1)
     integers = quantise(collapse(stumps, 6), bits, codes, 12)
     integers.bias[0] += 20
     assert not compare(stumps, integers, bits, codes).holds
 
 
-def test_a_nearly_empty_ensemble_has_a_finite_scale(make_rows: MakeRows) -> None:
+def test_a_nearly_empty_ensemble_has_a_finite_scale() -> None:
     tables = ScoreTables.of(np.array([1e-300, -1e-300]), np.zeros((6, 2)), (), ())
     assert quantise(tables, *make_rows(joints=0)).scale <= FINEST_SCALE
 
 
 @given(seed=st.integers(0, 10_000))
-def test_means_stand_for_the_rows_trained_on(make_stumps: MakeStumps, make_rows: MakeRows, seed: int) -> None:
+def test_means_stand_for_the_rows_trained_on(seed: int) -> None:
     tables, (bits, codes) = collapse(make_stumps(seed), 6), make_rows(seed)
     integers = quantise(tables, bits, codes)
     expected = integers.switch_rows * bits.mean(axis=0)[:, np.newaxis]
@@ -184,7 +171,7 @@ def test_means_stand_for_the_rows_trained_on(make_stumps: MakeStumps, make_rows:
 
 
 @given(seed=st.integers(0, 100))
-def test_the_order_of_the_rows_changes_no_byte(make_stumps: MakeStumps, make_rows: MakeRows, seed: int) -> None:
+def test_the_order_of_the_rows_changes_no_byte(seed: int) -> None:
     tables, (bits, codes) = collapse(make_stumps(seed), 6), make_rows(seed)
     order = np.random.default_rng(seed).permutation(len(bits))
     shuffled = quantise(tables, bits[order], codes[order])
@@ -192,7 +179,7 @@ def test_the_order_of_the_rows_changes_no_byte(make_stumps: MakeStumps, make_row
 
 
 @pytest.mark.parametrize("width", [16, 8])
-def test_no_frame_at_all_overflows(make_stumps: MakeStumps, make_rows: MakeRows, width: int) -> None:
+def test_no_frame_at_all_overflows(width: int) -> None:
     integers = quantise(collapse(make_stumps(3, switches=4, joints=2), 4), *make_rows(switches=4, joints=2), width)
     limit, partial = 2 ** (width - 1) - 1, {tuple(integers.bias.tolist())}
     terms = [[row, 0 * row] for row in integers.switch_rows.astype(int)]
@@ -203,9 +190,7 @@ def test_no_frame_at_all_overflows(make_stumps: MakeStumps, make_rows: MakeRows,
 
 
 @given(seed=st.integers(0, 1000), shrinkage=st.sampled_from([1e-5, 1e-8, 1e-10, 1e-12, 1e-200]))
-def test_scores_next_to_the_ensembles_ties_do_not_break_the_guarantee(
-    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, shrinkage: float
-) -> None:
+def test_scores_next_to_the_ensembles_ties_do_not_break_the_guarantee(seed: int, shrinkage: float) -> None:
     stumps, (bits, codes) = make_stumps(seed, shrinkage=shrinkage), make_rows(seed)
     found = compare(stumps, quantise(collapse(stumps, 6), bits, codes), bits, codes)
     assert not found.covered[found.changed].any()
@@ -213,7 +198,7 @@ def test_scores_next_to_the_ensembles_ties_do_not_break_the_guarantee(
 
 
 @pytest.mark.parametrize(("rows", "kept"), [("aab", [9]), ("abb", [3]), ("aba", [3, 9]), ("abc", [3, 9]), ("aaa", [])])
-def test_a_threshold_is_dropped_only_between_equal_rows(make_rows: MakeRows, rows: str, kept: list[int]) -> None:
+def test_a_threshold_is_dropped_only_between_equal_rows(rows: str, kept: list[int]) -> None:
     values = {"a": [-1.0, 1.0], "b": [1.0, -1.0], "c": [0.5, 0.25]}
     joint = np.array([values[row] for row in rows])
     tables = ScoreTables.of(np.zeros(2), np.zeros((6, 2)), (np.array([3, 9], np.uint16),), (joint,))

@@ -1,7 +1,5 @@
 """What stands in for lost inputs: likelier than the mean rows, within bounds, in whatever order the rows come."""
 
-from collections.abc import Callable
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,7 +10,8 @@ from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import quantise
 
-MakeStumps = Callable[..., Stumps]
+from .conftest import make_stumps
+
 Rows = tuple[np.ndarray, np.ndarray, np.ndarray]
 K, SWITCHES = 4, 6
 
@@ -45,14 +44,14 @@ def _loss(tables: IntegerTables, rows: Rows, switch: int) -> float:
 
 
 @given(seed=st.integers(0, 100))
-def test_a_lost_switch_leaves_the_rows_likelier_than_its_mean_row_does(make_stumps: MakeStumps, seed: int) -> None:
+def test_a_lost_switch_leaves_the_rows_likelier_than_its_mean_row_does(seed: int) -> None:
     rows = _rows(seed, 200, joints=0)
     before, after = _both(make_stumps(seed, classes=K, switches=SWITCHES, joints=0), rows)
     losses = np.array([[_loss(tables, rows, switch) for switch in range(SWITCHES)] for tables in (before, after)])
     assert np.all(losses[1] <= losses[0] + 2 / before.scale)
 
 
-def test_what_the_others_say_already_is_not_said_again(make_stumps: MakeStumps) -> None:
+def test_what_the_others_say_already_is_not_said_again() -> None:
     rows = _rows(1, 400, joints=0)
     tables, fitted = _both(make_stumps(3, rounds=60, classes=K, switches=SWITCHES, joints=0), rows)
     gains = [_loss(tables, rows, switch) - _loss(fitted, rows, switch) for switch in range(SWITCHES)]
@@ -60,9 +59,7 @@ def test_what_the_others_say_already_is_not_said_again(make_stumps: MakeStumps) 
 
 
 @given(seed=st.integers(0, 100), n=st.integers(1, 60), joints=st.integers(0, 3))
-def test_what_stands_in_lies_within_what_the_input_adds(
-    make_stumps: MakeStumps, seed: int, n: int, joints: int
-) -> None:
+def test_what_stands_in_lies_within_what_the_input_adds(seed: int, n: int, joints: int) -> None:
     before, after = _both(make_stumps(seed, classes=K, switches=SWITCHES, joints=joints), _rows(seed, n, joints))
     rows = before.switch_rows
     assert np.all((np.minimum(rows, 0) <= after.switch_means) & (after.switch_means <= np.maximum(rows, 0)))
@@ -73,7 +70,7 @@ def test_what_stands_in_lies_within_what_the_input_adds(
 
 
 @given(seed=st.integers(0, 30))
-def test_the_order_of_the_rows_is_no_matter(make_stumps: MakeStumps, seed: int) -> None:
+def test_the_order_of_the_rows_is_no_matter(seed: int) -> None:
     bits, codes, labels = _rows(seed, 1500, joints=2)
     tables, fitted = _both(make_stumps(seed, classes=K, switches=SWITCHES, joints=2), (bits, codes, labels))
     order = np.random.default_rng(seed).permutation(len(labels))
@@ -92,7 +89,7 @@ def test_neither_is_it_where_millions_of_rows_are_added_up() -> None:
 
 
 @given(seed=st.integers(0, 30))
-def test_inputs_that_add_nothing_change_nothing_for_the_others(make_stumps: MakeStumps, seed: int) -> None:
+def test_inputs_that_add_nothing_change_nothing_for_the_others(seed: int) -> None:
     bits, codes, labels = _rows(seed, 200, joints=1)
     scores = collapse(make_stumps(seed, classes=K, switches=SWITCHES, joints=1), SWITCHES)
     tables = quantise(scores, bits, codes, width=15)

@@ -1,5 +1,5 @@
 import tracemalloc
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from fractions import Fraction
 from itertools import permutations, product
 
@@ -10,14 +10,13 @@ from hypothesis import strategies as st
 
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import float_slack
-from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.proof import Rounding, _Pairs
 from thenar.runtime.model.quantise import quantise, rounding_error
 from thenar.runtime.model.tables import ScoreTables
 
-MakeStumps = Callable[..., Stumps]
-MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
+from .conftest import make_rows, make_stumps
+
 Ran = tuple[list[Fraction], list[int]]
 
 widths = st.sampled_from([4, 5, 6, 8, 16])
@@ -48,17 +47,15 @@ def _lost(run: Ran, leader: int, competitor: int) -> Fraction:
     return (exact[leader] - exact[competitor]) - (deployed[leader] - deployed[competitor])
 
 
-def _small(make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int) -> tuple[ScoreTables, IntegerTables]:
+def _small(seed: int, width: int) -> tuple[ScoreTables, IntegerTables]:
     tables = collapse(make_stumps(seed, rounds=4, classes=3, switches=3, joints=2), 3)
     return tables, quantise(tables, *make_rows(seed, switches=3, joints=2), width)
 
 
 @settings(deadline=None, max_examples=40)
 @given(seed=st.integers(0, 10_000), width=widths)
-def test_of_all_frames_none_loses_more_and_the_witness_as_much(
-    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int
-) -> None:
-    tables, integers = _small(make_stumps, make_rows, seed, width)
+def test_of_all_frames_none_loses_more_and_the_witness_as_much(seed: int, width: int) -> None:
+    tables, integers = _small(seed, width)
     rounding, runs = Rounding(tables, integers), list(_every_run(tables, integers))
     for pair in permutations(range(3), 2):
         frame = rounding.worst(*pair)
@@ -70,10 +67,8 @@ def test_of_all_frames_none_loses_more_and_the_witness_as_much(
 
 @settings(deadline=None, max_examples=40)
 @given(seed=st.integers(0, 10_000), width=st.sampled_from([4, 5, 6]))
-def test_no_frame_with_more_than_the_safe_margin_changes_class(
-    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int
-) -> None:
-    tables, integers = _small(make_stumps, make_rows, seed, width)
+def test_no_frame_with_more_than_the_safe_margin_changes_class(seed: int, width: int) -> None:
+    tables, integers = _small(seed, width)
     safe = Rounding(tables, integers).safe_margin()
     for exact, deployed in _every_run(tables, integers):
         if exact.index(max(exact)) != deployed.index(max(deployed)):
@@ -81,9 +76,7 @@ def test_no_frame_with_more_than_the_safe_margin_changes_class(
 
 
 @given(seed=st.integers(0, 10_000), width=widths)
-def test_the_worst_is_within_what_counting_inputs_promises(
-    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int
-) -> None:
+def test_the_worst_is_within_what_counting_inputs_promises(seed: int, width: int) -> None:
     tables = collapse(make_stumps(seed), 6)
     integers = quantise(tables, *make_rows(seed), width)
     rounding = Rounding(tables, integers)

@@ -1,9 +1,6 @@
 """Movements whose switches and joint say at once what is held, if anything."""
 
-from collections.abc import Callable
-
 import numpy as np
-import pytest
 
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 
@@ -13,7 +10,7 @@ TYPES = ("pinch", "hook", "fist")
 BEFORE, HELD, AFTER = 15, 30, 10
 
 
-def movements(subjects: str = "AB", repetitions: int = 3, seed: int = 1, noise: float = 0.02) -> GraspSet:
+def make_movements(subjects: str = "AB", repetitions: int = 3, seed: int = 1, noise: float = 0.02) -> GraspSet:
     """Return whole movements of each type by each subject, in a random order: open, held, open again."""
     random = np.random.default_rng(seed)
     parts = []
@@ -37,8 +34,3 @@ def movements(subjects: str = "AB", repetitions: int = 3, seed: int = 1, noise: 
         trials=np.repeat([trial for _, trial, _ in parts], sizes),
         times_us=np.concatenate([10_000 * np.arange(np.count_nonzero(owners == each)) for each in subjects]),
     )
-
-
-@pytest.fixture(scope="session")
-def make_movements() -> Callable[..., GraspSet]:
-    return movements

@@ -1,6 +1,5 @@
 """Streams of a set: the newest row at each tick, and where one ends."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,20 +8,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.movements.streams import PAUSE_US, MovementError, streams_of
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.merging import merge
 
-Make = Callable[..., GraspSet]
+from .conftest import make_movements
 
 
-def test_a_stream_of_each_subject_has_all_rows_in_order(make_movements: Make) -> None:
+def test_a_stream_of_each_subject_has_all_rows_in_order() -> None:
     grasp_set = make_movements()
     streams = streams_of(grasp_set)
     assert [stream.subject for stream in streams] == ["A", "B"]
     assert np.concatenate([stream.rows for stream in streams]).tolist() == list(range(len(grasp_set)))
 
 
-def test_rows_without_times_are_ten_milliseconds_apart(make_movements: Make) -> None:
+def test_rows_without_times_are_ten_milliseconds_apart() -> None:
     grasp_set = make_movements("A")
     blind = replace(grasp_set, times_us=np.empty(0, np.int64))
     for tick_us in (10_000, 20_000, 5_000):
@@ -31,7 +29,7 @@ def test_rows_without_times_are_ten_milliseconds_apart(make_movements: Make) -> 
 
 
 @given(st.lists(st.integers(1, 40_000), min_size=1, max_size=40), st.integers(1000, 30_000))
-def test_each_tick_has_the_newest_row(make_movements: Make, steps: list[int], tick_us: int) -> None:
+def test_each_tick_has_the_newest_row(steps: list[int], tick_us: int) -> None:
     times = np.cumsum([7, *steps])
     grasp_set = replace(make_movements("A").rows(np.arange(len(times))), times_us=times)
     (stream,) = streams_of(grasp_set, tick_us)
@@ -41,7 +39,7 @@ def test_each_tick_has_the_newest_row(make_movements: Make, steps: list[int], ti
     assert times[-1] - tick_us < 7 + (len(stream.rows) - 1) * tick_us <= times[-1]
 
 
-def test_a_stream_ends_before_a_pause_and_where_the_clock_starts_again(make_movements: Make) -> None:
+def test_a_stream_ends_before_a_pause_and_where_the_clock_starts_again() -> None:
     grasp_set = make_movements("A")
     times = grasp_set.times_us.copy()
     times[20:] += PAUSE_US
@@ -52,7 +50,7 @@ def test_a_stream_ends_before_a_pause_and_where_the_clock_starts_again(make_move
     assert [stream.continued for stream in found] == [False, True, True]
 
 
-def test_a_clock_of_each_trial_starts_a_stream_with_it(make_movements: Make) -> None:
+def test_a_clock_of_each_trial_starts_a_stream_with_it() -> None:
     grasp_set = make_movements("A")
     first = np.flatnonzero(np.diff(grasp_set.trials, prepend=-1))
     own = grasp_set.times_us - np.repeat(grasp_set.times_us[first], np.diff(first, append=len(grasp_set)))
@@ -61,13 +59,13 @@ def test_a_clock_of_each_trial_starts_a_stream_with_it(make_movements: Make) -> 
     assert not any(stream.continued for stream in streams)
 
 
-def test_sessions_are_streams_of_their_own(make_movements: Make) -> None:
+def test_sessions_are_streams_of_their_own() -> None:
     grasp_set = make_movements("A")
     sessions = np.where(np.arange(len(grasp_set)) < 60, "1", "2")
     assert [stream.session for stream in streams_of(replace(grasp_set, sessions=sessions))] == ["1", "2"]
 
 
-def test_rows_that_are_trials_of_their_own_are_no_movements(make_movements: Make) -> None:
+def test_rows_that_are_trials_of_their_own_are_no_movements() -> None:
     grasp_set = make_movements()
     held = grasp_set.rows(np.unique(grasp_set.trial_ids, return_index=True)[1]).without_none()
     with pytest.raises(MovementError, match="whole movements"):
@@ -76,7 +74,7 @@ def test_rows_that_are_trials_of_their_own_are_no_movements(make_movements: Make
         streams_of(replace(grasp_set, independent=True))
 
 
-def test_static_grasps_beside_movements_are_of_no_stream(make_movements: Make) -> None:
+def test_static_grasps_beside_movements_are_of_no_stream() -> None:
     grasp_set = make_movements()
     held = grasp_set.without_none()
     single = held.rows(np.unique(held.trial_ids, return_index=True)[1])

@@ -1,6 +1,5 @@
 """The consensus of demonstrations: alignment, steps, and what is written of them."""
 
-from collections.abc import Callable
 from itertools import permutations
 from pathlib import Path
 from xml.etree import ElementTree
@@ -24,16 +23,17 @@ from thenar.compiler.artifact.teaching import (
 from thenar.compiler.movements.segments import levenshtein
 from thenar.compiler.movements.streams import MovementError
 from thenar.compiler.movements.transitions import Transitions
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime import Build
 from thenar.runtime.preshape import Preshape, PreshapeTable
 from thenar.runtime.task import Task
+
+from .conftest import make_movements
 
 STRINGS = st.lists(st.text("abcd", max_size=6), min_size=1, max_size=5)
 
 
 @pytest.fixture(scope="module")
-def build(make_movements: Callable[..., GraspSet], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("teaching") / "build"
     return compile_build(make_movements(), folder, rounds=5, folds=0).folder
 
@@ -102,9 +102,7 @@ def test_a_task_survives_its_file_and_each_step_is_an_action(build: Path) -> Non
         assert action.attrib["joints"] == "bend=30"
 
 
-def test_each_stream_is_a_demonstration_with_its_joint_values(
-    build: Path, make_movements: Callable[..., GraspSet], tmp_path: Path
-) -> None:
+def test_each_stream_is_a_demonstration_with_its_joint_values(build: Path, tmp_path: Path) -> None:
     grasp_set = make_movements("CD", 2, seed=5)
     grasp_set.save(tmp_path / "demos.grasps")
     shown = list(demonstrations(build, [tmp_path / "demos.grasps"]))

@@ -1,6 +1,5 @@
 """Which type follows which: counted, written, listed in the report."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +14,8 @@ from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.movements.streams import MovementError
 from thenar.compiler.movements.transitions import FREQUENT, Transitions
 from thenar.compiler.recordings.graspset import GraspSet
+
+from .conftest import make_movements
 
 TYPES = tuple(f"type {number}" for number in range(14))
 SEQUENCES = st.lists(st.lists(st.sampled_from(TYPES), max_size=12), max_size=6)
@@ -34,9 +35,7 @@ def test_changes_count_once_and_shares_are_per_type(sequences: list[list[str]]) 
         assert all(share >= FREQUENT for share in shares)
 
 
-def test_nothing_held_is_passed_over_and_what_is_written_is_read(
-    make_movements: Callable[..., GraspSet], tmp_path: Path
-) -> None:
+def test_nothing_held_is_passed_over_and_what_is_written_is_read(tmp_path: Path) -> None:
     grasp_set = make_movements("A", 2)
     found = Transitions.of_set(grasp_set)
     held = [grasp_set.grasps[rows[0]] for rows in np.split(np.arange(len(grasp_set)), _starts(grasp_set))]
@@ -58,9 +57,7 @@ def _starts(grasp_set: GraspSet) -> np.ndarray:
     return np.flatnonzero(grasp_set.grasps[1:] != grasp_set.grasps[:-1]) + 1
 
 
-def test_a_report_lists_changes_where_the_recordings_are_whole_movements(
-    make_movements: Callable[..., GraspSet], tmp_path: Path
-) -> None:
+def test_a_report_lists_changes_where_the_recordings_are_whole_movements(tmp_path: Path) -> None:
     grasp_set = make_movements("AB", 2)
     apart = replace(grasp_set, trials=np.arange(len(grasp_set)))
     for number, (rows, listed) in enumerate(((grasp_set.without_none(), False), (apart, False), (grasp_set, True))):

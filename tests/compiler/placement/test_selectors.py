@@ -1,6 +1,5 @@
 """Selectors, as scikit-learn checks them and as its users join them to other estimators."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +11,7 @@ from sklearn.naive_bayes import BernoulliNB
 from sklearn.pipeline import make_pipeline
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from thenar.compiler import GraspSet, grow_id3
+from thenar.compiler import grow_id3
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.placement import place
 from thenar.compiler.placement.ports import PortCosts
@@ -20,7 +19,7 @@ from thenar.compiler.placement.selectors import SwitchSelector
 from thenar.drivers.members import MemberError
 from thenar.runtime.recipe import Recipe
 
-Make = Callable[..., GraspSet]
+from ..conftest import make_set, with_none
 
 
 # Some checks take positive inputs only: all switches are closed then, and scikit-learn warns that none is kept.
@@ -42,7 +41,7 @@ def data() -> tuple[Any, Any]:
 
 
 @pytest.mark.parametrize("name", ["id3", "elimination", "id3-cost", "rfe"])
-def test_a_selector_keeps_what_thenar_place_keeps(make_set: Make, name: str) -> None:
+def test_a_selector_keeps_what_thenar_place_keeps(name: str) -> None:
     grasps = make_set(rows=60, switches=10)
     selector = SwitchSelector(name, n_switches=4, min_samples=6).fit(grasps.switches, grasps.grasps)
     papers = name == "id3"
@@ -52,9 +51,7 @@ def test_a_selector_keeps_what_thenar_place_keeps(make_set: Make, name: str) -> 
     assert selector.get_support(indices=True).tolist() == sorted(selector.order_)
 
 
-def test_rows_in_which_nothing_is_held_place_no_switch(
-    make_set: Make, with_none: Callable[[GraspSet], GraspSet]
-) -> None:
+def test_rows_in_which_nothing_is_held_place_no_switch() -> None:
     grasps = make_set(subjects=8, types=2)
     more = with_none(grasps)
     found, other = place(grasps, prune=4, keep_joints=1), place(more, prune=4, keep_joints=1)

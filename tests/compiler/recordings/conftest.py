@@ -36,7 +36,7 @@ def _joints(draw: st.DrawFn, name: str) -> Joint:
 
 
 @st.composite
-def _grasp_sets(draw: st.DrawFn) -> GraspSet:
+def grasp_sets(draw: st.DrawFn) -> GraspSet:
     rows = draw(st.integers(1, 12))
     columns = draw(st.lists(NAMES, min_size=1, max_size=20, unique=True))
     split, end = sorted(draw(st.tuples(*[st.integers(0, len(columns))] * 2)))
@@ -66,11 +66,6 @@ def _grasp_sets(draw: st.DrawFn) -> GraspSet:
         taxel_columns=taxels,
         times_us=times if times.any() else np.empty(0, np.int64),
     )
-
-
-@pytest.fixture(scope="session")
-def grasp_sets() -> st.SearchStrategy[GraspSet]:
-    return _grasp_sets()
 
 
 @pytest.fixture

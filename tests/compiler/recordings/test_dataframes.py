@@ -7,21 +7,19 @@ import hypothesis.strategies as st
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from thenar.compiler import ColumnRoles, GraspSet, Joint, from_dataframe, to_dataframe
 from thenar.compiler.recordings import ColumnsError, RecordingError, TableError
 from thenar.compiler.recordings.columns import JointColumns
 from thenar.compiler.recordings.taxonomy import own
 
+from .conftest import grasp_sets
+
 
 @pytest.mark.filterwarnings("ignore:.*may be clocks:UserWarning")  # a joint may be called T
-@given(data=st.data(), codes=st.booleans())
-@settings(deadline=None)
-def test_a_set_comes_back_from_its_frame(
-    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet], codes: bool
-) -> None:
-    grasp_set = data.draw(grasp_sets)
+@given(grasp_set=grasp_sets(), codes=st.booleans())
+def test_a_set_comes_back_from_its_frame(grasp_set: GraspSet, codes: bool) -> None:
     frame = to_dataframe(grasp_set, codes)
     assert from_dataframe(frame).fingerprint() == grasp_set.fingerprint()
     assert len(frame) == len(grasp_set)

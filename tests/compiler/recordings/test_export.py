@@ -6,13 +6,15 @@ from pathlib import Path
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from thenar.compiler.recordings import TableError
 from thenar.compiler.recordings.export import SUFFIXES, export, to_arff, to_csv
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.recordings.taxonomy import own
+
+from .conftest import grasp_sets
 
 
 @pytest.fixture(scope="session")
@@ -21,12 +23,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 # Parquet is read in a process of its own: tests/cli has a set of it.
-@given(data=st.data(), suffix=st.sampled_from(SUFFIXES[:-1]), codes=st.booleans())
-@settings(deadline=None)
+@given(grasp_set=grasp_sets(), suffix=st.sampled_from(SUFFIXES[:-1]), codes=st.booleans())
 def test_an_exported_table_reads_back_as_the_same_set(
-    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet], folder: Path, suffix: str, codes: bool
+    grasp_set: GraspSet, folder: Path, suffix: str, codes: bool
 ) -> None:
-    grasp_set = data.draw(grasp_sets)
     table, columns = folder / f"table{suffix}", folder / "columns.toml"
     export(grasp_set, table, codes=codes, columns=columns)
     again, report = import_file(table, columns)

@@ -2,16 +2,17 @@ import re
 from pathlib import Path
 from typing import Any
 
-import hypothesis.strategies as st
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from thenar.compiler.arrays import pack, unpack
 from thenar.compiler.recordings.graspset import KIND, VERSION, GraspSet
 from thenar.runtime.errors import SealError
 from thenar.runtime.sealed import seal, unseal
+
+from .conftest import grasp_sets
 
 
 @pytest.fixture(scope="session")
@@ -19,10 +20,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("grasps")
 
 
-@given(data=st.data())
-@settings(deadline=None)
-def test_any_set_survives_its_file(data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet], folder: Path) -> None:
-    grasp_set = data.draw(grasp_sets)
+@given(grasp_set=grasp_sets())
+def test_any_set_survives_its_file(grasp_set: GraspSet, folder: Path) -> None:
     grasp_set.save(folder / "a.grasps")
     loaded = GraspSet.load(folder / "a.grasps")
     assert loaded.fingerprint() == grasp_set.fingerprint()

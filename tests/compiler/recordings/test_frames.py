@@ -1,5 +1,4 @@
 import runpy
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.recordings.summary import check_trials, looks_like_frames
 from thenar.compiler.recordings.taxonomy import own
 
-Measure = Callable[[Callable[[], object]], int]
+from ...conftest import calls, peak_bytes
 
 COLUMNS = Path(__file__).resolve().parents[3] / "examples" / "columns"
 
@@ -112,7 +111,7 @@ def test_what_never_varies_and_what_is_hardly_there_says_nothing() -> None:
 
 
 @pytest.mark.parametrize("wrong", [False, True])
-def test_ten_times_the_rows_make_no_more_calls(calls: Measure, peak_bytes: Measure, wrong: bool) -> None:
+def test_ten_times_the_rows_make_no_more_calls(wrong: bool) -> None:
     few, many = (make(trials=trials, frames=10, types=10, subjects=1, n_switches=160) for trials in (20, 200))
     if wrong:
         few, many = misnamed(few, "row"), misnamed(many, "row")

@@ -5,11 +5,13 @@ from typing import Any
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from thenar.compiler import GraspSet
-from thenar.compiler.recordings import RecordingError
+from thenar.compiler.recordings import RecordingError, check_names
 from thenar.compiler.recordings.graspset import Joint
+
+from .conftest import grasp_sets
 
 PAD, PADS = Joint("pad", "N", 0, 0.0, 4095, 20.0), np.array([[0], [4095], [65535], [1], [2], [3]], np.uint16)
 
@@ -20,12 +22,8 @@ def fields(grasp_set: GraspSet) -> dict[str, Any]:
     return {name: getattr(grasp_set, name) for name in names}
 
 
-@given(data=st.data())
-@settings(deadline=None)
-def test_labels_are_the_grasps_numbers_in_the_taxonomy(
-    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]
-) -> None:
-    grasp_set = data.draw(grasp_sets)
+@given(grasp_set=grasp_sets())
+def test_labels_are_the_grasps_numbers_in_the_taxonomy(grasp_set: GraspSet) -> None:
     assert [grasp_set.taxonomy.names[label] for label in grasp_set.labels] == grasp_set.grasps.tolist()
     none = (grasp_set.grasps == "none") & ("none" not in grasp_set.taxonomy.types)
     assert grasp_set.is_none.tolist() == none.tolist()
@@ -36,9 +34,8 @@ def test_labels_are_the_grasps_numbers_in_the_taxonomy(
 
 
 @given(data=st.data())
-@settings(deadline=None)
-def test_rows_picks_every_array_alike(data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]) -> None:
-    grasp_set = data.draw(grasp_sets)
+def test_rows_picks_every_array_alike(data: st.DataObject) -> None:
+    grasp_set = data.draw(grasp_sets())
     index = data.draw(st.lists(st.integers(0, len(grasp_set) - 1), max_size=5))
     picked = grasp_set.rows(index)
     for name in ("switches", "codes", "grasps", "subjects", "objects", "sessions", "trials", "labels"):
@@ -119,11 +116,8 @@ def test_taxels_are_columns_beside_the_switches(small: GraspSet) -> None:
 
 
 @given(data=st.data())
-@settings(deadline=None)
-def test_a_trial_is_subject_type_object_session_and_number(
-    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]
-) -> None:
-    grasp_set = data.draw(grasp_sets)
+def test_a_trial_is_subject_type_object_session_and_number(data: st.DataObject) -> None:
+    grasp_set = data.draw(grasp_sets())
     grasp_set = grasp_set.rows(data.draw(st.lists(st.integers(0, len(grasp_set) - 1), max_size=20)))
     sessions = np.array([data.draw(st.sampled_from("12")) for _ in range(len(grasp_set))], np.str_)
     grasp_set = GraspSet(**fields(grasp_set) | {"sessions": sessions, "independent": data.draw(st.booleans())})
@@ -168,3 +162,21 @@ def test_a_joint_reads_codes_as_values_by_its_two_points() -> None:
 def test_a_calibration_that_is_no_line_is_refused(points: tuple[int, float, int, float], reason: str) -> None:
     with pytest.raises(RecordingError, match=reason):
         Joint("index", "deg", *points)
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [("", "is empty"), (" a", "blank"), ("a\n", "blank"), ("a\tb", "control"), ("\ud800", "control"), ("?", "missing")],
+)
+def test_a_name_that_a_file_format_would_lose_is_refused(name: str, reason: str) -> None:
+    with pytest.raises(RecordingError, match=reason):
+        check_names("column", ["fine", name])
+
+
+def test_ordinary_names_of_any_language_pass() -> None:
+    check_names("column", ["thumb 1", "親指", "a,b", "it's", "50 %"])
+
+
+def test_equal_names_are_refused() -> None:
+    with pytest.raises(RecordingError, match="switch 'a' occurs twice"):
+        check_names("switch", ["a", "b", "a"])

@@ -4,13 +4,15 @@ from pathlib import Path
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from thenar.compiler import merge, split
 from thenar.compiler.recordings import RecordingError
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.merging import By, split_into
 from thenar.compiler.recordings.taxonomy import FEIX_33, own
+
+from .conftest import grasp_sets
 
 BY = st.sampled_from(["subject", "object", "session"])
 
@@ -28,11 +30,8 @@ def rows_of(grasp_set: GraspSet) -> list[tuple[object, ...]]:
 
 
 @given(data=st.data(), by=BY)
-@settings(deadline=None)
-def test_the_parts_of_a_set_merge_to_the_same_rows(
-    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet], by: By
-) -> None:
-    grasp_set = data.draw(grasp_sets)
+def test_the_parts_of_a_set_merge_to_the_same_rows(data: st.DataObject, by: By) -> None:
+    grasp_set = data.draw(grasp_sets())
     grasp_set = replace(
         grasp_set, independent=data.draw(st.booleans()), simulated=data.draw(st.sampled_from(["", "x"]))
     )

@@ -1,20 +1,24 @@
+import codecs
 import gzip
 import io
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.recordings import TableError
 from thenar.compiler.recordings.cells import numbers
 from thenar.compiler.recordings.columns import TextFormat
-from thenar.compiler.recordings.table import Table, read_table
+from thenar.compiler.recordings.table import Table, read_arff, read_table, sniff
+
+from ...conftest import calls
 
 
 def csv(content: bytes, folder: Path, delimiter: str = ",") -> Table:
@@ -145,7 +149,6 @@ ARFF = st.text("@{}',\"%? \\\nab01").map(
     st.one_of(st.binary(), st.text('a1,"\r\n \0').map(str.encode), ARFF),
     st.booleans(),
 )
-@settings(deadline=None)
 def test_any_bytes_are_a_table_or_refused_and_never_crash(
     folder: Path, suffix: str, content: bytes, zipped: bool
 ) -> None:
@@ -161,3 +164,148 @@ def test_a_number_too_large_for_a_double_becomes_infinite_in_its_row(tmp_path: P
     np.savez(tmp_path / "t.npz", a=np.array([1, largest, -largest], np.longdouble))
     column = numbers(read_table(tmp_path / "t.npz").columns["a"]).values
     assert column.tolist() == [1.0, float(largest), -float(largest)]
+
+
+HEADER = """% a comment
+@RELATION 'a b'
+@attribute 'my joint' NUMERIC
+@ATTRIBUTE s {0, 1}
+@attribute\tclass {'Disk (power)', 'Hook, platform, push', "it's", 'it\\'s not', x}
+
+@data
+"""
+
+
+def arff(text: str) -> Table:
+    return read_arff("t.arff", text.splitlines(keepends=True))
+
+
+def test_numbers_nominals_quotes_and_missing_values_are_read() -> None:
+    table = arff(
+        HEADER + "1.5,0,'Disk (power)'\n% between\n?,1, 'Hook, platform, push'\n\n-2e1 ? \"it's\"\n3,0,'it\\'s not'\n"
+    )
+    assert {name: list(column) for name, column in table.columns.items()} == {
+        "my joint": ["1.5", "?", "-2e1", "3"],
+        "s": ["0", "1", "?", "0"],
+        "class": ["Disk (power)", "Hook, platform, push", "it's", "it's not"],
+    }
+    assert table.rows.tolist() == [1, 2, 3, 4]
+
+
+def test_a_gzipped_arff_is_read_by_its_suffix(tmp_path: Path) -> None:
+    (tmp_path / "t.arff.gz").write_bytes(gzip.compress((HEADER + "1,0,x\n").encode()))
+    assert list(read_table(tmp_path / "t.arff.gz").columns["class"]) == ["x"]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "t.arff is not ARFF: it has no line @data"),
+        ("garbage\n", "t.arff line 1: expected @attribute or @data, not 'garbage'"),
+        (HEADER.replace("s {", "'my joint' {"), "line 4: attribute 'my joint' occurs twice"),
+        (HEADER.replace("NUMERIC", "string"), "line 3: attribute 'my joint' is string; only numeric and nominal"),
+        (HEADER.replace("{0, 1}", "{0, 1"), r"line 4: attribute 's' is \{0, 1; only"),
+        (HEADER.replace("s {0, 1}", "s"), "line 4: an attribute has a name and a type"),
+        (HEADER + "1,0\n", "row 1 has 2 values, the header 3 attributes"),
+        (HEADER + "1,0,x\n1,2,x\n", "row 2: '2' is not among the values of attribute 's'"),
+        (HEADER + "{0 1, 2 x}\n", "row 1 cannot be read as values: sparse rows are not read"),
+        (HEADER + "1,0,'x\n", "row 1 cannot be read as values: "),
+    ],
+)
+def test_what_is_no_arff_is_refused_with_the_line_or_row(text: str, reason: str) -> None:
+    with pytest.raises(TableError, match=reason):
+        arff(text)
+
+
+ROWS = [["Griff", "Person", "Daumen"], ["Größe", "Jörg", "1,5"], ["Haken", "Käthe", "12,25"], ["Haken", "Anna", "3"]]
+
+
+def written(delimiter: str, encoding: str, rows: list[list[str]] = ROWS) -> bytes:
+    quoted = [[f'"{cell}"' if delimiter in cell else cell for cell in row] for row in rows]
+    return "".join(delimiter.join(row) + "\r\n" for row in quoted).encode(encoding)
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t", ",", "|"])
+@pytest.mark.parametrize(
+    ("encoding", "found"),
+    [("utf-8", "utf-8"), ("utf-8-sig", "utf-8"), ("latin-1", "cp1252"), ("cp1252", "cp1252"), ("utf-16", "utf-16")],
+)
+def test_delimiter_decimal_comma_encoding_and_header_are_found(
+    delimiter: str, encoding: str, found: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "t.csv"
+    path.write_bytes(written(delimiter, encoding))
+    text, reasons = sniff(path)
+    assert text == TextFormat(delimiter, ",", found)
+    assert [reason.partition(":")[0].split()[0] for reason in reasons] == ["encoding", "delimiter", "decimal", "header"]
+    table = read_table(path, text)
+    assert {name: list(column) for name, column in table.columns.items()} == {
+        name: [row[place] for row in ROWS[1:]] for place, name in enumerate(ROWS[0])
+    }
+
+
+def test_a_gzipped_table_is_looked_into(tmp_path: Path) -> None:
+    (tmp_path / "t.csv.gz").write_bytes(gzip.compress(written(";", "latin-1")))
+    assert sniff(tmp_path / "t.csv.gz")[0] == TextFormat(";", ",", "cp1252")
+
+
+@pytest.mark.parametrize(
+    ("rows", "header"),
+    [
+        ([["mug", "0", "1.5"], ["ball", "1", "2.5"], ["can", "0", "3.5"]], False),
+        ([["g", "s", "j"], ["mug", "0", "1.5"], ["ball", "1", "2.5"]], True),
+        ([["g", "s", "j"], ["mug", "0", ""], ["ball", "1", "NA"]], True),
+        ([["g", "h"], ["mug", "a"], ["ball", "b"]], True),
+        ([["mug", "a"], ["ball", "a"], ["mug", "b"]], False),
+        ([["g", "s", "j"]], True),
+    ],
+)
+def test_a_header_is_told_from_a_row(rows: list[list[str]], header: bool, tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_bytes(written(",", "utf-8", rows))
+    text = sniff(path)[0]
+    assert text.header is header
+    if not header:
+        table = read_table(path, text)
+        assert [*table.columns] == [f"column {number}" for number in range(1, len(rows[0]) + 1)]
+        assert table.rows.tolist() == [1, 2, 3]
+
+
+def test_a_letter_far_down_decides_on_the_encoding(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_bytes(b"g,s\n" + b"mug,1\n" * 300_000 + "Größe,0\n".encode("latin-1"))
+    assert sniff(path)[0].encoding == "cp1252"
+    # Split between two pieces that are read.
+    path.write_bytes(b"g,s\n" + b"x" * ((1 << 20) - 5) + "ö,1\nä,0\n".encode())
+    assert sniff(path)[0].encoding == "utf-8"
+
+
+def test_non_utf8_tables_are_windows_1252_if_python_agrees(tmp_path: Path) -> None:
+    for byte in range(0x80, 0x100):
+        content = b"g,s\nx" + bytes([byte]) + b",1\n"
+        (tmp_path / "t.csv").write_bytes(content)
+        try:
+            content.decode("cp1252")
+            expected = "cp1252"
+        except UnicodeDecodeError:
+            expected = "latin-1"
+        assert sniff(tmp_path / "t.csv")[0].encoding == expected, hex(byte)
+
+
+@pytest.mark.parametrize("signs", ["\",;\t| '\\ab1", "\"'~`,;|", '",a\\', "1.,- ", '"', ",", "*/ int x; /*,"])
+def test_a_hostile_sample_is_looked_at_quickly(signs: str, tmp_path: Path) -> None:
+    """Long lines of whatever may be a delimiter, a quote or an escape, in two orders."""
+    random = Random(1)
+    lines = ["".join(random.choices(signs, k=20_000)) for _ in range(30)] + [signs * (20_000 // len(signs))] * 30
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    assert calls(lambda: sniff(tmp_path / "t.csv")) < 3_000_000
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\n\n", b"x" * 200_000, b"\x81\x8d\xff\n\x00,1\n", codecs.BOM_UTF16_LE + b"a"]
+)
+def test_near_tables_are_sniffed_quickly_and_refused_by_the_reader(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_bytes(content)
+    with pytest.raises(TableError):
+        read_table(path, sniff(path)[0])

@@ -45,7 +45,7 @@ def test_the_commonest_mistakes_are_named_first_and_hits_never(counts: np.ndarra
     assert [int(sentence.split(": ")[1].split()[0]) for sentence in said] == wrong[:5]
 
 
-def test_the_tree_has_a_line_for_each_node_and_a_large_one_is_cut(bare: ReportContent) -> None:
+def test_the_tree_has_a_line_a_node_and_is_cut_if_large(bare: ReportContent) -> None:
     assert bare.tree is not None
     lines, said = tree_text(bare.tree, bare.manifest)
     assert len(lines.split("\n")) == len(bare.tree.nodes)

@@ -30,7 +30,7 @@ from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import PAIRED, PLAIN, SLOPED
 from thenar.simulator.handmaps.handmap import hand_map
 
-Make = Callable[..., GraspSet]
+from ..conftest import make_set, with_none
 
 pytestmark = pytest.mark.slow
 
@@ -133,7 +133,7 @@ def differing(build: Build, frames: list[list[list[int]]], answers: list[dict[st
 
 
 @pytest.fixture(scope="module")
-def with_none_too(make_set: Make, with_none: Callable[[GraspSet], GraspSet]) -> GraspSet:
+def with_none_too() -> GraspSet:
     return with_none(make_set(rows=60))
 
 
@@ -150,7 +150,7 @@ def compiled(grasp_set: GraspSet, folder: Path, **options: Any) -> Build:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_all_rows_have_pythons_scores_and_answers(trier: Trier, make_set: Make, tmp_path: Path, kind: str) -> None:
+def test_all_rows_have_pythons_scores_and_answers(trier: Trier, tmp_path: Path, kind: str) -> None:
     version, options = KINDS[kind]
     grasp_set = make_set()
     build = compiled(grasp_set, tmp_path / "build", **options)
@@ -162,9 +162,7 @@ def test_all_rows_have_pythons_scores_and_answers(trier: Trier, make_set: Make, 
     assert trier.log("browser") == []
 
 
-def test_the_page_predicts_none_as_python_does(
-    trier: Trier, make_set: Make, with_none_too: GraspSet, tmp_path: Path
-) -> None:
+def test_the_page_predicts_none_as_python_does(trier: Trier, with_none_too: GraspSet, tmp_path: Path) -> None:
     for name, grasp_set in (("class", with_none_too), ("refusing", make_set())):
         build = compiled(grasp_set, tmp_path / name, rounds=8)
         assert (build.rejector is None) == (name == "class")
@@ -190,7 +188,7 @@ def test_the_page_predicts_none_as_python_does(
 
 
 @pytest.fixture(scope="module")
-def gloved(make_set: Make) -> GraspSet:
+def gloved() -> GraspSet:
     """Return a set that switches of the shipped glove, and joints of a CyberGlove, have recorded."""
     made = make_set()
     names = ("index_mpj", "index_pij", "thumb_abduction")
@@ -328,9 +326,7 @@ def test_a_lost_switch_counts_by_its_mean(opened: Trier, folder: Path) -> None:
     )
 
 
-def test_a_taxel_goes_from_level_to_level_and_recorded_values_are_levels(
-    trier: Trier, make_set: Make, tmp_path: Path
-) -> None:
+def test_a_taxel_goes_from_level_to_level_and_recorded_values_are_levels(trier: Trier, tmp_path: Path) -> None:
     made = make_set()
     held = np.where(made.switches[:, 2:4], 2500, 300) + np.random.default_rng(3).integers(0, 1200, (len(made), 2))
     padded = replace(
@@ -392,7 +388,7 @@ def test_the_page_fits_light_and_dark_screens_with_readable_letters(opened: Trie
         opened.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
-def test_names_that_hold_scripts_run_nothing(trier: Trier, make_set: Make, tmp_path: Path) -> None:
+def test_names_that_hold_scripts_run_nothing(trier: Trier, tmp_path: Path) -> None:
     made = make_set()
     types = (
         "<script>alert(1)</script>",

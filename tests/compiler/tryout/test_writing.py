@@ -4,23 +4,22 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from thenar.compiler import GraspSet, compile_build
+from thenar.compiler import compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.pictures import PALETTE, embedded
 from thenar.compiler.report import tryout
 from thenar.compiler.report.tryout import MOST_BYTES, sample, scoped
 
-Make = Callable[..., GraspSet]
+from ..conftest import make_set, with_none
 
 
 @pytest.fixture(scope="module")
-def build(make_set: Make, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("tried") / "build"
     compile_build(make_set(), folder, documents=Documents(), rounds=3, folds=0)
     return folder
@@ -51,9 +50,7 @@ def test_the_page_holds_the_very_tables_and_rows_of_every_type(build: Path) -> N
     assert '<a href="try.html">' in (build / "report.html").read_text()
 
 
-def test_the_page_states_its_first_frame_and_empty_hand_knowledge(
-    build: Path, make_set: Make, with_none: Callable[[GraspSet], GraspSet], tmp_path: Path
-) -> None:
+def test_the_page_states_its_first_frame_and_empty_hand_knowledge(build: Path, tmp_path: Path) -> None:
     page, warning = (build / "try.html").read_text(), "This build was trained without an empty hand"
     assert ">All switches open, joints at the medians of the rows</button>" in page
     assert warning in page
@@ -61,20 +58,18 @@ def test_the_page_states_its_first_frame_and_empty_hand_knowledge(
     assert warning not in (tmp_path / "none" / "try.html").read_text()
 
 
-def test_large_pages_hold_fewer_rows_or_are_omitted(
-    make_set: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    size = len((_compiled(make_set, tmp_path / "whole") / "try.html").read_bytes())
+def test_large_pages_hold_fewer_rows_or_are_omitted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    size = len((_compiled(tmp_path / "whole") / "try.html").read_bytes())
     monkeypatch.setattr(tryout, "MOST_BYTES", size - 500)
-    page = (_compiled(make_set, tmp_path / "less") / "try.html").read_bytes()
+    page = (_compiled(tmp_path / "less") / "try.html").read_bytes()
     assert size - 700 < len(page) <= size - 500
     monkeypatch.setattr(tryout, "MOST_BYTES", 20_000)
-    bare = _compiled(make_set, tmp_path / "none")
+    bare = _compiled(tmp_path / "none")
     assert not (bare / "try.html").exists()
     assert "try.html" not in (bare / "report.html").read_text()
 
 
-def _compiled(make_set: Make, folder: Path) -> Path:
+def _compiled(folder: Path) -> Path:
     return compile_build(make_set(), folder, documents=Documents(), rounds=3, folds=0).folder
 
 

@@ -3,7 +3,6 @@ import select
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -11,6 +10,8 @@ import pytest
 
 from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c
 from thenar.drivers.errors import DeviceError, SettingError
+
+from ...conftest import tool
 
 MCP = EmulatedChip("mcp23017", 0x20)
 
@@ -62,7 +63,7 @@ def test_several_buses_are_served_at_a_time_each_with_its_own_chips() -> None:
 
 
 @pytest.mark.usefixtures("umockdev")
-def test_programs_that_know_nothing_of_thenar_meet_the_chips_too(tool: Callable[[str], str]) -> None:
+def test_programs_that_know_nothing_of_thenar_meet_the_chips_too() -> None:
     program = tool("i2cget")
     with EmulatedI2c([EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,), paced=False)]) as emulated:
         assert client(emulated, program, "-y", "3", "0x20", "0x00").strip() == "0xff"

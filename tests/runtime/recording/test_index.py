@@ -1,7 +1,7 @@
 """A recording that is read from anywhere, beside the same one read from its beginning."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -14,7 +14,8 @@ from thenar.runtime.recording.reader import Entry, Index, Reader
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
 
-Calls = Callable[[Callable[[], object]], int]
+from ...conftest import calls
+
 START_US = 5_000_000
 FRAMES = 1500
 
@@ -73,7 +74,7 @@ def test_from_any_moment_all_that_follows_is_read_and_not_much_before(path: Path
         assert found[0][0] > min(moment, entries[-1][0]) - 500_000 or found == entries
 
 
-def test_an_overview_decodes_all_labels_and_few_recognitions(path: Path, calls: Calls) -> None:
+def test_an_overview_decodes_all_labels_and_few_recognitions(path: Path) -> None:
     found = [entry for _, entry in Index(path).scan(100_000)]
     kinds = [sum(isinstance(entry, kind) for entry in found) for kind in (SwitchFrame, GloveFrame, LiveGrasp, Label)]
     assert kinds == [0, 0, 4 * FRAMES // 100, FRAMES // 250]
@@ -81,7 +82,7 @@ def test_an_overview_decodes_all_labels_and_few_recognitions(path: Path, calls: 
     assert sampled < every / 2
 
 
-def test_seeking_reads_no_more_of_longer_recordings(tmp_path: Path, session: Session, calls: Calls) -> None:
+def test_seeking_reads_no_more_of_longer_recordings(tmp_path: Path, session: Session) -> None:
     cost = []
     for frames_ in (1000, 8000):
         index = Index(record(tmp_path / f"{frames_}.mcap", session, frames_))

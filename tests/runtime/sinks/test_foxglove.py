@@ -32,6 +32,8 @@ from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp
 from thenar.runtime.sinks import SinkError, open_sink
 
+from ...conftest import tool
+
 MakeGrasp = Callable[..., LiveGrasp]
 LAYOUT = Path(__file__).resolve().parents[3] / "examples" / "foxglove-layout.json"
 LONG_S = 60.0
@@ -66,7 +68,7 @@ def eventually(condition: Callable[[], bool]) -> None:
 
 
 @pytest.fixture(autouse=True)
-def _sdk(tool: Callable[[str], str]) -> None:
+def _sdk() -> None:
     if find_spec("foxglove") is None:
         tool("foxglove-sdk of PyPI")
 

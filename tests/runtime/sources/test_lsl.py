@@ -20,6 +20,8 @@ from thenar.runtime.sinks import open_sink
 from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.lsl import LslReader
 
+from ...conftest import tool
+
 names = count()
 LONG_S = 20.0
 GLOVE = """
@@ -34,7 +36,7 @@ taxels = {{ pad = [0, 1] }}
 
 
 @pytest.fixture(scope="module")
-def lsl(tool: Callable[[str], str]) -> ModuleType:
+def lsl() -> ModuleType:
     if find_spec("pylsl") is None:
         tool("pylsl of PyPI")
     return load_pylsl("test")

@@ -1,13 +1,15 @@
-"""Forces on hand and object, against sums written out one by one."""
+"""Forces on hand and object against sums written out, surfaces of objects, what hands are told of skin and touch."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.hand import LIMITS_DEG
-from thenar.simulator.body.shapes import Pose
+from thenar.simulator.body.shapes import Box, Cylinder, Pose, Shape, Sphere
 from thenar.simulator.contact.balance import (
     HOLD_N_PER_MM,
     HOLD_NMM_PER_RAD,
@@ -15,8 +17,10 @@ from thenar.simulator.contact.balance import (
     Balance,
     Skin,
     command,
+    surfaces,
+    turned,
 )
-from thenar.simulator.contact.model import STIFFNESS
+from thenar.simulator.contact.model import STIFFNESS, torques
 
 from ..small import make_case
 
@@ -113,3 +117,94 @@ def test_skin_off_the_object_forgets_what_it_stuck_to(balance: Balance) -> None:
 def test_without_friction_skin_only_presses(balance: Balance) -> None:
     slippery = Balance(balance.command, replace(balance.skin, friction=0.0), balance.angles, balance.pose)
     assert slippery.forces == pytest.approx(slippery.presses[:, None] * slippery.normal, abs=1e-9)
+
+
+SHAPES: tuple[Shape, ...] = (Sphere(60.0), Cylinder(30.0, 120.0), Box(80.0, 20.0, 40.0))
+GIVEN = st.lists(st.tuples(st.sampled_from(SHAPES), st.integers(1, 3)), min_size=1, max_size=5)
+
+
+def scattered(n: int) -> tuple[Pose, np.ndarray]:
+    draw = np.random.default_rng(n)
+    numbers = np.concatenate([draw.uniform(-50.0, 50.0, (3, n)), draw.uniform(-2.0, 2.0, (3, n))])
+    return Pose.of(numbers), draw.uniform(-80.0, 80.0, (6, 3, n))
+
+
+@given(GIVEN)
+def test_each_repetition_meets_its_own_object(asked: list[tuple[Shape, int]]) -> None:
+    shapes, counts = [shape for shape, _ in asked], [count for _, count in asked]
+    pose, points = scattered(sum(counts))
+    distance, normal, curvature = surfaces(shapes, counts).at(pose, points)
+    whose = [shape for shape, count in asked for _ in range(count)]
+    for one, shape in enumerate(whose):
+        alone, place = Pose(pose.position[:, [one]], pose.rotation[..., [one]]), points[..., [one]]
+        known_distance, known_normal = alone.distance(shape, place)
+        assert np.array_equal(distance[:, [one]], known_distance)
+        assert np.array_equal(normal[..., [one]], known_normal)
+        assert np.array_equal(curvature[:, [one]], shape.curvature(alone.inward(place)))
+
+
+@given(GIVEN, st.data())
+def test_some_rows_keep_their_objects(asked: list[tuple[Shape, int]], data: st.DataObject) -> None:
+    found = surfaces([shape for shape, _ in asked], [count for _, count in asked])
+    n = len(found.whose)
+    kept = np.flatnonzero(data.draw(st.lists(st.booleans(), min_size=n, max_size=n).filter(any)))
+    pose, points = scattered(n)
+    whole = found.at(pose, points)
+    part = found.rows(kept).at(Pose(pose.position[:, kept], pose.rotation[..., kept]), points[..., kept])
+    for all_rows, some in zip(whole, part, strict=True):
+        assert np.array_equal(all_rows[..., kept], some)
+
+
+@given(GIVEN)
+def test_bars_are_told_from_what_bends_both_ways(asked: list[tuple[Shape, int]]) -> None:
+    found = surfaces([shape for shape, _ in asked], [count for _, count in asked]).bars()
+    whose = [shape for shape, count in asked for _ in range(count)]
+    assert found.tolist() == [float(isinstance(shape, Cylinder)) for shape in whose]
+
+
+SKINS = st.builds(
+    Skin,
+    press_n_per_mm=st.floats(0.1, 100.0),
+    soft_mm=st.floats(0.05, 5.0),
+    drag_n_per_mm=st.floats(0.1, 100.0),
+    friction=st.floats(0.0, 2.0),
+)
+
+
+@given(SKINS, st.floats(-5.0, 10.0))
+def test_the_stiffness_of_skin_is_the_derivative_of_its_force(skin: Skin, sunk: float) -> None:
+    step = 1e-6
+    force, stiffness = skin.press(np.array([sunk - step, sunk, sunk + step]))
+    # The stiffness has kinks at 0 and `soft_mm`: there a difference sees half of either side.
+    assert (force[2] - force[0]) / (2 * step) == pytest.approx(
+        stiffness[1], abs=2 * step * skin.press_n_per_mm / skin.soft_mm + 1e-7 * skin.press_n_per_mm
+    )
+
+
+@given(SKINS, st.floats(0.0, 10.0))
+def test_deep_skin_is_a_spring_from_half_the_soft_depth(skin: Skin, deeper: float) -> None:
+    force, stiffness = skin.press(np.array([skin.soft_mm + deeper]))
+    assert stiffness[0] == pytest.approx(skin.press_n_per_mm)
+    assert force[0] == pytest.approx(skin.press_n_per_mm * (deeper + skin.soft_mm / 2))
+
+
+def test_skin_first_touches_where_it_is(by_grasp: dict[str, Condition]) -> None:
+    told = command([make_case(by_grasp[grasp]) for grasp in ("PoS", "Tip", "CMF")])
+    hand, skeleton = told.hand, told.hand.skeleton(told.angles)
+    of_skin = skeleton.origins[hand.sphere_capsules] + turned(skeleton.frames[hand.sphere_capsules], told.skin_points)
+    of_object = told.pose.outward(told.object_points) + told.pose.position
+    assert of_skin == pytest.approx(of_object, abs=1e-10)
+    from_middle = np.linalg.norm(of_skin - hand.spheres(skeleton), axis=1)
+    assert from_middle == pytest.approx(np.broadcast_to(hand.sphere_radii[:, None], from_middle.shape), rel=1e-9)
+
+
+def test_weight_pulls_down_with_mass(by_grasp: dict[str, Condition]) -> None:
+    condition = by_grasp["PoS"]
+    weight = command([make_case(condition, 4)]).weight
+    assert weight == pytest.approx(np.tile(condition.held.down[:, None] * condition.thing.mass_kg * 9.80665, 4))
+
+
+def test_torque_is_that_of_the_grip(by_grasp: dict[str, Condition]) -> None:
+    case = make_case(by_grasp["Tip"], 4)
+    unit = torques(case.condition, case.condition.hand.skeleton(case.angles), Pose.of(case.numbers))
+    assert command([case]).torque == pytest.approx(unit * case.grip_n)

@@ -1,22 +1,20 @@
 """The pipeline: what a scene lists, in order, and what cannot be compiled."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.simulator.body.condition import Condition
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS, hold_frame
 from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import Recording, Scene
 
+from ..small import make_batch, make_condition, make_scene
+
 NAMES = tuple(EFFECTS)
 
-SceneMaker = Callable[..., Scene]
-BatchMaker = Callable[..., Batch]
 
 OWN = {
     "glove.recall",
@@ -49,7 +47,7 @@ def order(scene: Scene) -> list[str]:
 
 
 @given(names=SUBSETS)
-def test_a_pipeline_holds_only_scene_effects_and_glove_steps(make_scene: SceneMaker, names: list[str]) -> None:
+def test_a_pipeline_holds_only_scene_effects_and_glove_steps(names: list[str]) -> None:
     stops = compile_pipeline(make_scene(names)).steps
     on_wire = any(name.startswith("wire.") for name in names)
     assert sorted(stop.effect.name for stop in stops if not stop.own) == sorted(names)
@@ -59,9 +57,7 @@ def test_a_pipeline_holds_only_scene_effects_and_glove_steps(make_scene: SceneMa
 
 
 @given(names=SUBSETS, seed=st.integers(0, 100))
-def test_the_order_is_that_of_the_numbers_however_the_scene_lists_them(
-    make_scene: SceneMaker, names: list[str], seed: int
-) -> None:
+def test_the_order_is_that_of_the_numbers_however_the_scene_lists_them(names: list[str], seed: int) -> None:
     scene = make_scene(names)
     shuffled = np.random.default_rng(seed).permutation(len(names))
     other = make_scene(names, name="other")
@@ -76,7 +72,7 @@ def _pick(scene: Scene, places: np.ndarray) -> tuple:
     return tuple(scene.effects[place] for place in places)
 
 
-def test_the_order_of_everything(make_scene: SceneMaker) -> None:
+def test_the_order_of_everything() -> None:
     assert " ".join(order(make_scene(EVERYTHING))) == (
         "glove.recall hand.style hand.posture hand.object_pose hand.grip contact.quasistatic "
         "glove.threshold switch.threshold glove.close contact.ramp "
@@ -113,7 +109,7 @@ class Watched(Batch):
 FIELDS = set(Batch.__dataclass_fields__) - {"condition", "repetitions"}
 
 
-def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_batch: BatchMaker) -> None:
+def test_every_step_reads_and_writes_what_it_says() -> None:
     plain = make_batch(range(2))
     batch = Watched.__new__(Watched)
     object.__setattr__(batch, "seen", [])
@@ -134,7 +130,7 @@ def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_b
         written |= writes
 
 
-def test_a_scene_without_contact_model_gets_the_gloves_default(make_scene: SceneMaker) -> None:
+def test_a_scene_without_contact_model_gets_the_gloves_default() -> None:
     stops = compile_pipeline(make_scene(["hand.grip"])).steps
     assert [(s.effect.name, s.own) for s in stops if s.effect.order < 300] == [
         ("glove.recall", True),
@@ -154,12 +150,7 @@ def outcome(batch: Batch, row: int) -> dict[str, bytes]:
 
 @settings(max_examples=4, deadline=None)
 @given(company=st.lists(st.integers(0, 50), min_size=2, max_size=5, unique=True))
-def test_repetitions_do_not_depend_on_their_batch(
-    make_scene: SceneMaker,
-    make_batch: BatchMaker,
-    make_condition: Callable[..., Condition],
-    company: list[int],
-) -> None:
+def test_repetitions_do_not_depend_on_their_batch(company: list[int]) -> None:
     pipeline = compile_pipeline(make_scene([listed_with("contact.quasistatic", most_steps=12), *light()]))
     row = len(company) // 2
     alone, together = make_batch([company[row]]), make_batch(company)
@@ -169,7 +160,7 @@ def test_repetitions_do_not_depend_on_their_batch(
     assert outcome(alone, 0) == outcome(together, row)
 
 
-def test_lead_and_release_do_not_change_the_read_frame(make_scene: SceneMaker, make_batch: BatchMaker) -> None:
+def test_lead_and_release_do_not_change_the_read_frame() -> None:
     """Of every effect: what is drawn for a frame hangs on its time, not on how many come before and after it."""
     found = []
     for lead_ms, release_ms in ((30.0, 40.0), (200.0, 0.0)):
@@ -185,7 +176,7 @@ def test_lead_and_release_do_not_change_the_read_frame(make_scene: SceneMaker, m
         np.testing.assert_array_equal(one, other)
 
 
-def test_a_run_enters_every_step_with_its_batches(make_scene: SceneMaker, make_batch: BatchMaker) -> None:
+def test_a_run_enters_every_step_with_its_batches() -> None:
     pipeline, ledger = compile_pipeline(make_scene(["hand.grip", "joint.noise"])), Ledger()
     pipeline.run([make_batch(range(3)), make_batch(range(2))], ledger)
     pipeline.run([make_batch(range(4))], ledger)

@@ -1,7 +1,6 @@
 """The rest between grasps: where the hand lies, when it gets there, and that no other frame notices."""
 
 import re
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,8 +21,7 @@ from thenar.simulator.pipeline.simulation import simulate
 from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import ListedEffect, Recording, Scene
 
-SceneMaker = Callable[..., Scene]
-BatchMaker = Callable[..., Batch]
+from ..small import make_batch, make_condition, make_scene
 
 MOVING = Recording(lead_ms=30.0, hold_ms=250.0, release_ms=40.0, rows="all", rest=True, rest_ms=50.0)
 VARIED = [
@@ -46,9 +44,7 @@ def whole(name: str, seed: int = 1, **changes: Any) -> GraspSet:
 
 
 @pytest.mark.parametrize("rest", ["relaxed", "flat", True])
-def test_the_hand_goes_to_its_rest_as_it_came_and_stays(
-    rest: str | bool, make_scene: SceneMaker, make_batch: BatchMaker
-) -> None:
+def test_the_hand_goes_to_its_rest_as_it_came_and_stays(rest: str | bool) -> None:
     recording = replace(MOVING, rest=rest)
     batch = run(make_scene(["hand.transition"], recording=recording), make_batch(range(3)))
     open_deg = sensors_deg(RESTS_DEG["relaxed" if rest is True else str(rest)])
@@ -61,9 +57,7 @@ def test_the_hand_goes_to_its_rest_as_it_came_and_stays(
     np.testing.assert_array_equal(after[:, 2:], np.tile(open_deg, (3, 6, 1)))
 
 
-def test_rests_vary_and_join_consecutive_trials(
-    make_scene: SceneMaker, make_batch: BatchMaker, make_condition: Callable[..., Any]
-) -> None:
+def test_rests_vary_and_join_consecutive_trials() -> None:
     scene = make_scene([*VARIED, "hand.transition"], recording=MOVING)
     batch = make_batch(range(400))
     batch.trials = np.arange(400)
@@ -82,7 +76,7 @@ def test_rests_vary_and_join_consecutive_trials(
     assert (batch.rest_deg <= LIMITS_DEG[:, 1]).all()
 
 
-def test_without_style_and_posture_all_rest_alike(make_scene: SceneMaker, make_batch: BatchMaker) -> None:
+def test_without_style_and_posture_all_rest_alike() -> None:
     batch = run(make_scene(["hand.transition"], recording=MOVING), make_batch(range(4)))
     assert np.array_equal(np.asarray(batch.rest_deg), np.tile(RESTS_DEG["relaxed"], (4, 1)))
 
@@ -155,8 +149,6 @@ def test_a_flat_hand_that_no_build_has_seen_is_none(trained: str, inputs: str, t
         (MOVING, "hand.grip", "the effect [effects.hand.transition]"),
     ],
 )
-def test_a_rest_that_nothing_would_show_is_refused(
-    recording: Recording, effect: str, lacks: str, make_scene: SceneMaker
-) -> None:
+def test_a_rest_that_nothing_would_show_is_refused(recording: Recording, effect: str, lacks: str) -> None:
     with pytest.raises(SceneError, match=rf"^recording\.rest: .* the scene needs {re.escape(lacks)}$"):
         compile_pipeline(make_scene([effect], recording=recording))

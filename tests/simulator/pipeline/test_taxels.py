@@ -14,14 +14,16 @@ from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
-from thenar.simulator.scenes.scene import Recording, Scene, SceneGlove
+from thenar.simulator.scenes.scene import Recording, SceneGlove
+
+from ..small import make_batch, make_scene
 
 ALL = SceneGlove(taxels="all")
 LOSES: Any = {"rate": 0.02}
 
 
 @pytest.fixture
-def run(make_scene: Callable[..., Scene], make_batch: Callable[..., Batch]) -> Callable[..., Batch]:
+def run() -> Callable[..., Batch]:
     """Return a function of effects and changes of the scene that returns the batch as the pipeline leaves it."""
 
     def make(effects: tuple[str, ...] = (), **changes: object) -> Batch:
@@ -62,9 +64,7 @@ def test_ramped_taxels_pass_thresholds_when_switches_change(
     assert not batch.taxels_n[:, -1].any()
 
 
-def test_only_named_places_are_taxels(
-    make_scene: Callable[..., Scene],
-) -> None:
+def test_only_named_places_are_taxels() -> None:
     scene = load_scene("quick").varied(repetitions=2, subjects=["A"])
     plain = simulate(scene, 1).grasp_set
     glove = SceneGlove(taxels=("index_distal", "thumb_distal_5"))
@@ -108,7 +108,7 @@ def test_a_scene_without_the_converter_counts_thousandths() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name.startswith("taxel.")])
-def test_an_effect_on_taxels_needs_some(name: str, make_scene: Callable[..., Scene]) -> None:
+def test_an_effect_on_taxels_needs_some(name: str) -> None:
     with pytest.raises(SceneError, match=f"^effects.{name}: the glove has no taxels"):
         compile_pipeline(make_scene([name], glove=SceneGlove()))
 
@@ -125,7 +125,7 @@ def test_counts_go_over_the_boards_line_and_come_through_where_nothing_happens(
     np.testing.assert_array_equal(sent.taxels[whole], plain.taxels[whole])
 
 
-def test_counts_that_are_lost_leave_those_of_the_frame_before(make_scene: Any, make_batch: Any) -> None:
+def test_counts_that_are_lost_leave_those_of_the_frame_before() -> None:
     effects = ["contact.ramp", ("wire.lost_bytes", LOSES)]
     recording = Recording(rows="all", rate_hz=20.0, hold_ms=500.0)
     found = []
@@ -144,7 +144,7 @@ def test_counts_that_are_lost_leave_those_of_the_frame_before(make_scene: Any, m
     assert not np.array_equal(plain, damaged)
 
 
-def test_a_rate_that_the_line_has_no_time_for_is_refused(make_scene: Callable[..., Scene]) -> None:
+def test_a_rate_that_the_line_has_no_time_for_is_refused() -> None:
     with pytest.raises(SceneError, match="request at most 97"):
         compile_pipeline(make_scene(["wire.lost_bytes", "frame.jitter"], glove=ALL))
 

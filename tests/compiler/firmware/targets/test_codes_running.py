@@ -15,11 +15,10 @@ from thenar.compiler.firmware.targets.avr import harness
 from thenar.compiler.firmware.tools import STRICT, call, find, workshop
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
+from ....conftest import tool
+from ....tables import describe
+from ..conftest import make_tables
 
 STREAM = """
 name = "glove"
@@ -80,7 +79,7 @@ int main(void)
 
 
 @pytest.fixture(params=["stream", "cyberglove"])
-def library(request: pytest.FixtureRequest, make_tables: MakeTables, describe: Describe) -> Callable[[bool], Library]:
+def library(request: pytest.FixtureRequest) -> Callable[[bool], Library]:
     """Return what makes the library of a glove, for an AVR or not."""
     tables = make_tables(switches=2, joints=3)
     manifest = describe(tables)  # degrees, half of one a code
@@ -112,7 +111,7 @@ def test_codes_are_python_s_in_an_emulator(library: Callable[[bool], Library], c
     assert np.frombuffer(written, "<u2").tolist() == python_s(made.sensors, readings)
 
 
-def test_codes_are_python_s_on_an_avr(library: Callable[[bool], Library], tool: Callable[[str], str]) -> None:
+def test_codes_are_python_s_on_an_avr(library: Callable[[bool], Library]) -> None:
     target, made, readings = TARGETS["avr328p"], library(True), [*range(-70_000, 70_000, 411), *range(256)]
     if missing := target.missing():
         tool(missing.split()[0])

@@ -1,6 +1,5 @@
 """The core on emulated 32-bit cores: its instructions are counted exactly, and few."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,9 @@ from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
 from thenar.compiler.firmware.words import numbered
 from thenar.firmware_templates.rendering import file_text
-from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.terms.line import Slope
+
+from ..conftest import make_tables
 
 # Compilers and simulators of whole programs: minutes, together.
 pytestmark = pytest.mark.slow
@@ -22,12 +22,10 @@ PARTS = ("cortex-m0plus", "cortex-m4", "rv32imac")
 # Of classify() for 33 switches and 16 joints with 14 classes, by bins or by lines.
 MOST_INSTRUCTIONS = {"cortex-m0plus": (2300, 1850), "cortex-m4": (1750, 1400), "rv32imac": (1900, 1550)}
 
-MakeTables = Callable[..., IntegerTables]
-
 
 @pytest.mark.parametrize("lines", [False, True], ids=["bins", "lines"])
 @pytest.mark.parametrize("part", PARTS)
-def test_a_frame_takes_few_instructions(make_tables: MakeTables, cores: Any, part: str, lines: bool) -> None:
+def test_a_frame_takes_few_instructions(cores: Any, part: str, lines: bool) -> None:
     tables = make_tables(classes=14, switches=33, joints=16, reach=200)
     if lines:
         rows = np.arange(-7, 7, dtype=np.int8)
@@ -130,7 +128,7 @@ def stand_in(classify: str) -> dict[str, str]:
 
 
 @pytest.fixture
-def layout(make_tables: MakeTables) -> Layout:
+def layout() -> Layout:
     """A layout of frames of two bytes of switches and six of codes, for five classes."""
     return Layout(make_tables())
 

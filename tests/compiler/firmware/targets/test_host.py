@@ -7,19 +7,14 @@ import pytest
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
-from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.targets.host import MEMBER as HOST
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
-Probed = Callable[[IntegerTables, int], Probes]
-SameAsPython = Callable[[Predictions, IntegerTables, Probes], None]
+from ....tables import describe
+from ..conftest import make_tables
 
 
 @pytest.fixture
-def files(describe: Describe) -> Callable[[Layout], dict[str, str]]:
+def files() -> Callable[[Layout], dict[str, str]]:
     """Return what writes the classifier "hand" of a layout."""
     return lambda layout: Library("hand", describe(layout.tables), layout).files
 
@@ -27,7 +22,7 @@ def files(describe: Describe) -> Callable[[Layout], dict[str, str]]:
 Files = Callable[[Layout], dict[str, str]]
 
 
-def test_no_frames_have_no_answers(make_tables: MakeTables, files: Files) -> None:
+def test_no_frames_have_no_answers(files: Files) -> None:
     layout = Layout(make_tables())
     answers = HOST.run(files(layout), "hand", layout, np.zeros((0, 8), np.uint8))
     assert answers.scores.shape == (0, 5)
@@ -42,20 +37,20 @@ OTHERS: dict[str, np.ndarray] = {
 
 
 @pytest.mark.parametrize("other", list(OTHERS))
-def test_frames_of_another_layout_are_refused(make_tables: MakeTables, other: str) -> None:
+def test_frames_of_another_layout_are_refused(other: str) -> None:
     layout = Layout(make_tables())
     with pytest.raises(FirmwareError, match=r"this layout takes uint8 \(n, 8\)"):
         HOST.run({}, "hand", layout, OTHERS[other])
 
 
-def test_a_warning_is_an_error_that_shows_it(make_tables: MakeTables, files: Files) -> None:
+def test_a_warning_is_an_error_that_shows_it(files: Files) -> None:
     layout = Layout(make_tables())
     untidy = files(layout) | {"untidy.c": "int twice(int x); int twice(int x) { int idle; return 2 * x; }\n"}
     with pytest.raises(FirmwareError, match=r"(?s)ended with 1: .*untidy\.c.*unused variable .*idle"):
         HOST.run(untidy, "hand", layout, np.zeros((1, 8), np.uint8))
 
 
-def test_a_sanitizer_s_finding_is_an_error_that_shows_it(make_tables: MakeTables, files: Files) -> None:
+def test_a_sanitizer_s_finding_is_an_error_that_shows_it(files: Files) -> None:
     layout = Layout(make_tables())
     made = files(layout)
     head = "uint16_t thenar_classify(thenar *hand)\n{\n"
@@ -68,7 +63,7 @@ def test_a_sanitizer_s_finding_is_an_error_that_shows_it(make_tables: MakeTables
 OVERFLOW = "    volatile int most = 2147483647;\n    most = most + 1;\n"
 
 
-def test_a_program_that_answers_too_few_frames_is_an_error(make_tables: MakeTables, files: Files) -> None:
+def test_a_program_that_answers_too_few_frames_is_an_error(files: Files) -> None:
     layout = Layout(make_tables())
     made = files(layout)
     early = {"early.c": "#include <stdlib.h>\n__attribute__((constructor)) static void leave(void) { exit(0); }\n"}
@@ -76,9 +71,7 @@ def test_a_program_that_answers_too_few_frames_is_an_error(make_tables: MakeTabl
         HOST.run(made | early, "hand", layout, np.zeros((2, 8), np.uint8))
 
 
-def test_a_missing_compiler_is_named_with_its_package(
-    make_tables: MakeTables, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_missing_compiler_is_named_with_its_package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     layout = Layout(make_tables())
     with pytest.raises(FirmwareError, match="gcc or clang not found; Debian: apt-get install gcc"):

@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,10 +26,9 @@ from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.softmax import Softmax
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
-Probed = Callable[[IntegerTables, int], Probes]
-SameAsPython = Callable[..., None]
+from ....conftest import tool
+from ....tables import describe
+from ..conftest import make_tables, probed, same_as_python
 
 TARGET = TARGETS["micropython"]
 SHAPES: dict[str, dict[str, int]] = {
@@ -43,7 +42,7 @@ SHAPES: dict[str, dict[str, int]] = {
 
 
 @pytest.fixture(autouse=True)
-def interpreter(tool: Callable[[str], str]) -> None:
+def interpreter() -> None:
     if missing := TARGET.missing():
         tool(missing.split()[0])
 
@@ -53,12 +52,7 @@ def answers(layout: Layout, manifest: Manifest, frames: Probes, **how: Any) -> P
     return TARGET.run(TARGET.sources(Library("hand", manifest, layout)), "hand", layout, sent, **how)
 
 
-def test_every_score_is_python_s_with_inputs_missing_too(
-    make_tables: MakeTables,
-    describe: Describe,
-    probed: Probed,
-    same_as_python: SameAsPython,
-) -> None:
+def test_every_score_is_python_s_with_inputs_missing_too() -> None:
     tables = make_tables(**SHAPES["small"])
     frames = probed(tables, 500)
     for lost in (None, lost_inputs(tables, len(frames), 3)):
@@ -82,14 +76,7 @@ def with_pairs(tables: IntegerTables) -> IntegerTables:
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [False, True], ids=["whole", "missing"])
 @pytest.mark.parametrize("shape", [*list(SHAPES)[1:], "slopes", "pairs"])
-def test_so_it_is_for_tables_of_any_shape(
-    make_tables: MakeTables,
-    describe: Describe,
-    probed: Probed,
-    same_as_python: SameAsPython,
-    shape: str,
-    lost: bool,
-) -> None:
+def test_so_it_is_for_tables_of_any_shape(shape: str, lost: bool) -> None:
     tables = make_tables(**SHAPES.get(shape, SHAPES["small"]))
     tables = {"slopes": with_slopes, "pairs": with_pairs}.get(shape, lambda same: same)(tables)
     frames = probed(tables, 60)
@@ -123,9 +110,7 @@ def printed(files: Mapping[str, str], program: str, folder: Path) -> str:
     return done.stdout
 
 
-def test_margin_probability_and_refusal_are_python_s(
-    make_tables: MakeTables, describe: Describe, tmp_path: Path
-) -> None:
+def test_margin_probability_and_refusal_are_python_s(tmp_path: Path) -> None:
     tables = make_tables(**SHAPES["small"])
     bits = np.arange(tables.n_switches)[np.newaxis] % 3 == 0
     codes = 40 * np.arange(tables.n_joints, dtype=np.uint16)[np.newaxis]
@@ -160,7 +145,7 @@ for tick in range({ticks}):
 """
 
 
-def test_a_segmenter_begins_afresh(make_tables: MakeTables, describe: Describe, tmp_path: Path) -> None:
+def test_a_segmenter_begins_afresh(tmp_path: Path) -> None:
     tables = make_tables(**SHAPES["small"])
     model = structs.replace(SegmentModel.usual(tables.n_classes, False, tables.scale / 8), enter=(40,) * 7)
     manifest = structs.replace(describe(tables), segments=model)
@@ -204,9 +189,7 @@ taxels = { pad = [0, 1023] }
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["of a glove", "not known"])
-def test_readings_become_python_s_codes(
-    make_tables: MakeTables, describe: Describe, tmp_path: Path, known: bool
-) -> None:
+def test_readings_become_python_s_codes(tmp_path: Path, known: bool) -> None:
     tables = make_tables(**SHAPES["small"])
     manifest = describe(tables)
     levels = [Threshold(code, 0.0, Calibration(0, "pad", "counts", 0, 0.0, 1, 1.0)) for code in (90, 400)]

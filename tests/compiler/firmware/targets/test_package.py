@@ -14,12 +14,11 @@ from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.package import Package
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
-Tool = Callable[[str], str]
+from ....conftest import tool
+from ....tables import describe
+from ..conftest import make_tables
+
 Written = Callable[..., Path]
 
 PACKAGES = [name for name, target in TARGETS.items() if isinstance(target, Package)]
@@ -81,7 +80,7 @@ unsigned glove_works(void) { return thenar_hand_check(); }
 
 
 @pytest.fixture
-def written(make_tables: MakeTables, describe: Describe, tmp_path: Path) -> Written:
+def written(tmp_path: Path) -> Written:
     """Return what writes the package "hand" of a target."""
 
     def written(target: str, grasp: str = "grasp 0") -> Path:
@@ -114,7 +113,7 @@ def built(cmake: str, source: Path, *options: object) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize("board", list(BOARDS))
 def test_every_board_s_compiler_takes_its_package_through_the_sdk_s_cmake(
-    tool: Tool, written: Written, tmp_path: Path, board: str
+    written: Written, tmp_path: Path, board: str
 ) -> None:
     target, sdk, compiler, flags = BOARDS[board]
     assert {path.suffix for path in (written(target) / "src").iterdir()} == {".c", ".h"}
@@ -131,7 +130,7 @@ def test_every_board_s_compiler_takes_its_package_through_the_sdk_s_cmake(
 
 
 @pytest.mark.slow
-def test_the_package_builds_tests_itself_and_installs(tool: Tool, written: Written, tmp_path: Path) -> None:
+def test_the_package_builds_tests_itself_and_installs(written: Written, tmp_path: Path) -> None:
     cmake = tool("cmake")
     out = built(cmake, written("generic"), f"-DCMAKE_C_FLAGS={STRICT}")
     assert "100% tests passed" in run(tool("ctest"), "--test-dir", out)
@@ -202,7 +201,7 @@ def test_every_package_says_how_each_ecosystem_takes_it_and_under_which_licence(
     assert (made / "LICENSE").read_text() == licence
 
 
-def test_the_program_in_the_readme_compiles(tool: Tool, written: Written, tmp_path: Path) -> None:
+def test_the_program_in_the_readme_compiles(written: Written, tmp_path: Path) -> None:
     made = written("generic")
     lines = re.findall(r"^    (.*)$", (made / "README.md").read_text().partition("## Use in each")[0], re.MULTILINE)
     included, shown = ([line for line in lines if line.startswith("#") == is_one] for is_one in (True, False))

@@ -17,13 +17,14 @@ from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
+
+from ....conftest import tool
+from ....tables import describe
+from ..conftest import make_tables
 
 # Compilers and simulators of whole programs: minutes, together.
 pytestmark = pytest.mark.slow
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
 
 ARDUINO = Path("/usr/share/arduino/hardware")
 BUILDER = Path("/usr/share/arduino-builder")  # where Debian's package says where the IDE's tools are
@@ -50,7 +51,7 @@ def glove(manifest: Manifest) -> Harness:
 
 
 @pytest.fixture
-def library(describe: Describe, tmp_path: Path) -> Callable[..., Path]:
+def library(tmp_path: Path) -> Callable[..., Path]:
     """Return what writes the library "hand" of a layout."""
 
     def library(layout: Layout, known: bool = True) -> Path:
@@ -66,7 +67,7 @@ def library(describe: Describe, tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def sketch(tool: Callable[[str], str], tmp_path: Path, cores: Path) -> Callable[..., Path]:
+def sketch(tmp_path: Path, cores: Path) -> Callable[..., Path]:
     """Return what has Arduino's builder compile a library and its example for a board, without a warning about them."""
     if not ARDUINO.is_dir():
         tool("arduino-core-avr")
@@ -102,13 +103,7 @@ Sketch = Callable[..., Path]
 @pytest.mark.parametrize("entry_bits", [16, 8])
 @pytest.mark.parametrize("board", list(BOARDS))
 def test_the_example_prints_the_grasp_that_python_finds(
-    tool: Callable[[str], str],
-    make_tables: MakeTables,
-    describe: Describe,
-    library: Library,
-    sketch: Sketch,
-    board: str,
-    entry_bits: int,
+    library: Library, sketch: Sketch, board: str, entry_bits: int
 ) -> None:
     tables = make_tables(**ON_A_BOARD[board], reach=20 if entry_bits == 8 else 300)
     elf = sketch(library(Layout(tables)), board)
@@ -138,14 +133,12 @@ def first_line(simavr: str, elf: Path, part: str) -> str:
     ids=["switches", "joints", "both"],
 )
 def test_inputs_beyond_the_boards_pins_are_read_by_other_parts(
-    make_tables: MakeTables, library: Library, sketch: Sketch, inputs: dict[str, int]
+    library: Library, sketch: Sketch, inputs: dict[str, int]
 ) -> None:
     sketch(library(Layout(make_tables(**inputs))), "uno")
 
 
-def test_it_refuses_readings_of_which_nothing_is_known(
-    make_tables: MakeTables, library: Library, sketch: Sketch
-) -> None:
+def test_it_refuses_readings_of_which_nothing_is_known(library: Library, sketch: Sketch) -> None:
     made = library(Layout(make_tables(highest=1000)), known=False)
     assert "{0, 0}, /* j0: code 0 and code 50 */" in (made / "examples/Recognise/Recognise.ino").read_text()
     for given in ("-DCALIBRATED=1", "-DSHOW_READINGS"):
@@ -154,7 +147,7 @@ def test_it_refuses_readings_of_which_nothing_is_known(
         sketch(made, "uno")
 
 
-def test_the_properties_are_those_that_the_specification_asks_for(make_tables: MakeTables, library: Library) -> None:
+def test_the_properties_are_those_that_the_specification_asks_for(library: Library) -> None:
     lines = (library(Layout(make_tables())) / "library.properties").read_text().splitlines()
     fields = dict(line.split("=", 1) for line in lines)
     # The page that `url` names is whoever's who publishes the library: one that is empty is worse than none.
@@ -166,9 +159,7 @@ def test_the_properties_are_those_that_the_specification_asks_for(make_tables: M
     assert fields["sentence"] == "Recognises 5 grasp types from 9 switches and 3 joints of a glove."
 
 
-def test_names_that_are_no_words_of_c_do_no_harm(
-    make_tables: MakeTables, describe: Describe, library: Library, sketch: Sketch, tmp_path: Path
-) -> None:
+def test_names_that_are_no_words_of_c_do_no_harm(library: Library, sketch: Sketch, tmp_path: Path) -> None:
     tables = make_tables(switches=2, joints=1)
     layout = Layout(tables)
     manifest = describe(tables)

@@ -18,15 +18,17 @@ from thenar.runtime.published import NONE
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.segmenting.model import SegmentModel
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
+from ....conftest import tool
+from ....tables import describe
+from ..conftest import make_tables
+
 KINDS = ("cortex-m0plus", "host", "micropython", "rv32imac")
 Running = Callable[..., Predictions]
 TICKS = 3 * STREAM_TICKS + 77  # several streams, the last without its end
 
 
 @pytest.fixture(params=KINDS)
-def running(request: pytest.FixtureRequest, tool: Callable[[str], str]) -> Running:
+def running(request: pytest.FixtureRequest) -> Running:
     """Return what runs a manifest's classifier on frames, of which some inputs may be lost."""
     target = TARGETS[request.param]
     runs = target if target.kind else request.getfixturevalue("cores")[target.name]
@@ -79,7 +81,7 @@ def scores_of(build: Build, frames: Probes, lost: Lost) -> NDArray[np.int64]:
     return np.array([without(bits, codes, row[:s], row[s:]) for bits, codes, row in held]) - LANE_OFFSET
 
 
-def described(tables: IntegerTables, describe: Describe, kind: str) -> Manifest:
+def described(tables: IntegerTables, kind: str) -> Manifest:
     """Return a manifest with costs of segments, and a class "none", a rejection of some of the frames, or neither."""
     manifest = replace(describe(tables), segments=model_of(tables, kind == "class none", 5))
     n, j = tables.n_classes, tables.n_joints
@@ -92,11 +94,9 @@ def described(tables: IntegerTables, describe: Describe, kind: str) -> Manifest:
 
 
 @pytest.mark.parametrize("kind", ["class none", "refusals", "neither"])
-def test_every_state_is_python_s_with_missing_inputs_ends_and_restarts(
-    running: Running, make_tables: MakeTables, describe: Describe, kind: str
-) -> None:
+def test_every_state_is_python_s_with_missing_inputs_ends_and_restarts(running: Running, kind: str) -> None:
     tables = make_tables(seed=4, classes=6, reach=60)
-    manifest = described(tables, describe, kind)
+    manifest = described(tables, kind)
     assert manifest.segments is not None
     frames, lost = movements(tables, 8)
     frames, lost = joined(frames, frames), np.vstack([np.zeros_like(lost), lost])
@@ -112,9 +112,7 @@ def test_every_state_is_python_s_with_missing_inputs_ends_and_restarts(
         assert len(set(expected[half].tolist())) > 3
 
 
-def test_a_build_without_costs_of_segments_has_no_decoder(
-    running: Running, make_tables: MakeTables, describe: Describe
-) -> None:
+def test_a_build_without_costs_of_segments_has_no_decoder(running: Running) -> None:
     tables = make_tables()
     frames, _ = movements(tables, 1)
     assert running(describe(tables), tables, frames, None).states is None

@@ -3,7 +3,6 @@
 import dataclasses
 import re
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +18,17 @@ from thenar.compiler.firmware.targets.package import Package
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
-from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.manifest import Calibration, Switch, Threshold
+
+from ....conftest import tool
+from ....tables import describe
+from ..conftest import make_tables
 
 VARIANTS = Path("/usr/share/arduino/hardware/arduino/avr/variants")
 # The macros of Arduino's boards.
 MACROS = ("NUM_DIGITAL_PINS", "PIN_A0", "NUM_ANALOG_INPUTS")
 BOARDS = {"Uno": (20, 14, 6), "Nano": (20, 14, 8), "Mega": (70, 54, 16)}
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
 
 # Pins with what is wired to them: switches to ground, shift registers 74HC165 one behind the other, which take their
 # inputs while PL is low and go on when CP rises, and multiplexers CD74HC4067. A line of a glove: switches, then counts.
@@ -122,7 +122,7 @@ CASES = [
 ]
 
 
-def build_of(make_tables: MakeTables, describe: Describe, switches: int, joints: int, taxels: int) -> Build:
+def build_of(switches: int, joints: int, taxels: int) -> Build:
     """Return a build of these inputs; a taxel is one level, before all but two switches."""
     tables = make_tables(seed=1, switches=switches + taxels, joints=joints)
     manifest = describe(tables)
@@ -157,15 +157,10 @@ def expected_of(build: Build, sensors: Sensors, known: bool, closed: np.ndarray,
     ids=lambda value: "-".join(map(str, value)) if isinstance(value, tuple) else "of a glove" * value or "filled in",
 )
 def test_every_frame_is_answered_as_by_python(
-    tool: Callable[[str], str],
-    make_tables: MakeTables,
-    describe: Describe,
-    tmp_path: Path,
-    case: tuple[str, str, int, int, int, str],
-    known: bool,
+    tmp_path: Path, case: tuple[str, str, int, int, int, str], known: bool
 ) -> None:
     target, board, switches, joints, taxels, parts = case
-    build = build_of(make_tables, describe, switches, joints, taxels)
+    build = build_of(switches, joints, taxels)
     manifest, layout = build.manifest, Layout(build.tables)
     ranges = ", ".join(f"{joint.name} = [0, 1016]" for joint in manifest.joints)
     harness = parse_harness(GLOVE.format(ranges, "pad = [0, 1023]" * taxels), "g") if joints + taxels else None
@@ -226,7 +221,7 @@ def macros(board: str) -> dict[str, int]:
 
 
 @pytest.mark.parametrize("board", BOARDS)
-def test_macros_are_those_of_arduinos_core(tool: Callable[[str], str], board: str) -> None:
+def test_macros_are_those_of_arduinos_core(board: str) -> None:
     variant = {"Uno": "standard", "Nano": "eightanaloginputs", "Mega": "mega"}[board]
     if not (VARIANTS / variant).is_dir():
         tool("arduino-core-avr")
@@ -247,7 +242,7 @@ def test_macros_are_those_of_arduinos_core(tool: Callable[[str], str], board: st
     ],
 )
 def test_the_example_for_a_board_with_too_few_pins_does_not_compile(
-    tool: Callable[[str], str], make_tables: MakeTables, target: str, board: str, switches: int, joints: int, lacks: str
+    target: str, board: str, switches: int, joints: int, lacks: str
 ) -> None:
     tables = make_tables(switches=switches, joints=joints, bins=3)
     library = Library("hand", numbered(tables), Layout(tables))

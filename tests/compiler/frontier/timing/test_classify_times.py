@@ -1,11 +1,15 @@
+"""The model of classify times, and layouts that are compiled and simulated beside it."""
+
 import pytest
 
 from thenar.compiler.firmware.costs import fit_for
 from thenar.compiler.firmware.targets import TARGETS, timed
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.frontier.price import ClassifyModel, classify_us, fit_here, random_tables
+from thenar.compiler.frontier.price import ClassifyModel, classify_us, count_steps, fit_here, fitting, random_tables
 from thenar.compiler.workers import in_workers
 from thenar.runtime.model.integers import tables_to_bytes
+
+from ....conftest import tool
 
 PYTHON = (1.0, 0.1, 0.2, 0.3, 0.01, 0.02, 10.0)
 TABLES = random_tables(33, 16, 14)
@@ -69,3 +73,35 @@ def test_what_is_fitted_here_foretells_other_shapes() -> None:
         assert found is not None
         assert 0.5 < found.us / taken < 2.0
     assert min(weights) >= 0
+
+
+@pytest.fixture
+def simavr() -> None:
+    for name in ("avr-gcc", "make"):
+        tool(name)
+    if TARGETS["avr328p"].missing() is not None:
+        tool("libsimavr-dev")
+
+
+@pytest.mark.usefixtures("simavr")
+def test_cycles_of_an_avr_are_foretold_within_ten_percent() -> None:
+    part = TARGETS["avr328p"]
+    for tables in (random_tables(20, 0, 14), random_tables(8, 0, 5)):
+        fit = fitting(tables, part)
+        assert fit is not None
+        assert fit.cost is not None
+        assert fit.cost.cycles == pytest.approx(count_steps(tables_to_bytes(tables), ClassifyModel("avr328p")), rel=0.1)
+
+
+def test_a_target_without_tools_names_what_is_missing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    reason = ClassifyModel("avr328p").unmeasured
+    assert "avr-gcc" in reason
+    assert "apt-get install" in reason
+
+
+def test_a_raspberry_pi_is_not_timed_elsewhere() -> None:
+    assert "no Raspberry Pi" in ClassifyModel("pi", python=PYTHON).unmeasured
+    assert not ClassifyModel("host", python=PYTHON).unmeasured

@@ -8,7 +8,7 @@ scans each bus _SCANS times.
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 
 import msgspec
@@ -23,6 +23,8 @@ from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxCha
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_board
 from thenar.runtime.scanning.timing import free_us, reading_of, scan_us
+
+from ....conftest import tool
 
 # Numbers of switches on new gloves; the most need muxes.
 _SIZES = (8, 20, 33, 66, 115)
@@ -154,7 +156,7 @@ def two_muxes() -> Harness:
 
 
 @pytest.fixture
-def umockdev(tool: Callable[[str], str]) -> None:
+def umockdev() -> None:
     tool("umockdev-wrapper")
 
 

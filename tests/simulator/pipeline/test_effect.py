@@ -1,10 +1,14 @@
-"""When frames are scanned: always at the end of holding, whatever else."""
+"""When frames are scanned: always at the end of holding, whatever else; and the registry of effects."""
+
+from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.pipeline.effect import at_a_time, drawn_rows, frame_times, hold_frame
+from thenar.simulator import effects
+from thenar.simulator.pipeline.effect import EFFECTS, at_a_time, drawn_rows, frame_times, hold_frame
 
 from ..small import make_setting
 
@@ -50,3 +54,18 @@ def test_the_more_frames_the_fewer_repetitions_at_a_time_but_never_none(
     assert found == few or (found + 1) * frames > 50_000
     assert found <= at_a_time(setting, few + more)
     assert at_a_time(make_setting(timed=False, period_us=period, hold_us=hold), few) == few
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effects_record_has_default_parameters_and_one_factory(name: str) -> None:
+    effect = EFFECTS[name]
+    assert effect.name == name
+    assert sum(maker is not None for maker in (effect.prepare, effect.model, effect.together)) == 1
+    # A scene may list it without saying more.
+    effect.parameters()()
+
+
+def test_effect_modules_have_their_effects_name_and_unique_order() -> None:
+    modules = {path.stem for path in Path(effects.__path__[0]).glob("*.py")} - {"__init__"}
+    assert modules == {name.replace(".", "_") for name in EFFECTS}
+    assert len({effect.order for effect in EFFECTS.values()}) == len(EFFECTS)
