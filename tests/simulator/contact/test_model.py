@@ -1,4 +1,4 @@
-"""A grip's torques do the work of the pads that press; a capsule shares its force among its switches, and loses none."""
+"""A grip's torques do the work of the pads that press; a capsule shares its force among its switches without loss."""
 
 import numpy as np
 import pytest
