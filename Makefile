@@ -87,7 +87,7 @@ format: $(VENV)/installed  ## let ruff fix what it can
 
 types: $(VENV)/installed  ## mypy --strict, and pyright: no import of ours that an editor cannot follow
 	$(BIN)/mypy $(foreach package,$(PACKAGES),-p thenar.$(package))
-	MYPYPATH=src:benchmarks:tests/fuzz:tests/mutants:tests/compiler/frontier $(BIN)/mypy --explicit-package-bases tests benchmarks
+	MYPYPATH=src:benchmarks:tests/fuzz:tests/mutants $(BIN)/mypy --explicit-package-bases tests benchmarks
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
 $(VENV)/bench: $(VENV)/installed

@@ -277,7 +277,7 @@ def hostile_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[
 @pytest.fixture(scope="session")
 def examples() -> Any:
     """Return the module with example_frontier, the made-up frontier for all tests that show one."""
-    path = Path(__file__).parent / "compiler" / "frontier" / "example_frontier.py"
+    path = Path(__file__).parent / "fuzz" / "example_frontier.py"
     spec = importlib.util.spec_from_file_location("example_frontier", path)
     assert spec is not None
     assert spec.loader is not None

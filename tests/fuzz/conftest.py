@@ -1,4 +1,4 @@
-"""The mutators lie beside the tests that use them, with the made-up frontier, and are found as `run.py` finds them.
+"""The mutators lie in the folder of the tests that use them, with the made-up frontier, and are found as `run.py` finds them.
 
 Before all else: a package that documentation is made with is called as a module here.
 """
@@ -6,4 +6,4 @@ Before all else: a package that documentation is made with is called as a module
 import sys
 from pathlib import Path
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "compiler" / "frontier")]
+sys.path.insert(0, str(Path(__file__).parent))

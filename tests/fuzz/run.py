@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 HERE = Path(__file__).resolve().parent
-# Of the made-up frontier.
-sys.path.append(str(HERE.parent / "compiler" / "frontier"))
 # Seconds that coverage has a format before the next one's turn.
 _TURN_S = 40
 # Mutants of one format before the next one's turn, by time.

@@ -126,12 +126,13 @@ def test_counts_go_over_the_boards_line_and_come_through_where_nothing_happens(
 
 
 def test_counts_that_are_lost_leave_those_of_the_frame_before() -> None:
-    effects = ["contact.ramp", ("wire.lost_bytes", LOSES)]
+    effects: list[str | tuple[str, dict[str, Any]]] = ["contact.ramp", ("wire.lost_bytes", LOSES)]
     recording = Recording(rows="all", rate_hz=20.0, hold_ms=500.0)
     found = []
     for listed in (effects[:1], effects):
         batch = make_batch(range(4))
         compile_pipeline(make_scene(listed, glove=ALL, recording=recording)).run([batch], Ledger())
+        assert batch.taxels is not None
         found.append(batch.taxels)
     plain, damaged = found
     for one, other in zip(plain, damaged, strict=True):
