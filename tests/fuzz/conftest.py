@@ -1,4 +1,4 @@
-"""The mutators lie in the folder of the tests that use them, with the made-up frontier, and are found as `run.py` finds them.
+"""The mutators and the made-up frontier lie with the tests that use them, and are found as `run.py` finds them.
 
 Before all else: a package that documentation is made with is called as a module here.
 """

@@ -1,7 +1,5 @@
 """Straight-line code for an AVR: for which tables it is written, and what entries cost. Its scores: test_core.py."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from thenar.compiler.firmware.classifier import Library
@@ -10,7 +8,7 @@ from thenar.compiler.firmware.straight import Straight, straight
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.model.integers import IntegerTables
 
-MakeTables = Callable[..., IntegerTables]
+from .conftest import make_tables
 
 
 def of_switch(row: list[int]) -> Straight:
@@ -22,7 +20,7 @@ def of_switch(row: list[int]) -> Straight:
     return function
 
 
-def test_it_is_for_tables_without_bins_and_grids(make_tables: MakeTables) -> None:
+def test_it_is_for_tables_without_bins_and_grids() -> None:
     assert straight(Layout(make_tables(joints=1))) is None
     assert straight(Layout(make_tables(joints=0))) is not None
     for joints, there in ((0, True), (1, False)):

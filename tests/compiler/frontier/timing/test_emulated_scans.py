@@ -24,8 +24,6 @@ from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_board
 from thenar.runtime.scanning.timing import free_us, reading_of, scan_us
 
-from ....conftest import tool
-
 # Numbers of switches on new gloves; the most need muxes.
 _SIZES = (8, 20, 33, 66, 115)
 _SCANS = 2
@@ -157,6 +155,8 @@ def two_muxes() -> Harness:
 
 @pytest.fixture
 def umockdev() -> None:
+    from ....conftest import tool  # here, as the module is a program too
+
     tool("umockdev-wrapper")
 
 
