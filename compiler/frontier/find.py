@@ -46,7 +46,7 @@ from .finalists import (
 from .latency import POLICIES, latencies, movements_of
 from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, ReferencePoint, Tried, frontier_to_bytes
-from .price import equipment_for, measured
+from .price import equipment_for
 from .replay import Replay, replay_of
 from .search import TAXEL_LEVELS, Search, placement_of
 from .survey import Cuts, Survey
@@ -299,7 +299,7 @@ def _found(survey: Survey, replay: Replay) -> Frontier:
     combinations = len(POLICIES) * len(designs) + len(tried)
     luck = lucks(designs, screened, survey)
     designs = list(dict.fromkeys(design for front in best_designs(designs) for design in front))
-    times = measured([design.tables.content for design in designs], equipment.model, survey.cache)
+    times = survey.measured(design.tables.content for design in designs)
     designs = [replace(design, measured=times.get(design.tables.content)) for design in designs]
     claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
     model = equipment.model

@@ -34,7 +34,7 @@ from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..trainers.base import Training
 from .cache import Cache, stored
-from .points import FrontierError, How, PointTime
+from .points import FrontierError, How
 from .wirings import (
     NO_RECORDS,
     ReadingCost,
@@ -361,17 +361,3 @@ def count_steps(content: bytes, model: ClassifyModel) -> float:
 def time_here(contents: tuple[bytes, ...], yardstick: float) -> tuple[float, ...]:
     """Time the runtime on each of the tables, scaled by its yardstick; return microseconds."""
     return tuple(classify_us([tables_from_bytes(content) for content in contents], yardstick))
-
-
-def measured(contents: Sequence[bytes], model: ClassifyModel, cache: Cache) -> dict[bytes, PointTime]:
-    """Return the time of classifying with each of these tables, simulated or measured; none if that is not possible."""
-    several = tuple(dict.fromkeys(contents))
-    if model.unmeasured:
-        return {}
-    if model.python is None:
-        steps = cache.ask(count_steps, [(content, model) for content in several])
-        times = [PointTime(model.us(round(count)), "simulated") for count in steps]
-    else:
-        (times_us,) = cache.ask(time_here, [(several, model.python[-1])])
-        times = [PointTime(us, "measured") for us in times_us]
-    return dict(zip(several, times, strict=True))

@@ -26,7 +26,7 @@ from ..samples import Columns, Samples, decided
 from ..trainers.base import Training
 from .cache import Cache, stored
 from .points import By, PointTime
-from .price import Equipment, PricedTables, price
+from .price import Equipment, PricedTables, count_steps, price, time_here
 from .search import SHAPES, TAXEL_LEVELS, Search
 
 # Settings are selected on the placement whose number of switches is nearest to the paper's.
@@ -272,6 +272,19 @@ class Survey:
             for recipe, several in tables.items()
         }
         return self._ask(price, calls)
+
+    def measured(self, contents: Iterable[bytes]) -> dict[bytes, PointTime]:
+        """Return the time of classifying with each of these tables.bin, simulated or measured; none if impossible."""
+        model, several = self.equipment.model, tuple(dict.fromkeys(contents))
+        if model.unmeasured:
+            return {}
+        if model.python is None:
+            steps = self.cache.ask(count_steps, [(content, model) for content in several])
+            times = [PointTime(model.us(round(count)), "simulated") for count in steps]
+        else:
+            (times_us,) = self.cache.ask(time_here, [(several, model.python[-1])])
+            times = [PointTime(us, "measured") for us in times_us]
+        return dict(zip(several, times, strict=True))
 
     def _ask(self, function: Callable[..., R], calls: Mapping[K, tuple[Any, ...]]) -> dict[K, R]:
         """Return the result of a stored function for each tuple of arguments."""

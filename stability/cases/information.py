@@ -7,14 +7,7 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.compiler.placement.gain import (
-    Cooccurrence,
-    NodeCounts,
-    best_position,
-    compare,
-    entropy_bits,
-    gain_bits,
-)
+from thenar.compiler.placement.gain import Cooccurrence, NodeCounts, best_position, compare, entropy_bits, gain_bits
 
 from ..checks.rounds import ROUNDING, part_of
 from ..finding import REFERENCE, Finding

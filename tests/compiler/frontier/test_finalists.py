@@ -16,15 +16,16 @@ from thenar.compiler.frontier.finalists import (
 )
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.frontier.price import Classified, ClassifyModel, Equipment, PricedTables
+from thenar.compiler.frontier.price import Classified, PricedTables
 from thenar.compiler.frontier.search import SHAPES, Search, placed, tabled
-from thenar.compiler.frontier.survey import Cuts, FoldHits, Survey, TrialAccuracy
-from thenar.compiler.frontier.wirings import WIRE_ONLY, ScanTimes
+from thenar.compiler.frontier.survey import FoldHits, TrialAccuracy
+from thenar.compiler.frontier.wirings import ScanTimes
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.samples import Samples
 from thenar.runtime.recipe import PAPERS_TRAINER, Inputs, Recipe
+
+from .conftest import survey_of
 
 
 def judged(rate: float) -> TrialAccuracy:
@@ -119,23 +120,21 @@ def test_elimination_is_tried_at_every_size_up_to_all_switches(elements: int, si
 
 def test_the_papers_placements_are_marked_with_all_inputs_that_there_are(grasp_set: GraspSet, tmp_path: Path) -> None:
     papers, every = ("id3", 62, PAPERS_TRAINER), ("elimination", 14, PAPERS_TRAINER)
-    samples, equipment = Samples.of(grasp_set), Equipment(ClassifyModel("avr328p"), (), WIRE_ONLY)
-
-    def marked(samples: Samples) -> dict[Recipe, str]:
-        search = Search(methods=("id3",), baselines=())
-        survey = Survey(grasp_set, "set", samples, None, search, Cuts.of(samples, search), equipment, cache)
-        return recipes_to_mark(survey)
-
+    bare = replace(grasp_set, codes=grasp_set.codes[:, :0], joints=())
     with Store(tmp_path / "store.sqlite", "test") as store:
         cache = Cache(store, lambda _done, _all: None, jobs=1)
-        assert marked(samples) == {
+        assert recipes_to_mark(survey_of(grasp_set, cache)) == {
             placed(*papers, "switches"): "paper, S = 62",
             placed(*every, "switches"): "all of 14",
             placed(*papers, "both"): "paper, S = 62, joints",
             placed(*every, "both"): "all of 14, joints",
         }
-        assert list(marked(samples.with_joints(()))) == [placed(*papers, "switches"), placed(*every, "switches")]
-        assert marked(samples.keeping(())) == {}
+        assert list(recipes_to_mark(survey_of(bare, cache))) == [
+            placed(*papers, "switches"),
+            placed(*every, "switches"),
+        ]
+        joints_alone = replace(grasp_set, switches=grasp_set.switches[:, :0], switch_names=())
+        assert recipes_to_mark(survey_of(joints_alone, cache)) == {}
 
 
 def test_one_type_leaves_nothing_to_tell_apart(grasp_set: GraspSet) -> None:

@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.compiler.frontier.cache import Cache, Store, question
-from thenar.compiler.frontier.price import ClassifyModel, Equipment, measured, price, random_tables
+from thenar.compiler.frontier.price import ClassifyModel, Equipment, price, random_tables
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.wirings import WIRE_ONLY, ReadingCost, wirings
 from thenar.compiler.placement.elements import Element, names_of
@@ -20,6 +20,7 @@ from thenar.runtime.recipe import Recipe
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 
 from ...conftest import tool
+from .conftest import survey_of
 
 
 def test_a_finalist_is_priced_with_what_its_build_holds_for_lost_inputs(grasp_set: GraspSet) -> None:
@@ -40,35 +41,35 @@ CONTENT = tables_to_bytes(TABLES)
 
 
 @pytest.mark.slow
-def test_on_a_host_the_runtime_is_timed_once(tmp_path: Path) -> None:
+def test_on_a_host_the_runtime_is_timed_once(grasp_set: GraspSet, tmp_path: Path) -> None:
     model = ClassifyModel("host", python=(5.0, 0.1, 0.5, 0.1, 0.01, 0.01, 10.0))
     with Store(tmp_path / "store", "here") as store:
-        cache = Cache(store, lambda *_: None, jobs=1)
-        timed = measured([CONTENT, CONTENT], model, cache)
+        survey = survey_of(grasp_set, Cache(store, lambda *_: None, jobs=1), model)
+        timed = survey.measured([CONTENT, CONTENT])
         known = len(store)
-        assert measured([CONTENT], model, cache) == timed
+        assert survey.measured([CONTENT]) == timed
         assert len(store) == known == 1
     assert timed[CONTENT].how == "measured"
     assert 0 < timed[CONTENT].us < 100_000
 
 
 @pytest.mark.slow
-def test_on_an_avr_the_time_is_what_was_simulated(tmp_path: Path) -> None:
+def test_on_an_avr_the_time_is_what_was_simulated(grasp_set: GraspSet, tmp_path: Path) -> None:
     tool("avr-gcc")
     model = ClassifyModel("avr328p")
     assert not model.unmeasured
     with Store(tmp_path / "store", "here") as store:
-        found = measured([CONTENT], model, Cache(store, lambda *_: None, jobs=1))[CONTENT]
+        found = survey_of(grasp_set, Cache(store, lambda *_: None, jobs=1)).measured([CONTENT])[CONTENT]
     predicted = model.cost(TABLES)
     assert predicted is not None
     assert found.how == "simulated"
     assert found.us == pytest.approx(predicted.us, rel=0.1)
 
 
-def test_what_cannot_be_measured_here_has_no_time(tmp_path: Path) -> None:
+def test_what_cannot_be_measured_here_has_no_time(grasp_set: GraspSet, tmp_path: Path) -> None:
     model = ClassifyModel("pi", python=(5.0, 0.1, 0.5, 0.1, 0.01, 0.01, 10.0))
     with Store(tmp_path / "store", "here") as store:
-        assert measured([CONTENT], model, Cache(store, lambda *_: None, jobs=1)) == {}
+        assert survey_of(grasp_set, Cache(store, lambda *_: None, jobs=1), model).measured([CONTENT]) == {}
 
 
 MODEL = ClassifyModel("cortex-m4")
