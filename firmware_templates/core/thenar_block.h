@@ -22,9 +22,10 @@ typedef struct {
 #define ADD_PRODUCT(sum, slopes) \
     __asm__("lpm %2, Z+\n\tmulsu %2, %3\n\tadd %A0, r0\n\tadc %B0, r1\n\tclr __zero_reg__" \
             : "+r"(sum), "+z"(slopes), "=&a"(slope) : "a"(distance))
-#define EIGHT(add, place) \
-    add(sums->a, place); add(sums->b, place); add(sums->c, place); add(sums->d, place); \
-    add(sums->e, place); add(sums->f, place); add(sums->g, place); add(sums->h, place)
+#define PUT_ENTRY(sum, to) (*(to)++ = (sum))
+#define EIGHT(each, place) \
+    each(sums->a, place); each(sums->b, place); each(sums->c, place); each(sums->d, place); \
+    each(sums->e, place); each(sums->f, place); each(sums->g, place); each(sums->h, place)
 
 static inline void add_row(block *sums, const int16_t *row)
 {
@@ -40,16 +41,9 @@ static inline void add_line(block *sums, uint8_t distance, const int8_t *slopes)
 
 static inline void put(int16_t *scores, const block *sums)
 {
-    uint16_t *const to = (uint16_t *)scores;
+    uint16_t *to = (uint16_t *)scores;
 
-    to[0] = sums->a;
-    to[1] = sums->b;
-    to[2] = sums->c;
-    to[3] = sums->d;
-    to[4] = sums->e;
-    to[5] = sums->f;
-    to[6] = sums->g;
-    to[7] = sums->h;
+    EIGHT(PUT_ENTRY, to);
 }
 #else
 typedef struct {
