@@ -170,7 +170,7 @@ def _sources(glove: Path, web: str | None, *, taxels: bool) -> "Iterator[tuple[H
 
 
 def _await(sources: "Sources", read: Callable[[], Any], what: str) -> None:
-    """Wait until something is read. Raises DeviceError if nothing comes, SettingError for a device that never works."""
+    """Wait until something is read. Raises DeviceError if no data comes, SettingError for a device that cannot work."""
     from thenar.drivers.errors import DeviceError
 
     end = monotonic() + _PATIENCE_S

@@ -9,7 +9,7 @@ from typing import Any
 
 from msgspec import to_builtins
 
-from thenar.compiler.evaluation.sofar import InterimAccuracy, recording_so_far
+from thenar.compiler.evaluation.interim import InterimAccuracy, interim_accuracy_of
 from thenar.compiler.hand import drawn_glove
 from thenar.compiler.recordings.taxonomy import ANY, MOVEMENTS, Taxonomy
 from thenar.compiler.workers import BackgroundTask
@@ -87,7 +87,7 @@ class StudiedPage(Closing):
             return
         if self._studied < 0 or abs(guide.done - self._studied) >= self._round or guide.trial is None:
             self._studied = guide.done
-            self._background.start(recording_so_far, self._recording)
+            self._background.start(interim_accuracy_of, self._recording)
 
     def warn(self, warnings: Sequence[str]) -> None:
         """Show what is odd in the set that was written, instead of the accuracy so far."""

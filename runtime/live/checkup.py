@@ -238,7 +238,7 @@ def _chip(device: I2cDevice, place: int, time: ChipTime) -> CheckResult:
 def _remarked(finding: CheckResult) -> CheckResult:
     """Return the finding with a remark if it is slow, or silent."""
     if finding.measured_us is None and finding.present:
-        remark = "it responds, and then nothing comes: is it busy, or set to another rate?"
+        remark = "it responds, and then no data is received: is it busy, or set to another rate?"
         return msgspec.structs.replace(finding, remarks=(*finding.remarks, remark))
     times = (finding.measured_us or 0.0) / finding.predicted_us
     if times <= SLOW:

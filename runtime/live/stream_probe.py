@@ -83,7 +83,7 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
         came = list(_listened(reader, listen_s))
         counts, odd, other = reader.counts(), reader.odd, reader.other_sender()
     if not came:
-        raise DeviceError(f"{port}: {_no_rows(bare, reader) or other or 'nothing comes'}")
+        raise DeviceError(f"{port}: {_no_rows(bare, reader) or other or 'no data received'}")
     wrong, such = counts.misfits + counts.overlong, f", such as {odd}" if odd else ""
     remarks = [f"{wrong} lines were not rows{such}" if wrong > 1 else f"1 line was not a row: {odd}"] if wrong else []
     remarks += [f"{counts.damaged} lines were damaged: check the cable and the baud rate"] if counts.damaged else []

@@ -9,7 +9,7 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
-from thenar.compiler.evaluation.sofar import recognition_so_far
+from thenar.compiler.evaluation.interim import interim_accuracy
 from thenar.runtime.recording.guide import read_journal
 
 from .conftest import ENTER, Browser, Command, Wearer
@@ -86,9 +86,9 @@ def test_a_whole_collection_by_keyboard(
     page.wait(lambda: page.text("link").startswith("page: ended since"))
     grasp_set = GraspSet.load(tmp_path / "set.grasps")
     assert len(set(grasp_set.trials.tolist())) == 9
-    so_far = recognition_so_far(grasp_set)
-    assert told[0].startswith(f"{so_far.correct} of 9 trials (")
-    assert told[1] == len(so_far.types) == 3
+    interim = interim_accuracy(grasp_set)
+    assert told[0].startswith(f"{interim.correct} of 9 trials (")
+    assert told[1] == len(interim.types) == 3
     assert run(["import", str(tmp_path / "set.mcap"), "-o", str(tmp_path / "again.grasps")]) == 0
     assert (tmp_path / "again.grasps").read_bytes() == (tmp_path / "set.grasps").read_bytes()
     assert page.faults() == []

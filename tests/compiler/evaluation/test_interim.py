@@ -5,13 +5,13 @@ import pytest
 
 from thenar.compiler import GraspSet
 from thenar.compiler.evaluation.folds import EvaluationError
-from thenar.compiler.evaluation.sofar import (
+from thenar.compiler.evaluation.interim import (
     _CONSTANT,
     _PENALTY,
     _inputs,
+    interim_accuracy,
+    interim_accuracy_of,
     left_out_scores,
-    recognition_so_far,
-    recording_so_far,
 )
 from thenar.compiler.recordings.graspset import Joint
 from thenar.runtime.frames import GloveFrame, SwitchFrame
@@ -61,7 +61,7 @@ def grasps(repetitions: int, *, noise: float, seed: int = 3) -> GraspSet:
 
 
 def test_types_that_are_taken_for_each_other_come_first_and_say_so() -> None:
-    found = recognition_so_far(grasps(12, noise=3))
+    found = interim_accuracy(grasps(12, noise=3))
     assert found.total == 36
     assert found.correct == sum(one.correct for one in found.types)
     assert found.types[-1].grasp == "cup"
@@ -77,27 +77,27 @@ def test_of_equally_good_types_that_with_fewer_trials_comes_first() -> None:
     whole = grasps(10, noise=3)
     cups = np.flatnonzero(whole.grasps == "cup")
     few = whole.rows(np.setdiff1d(np.flatnonzero(whole.grasps != "rod"), cups[3:]))
-    found = recognition_so_far(few)
+    found = interim_accuracy(few)
     assert [(one.grasp, one.correct, one.total) for one in found.types] == [("cup", 3, 3), ("pen", 10, 10)]
 
 
 def test_a_type_with_one_trial_has_no_accuracy_and_does_not_count() -> None:
     whole = grasps(6, noise=3)
     rods = np.flatnonzero(whole.grasps == "rod")
-    found = recognition_so_far(whole.rows(np.setdiff1d(np.arange(18), rods[1:])))
+    found = interim_accuracy(whole.rows(np.setdiff1d(np.arange(18), rods[1:])))
     rod = next(one for one in found.types if one.grasp == "rod")
     assert (rod.total, rod.correct, rod.low, rod.high, rod.taken_for) == (1, 0, 0.0, 1.0, "")
     assert found.types[0] is rod
     assert found.total == 12 == sum(one.total for one in found.types if one is not rod)
     assert found.correct == sum(one.correct for one in found.types)
-    first = recognition_so_far(whole.rows(np.arange(3)))
+    first = interim_accuracy(whole.rows(np.arange(3)))
     assert (first.total, first.correct, first.low, first.high) == (0, 0, 0.0, 1.0)
 
 
 def test_rows_of_a_trial_count_once_and_constant_inputs_never() -> None:
     whole = grasps(6, noise=3)
     thrice = whole.rows(np.repeat(np.arange(len(whole)), 3))
-    one, three = recognition_so_far(whole), recognition_so_far(thrice)
+    one, three = interim_accuracy(whole), interim_accuracy(thrice)
     assert three.total == one.total == 18
     assert (_inputs(whole)[:, 2] == 0).all()
 
@@ -105,7 +105,7 @@ def test_rows_of_a_trial_count_once_and_constant_inputs_never() -> None:
 def test_one_type_alone_is_taken_for_nothing_else() -> None:
     whole = grasps(4, noise=1)
     with pytest.raises(EvaluationError, match="all trials are of one grasp type"):
-        recognition_so_far(whole.rows(np.flatnonzero(whole.grasps == "cup")))
+        interim_accuracy(whole.rows(np.flatnonzero(whole.grasps == "cup")))
 
 
 def test_a_recording_is_read_while_it_is_written(tmp_path: Path) -> None:
@@ -120,7 +120,7 @@ def test_a_recording_is_read_while_it_is_written(tmp_path: Path) -> None:
             name, thing = (("pen", "biro"), ("cup", "mug"))[number % 2]
             for event in ("begun", "captured", "accepted"):
                 recorder.label(Label(10 * number, event, number, name, "A", thing))
-            found = recording_so_far(path)
+            found = interim_accuracy_of(path)
             assert (found is None) == (number == 1)
     assert found is not None
     assert (found.total, found.correct) == (6, 6)

@@ -29,7 +29,7 @@ _CONSTANT = 1e4
 
 
 @dataclass(frozen=True, slots=True)
-class TypeSoFar:
+class InterimType:
     """A grasp type, or none: the number of its trials, how many are correct, the 95 % interval of that accuracy in
     0..1, and the type most often predicted for the others ("" if there are none).
 
@@ -55,10 +55,10 @@ class InterimAccuracy:
     correct: int
     low: float
     high: float
-    types: tuple[TypeSoFar, ...]
+    types: tuple[InterimType, ...]
 
 
-def recognition_so_far(grasp_set: GraspSet) -> InterimAccuracy:
+def interim_accuracy(grasp_set: GraspSet) -> InterimAccuracy:
     """Return the accuracy for a set's trials, each predicted from all others.
 
     Types are ordered by the lower end of their interval, which is low for types that are mistaken for others and for
@@ -76,7 +76,7 @@ def recognition_so_far(grasp_set: GraspSet) -> InterimAccuracy:
         guesses = predicted[truth == number]
         wrong = np.bincount(guesses[guesses != number], minlength=len(classes))
         taken_for = names[classes[wrong.argmax()]] if wrong.any() and len(guesses) > 1 else ""
-        types.append(TypeSoFar(names[label], len(guesses), *_rate(guesses == number, len(guesses) > 1), taken_for))
+        types.append(InterimType(names[label], len(guesses), *_rate(guesses == number, len(guesses) > 1), taken_for))
     counts = (np.bincount(truth) > 1)[truth]
     types.sort(key=lambda kind: kind.low)
     return InterimAccuracy(int(counts.sum()), *_rate((predicted == truth)[counts], bool(counts.any())), tuple(types))
@@ -113,10 +113,10 @@ def left_out_scores(inputs: Floats, label: NDArray[np.intp], trial: NDArray[np.i
     return scores
 
 
-def recording_so_far(recording: Path) -> InterimAccuracy | None:
+def interim_accuracy_of(recording: Path) -> InterimAccuracy | None:
     """Return the accuracy for the trials of a recording so far; None while they have fewer than two types."""
     grasp_set, _ = import_recordings([recording])
-    return recognition_so_far(grasp_set) if len(np.unique(grasp_set.labels)) > 1 else None
+    return interim_accuracy(grasp_set) if len(np.unique(grasp_set.labels)) > 1 else None
 
 
 def _inputs(grasp_set: GraspSet) -> Floats:
