@@ -25,7 +25,7 @@ from scipy.optimize import linprog
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.costs import NAME_BYTES, estimate, sizes, table_bytes, terms
-from thenar.compiler.firmware.layout import Layout
+from thenar.compiler.firmware.layout import GROUPS, Layout
 from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.firmware.targets.base import Formula
@@ -101,7 +101,7 @@ def runner(target: Target) -> Any:
 def measured(name: str, seed: int) -> Point | None:
     """Return the point of a drawn build on a target; None where it does not fit."""
     target, tables = TARGETS.named(name), drawn(seed)
-    layout = Layout(tables)
+    layout = Layout(tables, GROUPS[seed % len(GROUPS)])
     plain = numbered(tables)
     names = replace(plain, grasps=tuple(f"{grasp:.<{NAME_BYTES - 1}}" for grasp in plain.grasps))
     library = Library("glove", names, layout)

@@ -122,6 +122,7 @@ def _values(name: str, names: Manifest, layout: Layout, notes: Sequence[str]) ->
         "name_bytes": 1 + max(len(text.encode()) for text in texts),
         "memory": layout.memory,
         "row_pairs": layout.row_pairs,
+        "group": layout.group,
         "found": layout.found,
         "softmax": Softmax(tables.scale),
         "columns": _remark(f"The entries of a row: {', '.join(map(comment, names.grasps))}."),

@@ -1,4 +1,4 @@
-"""The cost of a classifier on a part, and with it the smallest part that holds a build.
+"""The cost of a classifier on a part, and with it the layout of a build there, and the smallest part that holds it.
 
 It is estimated without a compiler: flash is the size of the compiled core and the exact bytes of the tables, RAM is
 exact. Time is a sum of a few terms, whose coefficients `benchmarks/firmwarefit.py` fits to the cycles that simavr
@@ -16,7 +16,7 @@ from thenar.runtime.model.integers import IntegerTables
 
 from . import FirmwareError
 from .classifier import Library
-from .layout import Layout
+from .layout import GROUPS, Layout
 from .probes import Predictions, Unit, extreme_frames, joined, random_frames
 from .straight import straight
 from .targets import TARGETS, Target
@@ -25,9 +25,11 @@ from .tools import STRICT, call, find, workshop
 
 NAME_BYTES = 16  # of a grasp type's name, its end included, where the names are not known
 _NOTE_WIDTH = 114
-CORE_SUM = 1250  # bytes of thenar_sum() on an AVR
+CORE_SUM = 1288  # bytes of thenar_sum() on an AVR
 # avr-gcc cannot make a larger object.
 _LARGEST_ARRAY = 32767
+# Switches share lookups, which takes more flash and less time, unless the classifier then takes half of the flash.
+_FAST_SHARE = 2
 _RANDOM = 2000
 # The linker can remove uncalled code only if it has a separate section.
 _SECTIONS = ("-ffunction-sections", "-fdata-sections")
@@ -73,7 +75,8 @@ def terms(layout: Layout, *, avr: bool) -> dict[str, int]:
 
     one           for the core
     blocks        of eight grasp types, which are added up at once
-    switches      whose rows are found
+    bytes         of switches
+    groups        of switches, whose rows are found
     rows, lines   that are added, in all blocks
     distances     of lines, and `shifts` of their codes
     bins, halves  joints whose thresholds are searched, and the comparisons
@@ -85,7 +88,8 @@ def terms(layout: Layout, *, avr: bool) -> dict[str, int]:
     core = {
         "one": 1,
         "blocks": blocks,
-        "switches": tables.n_switches,
+        "bytes": -(-tables.n_switches // 8),
+        "groups": len(layout.groups),
         "rows": layout.found * blocks,
         "lines": len(tables.slopes) * blocks,
         "distances": len(tables.slopes),
@@ -125,7 +129,8 @@ def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> 
     """Return the fit of `tables` on a target, whose flash the classifier may fill up to `flash` bytes, by default three
     quarters, so that scanning and sending have room, and never more than its `most_flash`.
 
-    Raises FirmwareError if it does not fit, or the part has less flash than `flash`.
+    Of the layouts, it is the fastest that takes half of the part's flash or less; otherwise the smallest. Raises
+    FirmwareError if it does not fit, or the part has less flash than `flash`.
     """
     if target.any_part:
         return smallest_fit(tables, flash=flash)
@@ -133,8 +138,20 @@ def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> 
         raise FirmwareError(
             f"the classifier cannot be allowed {flash} bytes of flash: {target.named} has {target.flash} bytes"
         )
+    *faster, smallest = GROUPS
+    share = target.flash // _FAST_SHARE
     allowed = min(target.flash * 3 // 4, target.most_flash) if flash is None else flash
-    layout = Layout(tables)
+    for group in faster:
+        with suppress(FirmwareError):
+            fit = _fit(target, tables, group, allowed)
+            if fit.cost is None or fit.cost.flash <= share:
+                return fit
+    return _fit(target, tables, smallest, allowed)
+
+
+def _fit(target: Target, tables: IntegerTables, group: int, allowed: int) -> PartFit:
+    """Return the fit with a layout, in `allowed` bytes of flash. Raises FirmwareError if it does not fit."""
+    layout = Layout(tables, group)
     if target.formula is None:
         return PartFit(target, layout, None)
     rows = 4 * layout.row_pairs * layout.n_rows

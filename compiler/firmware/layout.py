@@ -2,10 +2,10 @@
 
     score_k = start_k + sum over found rows of row[k] + sum over lines of above * slope[k]
 
-All rows lie in one table: the start; those of switches; the bins of every joint that has thresholds; the cells of every
-pair of joints. A row is found by its place in pairs of entries. The middle of a line's range adds nothing, so what its
-lowest code adds is part of the start. Every sum is the one of `IntegerTables`, bit for bit: both are exact modulo 2^16,
-and no score leaves int16.
+All rows lie in one table: the start; for every group of switches the sums of each combination of closed ones; the bins
+of every joint that has thresholds; the cells of every pair of joints. A row is found by its place in pairs of
+entries. The middle of a line's range adds nothing, so what its lowest code adds is part of the start. Every sum is
+the one of `IntegerTables`, bit for bit: both are exact modulo 2^16, and no score leaves int16.
 """
 
 from dataclasses import dataclass
@@ -20,6 +20,8 @@ from thenar.runtime.model.terms.base import HIGHEST_CODE
 
 from . import FirmwareError
 
+GROUPS = (4, 1)
+"""The numbers of switches that can share a lookup, the fastest first."""
 _BLOCK = 4  # pairs that the core adds up at once: the shortest row
 _MOST = 65535  # places of rows and thresholds are numbers of 16 bits
 
@@ -52,9 +54,10 @@ class StoredBins:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """The layout of `tables`. Raises FirmwareError where it is too large."""
+    """A layout of `tables` in which `group` switches share a lookup. Raises FirmwareError where it is too large."""
 
     tables: IntegerTables
+    group: int = GROUPS[0]
 
     def __post_init__(self) -> None:
         tables = self.tables
@@ -73,6 +76,12 @@ class Layout:
         return max(-(-self.tables.n_classes // 2), _BLOCK)
 
     @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """The switches that share a lookup, by their numbers."""
+        count = self.tables.n_switches
+        return tuple(tuple(range(at, min(at + self.group, count))) for at in range(0, count, self.group))
+
+    @property
     def binned(self) -> tuple[int, ...]:
         """The joints that have thresholds; the others add the same row to every frame, which is part of the start."""
         return tuple(joint for joint, steps in enumerate(self.tables.thresholds) if len(steps))
@@ -82,12 +91,12 @@ class Layout:
         """The number of rows of the table."""
         cells = sum(grid.n_rows for grid in self.tables.grids)
         bins = sum(len(self.tables.thresholds[joint]) + 1 for joint in self.binned)
-        return 1 + self.tables.n_switches + bins + cells
+        return 1 + sum((1 << len(group)) - 1 for group in self.groups) + bins + cells
 
     @property
     def found(self) -> int:
         """The most rows that a frame adds, the start included."""
-        return 1 + self.tables.n_switches + len(self.binned) + len(self.tables.grids)
+        return 1 + len(self.groups) + len(self.binned) + len(self.tables.grids)
 
     @cached_property
     def start(self) -> Rows:
@@ -101,7 +110,8 @@ class Layout:
     def sections(self) -> tuple[tuple[str, tuple[int, ...], Rows], ...]:
         """The rows after the start: "switches" or "joints", their numbers, and the rows of a section (m, K)."""
         tables = self.tables
-        switches = [("switches", (bit.switch,), bit.row[np.newaxis].astype(np.int64)) for bit in tables.bits]
+        rows = tables.switch_rows
+        switches = [("switches", group, _sums(rows[group[0] : group[-1] + 1])) for group in self.groups]
         bins = [("joints", (joint,), tables.joint_rows[joint].astype(np.int64)) for joint in self.binned]
         grids = [("joints", grid.joints, grid.cells.astype(np.int64)) for grid in tables.grids]
         return (*switches, *bins, *grids)
@@ -110,7 +120,7 @@ class Layout:
     def bins(self) -> tuple[StoredBins, ...]:
         """The joints that have thresholds, then both joints of each pair."""
         tables = self.tables
-        row = 1 + tables.n_switches
+        row = 1 + sum((1 << len(group)) - 1 for group in self.groups)
         found, at = [], 0
         for joint in self.binned:
             found.append(StoredBins(joint, at, tuple(tables.thresholds[joint].tolist()), row * self.row_pairs))
@@ -157,3 +167,11 @@ class Layout:
         tables = self.tables
         small = len(tables.slopes) + -(-(tables.n_switches + tables.n_joints) // 8)
         return self.frame_size // 2 + 2 * self.row_pairs + self.found + -(-small // 2)
+
+
+def _sums(rows: NDArray[np.int16]) -> Rows:
+    """Return the sums of every combination of rows (n, K) but that of none, (2^n - 1, K): bit b is for row b."""
+    sums = np.zeros((1, rows.shape[1]), np.int64)
+    for row in rows:
+        sums = np.vstack([sums, sums + row])
+    return sums[1:]

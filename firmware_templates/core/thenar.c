@@ -97,24 +97,27 @@ static inline unsigned bin_of(const thenar *hand, const thenar_bins *bins)
     return below;
 }
 
-/* Switches: the row of each closed one. */
+/* Switches: a group adds one row, the sum of the rows of its closed switches; with all open it adds none. */
 static uint16_t *find_switches(const thenar *hand, uint16_t *found)
 {
-    const uint16_t pairs = hand->model->row_pairs;
+    const unsigned pairs = hand->model->row_pairs;
+    const uint8_t group = hand->model->group;
+    const uint8_t mask = (uint8_t)((1u << group) - 1u);
+    const unsigned per_group = pairs * mask;
     const uint8_t *const end = hand->switches + ((hand->model->switches + 7u) / 8u);
-    uint16_t first = pairs; /* the row of the first switch of a byte */
+    unsigned first = 0u; /* the row before those of the first group of a byte */
 
     for (const uint8_t *byte = hand->switches; byte < end; byte++) {
-        uint16_t row = first;
+        unsigned before = first;
 
-        for (uint_fast8_t closed = *byte; closed != 0u; closed = (uint_fast8_t)(closed >> 1)) {
-            if ((closed & 1u) != 0u) {
-                *found = row;
+        for (uint_fast8_t closed = *byte; closed != 0u; closed = (uint_fast8_t)(closed >> group)) {
+            if ((closed & mask) != 0u) {
+                *found = (uint16_t)(before + ((closed & mask) * pairs));
                 found++;
             }
-            row = (uint16_t)(row + pairs);
+            before += per_group;
         }
-        first = (uint16_t)(first + (8u * pairs));
+        first += per_group * hand->model->groups_of_byte;
     }
     return found;
 }
@@ -153,7 +156,6 @@ static void find_distances(const thenar *hand)
         const unsigned low = THENAR_READ_16(&line->low);
         const unsigned span = THENAR_READ_16(&line->span);
         const unsigned above = (code > low) ? (code - low) : 0u;
-
         const unsigned clipped = (above < span) ? above : span;
 
         *distance = (uint8_t)((clipped << THENAR_READ_8(&line->left)) >> THENAR_READ_8(&line->right));
@@ -213,23 +215,24 @@ void thenar_sum(thenar *hand)
 
 uint16_t thenar_classify(thenar *hand)
 {
-    const int16_t *score = hand->scores;
-    uint16_t best = 0u;
+    const int16_t *const scores = hand->scores;
+    unsigned best = 0u;
     int16_t top;
 
     hand->model->sum(hand);
     if (hand->n_lost > 0u) {
         add_means(hand);
     }
-    top = *score;
-    for (uint16_t k = 1u, classes = hand->model->classes; k < classes; k++) {
-        score++;
-        if (*score > top) {
-            top = *score;
+    top = scores[0];
+    for (unsigned k = 1u, classes = hand->model->classes; k < classes; k++) {
+        const int16_t score = scores[k];
+
+        if (score > top) {
+            top = score;
             best = k;
         }
     }
-    return best;
+    return (uint16_t)best;
 }
 
 static bool is_outside(const thenar *hand, const thenar_rejection *rejection, uint16_t grasp)

@@ -103,8 +103,10 @@ typedef struct {
     uint16_t found;      /* the most rows that a frame adds, the start included */
     uint16_t step;       /* of the softmax, with `shift` */
     uint8_t shift;
+    uint8_t group;       /* switches that share a lookup: 1 or 4 */
+    uint8_t groups_of_byte;
     void (*sum)(thenar *hand);      /* thenar_sum, or straight-line code with the tables of switches and lines in it */
-    const thenar_pair *rows;        /* the start; rows of switches; rows of bins; rows of grids */
+    const thenar_pair *rows;        /* the start; each group's sums but that of none; rows of bins; rows of grids */
     const thenar_slopes *slopes;    /* a row for each line */
     const thenar_bins *bins;
     const thenar_line *lines;

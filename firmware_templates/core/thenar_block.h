@@ -11,6 +11,8 @@
 #include "thenar.h"
 
 #ifdef __AVR__
+#include <string.h>
+
 typedef struct {
     uint16_t a, b, c, d, e, f, g, h;
 } block;
@@ -22,10 +24,9 @@ typedef struct {
 #define ADD_PRODUCT(sum, slopes) \
     __asm__("lpm %2, Z+\n\tmulsu %2, %3\n\tadd %A0, r0\n\tadc %B0, r1\n\tclr __zero_reg__" \
             : "+r"(sum), "+z"(slopes), "=&a"(slope) : "a"(distance))
-#define PUT_ENTRY(sum, to) (*(to)++ = (sum))
-#define EIGHT(each, place) \
-    each(sums->a, place); each(sums->b, place); each(sums->c, place); each(sums->d, place); \
-    each(sums->e, place); each(sums->f, place); each(sums->g, place); each(sums->h, place)
+#define EIGHT(add, place) \
+    add(sums->a, place); add(sums->b, place); add(sums->c, place); add(sums->d, place); \
+    add(sums->e, place); add(sums->f, place); add(sums->g, place); add(sums->h, place)
 
 static inline void add_row(block *sums, const int16_t *row)
 {
@@ -41,9 +42,7 @@ static inline void add_line(block *sums, uint8_t distance, const int8_t *slopes)
 
 static inline void put(int16_t *scores, const block *sums)
 {
-    uint16_t *to = (uint16_t *)scores;
-
-    EIGHT(PUT_ENTRY, to);
+    (void)memcpy(scores, sums, sizeof(*sums));
 }
 #else
 typedef struct {

@@ -19,7 +19,7 @@ MEMBER = (
         flash=128 << 10,
         ram=16 << 10,
         clock_hz=48_000_000,
-        formula=Formula((96.78, 72.76, 9.603, 14.78, 17.42, 22.0, 0, 33.64, 8.781, 8.008, 0, 0), 1388, 32),
+        formula=Formula((112.7, 66.9, 14.47, 12.24, 14.86, 17.76, 20.65, 0, 36.79, 8.557, 6.684, 0, 0), 1456, 32),
         flags=("-mcpu=cortex-m0plus", "-mthumb", "-O2", "-ffreestanding"),
     ),
     _cortex(
@@ -31,7 +31,7 @@ MEMBER = (
         flash=256 << 10,
         ram=64 << 10,
         clock_hz=64_000_000,
-        formula=Formula((46.37, 66.5, 8.103, 13.06, 13.47, 17.3, 0, 16.47, 8.256, 8.515, 0, 0), 1404, 32),
+        formula=Formula((59.97, 62.82, 2.632, 8.438, 13.09, 13.04, 18.43, 0, 16.85, 8.205, 7.766, 0, 0), 1428, 32),
         flags=("-mcpu=cortex-m4", "-mthumb", "-O2", "-ffreestanding"),
     ),
     _core(
@@ -42,7 +42,7 @@ MEMBER = (
         flash=128 << 10,
         ram=16 << 10,
         clock_hz=108_000_000,
-        formula=Formula((73.66, 48.29, 10.25, 13.94, 16.44, 19.31, 0, 19.62, 8.578, 5.663, 0, 0), 1452, 32),
+        formula=Formula((85.24, 37.89, 8.52, 8.935, 13.89, 16.45, 18.55, 0, 20.28, 8.469, 5.186, 0, 0), 1488, 32),
         compiler=RISCV_COMPILER,
         size=(("riscv64-unknown-elf-size",), "binutils-riscv64-unknown-elf"),
         flags=("-march=rv32imac", "-mabi=ilp32", "-misa-spec=2.2", "-O2", "-ffreestanding"),

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
-from thenar.compiler.firmware.layout import Layout
+from thenar.compiler.firmware.layout import GROUPS, Layout
 from thenar.compiler.firmware.probes import Lost, Predictions, Probes, joined, lost_inputs, random_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.host import MEMBER as HOST
@@ -57,6 +57,12 @@ SHAPES: dict[str, dict[str, Any]] = {
     "codes to the highest": {"highest": 65535, "reach": 1000},
 }
 EACH = pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
+# Every shape with every size of groups; the quick half takes the sizes in turn.
+PAIRED = [
+    pytest.param(shape, group, id=f"{name}-{group}", marks=[pytest.mark.slow] * (group != GROUPS[place % len(GROUPS)]))
+    for place, (name, shape) in enumerate(SHAPES.items())
+    for group in GROUPS
+]
 
 
 def made(
@@ -119,12 +125,12 @@ def with_missing(tables: IntegerTables, *whole: Probes) -> tuple[Probes, Lost]:
     return frames, lost
 
 
-def is_exact(tables: IntegerTables, runs: Any, frames: Probes, apart: bool = False, **given: Any) -> None:
+def is_exact(tables: IntegerTables, runs: Any, frames: Probes, group: int, apart: bool = False, **given: Any) -> None:
     """Compare all results on a target with Python's, those with missing inputs among them.
 
     apart  whole frames have a program of their own: on an AVR they go straight into the classifier's memory
     """
-    layout = Layout(tables)
+    layout = Layout(tables, group)
     files = Library("hand", numbered(tables), layout).files
     for some, lost in [(frames, None), with_missing(tables)] if apart else [with_missing(tables, frames)]:
         sent = layout.frame_bytes(some.bits, some.codes)
@@ -135,21 +141,22 @@ def is_exact(tables: IntegerTables, runs: Any, frames: Probes, apart: bool = Fal
 def test_results_on_this_machine_are_pythons_without_warnings(shape: dict[str, Any]) -> None:
     tool("gcc")
     tables = made(**shape)
-    is_exact(tables, HOST, probed(tables, 500))
+    is_exact(tables, HOST, probed(tables, 500), GROUPS[0])
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("group", GROUPS)
 @EACH
-def test_so_they_are_by_clang(shape: dict[str, Any]) -> None:
+def test_so_they_are_by_clang_and_with_groups_of_any_size(shape: dict[str, Any], group: int) -> None:
     name, tables = Path(tool("clang")).name, made(1, **shape)
-    is_exact(tables, HOST, probed(tables, 500), compiler=name)
+    is_exact(tables, HOST, probed(tables, 500), group, compiler=name)
 
 
-@EACH
-def test_on_an_avr_results_are_python_s(avr: None, shape: dict[str, Any]) -> None:
+@pytest.mark.parametrize(("shape", "group"), PAIRED)
+def test_on_an_avr_results_are_python_s(avr: None, shape: dict[str, Any], group: int) -> None:
     tables = made(2, **shape)
     part = TARGETS["avr2560" if tables.n_classes > 20 or tables.n_switches > 100 else "avr328p"]
-    is_exact(tables, part, probed(tables, 20), apart=True)
+    is_exact(tables, part, probed(tables, 20), group, apart=True)
 
 
 @pytest.mark.slow
@@ -157,7 +164,7 @@ def test_on_an_avr_results_are_python_s(avr: None, shape: dict[str, Any]) -> Non
 @EACH
 def test_on_cores_of_32_bits_results_are_python_s(cores: Any, shape: dict[str, Any], part: str) -> None:
     tables = made(3, **shape)
-    is_exact(tables, cores[part], probed(tables, 100))
+    is_exact(tables, cores[part], probed(tables, 100), GROUPS[0])
 
 
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -171,7 +178,7 @@ def test_any_tables_give_python_s_results(
     joints = max(joints, int(switches == 0))
     terms: dict[str, Any] = {"pairs": min(more, joints // 2)} if paired else {"lines": min(more, joints)}
     tables = made(seed, classes=classes, switches=switches, joints=joints, **terms)
-    is_exact(tables, HOST, random_frames(tables, 60, seed))
+    is_exact(tables, HOST, random_frames(tables, 60, seed), GROUPS[seed % len(GROUPS)])
 
 
 def test_tables_at_the_16_bit_limit_borrow_and_carry_correctly() -> None:
@@ -182,7 +189,8 @@ def test_tables_at_the_16_bit_limit_borrow_and_carry_correctly() -> None:
     zero = np.zeros((0, 5), np.int16)
     tables = IntegerTables.of(np.full(5, -1, np.int16), rows, (), (), 0 * rows, zero, 1.0)
     bits = np.array([[b >> i & 1 for i in range(4)] for b in range(16)], bool)
-    is_exact(tables, HOST, Probes(bits, np.zeros((16, 0), np.uint16)))
+    for group in GROUPS:
+        is_exact(tables, HOST, Probes(bits, np.zeros((16, 0), np.uint16)), group)
 
 
 def test_every_code_finds_its_row(avr: None) -> None:
@@ -190,7 +198,7 @@ def test_every_code_finds_its_row(avr: None) -> None:
     every = np.arange(1024, dtype=np.uint16)
     frames = Probes(np.zeros((1024, 2), bool), np.stack([every, every[::-1]], axis=1))
     for target in (HOST, TARGETS["avr328p"]):
-        is_exact(tables, target, frames, apart=target is not HOST)
+        is_exact(tables, target, frames, GROUPS[0], apart=target is not HOST)
 
 
 # A hand beside another, in memory whose neighbours are watched; unknown inputs; names of every length of buffer.
@@ -261,7 +269,7 @@ def test_the_core_is_the_same_for_every_build() -> None:
 
 def test_tables_beyond_16_bits_are_refused() -> None:
     with pytest.raises(FirmwareError, match=r"the tables have \d+ pairs of entries, but firmware has at most 65535"):
-        Layout(make_tables(classes=400, switches=400, joints=0, reach=5))
+        Layout(make_tables(classes=400, switches=100, joints=0, reach=5))
     with pytest.raises(FirmwareError, match="no switch and no joint"):
         Layout(make_tables(switches=0, joints=0))
 

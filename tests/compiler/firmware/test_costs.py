@@ -53,6 +53,13 @@ def wide_tables() -> IntegerTables:
     return make_tables(1, classes=14, switches=33, joints=16, bins=16, reach=300)
 
 
+def test_switches_share_look_ups_where_there_is_flash_for_it(tables: IntegerTables) -> None:
+    small, wide = make_tables(switches=8, joints=0), make_tables(classes=30, switches=48, joints=0)
+    assert [fit_for(SMALL, each).layout.group for each in (small, tables, wide)] == [4, 4, 1]
+    assert fit_for(TARGETS["avr2560"], tables).layout.group == 4
+    assert fit_for(TARGETS["host"], tables).layout.group == 4
+
+
 def test_a_fit_is_said_in_a_sentence(tables: IntegerTables) -> None:
     for part, unit in ((SMALL, "cycles"), (TARGETS["cortex-m4"], "instructions")):
         fit = fit_for(part, tables)
@@ -66,7 +73,7 @@ def test_a_fit_is_said_in_a_sentence(tables: IntegerTables) -> None:
 
 def test_what_takes_too_much_flash_or_ram_is_refused_with_a_remedy(wide_tables: IntegerTables) -> None:
     assert SMALL.formula is not None
-    cost = estimate(SMALL.formula, Layout(wide_tables), avr=True)
+    cost = estimate(SMALL.formula, Layout(wide_tables, 1), avr=True)
     assert fit_for(SMALL, wide_tables, cost.flash).cost == cost
     told = (
         f"about {cost.flash} bytes of flash and {cost.ram} of RAM on an atmega328p, but {cost.flash - 1} and 2048 are"

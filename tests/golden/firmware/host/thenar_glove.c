@@ -11,23 +11,27 @@ static const thenar_pair rows[] THENAR_FLASH = {
     /* The entries of a row: power grip, tip pinch, lateral pinch. */
     START(120, -40), START(7, 0), START(0, 0), START(0, 0),
 
-    /* switches: thumb tip */
+    /* switches: thumb tip, index tip, index middle, middle tip */
     PAIR(310, 205), PAIR(-80, 0), PAIR(0, 0), PAIR(0, 0),
-
-    /* switches: index tip */
     PAIR(-45, 260), PAIR(33, 0), PAIR(0, 0), PAIR(0, 0),
-
-    /* switches: index middle */
+    PAIR(265, 465), PAIR(-47, 0), PAIR(0, 0), PAIR(0, 0),
     PAIR(90, -12), PAIR(-7, 0), PAIR(0, 0), PAIR(0, 0),
-
-    /* switches: middle tip */
+    PAIR(400, 193), PAIR(-87, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(45, 248), PAIR(26, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(355, 453), PAIR(-54, 0), PAIR(0, 0), PAIR(0, 0),
     PAIR(150, -300), PAIR(41, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(460, -95), PAIR(-39, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(105, -40), PAIR(74, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(415, 165), PAIR(-6, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(240, -312), PAIR(34, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(550, -107), PAIR(-46, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(195, -52), PAIR(67, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(505, 153), PAIR(-13, 0), PAIR(0, 0), PAIR(0, 0),
 
-    /* switches: palm radial */
+    /* switches: palm radial, palm ulnar */
     PAIR(400, -390), PAIR(-120, 0), PAIR(0, 0), PAIR(0, 0),
-
-    /* switches: palm ulnar */
     PAIR(77, -8), PAIR(260, 0), PAIR(0, 0), PAIR(0, 0),
+    PAIR(477, -398), PAIR(140, 0), PAIR(0, 0), PAIR(0, 0),
 
     /* joints: thumb_rotation */
     PAIR(-200, 180), PAIR(90, 0), PAIR(0, 0), PAIR(0, 0),
@@ -42,8 +46,8 @@ static const thenar_pair rows[] THENAR_FLASH = {
 };
 
 static const thenar_bins bins[] THENAR_FLASH = {
-    {0u, 0u, 2u, 28u},
-    {1u, 3u, 2u, 44u},
+    {0u, 0u, 2u, 76u},
+    {1u, 3u, 2u, 92u},
 };
 
 static const uint16_t thresholds[] THENAR_FLASH = {
@@ -76,9 +80,11 @@ const thenar_model thenar_glove_model = {
     .n_bins = 2u,
     .n_lines = 0u,
     .n_grids = 0u,
-    .found = 9u,
+    .found = 5u,
     .step = 60511u,
     .shift = 16u,
+    .group = 4u,
+    .groups_of_byte = 2u,
     .sum = thenar_sum,
     .rows = rows,
     .bins = bins,

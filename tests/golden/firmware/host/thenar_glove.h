@@ -16,7 +16,7 @@ extern "C" {
 #define THENAR_GLOVE_CLASSES 3u
 #define THENAR_GLOVE_SWITCHES 6u
 #define THENAR_GLOVE_JOINTS 2u
-#define THENAR_GLOVE_MEMORY 21u /**< Words of memory for thenar_init(). */
+#define THENAR_GLOVE_MEMORY 17u /**< Words of memory for thenar_init(). */
 #define THENAR_GLOVE_NAME_BYTES 14u /**< Of the longest name, its end included. */
 
 /** The grasp types. */
