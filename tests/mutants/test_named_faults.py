@@ -84,8 +84,8 @@ FAULTS = (
     Fault(
         "of tied classes the build takes the last",
         "runtime/build.py",
-        "self.manifest.classes[biased_scores.index(max(biased_scores))]",
-        "self.manifest.classes[len(biased_scores) - 1 - biased_scores[::-1].index(max(biased_scores))]",
+        "self.classes[scores.index(max(scores))]",
+        "self.classes[len(scores) - 1 - scores[::-1].index(max(scores))]",
         "tests/runtime/test_build.py",
     ),
     Fault(
@@ -98,8 +98,8 @@ FAULTS = (
     Fault(
         "exp is taken of scores as they are, not less the greatest",
         "compiler/elementary.py",
-        "odds = exp(block - top)",
-        "odds = exp(block)",
+        "odds = exp(scores - top)",
+        "odds = exp(scores)",
         "tests/compiler/test_elementary.py",
     ),
     Fault(
