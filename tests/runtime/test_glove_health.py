@@ -40,6 +40,18 @@ def test_a_switch_that_changes_faster_than_a_hand_chatters() -> None:
     assert chattering.switches == 0
 
 
+def test_a_switch_recovers_while_another_still_chatters() -> None:
+    chattering, found = Chattering(2), []
+    for number in range(400):
+        chattering.frame(number * SECOND // 100, 0b11 * (number % 2) & (0b11 if number < 120 else 0b10), 0b11)
+        found.append(chattering.switches)
+    assert (found[119], found[-1]) == (0b11, 0b10)
+    alone = Chattering(1)
+    for number in range(400):
+        alone.frame(number * SECOND // 100, number % 2 if number < 120 else 0, 1)
+        assert alone.switches == found[number] & 1
+
+
 def test_a_closed_switch_read_now_and_then_does_not_chatter() -> None:
     chattering = Chattering(1)
     for number in range(250):

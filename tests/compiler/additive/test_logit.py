@@ -14,7 +14,7 @@ from sklearn.linear_model import LogisticRegression
 from thenar.compiler.elementary import softmax
 from thenar.compiler.trainers.base import BoostingError
 from thenar.compiler.trainers.logit import PENALTY, SMOOTHNESS, ColumnTables, fit_logit
-from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE
+from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE, MINIMA
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -166,3 +166,25 @@ def test_score_tables_add_what_the_columns_add(linear: bool) -> None:
 def test_what_makes_no_sense_is_refused(changes: dict[str, Any], because: str) -> None:
     with pytest.raises(BoostingError, match=because):
         fit_logit(*grasps(0), 3, **changes)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"penalty": 2.0},
+        {"smoothness": 1.0},
+        {"tolerance": 1e-3},
+        {"weights": np.arange(1.0, 61.0)},
+        {"held": np.arange(60) < 30},
+        {"counted": 6},
+        {"linear": True},
+    ],
+    ids=lambda change: "".join(change),
+)
+def test_a_remembered_minimum_is_that_of_the_same_fit(change: dict[str, Any]) -> None:
+    X, labels = grasps(5)
+    labels[:30] %= 2  # none of these rows is of the last class
+    plain, changed = (numbers(fit_logit(X, labels, 3, **settings)) for settings in ({}, change))
+    MINIMA.clear()
+    assert numbers(fit_logit(X, labels, 3, **change)) == changed != plain
+    assert not any(rows.flags.writeable for rows in MINIMA.values())

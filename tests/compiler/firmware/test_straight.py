@@ -9,6 +9,10 @@ from thenar.compiler.firmware.words import numbered
 from thenar.runtime.model.integers import IntegerTables
 
 from .conftest import make_tables
+from .test_core import made
+
+# Instructions that change their first register.
+CHANGING = {"ldi", "ldd", "mov", "movw", "clr", "add", "adc", "sub", "sbc", "subi", "sbci", "lsl", "lsr", "ror"}
 
 
 def of_switch(row: list[int]) -> Straight:
@@ -35,6 +39,22 @@ def test_an_entry_of_0_costs_nothing_and_a_multiple_of_256_one_instruction() -> 
     assert len(two.instructions) - len(none.instructions) == 4  # with the branch
     assert len(fine.instructions) - len(two.instructions) == 3
     assert [function.cycles - none.cycles for function in (one, two, fine)] == [2, 4, 7]
+
+
+def test_the_registers_of_a_caller_are_restored() -> None:
+    """By avr-gcc's convention a function may change r0, r18 to r27, r30 and r31; r1 is 0 again at its end."""
+    free = {"r0", *(f"r{number}" for number in (*range(18, 28), 30, 31))}
+    for types in (2, 9, 14, 30):
+        function = straight(Layout(made(classes=types, switches=9, joints=3, lines=3, constant=(0,))))
+        assert function is not None
+        lines = [line for _, code in function.steps for line in code if not line.endswith(":")]
+        pushed = [line.split()[1] for line in lines if line.startswith("push")]
+        assert [line.split()[1] for line in lines if line.startswith("pop")] == pushed[::-1]
+        changed = {line.replace(",", " ").split()[1] for line in lines if line.split()[0] in CHANGING}
+        changed |= {"r31"} if any(line.startswith("movw r30") for line in lines) else set()
+        assert changed <= free | {"r1"} | set(pushed)
+        at_r1 = [line for line in lines if line.startswith("mul ") or line.replace(",", " ").split()[1:2] == ["r1"]]
+        assert at_r1[-1] == "clr r1"
 
 
 def test_more_than_13_types_take_another_pass() -> None:

@@ -103,6 +103,16 @@ def test_every_fault_is_counted_as_the_runtime_scores_it(
             )
 
 
+def test_two_joints_of_a_grid_may_decide_only_together() -> None:
+    cells, none = np.array([[[0, 9], [9, 0]], [[9, 0], [9, 0]]], np.int16), np.empty(0, np.uint16)
+    zeros, step = np.zeros((2, 2), np.int16), np.array([4], np.uint16)
+    grid, rows = Grid((0, 1), (step, step), cells), (zeros[:1], zeros[:1])
+    tables = IntegerTables.of(zeros[0], zeros[:0], (none, none), rows, zeros[:0], zeros, 1.0, (grid,))
+    codes, labels = np.array([[9, 9]], np.uint16), np.zeros(1, np.intp)
+    found = count_faults(tables, np.zeros((1, 0), bool), codes, labels, labels)
+    assert (found.correct, found.lost, found.pairs) == (1, (1, 1), (0,))
+
+
 def test_the_worst_fault_of_each_kind_names_its_inputs() -> None:
     random = np.random.default_rng(3)
     tables = tables_of(random, 3, 3, 1, slope=False)
