@@ -27,8 +27,8 @@ _LN2_LOW = 1.9082149292705877e-10
 _EXP_UNDERFLOW = -746.0
 # Elements that are processed in one block: 256 KiB of doubles fit a processor's cache.
 _CACHED = 1 << 15
-# glibc returns freed memory above twice the largest array ever freed to the system, and faults it in again, which takes
-# longer than the arithmetic. Free an array close to 32 MiB, the largest that it respects; its pages are never touched.
+# glibc gives memory back to the system if more is free than twice the largest array ever freed. To fault it in again
+# takes longer than the arithmetic. So an array close to 32 MiB, the largest that counts, is freed here, untouched.
 np.empty(31 << 20, np.uint8)
 _EXP_TERMS = tuple(1.0 / math.factorial(n) for n in range(13, 1, -1))
 _LOG_TERMS = tuple(2.0 / n for n in range(23, 1, -2))

@@ -58,8 +58,9 @@ def estimate(formula: Formula, layout: Layout, *, avr: bool) -> Cost:
 
 
 def table_bytes(layout: Layout, *, avr: bool) -> int:
-    """Return the bytes of flash of the tables, without names and rejection, or of straight-line code in their place,
-    with which the linker leaves out a part of the core.
+    """Return the bytes of flash of the tables, without names and rejection.
+
+    Straight-line code takes the place of tables; the linker then leaves out a part of the core.
     """
     tables, means = layout.tables, 2 * layout.means.size
     if avr and (function := straight(layout)) is not None:

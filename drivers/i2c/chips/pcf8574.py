@@ -7,28 +7,37 @@ _PINS = ("A0", "A1", "A2", "P0", "P1", "P2", "P3", "VSS", "P4", "P5", "P6", "P7"
 _DOUBT = "the body's width (7.5 mm) is not confirmed: some sellers' parts have 3.9 mm"
 
 
-class Pcf8574Model(Device):
-    """No registers: written bytes are the latch, and a pin is high if both its latch and its external level are."""
+class LatchedModel(Device):
+    """A latch for every eight pins and no registers; bytes go to the latches by turns, from the first after a START.
 
-    pins = 8
+    A pin is high if both its latch and its external level are.
+    """
+
     has_registers = False
 
     def reset(self) -> None:
         """Reset to the state after power-on."""
-        self._latch = 0xFF
+        self._latches = [0xFF] * (self.pins // 8)
 
     def write(self, data: bytes) -> None:
         """Process the bytes of one write message."""
-        if data:
-            self._latch = data[-1]
+        for number, byte in enumerate(data):
+            self._latches[number % len(self._latches)] = byte
 
     def read(self, length: int) -> bytes:
         """Return the bytes of one read message."""
-        return bytes((self._latch & self.levels,)) * length
+        ports = (number % len(self._latches) for number in range(length))
+        return bytes(self._latches[port] & self.port(port) for port in ports)
 
     def poke(self, register: int, value: int) -> None:
         """Set a register to `value` without a bus write."""
-        self._latch = value
+        self._latches[register % len(self._latches)] = value
+
+
+class Pcf8574Model(LatchedModel):
+    """One latch."""
+
+    pins = 8
 
 
 class Pcf8574(Chip):

@@ -1,30 +1,13 @@
 """NXP and TI PCF8575: sixteen quasi-bidirectional pins and no registers."""
 
-from .base import TSSOP24, Chip, ChipPackage, Device, Reading, Write, byte_pins, pins_of_24, port_pins
+from .base import TSSOP24, Chip, ChipPackage, Reading, Write, byte_pins, pins_of_24, port_pins
+from .pcf8574 import LatchedModel
 
 
-class Pcf8575Model(Device):
-    """Two latches of eight pins and no registers; bytes alternate between them after every START."""
+class Pcf8575Model(LatchedModel):
+    """Two latches."""
 
     pins = 16
-    has_registers = False
-
-    def reset(self) -> None:
-        """Reset to the state after power-on."""
-        self._latches = [0xFF, 0xFF]
-
-    def write(self, data: bytes) -> None:
-        """Process the bytes of one write message."""
-        for number, byte in enumerate(data):
-            self._latches[number % 2] = byte
-
-    def read(self, length: int) -> bytes:
-        """Return the bytes of one read message."""
-        return bytes(self._latches[number % 2] & self.port(number % 2) for number in range(length))
-
-    def poke(self, register: int, value: int) -> None:
-        """Set a register to `value` without a bus write."""
-        self._latches[register & 1] = value
 
 
 class Pcf8575(Chip):

@@ -120,6 +120,15 @@ def test_lost_switches_refuse_nothing_by_being_lost(build: Build) -> None:
     assert lasting(live, 0, 1, 1000, lost=0b010000)[0].grasp == NONE
 
 
+def test_a_lost_switch_is_not_counted_as_closed(build: Build) -> None:
+    lost = np.array(flags(0b000001))
+    assert build.recognise(flags(FULL), []).grasp == NONE
+    found = build.recognise(flags(FULL), [], lost_switches=lost)
+    assert (found.grasp != NONE, found.degraded) == (True, True)
+    assert build.recognise(flags(0b000011), [], lost_switches=np.array(flags(0b111100))).grasp != NONE
+    assert build.recognise(flags(0b000001), [], lost_switches=lost & False).grasp == NONE
+
+
 @given(st.data())
 def test_with_none_a_standing_is_that_of_one_more_class(make_build: MakeBuild, data: st.DataObject) -> None:
     build = make_build(data.draw(st.integers(0, 9)), joints=0)

@@ -81,7 +81,6 @@ static void prepare(thenar_glove_line *line, const point_codes *codes)
     const int64_t step = (rises ? codes->second : codes->first) - low;
     const uint64_t steep = (uint64_t)((step < 0) ? -step : step) / (uint64_t)span;
     const int64_t unit = (int64_t)span * (INT64_C(1) << FRACTION);
-    uint32_t inexact, to_end;
 
     line->window = 4u;
     while ((line->window < ((uint32_t)span * 4u)) && (line->window < 131072u)) {
@@ -90,7 +89,7 @@ static void prepare(thenar_glove_line *line, const point_codes *codes)
     line->falls = step < 0;
     line->from = begin + (line->falls ? (int32_t)(line->window / 2u) : -(int32_t)(line->window / 2u));
     line->from = (line->from < -FARTHEST) ? -FARTHEST : ((line->from > FARTHEST) ? FARTHEST : line->from);
-    to_end = (uint32_t)(line->falls ? (line->from + FARTHEST) : (FARTHEST - line->from));
+    const uint32_t to_end = (uint32_t)(line->falls ? (line->from + FARTHEST) : (FARTHEST - line->from));
     line->window = (line->window > to_end) ? to_end : line->window;
     const int64_t at_from = (low * span) + (step * ((int64_t)line->from - begin)) + (unit / 2);
     const int64_t rest = ((at_from % unit) + unit) % unit;
@@ -103,15 +102,13 @@ static void prepare(thenar_glove_line *line, const point_codes *codes)
     line->offset = (uint32_t)(((uint64_t)rest / (uint64_t)span) >> (8u - line->shift));
     line->gain = (uint32_t)(steep >> (8u - line->shift));
     line->mask = ((uint32_t)0x10000u << line->shift) - 1u;
-    inexact = (2u * line->window) + 2u;
-    line->safe = 0u;
-    line->exact = false;
+    const uint32_t inexact = (2u * line->window) + 2u;
+
     if ((((steep * line->window) >> (8u - line->shift)) < HIGHEST_VALUE) && (line->mask > inexact)) {
         const uint64_t dropped = (uint64_t)((1u << (8u - line->shift)) - 1u);
 
-        line->safe = line->mask - inexact;
         line->exact = ((step % span) == 0) && (((steep | ((uint64_t)rest / (uint64_t)span)) & dropped) == 0u);
-        line->safe = line->exact ? UINT32_MAX : line->safe;
+        line->safe = line->exact ? UINT32_MAX : (line->mask - inexact);
     }
 }
 
