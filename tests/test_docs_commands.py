@@ -42,7 +42,7 @@ NOT_RUN = {
     "thenar run build/ --glove glove.toml --sink ros:/thenar": "needs a glove",
     "thenar simulate crowd --subjects 20 --repetitions 6 -o hands.grasps": "is for the rates below",
     "thenar evaluate hands.grasps --by subject --protocol nested --tables compositions --prune 30 --trainer logit": (
-        "takes minutes"
+        "is for the rates below, too"
     ),
 }
 # Commands that take too long for `make test`: there a page runs up to the first of them.
