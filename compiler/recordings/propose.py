@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
@@ -91,18 +91,22 @@ def _first_oddity(table: Table) -> str:
     if len(table.columns) == 1:
         (name,) = table.columns
         return f"its rows have one cell each, under {shortened(repr(name))}: name the `delimiter` in a columns.toml"
-    odd: list[tuple[int, str, str]] = []
-    for name, column in table.columns.items():
+    return min(_oddities(table, table.columns), default=(0, "", ""))[2]
+
+
+def _oddities(table: Table, names: Iterable[str]) -> Iterator[tuple[int, str, str]]:
+    """Yield the first cell of each column that is no number where others are: its row, the column, and a sentence."""
+    for name in names:
+        column = table.columns[name]
         wrong = np.flatnonzero(numbers(column, table.decimal).wrong)
         if not wrong.size:
             continue
         row, cell = int(wrong[0]), str(column[wrong[0]]).strip()
         shown = f"{list_rows(table.rows[[row]])} has {shortened(repr(cell))} in column {shortened(repr(name))}"
         if cell[:1] in ("[", "("):
-            odd.append((row, name, f"{shown}: write a list of numbers in each cell, or a column for each number"))
+            yield row, name, f"{shown}: write a list of numbers in each cell, or a column for each number"
         elif 2 * wrong.size < len(column):
-            odd.append((row, name, f"{shown}, which holds numbers elsewhere: correct the cell or delete the row"))
-    return min(odd)[2] if odd else ""
+            yield row, name, f"{shown}, which holds numbers elsewhere: correct the cell or delete the row"
 
 
 def _by_file(table: Table, proposal: ColumnProposal, paths: tuple[str, ...]) -> ColumnProposal:
@@ -203,7 +207,8 @@ class _Search:
         self.columns = [facts_of(table, name) for name in table.columns]
         self.chosen: dict[str, tuple[str, ...]] = {}
         self.why: dict[str, str] = {}
-        self.out: dict[str, str] = {}
+        texts = (column.name for column in self.columns if column.values is None)
+        self.out = {name: sentence for _, name, sentence in _oddities(table, texts)}
 
     def choose(self, key: str, column: Facts, why: str) -> None:
         """Give a column the role `key`."""
@@ -257,7 +262,7 @@ class _Search:
             self.chosen["label"] = self.chosen.pop("object")
             self.why["label"] = f"{unnamed}: the objects are what can be recognised"
             return
-        texts = [column for column in self.rest if column.values is None and 1 < column.distinct <= _TYPES]
+        texts = [column for column in self.free if column.values is None and 1 < column.distinct <= _TYPES]
         if not texts:
             raise TableError(
                 f"{self.table.what}: no column looks like the grasp type: name it in a columns.toml (`label`)"

@@ -209,3 +209,14 @@ ODDITIES = {
 def test_the_error_names_the_first_oddity(text: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("t.csv").write_text(text)
     assert ODDITIES[text] in refused("t.csv", capsys)
+
+
+def test_a_column_with_a_broken_cell_is_left_out_by_its_row(capsys: pytest.CaptureFixture[str]) -> None:
+    broken = "grasp,trial,a,b\nA,1,0,1.5\nB,1,x,2.5\nA,2,1,3\nB,2,1,4\n"
+    Path("t.csv").write_text(broken)
+    assert run(["import", "t.csv", "-o", "t.grasps", "--yes"]) == 0
+    told = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "a left out row 3 has 'x' in column 'a', which holds numbers elsewhere: correct the cell" in told
+    Path("t.csv").write_text(broken.replace("grasp", "kind"))
+    assert run(["import", "t.csv", "-o", "t.grasps", "--yes", "--overwrite"]) == 0
+    assert "kind label" in " ".join(capsys.readouterr().out.replace("│", " ").split())
