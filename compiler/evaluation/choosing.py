@@ -272,7 +272,7 @@ def _tested(task: tuple[Samples, Fold, list[Training], list[int]]) -> tuple[str,
     _, first, trial = np.unique(test.trials, return_index=True, return_inverse=True)
     weights, held = 1.0 / np.bincount(trial)[trial], ~test.is_none[first]
     if len(trainings) == 1:
-        models: tuple[Model, ...] = (trainings[0].train(learning),)
+        models: tuple[Model, ...] = (trainings[0].draft(learning),)
     else:
         rounds = [int(training.settings["rounds"] or 0) for training in trainings]
         models = trainings[int(np.argmax(rounds))].stages(learning, rounds)

@@ -130,6 +130,10 @@ class Trainer(ABC):
             and settings only, to the last bit.
         """
 
+    def draft(self, samples: "Samples", settings: Mapping[str, Any]) -> Model:
+        """Return a model to compare settings and trainers by, which need not be as precise as that of `train`."""
+        return self.train(samples, settings)
+
     def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> tuple[Model, ...]:
         """Return a model for each of these numbers of rounds, from one training; see `train`.
 
@@ -220,6 +224,10 @@ class Training:
     def train(self, samples: "Samples", report: Report | None = None) -> Model:
         """Return the trainer's model of `samples`."""
         return TRAINERS.named(self.trainer).train(self._rows(samples), self.settings, report)
+
+    def draft(self, samples: "Samples") -> Model:
+        """Return the trainer's model of `samples` for a comparison."""
+        return TRAINERS.named(self.trainer).draft(self._rows(samples), self.settings)
 
     def stages(self, samples: "Samples", rounds: Sequence[int]) -> tuple[Model, ...]:
         """Return the trainer's models of `samples` after each of these numbers of rounds."""

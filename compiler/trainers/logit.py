@@ -15,7 +15,7 @@ from thenar.runtime.model.terms.line import Line
 from ..elementary import Floats, on_one_grid
 from ..workers import check_memory
 from .base import BoostingError, Report, Setting, Trainer, check_rows
-from .newton import TOLERANCE, Column, Fit, Ruler, columns_of
+from .newton import DRAFT_TOLERANCE, TOLERANCE, Column, Fit, Ruler, columns_of
 
 if TYPE_CHECKING:
     from ..samples import Samples
@@ -198,6 +198,10 @@ class Logit(Trainer):
         given = {**settings, "max_bins": settings["max_bins"] or BINS, "linear": bool(settings["linear"])}
         tables = fit_logit(samples.inputs, samples.labels, samples.n_classes, **given, **of_none(samples))
         return tables.score_tables(samples.n_switches)
+
+    def draft(self, samples: "Samples", settings: Mapping[str, Any]) -> ScoreTables:
+        """Return the tables of a less precise minimum."""
+        return self.train(samples, {**settings, "tolerance": DRAFT_TOLERANCE})
 
 
 def of_none(samples: "Samples") -> dict[str, Any]:

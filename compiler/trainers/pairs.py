@@ -24,7 +24,7 @@ from .base import BoostingError, Report, Setting, Trainer, check_rows
 from .binning import BinnedColumn, bin_columns
 from .logit import BINS, count_of, of_none, spread_out, tables_of
 from .logit import MEMBER as LOGIT
-from .newton import TOLERANCE, Column, Fit, columns_of, sparse
+from .newton import DRAFT_TOLERANCE, TOLERANCE, Column, Fit, columns_of, sparse
 
 if TYPE_CHECKING:
     from ..samples import Samples
@@ -139,6 +139,10 @@ class Pairs(Trainer):
         return fit_pairs(
             samples.switches, samples.codes, samples.labels, samples.n_classes, **given, **of_none(samples)
         )
+
+    def draft(self, samples: "Samples", settings: Mapping[str, Any]) -> ScoreTables:
+        """Return the tables of less precise minima."""
+        return self.train(samples, {**settings, "tolerance": DRAFT_TOLERANCE})
 
 
 MEMBER = Pairs()

@@ -92,7 +92,7 @@ def test_every_candidate_is_scored_as_if_it_were_trained_alone(by: str | None) -
         hits, loss = 0, 0.0
         for fold in folds:
             learning, test = samples.rows(fold.train), samples.rows(fold.test)
-            scores = candidate.train(learning).scores(test.switches, test.codes)
+            scores = candidate.draft(learning).scores(test.switches, test.codes)
             for trial in np.unique(test.trials):
                 own = scores[test.trials == trial]
                 label = test.labels[test.trials == trial][0]
