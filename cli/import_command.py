@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from thenar.compiler.recordings.importer import ImportReport
     from thenar.compiler.recordings.propose import ColumnProposal
 
+# The joints whose coding is shown: those of a hand.
+_MOST_CODED = 24
+
 
 def _existing(context: click.Context, argument: click.Parameter, given: tuple[str, ...]) -> tuple[Path, ...]:
     """Return the paths, each of which is there, or is a pattern of files: a path with fields in braces."""
@@ -141,10 +144,12 @@ def _print(report: "ImportReport", output: Path) -> None:
     if rounded := [cost for cost in report.coding if cost.rounds]:
         numbers = ("step", "largest error", "rms error", "values before", "after")
         coding = table(("joint", "unit", *numbers), numbers, "Coding")
-        for cost in rounded:
+        for cost in rounded[:_MOST_CODED]:
             errors = (f"{cost.step:g}", f"{cost.largest_error:.3g}", f"{cost.rms_error:.3g}")
             coding.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
         out().print(coding)
+        if len(rounded) > _MOST_CODED:
+            echo(f"and {counted(len(rounded) - _MOST_CODED, 'joint')} more: --json lists them all")
     echo(
         f"{output}: {trials_of_frames(report.frames, report.trials, report.rests)}, "
         f"{counted(report.grasp_types, 'grasp type')} ({report.taxonomy}); "
