@@ -14,7 +14,7 @@ from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.base import HIGHEST_CODE, CoreTerm
 from thenar.runtime.model.terms.bins import Bins
 
-from ..elementary import Floats, add_exactly
+from ..elementary import Floats, add_exactly, on_grids
 from ..trainers.base import Model
 from ..trainers.stumps import Stumps, spread
 
@@ -86,14 +86,16 @@ def _joint(
 
 
 def _sums(contributions: Floats, classes: NDArray[np.intp], n_classes: int, stops: list[int]) -> Floats:
-    """Return the sums of the first n contributions for each n in `stops`, ascending, in two parts: (stops, 2, K)."""
-    total = carry = np.zeros(n_classes)
-    sums, done = [], 0
-    for stop in stops:
-        for stump in range(done, stop):
-            term = np.full(n_classes, contributions[1, stump])
-            term[classes[stump]] = contributions[0, stump]
-            total, carry = add_exactly(total, carry, term)
-        sums.append((total, carry))
-        done = stop
-    return np.array(sums)
+    """Return the sums of the first n contributions for each n in `stops`, ascending, in two parts: (stops, 2, K).
+
+    Each part is exact: the sum of the contributions on a grid, and of their remainders on a finer one.
+    """
+    n = stops[-1]
+    interval = np.searchsorted(stops, np.arange(n), side="right")
+    parts = []
+    for grid in on_grids(contributions[:, :n].reshape(1, -1)):
+        own, other = grid.units.reshape(2, -1)
+        sums = np.tile(np.bincount(interval, other, len(stops))[:, np.newaxis], n_classes)
+        np.add.at(sums, (interval, classes[:n]), own - other)
+        parts.append(np.ldexp(np.cumsum(sums, axis=0), -grid.exponents[0]))
+    return np.stack(parts, axis=1)
