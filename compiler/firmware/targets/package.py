@@ -10,6 +10,8 @@ from functools import partial
 from itertools import count, islice
 from typing import TYPE_CHECKING, Any
 
+from thenar.firmware_templates.rendering import render
+
 from .base import Formula, Target
 from .cores import M0PLUS, M4, RV32
 
@@ -48,18 +50,20 @@ class Package(Target):
         """Return path -> text of the package thenar_NAME: the classifier in src/, the files that each ecosystem
         requires, a self test in check/, and an example for Arduino.
         """
-        from thenar.firmware_templates.rendering import render
-
         from ..probes import CHECKS, check_header
         from ..words import inputs_in_words, markdown
 
         name, names, sensors = library.name, library.names, library.sensors
-        counts = {"switches": len(names.switches), "joints": len(names.joints)}
+        inputs = inputs_in_words(len(names.switches), len(names.joints))
         values = {
-            **{"name": name, "version": _VERSION, "thenar": markdown(names.thenar), "checks": CHECKS},
-            **{**counts, "on_pins": sensors.on_pins, "known": sensors.known},
+            "name": name,
+            "version": _VERSION,
+            "thenar": markdown(names.thenar),
+            "checks": CHECKS,
+            "switches": names.switches,
+            "sensors": sensors,
             "points": [(n, *map(markdown, (sensor.name, *sensor.says))) for n, sensor in enumerate(sensors.every)],
-            "sentence": f"Recognises {len(names.grasps)} grasp types from {inputs_in_words(**counts)} of a glove.",
+            "sentence": f"Recognises {len(names.grasps)} grasp types from {inputs} of a glove.",
             "sources": library.sources,
             "headers": [f"src/{path}" for path in library.whole if path.endswith(".h")],
         }
