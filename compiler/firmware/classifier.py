@@ -65,8 +65,30 @@ class Library:
     @cached_property
     def files(self) -> dict[str, str]:
         """The classifier alone, name -> text: the core, and the tables thenar_NAME.h and .c."""
+        names, layout, tables = self.names, self.layout, self.layout.tables
+        texts, prefix = answers_of(names), f"THENAR_{self.name.upper()}"
+        switches, joints = [switch.name for switch in names.switches], [joint.name for joint in names.joints]
+        values = {
+            "name": self.name,
+            "names": names,
+            "tables": tables,
+            "layout": layout,
+            "cells": _cells,
+            "notes": [*map(comment, self.notes)],
+            "inputs": inputs_in_words(tables.n_switches, tables.n_joints),
+            "nothing_held": none_of(names),
+            "texts": [string(f"{text}\0") for text in texts[:-1]] + [string(texts[-1])],
+            "name_bytes": 1 + max(len(text.encode()) for text in texts),
+            "softmax": Softmax(tables.scale),
+            "columns": _remark(f"The entries of a row: {', '.join(map(comment, names.grasps))}."),
+            "rows": [*_row_lines(layout.start[None], layout, "START"), *_section_lines(names, layout)],
+            "slopes": _row_lines([line.row.astype(int) for line in tables.slopes], layout, "SLOPES"),
+            "straight": straight(layout),
+            "grasp_enum": _enumerators(f"{prefix}_GRASP", names.grasps, names.grasps),
+            "switch_enum": _enumerators(f"{prefix}_SWITCH", switches, switches),
+            "joint_enum": _enumerators(f"{prefix}_JOINT", joints, map(joint_in_words, names.joints)),
+        }
         files = {name: file_text(f"core/{name}") for name in CORE_FILES}
-        values = _values(self.name, self.names, self.layout, self.notes)
         for ending in (".h", ".c"):
             files[f"thenar_{self.name}{ending}"] = render(f"tables/thenar_NAME{ending}.j2", **values)
         return files
@@ -97,34 +119,6 @@ def _cells(cells: Iterable[object], suffix: str = "") -> str:
     """Return cells without breaks as lines, each cell followed by `suffix` and a comma."""
     text = " ".join(f"{cell}{suffix}," for cell in cells)
     return "\n".join(_INDENT + line for line in wrap(text, COLUMNS - len(_INDENT), break_on_hyphens=False))
-
-
-def _values(name: str, names: Manifest, layout: Layout, notes: Sequence[str]) -> dict[str, object]:
-    """Return the values for the templates of the tables."""
-    tables, texts, prefix = layout.tables, answers_of(names), f"THENAR_{name.upper()}"
-    switches = [switch.name for switch in names.switches]
-    return {
-        "name": name,
-        "names": names,
-        "tables": tables,
-        "layout": layout,
-        "cells": _cells,
-        "notes": [*map(comment, notes)],
-        "inputs": inputs_in_words(tables.n_switches, tables.n_joints),
-        "nothing_held": none_of(names),
-        "texts": [string(f"{text}\0") for text in texts[:-1]] + [string(texts[-1])],
-        "name_bytes": 1 + max(len(text.encode()) for text in texts),
-        "softmax": Softmax(tables.scale),
-        "columns": _remark(f"The entries of a row: {', '.join(map(comment, names.grasps))}."),
-        "rows": [*_row_lines(layout.start[None], layout, "START"), *_section_lines(names, layout)],
-        "slopes": _row_lines([line.row.astype(int) for line in tables.slopes], layout, "SLOPES"),
-        "straight": straight(layout),
-        "grasp_enum": _enumerators(f"{prefix}_GRASP", names.grasps, names.grasps),
-        "switch_enum": _enumerators(f"{prefix}_SWITCH", switches, switches),
-        "joint_enum": _enumerators(
-            f"{prefix}_JOINT", [joint.name for joint in names.joints], map(joint_in_words, names.joints)
-        ),
-    }
 
 
 def _section_lines(names: Manifest, layout: Layout) -> Iterable[str]:

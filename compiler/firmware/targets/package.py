@@ -4,7 +4,6 @@ plain CMake. Targets differ in the core whose cost is estimated, and in the pins
 Layout and fields of the Arduino library are those of its specification, revision 1.5.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import count, islice
@@ -83,7 +82,9 @@ class Package(Target):
         said = [comment(f"{sensor.name}: {' and '.join(sensor.says)}") for sensor in sensors.every]
         plain = [number for number, switch in enumerate(library.names.switches) if switch.threshold is None]
         names = [comment(library.names.switches[number].name) for number in plain]
-        pins = list(islice(self._digital_pins(), len(names) + _ADDRESS_PINS + _REGISTER_PINS))
+        # In the order of their use; on a known part, analog pins from the last on follow the digital ones.
+        usable = (*self.digital, *reversed(self.analog)) if self.digital else (n for n in count(_FIRST) if n != _LED)
+        pins = list(islice(usable, len(names) + _ADDRESS_PINS + _REGISTER_PINS))
         analog = [*map(str, self.analog)] if self.digital else [f"A{number}" for number in range(len(said))]
         analog += ["0"] * (len(said) - len(analog))  # multiplexers replace the rest
 
@@ -110,13 +111,6 @@ class Package(Target):
             "address_pins_behind_registers": pins[_REGISTER_PINS:][:_ADDRESS_PINS],
             "output_pins": analog[: -(-len(said) // _ON_MULTIPLEXER)],
         }
-
-    def _digital_pins(self) -> Iterator[int]:
-        """Yield the digital pins in the order of their use; on a known part, the analog ones from the last on, too."""
-        if self.digital:
-            yield from (*self.digital, *reversed(self.analog))
-        else:
-            yield from (number for number in count(_FIRST) if number != _LED)
 
 
 _NEXT = "{folder}/README.md explains how to use it in each ecosystem"
