@@ -28,15 +28,13 @@ class Point(NamedTuple):
 
 
 class CodeLine(Struct, frozen=True):
-    """The line through two points, with codes clipped to `least` to `most`.
+    """The line through two points; codes are clipped to 0 to `HIGHEST_CODE`.
 
     Raises ValueError if the two have the same reading, or are further apart than the C can hold.
     """
 
     a: Point
     b: Point
-    least: int = 0
-    most: int = HIGHEST_CODE
 
     def __post_init__(self) -> None:
         farthest = max(abs(self.a.reading), abs(self.b.reading), abs(self.b.reading - self.a.reading))
@@ -51,7 +49,7 @@ class CodeLine(Struct, frozen=True):
         span, above = last - first, min(max(reading, -FARTHEST), FARTHEST) - first
         whole, rest = divmod(low * span + (high - low) * above + (span << FRACTION - 1), span << FRACTION)
         nearest = whole - (whole & 1) if rest == 0 else whole
-        return min(max(nearest, self.least), self.most)
+        return min(max(nearest, 0), HIGHEST_CODE)
 
 
 def code_point(coded: Calibration, value: float) -> int:

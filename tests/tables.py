@@ -1,10 +1,13 @@
-"""Manifests of integer tables that nobody trained."""
+"""Manifests of integer tables that nobody trained, and the codes of readings as a run has them."""
 
 import hashlib
 
+from thenar.compiler.firmware.sensors import CodeGrid, Sensor
+from thenar.runtime.code_line import CodeLine, Point
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.recipe import Recipe
+from thenar.runtime.sources.rows import _Grid
 
 
 def describe(tables: IntegerTables) -> Manifest:
@@ -22,3 +25,16 @@ def describe(tables: IntegerTables) -> Manifest:
         proof=Proof(16, tables.scale, tables.bound, 6.5, 13.0, 10, 0),
         rates=(Recognised("training", 0, 1, 10, 10),),
     )
+
+
+def grid_code(grid: CodeGrid, reading: int) -> int:
+    """Return the code of a stream's number."""
+    last = grid.first + grid.steps
+    return min(max(_Grid((grid.low, grid.high), grid.first, last).code(reading), grid.first), last)
+
+
+def code_of(sensor: Sensor, reading: int) -> int:
+    """Return the code of a known sensor's reading."""
+    assert sensor.readings is not None
+    first, second = map(Point, sensor.readings, sensor.codes)
+    return CodeLine(first, second).code(reading if sensor.grid is None else grid_code(sensor.grid, reading))

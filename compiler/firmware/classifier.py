@@ -5,18 +5,15 @@ the decoder of segments and the costs that a build has learnt for it.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 from textwrap import wrap
-from typing import Any
 
 from thenar.firmware_templates.rendering import file_text, render
-from thenar.runtime.manifest import Manifest, Rejection
-from thenar.runtime.model.terms.line import Slope
+from thenar.runtime.manifest import Manifest
 from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.softmax import Softmax
 
 from . import FirmwareError
-from .layout import Layout, Rows, StoredBins
+from .layout import Layout, Rows
 from .sensors import Sensors, codes_files, sensors_of
 from .straight import straight
 from .words import answers_of, check_name, comment, identifiers, inputs_in_words, joint_in_words, none_of, string
@@ -38,7 +35,6 @@ _INDENT = "    "
 
 LAG_US = 150_000
 _MOST_STATES = 255  # which a byte numbers
-_NO_CHANGE = {"enter": 0, "direct": 0, "leave": 0}
 
 
 @dataclass(frozen=True)
@@ -69,8 +65,30 @@ class Library:
     @cached_property
     def files(self) -> dict[str, str]:
         """The classifier alone, name -> text: the core, and the tables thenar_NAME.h and .c."""
+        names, layout, tables = self.names, self.layout, self.layout.tables
+        texts, prefix = answers_of(names), f"THENAR_{self.name.upper()}"
+        switches, joints = [switch.name for switch in names.switches], [joint.name for joint in names.joints]
+        values = {
+            "name": self.name,
+            "names": names,
+            "tables": tables,
+            "layout": layout,
+            "cells": _cells,
+            "notes": [*map(comment, self.notes)],
+            "inputs": inputs_in_words(tables.n_switches, tables.n_joints),
+            "nothing_held": none_of(names),
+            "texts": [string(f"{text}\0") for text in texts[:-1]] + [string(texts[-1])],
+            "name_bytes": 1 + max(len(text.encode()) for text in texts),
+            "softmax": Softmax(tables.scale),
+            "columns": _remark(f"The entries of a row: {', '.join(map(comment, names.grasps))}."),
+            "rows": [*_row_lines(layout.start[None], layout, "START"), *_section_lines(names, layout)],
+            "slopes": _row_lines([line.row.astype(int) for line in tables.slopes], layout, "SLOPES"),
+            "straight": straight(layout),
+            "grasp_enum": _enumerators(f"{prefix}_GRASP", names.grasps, names.grasps),
+            "switch_enum": _enumerators(f"{prefix}_SWITCH", switches, switches),
+            "joint_enum": _enumerators(f"{prefix}_JOINT", joints, map(joint_in_words, names.joints)),
+        }
         files = {name: file_text(f"core/{name}") for name in CORE_FILES}
-        values = _values(self.name, self.names, self.layout, self.notes)
         for ending in (".h", ".c"):
             files[f"thenar_{self.name}{ending}"] = render(f"tables/thenar_NAME{ending}.j2", **values)
         return files
@@ -97,60 +115,10 @@ class Library:
         return [path for path in self.whole if path.endswith(".c")]
 
 
-def _lines(cells: Iterable[object]) -> list[str]:
-    """Return cells without breaks as lines, separated by commas."""
-    text = ", ".join(map(str, cells))
-    width = COLUMNS - len(_INDENT)
-    return [_INDENT + line for line in wrap(f"{text},", width, break_on_hyphens=False)] if text else []
-
-
-def _values(name: str, names: Manifest, layout: Layout, notes: Sequence[str]) -> dict[str, object]:
-    """Return the values for the templates of the tables."""
-    tables, texts = layout.tables, answers_of(names)
-    own, pairs = layout.bins[: len(layout.binned)], layout.bins[len(layout.binned) :]
-    return {
-        "name": name,
-        "upper": name.upper(),
-        "notes": [*map(comment, notes)],
-        "digest": names.tables_sha256[:16],
-        "inputs": inputs_in_words(tables.n_switches, tables.n_joints),
-        "classes": tables.n_classes,
-        "switches": tables.n_switches,
-        "joints": tables.n_joints,
-        "nothing_held": none_of(names),
-        "names": [string(f"{text}\0") for text in texts[:-1]] + [string(texts[-1])],
-        "name_bytes": 1 + max(len(text.encode()) for text in texts),
-        "memory": layout.memory,
-        "row_pairs": layout.row_pairs,
-        "group": layout.group,
-        "found": layout.found,
-        "softmax": Softmax(tables.scale),
-        "columns": _remark(f"The entries of a row: {', '.join(map(comment, names.grasps))}."),
-        "rows": [*_row_lines(layout.start[None], layout, "START"), *_section_lines(names, layout)],
-        "slopes": _row_lines([line.row.astype(int) for line in tables.slopes], layout, "SLOPES"),
-        "lines": [f"{_INDENT}{_line(line)}," for line in tables.slopes],
-        "bins": [f"{_INDENT}{_bins(each)}," for each in own],
-        "n_bins": len(own),
-        "grids": [f"{_INDENT}{_grid(*pair)}," for pair in zip(pairs[::2], pairs[1::2], strict=True)],
-        "thresholds": _lines(f"{step}u" for step in layout.thresholds),
-        "means": [line for row in layout.means.astype("int16").tolist() for line in _lines(row)],
-        "rejection": _rejection(names.rejection),
-        "straight": straight(layout),
-        **_enumerations(name, names),
-    }
-
-
-def _bins(bins: StoredBins) -> str:
-    return f"{{{bins.joint}u, {bins.first_threshold}u, {bins.half}u, {bins.first_row}u}}"
-
-
-def _grid(down: StoredBins, across: StoredBins) -> str:
-    return f"{{{len(across.thresholds) + 1}u, {_bins(down)}, {_bins(across)}}}"
-
-
-def _line(line: Slope) -> str:
-    left, right = max(line.gain, 0), max(-line.gain, 0)
-    return f"{{{line.joint}u, {line.low}u, {line.high - line.low}u, {left}u, {right}u}}"
+def _cells(cells: Iterable[object], suffix: str = "") -> str:
+    """Return cells without breaks as lines, each cell followed by `suffix` and a comma."""
+    text = " ".join(f"{cell}{suffix}," for cell in cells)
+    return "\n".join(_INDENT + line for line in wrap(text, COLUMNS - len(_INDENT), break_on_hyphens=False))
 
 
 def _section_lines(names: Manifest, layout: Layout) -> Iterable[str]:
@@ -165,8 +133,9 @@ def _row_lines(rows: Iterable[Rows], layout: Layout, macro: str) -> list[str]:
     found = []
     for row in rows:
         entries = row.tolist() + [0] * (2 * layout.row_pairs - len(row))
-        found += _lines(f"{macro}({low},\xa0{high})" for low, high in zip(entries[::2], entries[1::2], strict=True))
-    return [line.replace("\xa0", " ") for line in found]
+        pairs = zip(entries[::2], entries[1::2], strict=True)
+        found.append(_cells(f"{macro}({low},\xa0{high})" for low, high in pairs).replace("\xa0", " "))
+    return found
 
 
 def _remark(text: str) -> list[str]:
@@ -176,31 +145,10 @@ def _remark(text: str) -> list[str]:
     return [*lines[:-1], lines[-1] + " */"]
 
 
-def _rejection(rejection: Rejection | None) -> dict[str, object] | None:
-    if rejection is None:
-        return None
-    return {
-        "least_scores": _lines(rejection.least_scores),
-        "closed": _lines(f"{count}u" for count in chain(*rejection.closed)),
-        "ranges": _lines(f"{code}u" for code in chain(*chain(*rejection.ranges))),
-        "outside": rejection.outside,
-    }
-
-
-def _enumerations(name: str, names: Manifest) -> dict[str, list[str]]:
-    """Return the lines of the enumerations in the header."""
-    kinds = {
-        "grasp": [(grasp, comment(grasp)) for grasp in names.grasps],
-        "switch": [(switch.name, comment(switch.name)) for switch in names.switches],
-        "joint": [(joint.name, comment(joint_in_words(joint))) for joint in names.joints],
-    }
-    return {f"{kind}_enum": _enumerators(f"THENAR_{name}_{kind}".upper(), each) for kind, each in kinds.items()}
-
-
-def _enumerators(prefix: str, named: Sequence[tuple[str, str]]) -> list[str]:
+def _enumerators(prefix: str, names: Sequence[str], described: Iterable[str]) -> list[str]:
     """Return the lines of enumerators, each with its description; the description comes first if it is too long."""
     lines = []
-    for number, (word, (_, what)) in enumerate(zip(identifiers([own for own, _ in named]), named, strict=True)):
+    for number, (word, what) in enumerate(zip(identifiers(names), map(comment, described), strict=True)):
         line, more = f"{prefix}_{word} = {number},", f" /**< {what} */"
         if len(_INDENT + line + more) <= COLUMNS:
             lines.append(line + more)
@@ -217,15 +165,18 @@ def segment_files(name: str, model: SegmentModel) -> dict[str, str]:
 
     Raises FirmwareError if there are too many states.
     """
-    values = decoder_values(model)
     limit = -(-model.most * 256 // model.gain) << model.shift
     clipped = model.most if limit <= 65535 else min((65535 >> model.shift) * model.gain >> 8, model.most)
-    values |= {
+    states, rings = _laid_out(model)
+    values = {
         "name": name,
-        "upper": name.upper(),
+        "model": model,
+        "lag": lag_of(model),
+        "states": states,
+        "groups": rings,
+        "waiting": rings[-1][1] if rings else 0,
         "limit": min(limit, 65535),
         "clipped": clipped,
-        "one_leave": len(set(model.leave)) == 1,
     }
     costs = {
         f"thenar_{name}_segments{ending}": render(f"tables/thenar_NAME_segments{ending}.j2", **values)
@@ -234,46 +185,29 @@ def segment_files(name: str, model: SegmentModel) -> dict[str, str]:
     return {path: file_text(f"core/{path}") for path in SEGMENT_FILES} | costs
 
 
-def decoder_values(model: SegmentModel) -> dict[str, Any]:
-    """Return the values for a template of the decoder in any language. Raises FirmwareError for too many states."""
+def lag_of(model: SegmentModel) -> int:
+    """Return the ticks until a tick's state is known. Raises FirmwareError if the decoder cannot number the states."""
     if model.n_types >= _MOST_STATES:
         raise FirmwareError(f"{model.n_types} grasp types: the segment decoder takes at most {_MOST_STATES - 1}")
-    states, rings = _laid_out(model)
-    return {
-        "model": model,
-        "types": model.n_types,
-        "refusal": model.refusal,
-        "lag": lag_of(model),
-        "states": states,
-        "groups": rings,
-        "waiting": rings[-1]["end"] if rings else 0,
-        "mask_bytes": -(-len(states) // 8),
-    }
-
-
-def lag_of(model: SegmentModel) -> int:
-    """Return the ticks until a tick's state is known."""
     return min(max(LAG_US // model.tick_us, 1), 250)
 
 
-def _laid_out(model: SegmentModel) -> tuple[list[dict[str, int]], list[dict[str, int]]]:
-    """Return the costs of each state, and its ring and place in it; and the rings in which states wait until they have
-    lasted long enough, one for each shortest duration: from `begin` to `end`, `width` a row.
+def _laid_out(model: SegmentModel) -> tuple[list[tuple[int, ...]], list[tuple[int, int, int]]]:
+    """Return for each state the costs to enter, from none and from another type, to leave, and to stay, its shortest
+    duration, its ring and its place in that; and the rings in which states wait until they have lasted long enough, one
+    for each shortest duration: begin, end, and the states of a row.
     """
-    numbers: dict[int, int] = {}
-    rings: list[dict[str, int]] = []
-    end, K = 0, model.n_types
+    numbers, rings, end = dict[int, int](), list[tuple[int, int, int]](), 0
     for least in sorted({each for each in model.least if each > 1}, key=model.least.index):
         width, begin = model.least.count(least), end
         end = begin + width * (least - 1)
         numbers[least] = len(rings)
-        rings.append({"begin": begin, "end": end, "width": width})
+        rings.append((begin, end, width))
     usual = max(model.stay, key=model.stay.count)
-    states = []
-    for k, least in enumerate(model.least):
-        change = {"enter": model.enter[k], "direct": model.direct[k], "leave": model.leave[k]} if k < K else _NO_CHANGE
+    # A change costs what the type says; the state none adds nothing.
+    changes = zip((*model.enter, 0), (*model.direct, 0), (*model.leave, 0), strict=True)
+    states = list[tuple[int, ...]]()
+    for k, (change, stay, least) in enumerate(zip(changes, model.stay, model.least, strict=True)):
         # Only differences between states matter, so the usual cost is subtracted; smaller ones wrap modulo 2^16.
-        stay = (model.stay[k] - usual) % 65536
-        place = {"ring": numbers.get(least, 0), "place": model.least[:k].count(least)}
-        states.append({**change, "stay": stay, "least": least, **place})
+        states.append((*change, (stay - usual) % 65536, least, numbers.get(least, 0), model.least[:k].count(least)))
     return states, rings

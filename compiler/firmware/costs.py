@@ -241,21 +241,19 @@ def run_counted(library: Library, target: Target) -> Predictions:
 
 def sizes(library: Library, target: Target) -> tuple[int, int]:
     """Return the bytes of flash and of RAM of a classifier and a hand, without functions that are not called."""
-    if target.compiler is None or target.size is None:
-        raise FirmwareError(
-            f"the target {target.name} has no compiler or no program `size` here: nothing can be measured"
-        )
+    if target.compiler is None:
+        raise FirmwareError(f"the target {target.name} has no compiler here: nothing can be measured")
     name = f"thenar_{library.name}"
     sources = sorted(path for path in library.files if path.endswith(".c"))
     called = [f"-Wl,-u,{symbol}" for symbol in ("hand", "memory", f"{name}_model", *_CALLED)]
     hand = f'#include "{name}.h"\nextern thenar hand;\nextern uint16_t memory[];\nthenar hand;\n'
     hand += f"uint16_t memory[THENAR_{library.name.upper()}_MEMORY];\n"
     with workshop({**library.files, "hand.c": hand}) as folder:
-        compiling = [find(target.compiler), *target.flags]
+        compiling = [compiler := find(target.compiler), *target.flags]
         call([*compiling, *STRICT, *_SECTIONS, "-c", *sources, "hand.c"], folder)
         objects = [path.replace(".c", ".o") for path in (*sources, "hand.c")]
         linking = [*compiling, "-nostartfiles", "-nostdlib", "-Wl,--gc-sections,-e,thenar_classify", *called]
         call([*linking, *objects, "-lgcc", "-o", "linked.elf"], folder)
-        line = call([find(target.size), "linked.elf"], folder).decode().splitlines()[1]
+        line = call([compiler.removesuffix("gcc") + "size", "linked.elf"], folder).decode().splitlines()[1]
     text, data, bss = map(int, line.split()[:3])
     return text + data, data + bss

@@ -59,11 +59,7 @@ def write_folder(files: Mapping[str, str], folder: Path, *, overwrite: bool = Fa
 
 def sums(files: Mapping[str, str]) -> str:
     """Return the output of `sha256sum` for the files, in the order of their names."""
-    return "".join(f"{_digest(text.encode())}  {path}\n" for path, text in sorted(files.items()))
-
-
-def _digest(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
+    return "".join(f"{hashlib.sha256(text.encode()).hexdigest()}  {path}\n" for path, text in sorted(files.items()))
 
 
 def _users_files(folder: Path) -> list[str]:
@@ -73,13 +69,9 @@ def _users_files(folder: Path) -> list[str]:
         return []
     if SUMS not in there:
         raise FirmwareError(f"{folder} is not empty and was not written by thenar: name another folder")
-    ours = _read_sums(folder / SUMS)
+    lines = read_file(folder / SUMS, LARGEST, FirmwareError).decode(errors="replace").splitlines()
+    ours = {path: digest for digest, _, path in (line.partition("  ") for line in lines) if path}
     for path in sorted(ours.keys() & set(there)):
-        if _digest(read_file(folder / path, LARGEST, FirmwareError)) != ours[path]:
+        if hashlib.sha256(read_file(folder / path, LARGEST, FirmwareError)).hexdigest() != ours[path]:
             raise FirmwareError(f"{folder}/{path} was changed since thenar wrote it: move it, or name another folder")
     return [path for path in there if path not in ours and path != SUMS]
-
-
-def _read_sums(path: Path) -> dict[str, str]:
-    lines = read_file(path, LARGEST, FirmwareError).decode(errors="replace").splitlines()
-    return {name: digest for digest, _, name in (line.partition("  ") for line in lines) if name}

@@ -4,10 +4,9 @@ Some frames are extreme, and the others are random. With the C a firmware folder
 """
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
-from textwrap import wrap
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,38 +56,38 @@ class Predictions:
         return 0 if self.cost is None else int(self.cost.max())
 
 
-def check_frames(frames: Frames, layout: Layout) -> None:
-    """Raise FirmwareError unless `frames` is uint8 (n, F)."""
+def sent_frames(frames: Frames, lost: Lost | None, layout: Layout) -> Frames:
+    """Return the frames (n, F) as programs read them: first a bit for each input that is `lost` (n, s + j), switches
+    first, unless that is None.
+
+    Raises FirmwareError unless `frames` is uint8 (n, F).
+    """
     size = layout.frame_size
     if frames.dtype != np.uint8 or frames.ndim != 2 or frames.shape[1] != size:
         raise FirmwareError(f"frames are {frames.dtype} {frames.shape}, but this layout takes uint8 (n, {size})")
+    return frames if lost is None else np.hstack([np.packbits(lost, axis=1, bitorder="little"), frames])
 
 
-def names_in(printed: bytes, layout: Layout) -> tuple[tuple[str, ...], bytes]:
-    """Return the names of the K types that a program printed first, each followed by a zero, and the rest.
+def answers_in(printed: bytes, frames: int, layout: Layout) -> Predictions:
+    """Return the predictions that a program printed: the names of the K types, each followed by a zero; then for each
+    frame K scores, a class, a margin and a probability, and a state where it decodes segments, 16 bits each,
+    little-endian.
 
-    Raises FirmwareError if there are fewer.
+    Raises FirmwareError if there are fewer names, or not as many predictions as frames.
     """
-    *names, rest = printed.split(b"\0", layout.tables.n_classes)
-    if len(names) < layout.tables.n_classes:
-        raise FirmwareError(f"the program printed {len(names)} names for {layout.tables.n_classes} grasp types")
-    return tuple(name.decode(errors="replace") for name in names), rest
-
-
-def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Predictions:
-    """Return the predictions that a program printed: for each frame K scores, a class, a margin and a probability, and
-    a state where it decodes segments, 16 bits each, little-endian.
-
-    Raises FirmwareError unless there is one for every frame.
-    """
-    size, classes = layout.tables.n_classes + 3, layout.tables.n_classes
-    if len(printed) not in (whole := [2 * each * len(frames) for each in (size, size + 1)]):
-        raise FirmwareError(f"the program printed {len(printed)} bytes for {len(frames)} frames of {2 * size} bytes")
-    with_states = len(frames) > 0 and len(printed) == whole[1]
-    words = np.frombuffer(printed, "<u2").astype(np.uint16).reshape(len(frames), size + with_states)
+    classes = layout.tables.n_classes
+    *names, rest = printed.split(b"\0", classes)
+    if len(names) < classes:
+        raise FirmwareError(f"the program printed {len(names)} names for {classes} grasp types")
+    size = classes + 3
+    if len(rest) not in (whole := [2 * each * frames for each in (size, size + 1)]):
+        raise FirmwareError(f"the program printed {len(rest)} bytes for {frames} frames of {2 * size} bytes")
+    with_states = frames > 0 and len(rest) == whole[1]
+    words = np.frombuffer(rest, "<u2").astype(np.uint16).reshape(frames, size + with_states)
     scores, (best, margins, shares) = words[:, :classes].view(np.int16), words[:, classes:size].T
     states = words[:, size] if with_states else None
-    return Predictions(scores, best, margins, shares, states=states)
+    said = tuple(name.decode(errors="replace") for name in names)
+    return Predictions(scores, best, margins, shares, names=said, states=states)
 
 
 def states_of(model: SegmentModel, scores: NDArray[np.integer], refused: NDArray[np.bool_]) -> NDArray[np.uint16]:
@@ -104,47 +103,24 @@ def states_of(model: SegmentModel, scores: NDArray[np.integer], refused: NDArray
 
 
 def record_files(
-    name: str, layout: Layout, machine: Literal["host", "avr"], *, lost: bool = False, segments: bool = False
+    name: str, layout: Layout, machine: Literal["host", "avr", "micropython"], *, lost: bool, segments: bool = False
 ) -> dict[str, str]:
     """Return the files, name -> text, of the program that classifies every frame with the tables `name`.
 
-    With `lost`, frames have the format of `with_lost`; with `segments`, it also pushes each to the decoder of segments.
-    """
-    values = record_values(name, layout, lost=lost) | {"segments": segments}
-    files = {"main.c": render(f"checking/{machine}_main.c.j2", **values)}
-    if machine == "avr" and not lost:
-        return files
-    return files | {"record.h": render("checking/record.h.j2", **values, named=machine != "avr")}
-
-
-def record_values(name: str, layout: Layout, *, lost: bool = False) -> dict[str, Any]:
-    """Return the values for the template of a program, in any language, that classifies every frame.
-
-    It reads the file "frames" and writes the file "predictions", or stdin and stdout: first the names, then the input
-    of `answers_from`.
+    It reads what `sent_frames` returns, with inputs that are `lost` or not, and writes what `answers_in` takes: from
+    stdin to stdout, in MicroPython from the file "frames" to the file "predictions", and on an AVR in memory. With
+    `segments`, it also pushes each to the decoder of segments; a module of MicroPython knows whether it has one.
     """
     tables = layout.tables
     lost_bytes = -(-(tables.n_switches + tables.n_joints) // 8) if lost else 0
-    return {
-        "name": name,
-        "lost_bytes": lost_bytes,
-        "stream_ticks": STREAM_TICKS,
-        "classes": tables.n_classes,
-        "switches": tables.n_switches,
-        "joints": tables.n_joints,
-        "frame_bytes": layout.frame_size + lost_bytes,
-    }
-
-
-def answers_in(printed: bytes, frames: Frames, layout: Layout) -> Predictions:
-    """Return the predictions that a program wrote after the names. Raises FirmwareError like its two parts."""
-    names, rest = names_in(printed, layout)
-    return replace(answers_from(rest, frames, layout), names=names)
-
-
-def with_lost(frames: Frames, lost: Lost | None) -> Frames:
-    """Return the frames (n, F), each preceded by a bit for each input that is `lost` (n, s + j), switches first."""
-    return frames if lost is None else np.hstack([np.packbits(lost, axis=1, bitorder="little"), frames])
+    values = {"name": name, "layout": layout, "tables": tables, "lost_bytes": lost_bytes, "segments": segments}
+    values["stream_ticks"] = STREAM_TICKS
+    if machine == "micropython":
+        return {"main.py": render("checking/record.py.j2", **values)}
+    files = {"main.c": render(f"checking/{machine}_main.c.j2", **values)}
+    if machine == "avr" and not lost:
+        return files
+    return files | {"record.h": render("checking/record.h.j2", **values)}
 
 
 _BYTE, _WORD = 0xFF, 0xFFFF
@@ -235,19 +211,18 @@ def _top(tables: IntegerTables) -> int:
 
 DRAWN = 16  # frames in addition to the two extreme ones
 CHECKS = DRAWN + 2
-_WIDTH = 120
 
 
 def check_header(name: str, layout: Layout) -> str:
     """Return thenar_NAME_check.h: frames, the expected predictions, and a function that compares."""
     frames = self_test_frames(layout)
     what = ("every switch open, lowest codes", "every switch closed, highest codes", *DRAWN * ("drawn",))
-    predictions = layout.tables.scores(frames.bits, frames.codes)
-    rows = zip(what, np.packbits(frames.bits, axis=1, bitorder="little"), frames.codes, predictions, strict=True)
-    checks = [_check(*row) for row in rows]
-    values = {"name": name, "upper": name.upper(), "classes": layout.tables.n_classes, "count": len(checks)}
-    inputs = {"switches": layout.tables.n_switches, "joints": layout.tables.n_joints}
-    return render("checking/check.h.j2", **values, **inputs, checks=checks)
+    packed = np.packbits(frames.bits, axis=1, bitorder="little").tolist()
+    closed = [[f"{byte:#04x}" for byte in row] for row in packed]
+    scores = layout.tables.scores(frames.bits, frames.codes)
+    grasps = scores.argmax(axis=1).tolist()
+    checks = list(zip(what, closed, frames.codes.tolist(), grasps, scores.tolist(), strict=True))
+    return render("checking/check.h.j2", name=name, tables=layout.tables, checks=checks)
 
 
 def self_test_frames(layout: Layout) -> Probes:
@@ -256,30 +231,8 @@ def self_test_frames(layout: Layout) -> Probes:
     They are drawn from a hash: the same build has the same frames with every release of numpy.
     """
     s, turning = layout.tables.n_switches, [turns(layout.tables, joint) for joint in range(layout.tables.n_joints)]
-    draws = _drawn(DRAWN, s + len(turning))
+    stream = hashlib.shake_256(b"thenar self test").digest(2 * DRAWN * (s + len(turning)))
+    draws = np.frombuffer(stream, "<u2").astype(np.uint16).reshape(DRAWN, s + len(turning))
     taken = [[0, codes[-1], *codes[draws[:, s + joint] % len(codes)]] for joint, codes in enumerate(turning)]
     bits = np.vstack([np.zeros((1, s), bool), np.ones((1, s), bool), draws[:, :s] % 2 == 1])
     return Probes(bits, np.array(taken, np.uint16).reshape(len(turning), CHECKS).T)
-
-
-def _drawn(rows: int, columns: int) -> NDArray[np.uint16]:
-    stream = hashlib.shake_256(b"thenar self test").digest(2 * rows * columns)
-    return np.frombuffer(stream, "<u2").astype(np.uint16).reshape(rows, columns)
-
-
-def _check(
-    what: str, closed: NDArray[np.uint8], codes: NDArray[np.uint16], scores: NDArray[np.int64]
-) -> dict[str, object]:
-    """Return a frame's description, and the lines of the initialisers of its members and of its scores."""
-    members = ([f"{byte:#04x}" for byte in closed.tolist()], [str(code) for code in codes.tolist()])
-    return {
-        "what": what,
-        "members": [_wrapped(words, 12) for words in members if words],
-        "grasp": int(scores.argmax()),
-        "scores": _wrapped([str(score) for score in scores.tolist()], 12),
-    }
-
-
-def _wrapped(words: list[str], indent: int) -> list[str]:
-    """Return the words as lines of an initialiser that is indented by `indent` columns."""
-    return wrap(", ".join(words), _WIDTH - indent)

@@ -99,11 +99,6 @@ def rows_files(name: str, names: Manifest, harness: Harness) -> dict[str, str]:
     return {**files, "README.md": render("rows/README.md.j2", name=name, sketches=sketches)}
 
 
-def _checksum(line: str) -> str:
-    """Return the two digits that end a line: of everything between `$` and `*`."""
-    return f"{reduce(xor, line.encode(), 0):02X}"
-
-
 def _sketch(name: str, kept: _Kept, stream: StreamWiring, board: BoardWiring) -> str:
     if lacking := [element for element in kept.columns if element not in board.wired]:
         raise FirmwareError(
@@ -120,6 +115,7 @@ def _sketch(name: str, kept: _Kept, stream: StreamWiring, board: BoardWiring) ->
     matrix = [] if board.matrix is None else list(_matrix_rows(board.matrix, numbers))
     columns = (pin for _, keys in matrix for _, pin, _ in keys)
     analog, channels = _analog_inputs(kept, board)
+    line = ",".join(("columns", *kept.columns))  # everything between `$` and `*`
     return render(
         "rows/NAME.ino.j2",
         name=name,
@@ -127,7 +123,7 @@ def _sketch(name: str, kept: _Kept, stream: StreamWiring, board: BoardWiring) ->
         stream=stream,
         board=board,
         names=[string(f",{name}") for name in kept.columns],
-        checksum=_checksum(",".join(("columns", *kept.columns))),
+        checksum=f"{reduce(xor, line.encode()):02X}",
         pins=pins,
         matrix=matrix,
         pulled_up=dict.fromkeys((*(pin for _, pin, _ in pins), *(pin for pin, _ in matrix), *columns)),

@@ -7,12 +7,13 @@ glove: its `glove.toml` and its calibrations give them, or the program that runs
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from thenar.drivers.calibration import GloveCalibration, poses_of
 from thenar.drivers.errors import SettingError
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.calibration import Meaning, codes_of_bytes, load_calibration, numbers_of, place_of
-from thenar.runtime.code_line import FARTHEST, FRACTION, CodeLine, Point, code_point
+from thenar.runtime.code_line import FARTHEST, FRACTION, code_point
 from thenar.runtime.harness.wiring import Harness, Range, StreamWiring
 from thenar.runtime.manifest import Calibration, Manifest, Threshold
 from thenar.runtime.sources.rows import JOINT_CODES, steps_of
@@ -24,24 +25,13 @@ from .words import comment, identifiers
 _RAW = "raw"
 
 
-@dataclass(frozen=True, slots=True)
-class CodeGrid:
-    """The even grid on which the numbers of a stream are coded first: `low` as `first`, `high` as `last`."""
+class CodeGrid(NamedTuple):
+    """The even grid on which the numbers of a stream are coded first: `low` as `first`, `high` `steps` later."""
 
     low: int
     high: int
     first: int
-    last: int
-
-    @property
-    def steps(self) -> int:
-        """The number of steps between the two."""
-        return self.last - self.first
-
-    def code(self, reading: int) -> int:
-        """Return the code of a number, as in `runtime.sources.rows`."""
-        ends = Point(self.low, 0), Point(self.high, self.steps << FRACTION)
-        return self.first + CodeLine(*ends, least=0, most=self.steps).code(reading)
+    steps: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,18 +50,12 @@ class Sensor:
     readings: tuple[int, int] | None = None
     grid: CodeGrid | None = None
 
-    def code(self, reading: int) -> int:
-        """Return the code of a known sensor's reading: the same as in C."""
-        assert self.readings is not None
-        first, second = map(Point, self.readings, self.codes)
-        return CodeLine(first, second).code(reading if self.grid is None else self.grid.code(reading))
-
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
     """The sensors of a build: joints, then taxels.
 
-    levels  of the taxels: the number of a switch, that of its taxel, and the code above which it is closed
+    levels  of the taxels: the number of a switch, that of the taxel's sensor, and the code above which it is closed
     """
 
     joints: tuple[Sensor, ...]
@@ -118,7 +102,7 @@ def sensors_of(names: Manifest, harness: Harness | None = None, calibration: Glo
     joints = tuple(_joint(joint, meaning, ranges.get(joint.name), known=known) for joint in names.joints)
     thresholds = [(n, switch.threshold) for n, switch in enumerate(names.switches) if switch.threshold is not None]
     coded = {threshold.taxel.name: threshold for _, threshold in thresholds}
-    places = {name: place for place, name in enumerate(coded)}
+    places = {name: place for place, name in enumerate(coded, len(joints))}
     levels = tuple((n, places[threshold.taxel.name], threshold.code) for n, threshold in thresholds)
     return Sensors(joints, _taxels(list(coded.values()), harness), levels)
 
@@ -191,7 +175,7 @@ def _grid(name: str, limits: Range, first: int, last: int) -> CodeGrid:
             f"the range of {name!r} in glove.toml, {low:g} to {high:g}, must be whole numbers within {FARTHEST}: "
             "a board converts its converter's counts; give their range"
         )
-    return CodeGrid(int(low), int(high), first, last)
+    return CodeGrid(int(low), int(high), first, last - first)
 
 
 def codes_files(name: str, sensors: Sensors) -> dict[str, str]:
@@ -200,18 +184,7 @@ def codes_files(name: str, sensors: Sensors) -> dict[str, str]:
         return {}
     values = {
         "name": name,
-        "upper": name.upper(),
-        "sensors": sensors.every,
-        "n_joints": len(sensors.joints),
-        "n_taxels": len(sensors.taxels),
-        "levels": sensors.levels,
-        "sorts": sensors.sorts.capitalize(),
-        "put": " or ".join(
-            ["the code of a joint"] * bool(sensors.joints)
-            + ["which levels of a taxel are closed"] * bool(sensors.taxels)
-        ),
-        "known": sensors.known,
-        "grids": any(sensor.grid for sensor in sensors.every),
+        "sensors": sensors,
         "words": identifiers([sensor.name for sensor in sensors.every]),
         "comments": [comment(f"{sensor.name}: {' and '.join(sensor.says)}") for sensor in sensors.every],
         "fraction": FRACTION,

@@ -25,6 +25,8 @@ from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.sources.rows import _Grid, steps_of
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine, count_limit
 
+from ..tables import code_of, grid_code
+
 SharedLibrary = Callable[..., ctypes.CDLL]
 
 READINGS = range(-FARTHEST - 300, FARTHEST + 301)
@@ -222,8 +224,8 @@ def test_a_stream_s_numbers_have_the_codes_that_a_run_gives_them(
     assert codes.calibrate(0, 10, 60)
     grid = sensors.joints[0].grid
     assert grid is not None
-    again = replace(sensors.joints[0], readings=(grid.code(10), grid.code(60)))
-    assert codes.sweep(0) == [again.code(reading) for reading in READINGS]
+    again = replace(sensors.joints[0], readings=(grid_code(grid, 10), grid_code(grid, 60)))
+    assert codes.sweep(0) == [code_of(again, reading) for reading in READINGS]
 
 
 @pytest.mark.parametrize("calibrated", [False, True], ids=["counts", "calibrated"])

@@ -22,11 +22,9 @@ from thenar.compiler.firmware.probes import (
     Frames,
     Lost,
     Predictions,
-    answers_from,
-    check_frames,
-    names_in,
+    answers_in,
     record_files,
-    with_lost,
+    sent_frames,
 )
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.firmware.tools import LIMIT_S, STRICT, Tool, call, find, lacking, workshop
@@ -64,7 +62,7 @@ class Core:
         limit_s: float = LIMIT_S,
     ) -> Predictions:
         """Return the predictions of the classifier `name` for frames (n, F), as `Target.run` does, with their costs."""
-        check_frames(frames, layout)
+        sent = sent_frames(frames, lost, layout).tobytes()
         segments = f"thenar_{name}_segments.c" in files
         record = record_files(name, layout, "host", lost=lost is not None, segments=segments)["record.h"]
         main = {path: (_HERE / path).read_text() for path in ("main.c", "ticks.h")}
@@ -72,7 +70,7 @@ class Core:
             **files,
             **main,
             "record.h": record,
-            "frames": with_lost(frames, lost).tobytes(),
+            "frames": sent,
         }
         written = self.emulate(given, limit_s)
         return self._counted(written, frames, layout)
@@ -99,16 +97,17 @@ class Core:
     def _counted(self, written: bytes, frames: Frames, layout: Layout) -> Predictions:
         """Return the predictions of the output: names, ticks of one instruction, each prediction and its ticks."""
         size = 2 * layout.tables.n_classes + 10
-        names, written = names_in(written, layout)
+        *names, written = written.split(b"\0", layout.tables.n_classes)
         if len(frames) and len(written) == 4 + (size + 2) * len(frames):  # each with a state
             size += 2
         if len(written) != 4 + size * len(frames):
             raise FirmwareError(f"the program on {self.machine} wrote {len(written)} bytes for {len(frames)} frames")
         records = np.frombuffer(written, np.uint8, offset=4).reshape(len(frames), size)
         ticks = np.ascontiguousarray(records[:, -4:]).view("<u4")[:, 0]
-        predictions = answers_from(records[:, :-4].tobytes(), frames, layout)
+        printed = b"\0".join([*names, records[:, :-4].tobytes()])
+        predictions = answers_in(printed, len(frames), layout)
         instructions = self.instructions(ticks, int.from_bytes(written[:4], "little"))
-        return replace(predictions, cost=instructions, unit="instructions", names=names)
+        return replace(predictions, cost=instructions, unit="instructions")
 
     def instructions(self, ticks: NDArray[np.uint32], of_one: int) -> NDArray[np.uint32]:
         """Return the instructions for each number of ticks, where one instruction took `of_one`."""

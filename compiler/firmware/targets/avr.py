@@ -7,12 +7,14 @@ The programs that run AVR code are linked to libsimavr, which is under the GPL 3
 import atexit
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, ClassVar
+
+from thenar.firmware_templates.rendering import render
 
 from .. import FirmwareError
 from ..tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lacking, workshop
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
     from ..layout import Layout
     from ..probes import Frames, Lost, Predictions
 
-_CLOCK_HZ = 16_000_000  # of the simulated time, which is not measured
 _MAKE: Tool = (("make",), "make")
 _WORDS = 6  # bytes of a prediction after the scores: type, margin, probability
 
@@ -38,16 +39,9 @@ class Avr(Target):
 
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text: the library, a Makefile (program, size, flash) and an initial main()."""
-        from thenar.firmware_templates.rendering import render
-
-        name, tables = library.name, library.layout.tables
-        values = {"name": name, "part": self.part, "programmer": self.programmer, "sources": library.sources}
-        inputs = {"switches": tables.n_switches, "joints": tables.n_joints}
-        return {
-            **library.whole,
-            "Makefile": render("avr_library/Makefile.j2", **values),
-            "main.c": render("avr_library/main.c.j2", name=name, upper=name.upper(), **inputs),
-        }
+        values = {"name": library.name, "target": self, "sources": library.sources, "tables": library.layout.tables}
+        made = {path: render(f"avr_library/{path}.j2", **values) for path in ("Makefile", "main.c")}
+        return library.whole | made
 
     def missing(self) -> str | None:
         """Return which of avr-gcc and simavr is missing, and how to install it; None if neither is."""
@@ -68,13 +62,13 @@ class Avr(Target):
         call; their stack the maximum of all frames, the return address included. With `lost` both are not measured,
         and margin and probability are returned as well.
         """
-        from ..probes import check_frames, record_files, with_lost
+        from ..probes import record_files, sent_frames
 
-        check_frames(frames, layout)
+        sent = sent_frames(frames, lost, layout)
         command = [find(AVR_COMPILER), *STRICT, *self.flags]
         program = harness("simavr_classify")
         main = record_files(name, layout, "avr", lost=lost is not None)
-        sent, entry = with_lost(frames, lost), "classify" if lost is None else "predict"
+        entry = "classify" if lost is None else "predict"
         with workshop({**files, **main}) as folder:
             sources = sorted(path for path in (*files, *main) if path.endswith((".c", ".S")))
             call([*command, *sources, "-o", "classifier.elf"], folder)
@@ -89,10 +83,9 @@ class Avr(Target):
             spans = f"{given:#x}:{sent.shape[1]}", f"{said:#x}:{size}"
             places = (hex(_symbol(found, symbol)) for symbol in (f"thenar_{entry}", "_end"))
             printed = call(
-                [str(program), self.part, str(_CLOCK_HZ), "classifier.elf", *places, *spans], folder, sent.tobytes()
+                [str(program), self.part, str(self.clock_hz), "classifier.elf", *places, *spans], folder, sent.tobytes()
             )
-        predictions = _answers(printed, len(frames), layout, words=0 if lost is None else _WORDS)
-        return predictions if lost is None else replace(predictions, cost=None, unit="", stack=None)
+        return _answers(printed, len(frames), layout, lost=lost is not None)
 
 
 def harness(program: str) -> Path:
@@ -143,29 +136,24 @@ def _symbol(found: Mapping[str, tuple[int, int]], name: str, size: int | None = 
     return address
 
 
-def _answers(printed: bytes, frames: int, layout: "Layout", *, words: int) -> "Predictions":
-    """Return the predictions; `words` is the size of type, margin and probability, 0 where these were not requested."""
+def _answers(printed: bytes, frames: int, layout: "Layout", *, lost: bool) -> "Predictions":
+    """Return the predictions: with type, margin and probability where inputs may be `lost`, else with their costs."""
     import numpy as np
 
     from ..probes import Predictions
 
-    classes = layout.tables.n_classes
-    said = [("said", "<u2", (words // 2,))] if words else []
+    said = [("said", "<u2", (_WORDS // 2,))] if lost else []
     counted = [("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")]
-    record = np.dtype([("scores", "<i2", (classes,)), *said, *counted])
+    record = np.dtype([("scores", "<i2", (layout.tables.n_classes,)), *said, *counted])
     if len(printed) != frames * record.itemsize:
         raise FirmwareError(f"the simulator gave {len(printed)} bytes for {frames} frames of {record.itemsize} bytes")
     records = np.frombuffer(printed, record)
+    scores, grasps = records["scores"].astype(np.int16), records["grasp"].astype(np.uint16)
+    if lost:
+        _, margins, shares = records["said"].astype(np.uint16).T
+        return Predictions(scores, grasps, margins, shares)
     stack = int(records["stack"].max()) if frames else None
-    return Predictions(
-        records["scores"].astype(np.int16),
-        records["grasp"].astype(np.uint16),
-        margins=records["said"][:, 1].astype(np.uint16) if words else None,
-        shares=records["said"][:, 2].astype(np.uint16) if words else None,
-        cost=records["cycles"].astype(np.uint32),
-        unit="cycles",
-        stack=stack,
-    )
+    return Predictions(scores, grasps, cost=records["cycles"].astype(np.uint32), unit="cycles", stack=stack)
 
 
 # `lpm` reaches the first 64 KiB of the flash, which the tables share with all other constants. The clocks are those of
@@ -179,7 +167,6 @@ _avr = partial(
     clock_hz=16_000_000,
     kind="avr",
     compiler=AVR_COMPILER,
-    size=(("avr-size",), "binutils-avr"),
     formula=Formula(
         (279.9, 195.8, 73.24, 34.62, 95.51, 102.7, 81.31, 7.858, 129.9, 29.44, 14.06, 80.66, 0.9945), 2268, 62
     ),

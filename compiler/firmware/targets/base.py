@@ -58,8 +58,8 @@ class Target:
     kind : str, optional
         The name in `thenar verify --firmware` of targets that differ in memory alone: the smallest that fits is
         verified. "" where `run` cannot run anything.
-    compiler, size : Tool, optional
-        The C compiler, called with `flags`, and its program `size`: `--measure` needs both.
+    compiler : Tool, optional
+        The C compiler, called with `flags`, whose name ends in gcc; binutils is next to it. `--measure` needs it.
     """
 
     avr: ClassVar[bool] = False
@@ -80,7 +80,6 @@ class Target:
     formula: Formula | None = None
     kind: str = ""
     compiler: Tool | None = None
-    size: Tool | None = None
     flags: tuple[str, ...] = ()
 
     @property

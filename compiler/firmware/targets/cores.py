@@ -6,7 +6,7 @@ from ..tools import ARM_COMPILER, RISCV_COMPILER
 from .base import Formula, Target
 
 _core = partial(Target, help="a library for this core, to link with the vendor's start-up code")
-_cortex = partial(_core, compiler=ARM_COMPILER, size=(("arm-none-eabi-size",), "binutils-arm-none-eabi"))
+_cortex = partial(_core, compiler=ARM_COMPILER)
 
 # Memories and clocks are those of common boards: SAMD21 (Arduino Zero), nRF52840 (Arduino Nano 33 BLE), GD32VF103CB
 # (Longan Nano).
@@ -44,7 +44,6 @@ MEMBER = (
         clock_hz=108_000_000,
         formula=Formula((85.24, 37.89, 8.52, 8.935, 13.89, 16.45, 18.55, 0, 20.28, 8.469, 5.186, 0, 0), 1488, 32),
         compiler=RISCV_COMPILER,
-        size=(("riscv64-unknown-elf-size",), "binutils-riscv64-unknown-elf"),
         flags=("-march=rv32imac", "-mabi=ilp32", "-misa-spec=2.2", "-O2", "-ffreestanding"),
     ),
 )

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from thenar.firmware_templates.rendering import render
+
 from ..tools import HOST_COMPILER, STRICT, call, find, lacking, workshop
 from .base import Target
 
@@ -22,8 +24,6 @@ class Host(Target):
 
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text: the library, a Makefile (library, self test, size) and the self test."""
-        from thenar.firmware_templates.rendering import render
-
         from ..probes import CHECKS, check_header
 
         return {
@@ -42,37 +42,22 @@ class Host(Target):
         return lacking(HOST_COMPILER)
 
     def run(
-        self,
-        files: Mapping[str, str],
-        name: str,
-        layout: "Layout",
-        frames: "Frames",
-        *,
-        lost: "Lost | None" = None,
-        compiler: str | None = None,
+        self, files: Mapping[str, str], name: str, layout: "Layout", frames: "Frames", *, lost: "Lost | None" = None
     ) -> "Predictions":
         """Return the predictions for frames (n, F), as in the base class.
 
-        `compiler` is "gcc" or "clang", by default the first that is installed. A finding of the address and undefined
-        behaviour sanitizers is an error.
+        A finding of the address and undefined behaviour sanitizers is an error.
         """
-        from ..probes import answers_in, check_frames, record_files, with_lost
+        from ..probes import answers_in, record_files, sent_frames
 
-        check_frames(frames, layout)
-        command = find(HOST_COMPILER if compiler is None else ((compiler,), compiler))
-        main = record_files(
-            name,
-            layout,
-            "host",
-            lost=lost is not None,
-            segments=f"thenar_{name}_segments.c" in files,
-        )
+        sent = sent_frames(frames, lost, layout).tobytes()
+        command = find(self.compiler or HOST_COMPILER)
+        segments = f"thenar_{name}_segments.c" in files
+        main = record_files(name, layout, "host", lost=lost is not None, segments=segments)
         with workshop({**files, **main}) as folder:
             sources = sorted(path for path in (*files, *main) if path.endswith(".c"))
             call([command, *STRICT, *_SANITIZED, *sources, "-o", "classifier"], folder)
-            return answers_in(
-                call([str(folder / "classifier")], folder, with_lost(frames, lost).tobytes()), frames, layout
-            )
+            return answers_in(call([str(folder / "classifier")], folder, sent), len(frames), layout)
 
 
 MEMBER = Host(

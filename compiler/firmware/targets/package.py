@@ -4,11 +4,12 @@ plain CMake. Targets differ in the core whose cost is estimated, and in the pins
 Layout and fields of the Arduino library are those of its specification, revision 1.5.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import count, islice
 from typing import TYPE_CHECKING, Any
+
+from thenar.firmware_templates.rendering import render
 
 from .base import Formula, Target
 from .cores import M0PLUS, M4, RV32
@@ -48,18 +49,20 @@ class Package(Target):
         """Return path -> text of the package thenar_NAME: the classifier in src/, the files that each ecosystem
         requires, a self test in check/, and an example for Arduino.
         """
-        from thenar.firmware_templates.rendering import render
-
         from ..probes import CHECKS, check_header
         from ..words import inputs_in_words, markdown
 
         name, names, sensors = library.name, library.names, library.sensors
-        counts = {"switches": len(names.switches), "joints": len(names.joints)}
+        inputs = inputs_in_words(len(names.switches), len(names.joints))
         values = {
-            **{"name": name, "version": _VERSION, "thenar": markdown(names.thenar), "checks": CHECKS},
-            **{**counts, "on_pins": sensors.on_pins, "known": sensors.known},
+            "name": name,
+            "version": _VERSION,
+            "thenar": markdown(names.thenar),
+            "checks": CHECKS,
+            "switches": names.switches,
+            "sensors": sensors,
             "points": [(n, *map(markdown, (sensor.name, *sensor.says))) for n, sensor in enumerate(sensors.every)],
-            "sentence": f"Recognises {len(names.grasps)} grasp types from {inputs_in_words(**counts)} of a glove.",
+            "sentence": f"Recognises {len(names.grasps)} grasp types from {inputs} of a glove.",
             "sources": library.sources,
             "headers": [f"src/{path}" for path in library.whole if path.endswith(".h")],
         }
@@ -79,7 +82,9 @@ class Package(Target):
         said = [comment(f"{sensor.name}: {' and '.join(sensor.says)}") for sensor in sensors.every]
         plain = [number for number, switch in enumerate(library.names.switches) if switch.threshold is None]
         names = [comment(library.names.switches[number].name) for number in plain]
-        pins = list(islice(self._digital_pins(), len(names) + _ADDRESS_PINS + _REGISTER_PINS))
+        # In the order of their use; on a known part, analog pins from the last on follow the digital ones.
+        usable = (*self.digital, *reversed(self.analog)) if self.digital else (n for n in count(_FIRST) if n != _LED)
+        pins = list(islice(usable, len(names) + _ADDRESS_PINS + _REGISTER_PINS))
         analog = [*map(str, self.analog)] if self.digital else [f"A{number}" for number in range(len(said))]
         analog += ["0"] * (len(said) - len(analog))  # multiplexers replace the rest
 
@@ -106,13 +111,6 @@ class Package(Target):
             "address_pins_behind_registers": pins[_REGISTER_PINS:][:_ADDRESS_PINS],
             "output_pins": analog[: -(-len(said) // _ON_MULTIPLEXER)],
         }
-
-    def _digital_pins(self) -> Iterator[int]:
-        """Yield the digital pins in the order of their use; on a known part, the analog ones from the last on, too."""
-        if self.digital:
-            yield from (*self.digital, *reversed(self.analog))
-        else:
-            yield from (number for number in count(_FIRST) if number != _LED)
 
 
 _NEXT = "{folder}/README.md explains how to use it in each ecosystem"

@@ -1,5 +1,6 @@
 """The C core: every score, grasp type, margin and probability is Python's, on this machine and on every part."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -125,7 +126,7 @@ def with_missing(tables: IntegerTables, *whole: Probes) -> tuple[Probes, Lost]:
     return frames, lost
 
 
-def is_exact(tables: IntegerTables, runs: Any, frames: Probes, group: int, apart: bool = False, **given: Any) -> None:
+def is_exact(tables: IntegerTables, runs: Any, frames: Probes, group: int, apart: bool = False) -> None:
     """Compare all results on a target with Python's, those with missing inputs among them.
 
     apart  whole frames have a program of their own: on an AVR they go straight into the classifier's memory
@@ -134,7 +135,7 @@ def is_exact(tables: IntegerTables, runs: Any, frames: Probes, group: int, apart
     files = Library("hand", numbered(tables), layout).files
     for some, lost in [(frames, None), with_missing(tables)] if apart else [with_missing(tables, frames)]:
         sent = layout.frame_bytes(some.bits, some.codes)
-        same_as_python(runs.run(files, "hand", layout, sent, lost=lost, **given), tables, some, lost)
+        same_as_python(runs.run(files, "hand", layout, sent, lost=lost), tables, some, lost)
 
 
 @EACH
@@ -149,7 +150,7 @@ def test_results_on_this_machine_are_pythons_without_warnings(shape: dict[str, A
 @EACH
 def test_so_they_are_by_clang_and_with_groups_of_any_size(shape: dict[str, Any], group: int) -> None:
     name, tables = Path(tool("clang")).name, made(1, **shape)
-    is_exact(tables, HOST, probed(tables, 500), group, compiler=name)
+    is_exact(tables, dataclasses.replace(HOST, compiler=((name,), "clang")), probed(tables, 500), group)
 
 
 @pytest.mark.parametrize(("shape", "group"), PAIRED)

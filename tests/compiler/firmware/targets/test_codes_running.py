@@ -17,7 +17,7 @@ from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.harness.loading import parse_harness
 
 from ....conftest import tool
-from ....tables import describe
+from ....tables import code_of, describe
 from ..conftest import make_tables
 
 STREAM = """
@@ -99,7 +99,7 @@ def library(request: pytest.FixtureRequest) -> Callable[[bool], Library]:
 
 
 def python_s(sensors: Sensors, readings: Sequence[int]) -> list[int]:
-    return [sensor.code(reading) for sensor in sensors.every for reading in readings]
+    return [code_of(sensor, reading) for sensor in sensors.every for reading in readings]
 
 
 @pytest.mark.parametrize("name", ["cortex-m0plus", "cortex-m4", "rv32imac"])

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -77,4 +78,4 @@ def test_a_missing_compiler_is_named_with_its_package(monkeypatch: pytest.Monkey
     with pytest.raises(FirmwareError, match="gcc or clang not found; Debian: apt-get install gcc"):
         HOST.run({}, "hand", layout, np.zeros((1, 8), np.uint8))
     with pytest.raises(FirmwareError, match="clang not found; Debian: apt-get install clang"):
-        HOST.run({}, "hand", layout, np.zeros((1, 8), np.uint8), compiler="clang")
+        replace(HOST, compiler=(("clang",), "clang")).run({}, "hand", layout, np.zeros((1, 8), np.uint8))

@@ -27,7 +27,7 @@ from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.softmax import Softmax
 
 from ....conftest import tool
-from ....tables import describe
+from ....tables import code_of, describe, grid_code
 from ..conftest import make_tables, probed, same_as_python
 
 TARGET = TARGETS["micropython"]
@@ -207,16 +207,16 @@ def test_readings_become_python_s_codes(tmp_path: Path, known: bool) -> None:
     lines = [[int(word) for word in line.split()] for line in text.splitlines()]
 
     def codes(every: Sequence[Sensor]) -> list[list[int]]:
-        return [[0 if each.readings is None else each.code(reading) for reading in readings] for each in every]
+        return [[0 if each.readings is None else code_of(each, reading) for reading in readings] for each in every]
 
     again = []
     for n, each in enumerate(sensors.every):
-        first, second = (each.grid.code(count) if each.grid else count for count in (900, 100 + n))
+        first, second = (grid_code(each.grid, count) if each.grid else count for count in (900, 100 + n))
         again.append(replace(each, readings=(first, second)))
     answers = [[int(one.readings[0] != one.readings[1]), 0] for one in again if one.readings]
     assert lines[0] == [int(known)] * count
     assert lines[1:-1] == [*codes(sensors.every), *answers, *codes(again), *answers]
-    found = [each.code(300 + 60 * n) for n, each in enumerate(again)]
+    found = [code_of(each, 300 + 60 * n) for n, each in enumerate(again)]
     bits = np.zeros(tables.n_switches, bool)
     bits[:2] = found[-1] > 90, found[-1] > 400
     held = np.array(found[:-1], np.uint16)

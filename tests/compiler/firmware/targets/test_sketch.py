@@ -21,7 +21,7 @@ from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Switch, Threshold
 
 from ....conftest import tool
-from ....tables import describe
+from ....tables import code_of, describe
 from ..conftest import make_tables
 
 VARIANTS = Path("/usr/share/arduino/hardware/arduino/avr/variants")
@@ -146,7 +146,7 @@ def expected_of(build: Build, sensors: Sensors, known: bool, closed: np.ndarray,
     expected = []
     for one, other in zip(closed, counts.tolist(), strict=True):
         bits = np.insert(one, names.index("pad"), other[-1] > 600) if "pad" in names else one
-        codes = [sensor.code(count) for sensor, count in zip(read, other, strict=False)]
+        codes = [code_of(sensor, count) for sensor, count in zip(read, other, strict=False)]
         expected.append(build.classify(bits, np.array(codes, np.uint16)))
     return expected
 
