@@ -12,7 +12,7 @@ and of the logistic regressions in C.
 
 import argparse
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -183,11 +183,10 @@ class Cost:
         )
 
 
-def _linked(folder: Path, sources: Mapping[str, str], part: str, include: Sequence[str] = ()) -> tuple[int, int]:
+def _linked(folder: Path, sources: Mapping[str, str], part: str) -> tuple[int, int]:
     """Link `program.elf` from the sources in the folder; return bytes of flash and RAM. Ignores warnings of peers."""
     code = sorted(path for path in sources if path.endswith((".c", ".cpp", ".S")))
-    paths = [f"-I{path}" for path in include]
-    call([find(AVR_COMPILER), f"-mmcu={part}", *_HOW, *paths, *code, "-lm", "-o", "program.elf"], folder)
+    call([find(AVR_COMPILER), f"-mmcu={part}", *_HOW, *code, "-lm", "-o", "program.elf"], folder)
     text, data, bss = call(["avr-size", "program.elf"], folder).decode().splitlines()[1].split()[:3]
     return int(text) + int(data), int(data) + int(bss)
 
@@ -211,21 +210,14 @@ def of_ours(layout: Layout, target: Target, frames: Frames, expected: NDArray[np
     return Cost(target.part, middle, most, flash, ram, results.stack, differing, len(frames))
 
 
-def of_peer(
-    name: str,
-    files: Mapping[str, str],
-    frames: Frames,
-    expected: NDArray[np.intp],
-    target: Target,
-    include: Sequence[str] = (),
-) -> Cost:
+def of_peer(name: str, files: Mapping[str, str], frames: Frames, expected: NDArray[np.intp], target: Target) -> Cost:
     """Return the cost of a peer's classifier for raw frames, including feature extraction.
 
     `expected` are its predictions in Python. Raises FirmwareError if it does not fit.
     """
     program = {**files, "main.c": "int predict(void);\nint main(void) { for (;;) predict(); }\n"}
     with workshop(program) as folder:
-        flash, ram = _linked(folder, program, target.part, include)
+        flash, ram = _linked(folder, program, target.part)
         if flash > target.flash or ram > target.ram:
             raise FirmwareError(f"{name} takes {flash} bytes of flash and {ram} of RAM: not on an {target.part}")
         words = [line.split() for line in call(["avr-nm", "-P", "program.elf"], folder).decode().splitlines()]
@@ -289,12 +281,12 @@ def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Row]:
         rows = raw(fold.asked)
         cores = "" if peer.in_c is None else on_cores(peer.in_c(model), rows, expected)
         try:
-            yield Row(peer.name, found, of_peer(peer.name, files, rows, expected, AVR, peer.include), cores)
+            yield Row(peer.name, found, of_peer(peer.name, files, rows, expected, AVR), cores)
         except FirmwareError as lack:
             CONSOLE.print(f"{lack}"[:200], markup=False)
             some = slice(SLOW_ROWS)
             try:
-                cost = of_peer(peer.name, files, rows[some], expected[some], LARGER, peer.include)
+                cost = of_peer(peer.name, files, rows[some], expected[some], LARGER)
             except FirmwareError as also:
                 CONSOLE.print(f"{also}"[:200], markup=False)
             else:

@@ -8,7 +8,7 @@ and 2, and codes are doubled, as int16; or, as uint8, they are in steps of two d
 import importlib.util
 import tempfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, partial
 from itertools import product
 from pathlib import Path
@@ -25,8 +25,8 @@ FORESTS = ((10, 40), (10, 80), (15, 60), (20, 30), (20, 60), (30, 40), (60, 14))
 LOGITS = (Groups(1, 3), Groups(3, 3), Groups(4, 3), Groups(4, 4), Groups(5, 3), Groups(6, 3), Groups(8, 3))
 # Shares of the joints' weights.
 SHARES = (1.0, 0.4, 0.3)
-HIDDEN = 16
-_FLOATS = "float"
+# Neurons of the networks tried.
+HIDDEN = (10, 16)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,6 @@ class Peer:
     files    returns name -> text of a model, which define `predict` over `input`
     in_c     the same for cores of 32 bits; None where it is not measured there
     needs    packages
-    include  folders of headers
     """
 
     name: str
@@ -46,7 +45,6 @@ class Peer:
     files: Callable[[Any], dict[str, str]]
     predictor: Callable[[Any], Predictor]
     needs: tuple[str, ...] = ()
-    include: tuple[str, ...] = field(default=())
     in_c: Callable[[Any], dict[str, str]] | None = None
 
     def answers_of(self, fold: Fold) -> Predictor:
@@ -59,18 +57,13 @@ class Peer:
         return all(importlib.util.find_spec(package) for package in self.needs)
 
 
-def _filling(kind: str, *, step: int) -> str:
-    """Return the C code that extracts features from `input`.
-
-    Switches become 0 and `step`; codes are in steps of two if kind is uint8_t, otherwise multiplied by `step`.
-    """
+def _filling(kind: str, bit: str = "byte & 1", code: str = "input[{0}]") -> str:
+    """Return the C code that extracts features from `input`: each `bit` of switches, and the `code` of each joint."""
     lines = []
     for port in range(PORTS):
         lines.append(f"byte = input[{port}];")
-        for bit in range(min(8, SWITCHES - 8 * port)):
-            value = "(byte & 1) << 1" if step == 2 else "byte & 1"
-            lines.append(f"features[{8 * port + bit}] = {value}; byte >>= 1;")
-    code = "input[{0}] & 0xFE" if kind == "uint8_t" else f"({kind})input[{{0}}] * {step}" if step > 1 else "input[{0}]"
+        bits = range(8 * port, min(8 * port + 8, SWITCHES))
+        lines += [f"features[{number}] = {bit}; byte >>= 1;" for number in bits]
     lines += [f"features[{SWITCHES + joint}] = {code.format(PORTS + joint)};" for joint in range(JOINTS)]
     body = "\n    ".join(lines)
     return (
@@ -108,42 +101,104 @@ def _emlearn_forest(kind: str) -> Callable[[Any], dict[str, str]]:
 
         code = emlearn.convert(model, method="inline", dtype=kind).save(name="forest", format="c", include_proba=False)
         call = f"int predict(void) {{ fill(); return (int)forest_predict(features, {FEATURES}); }}\n"
-        return {"peer.c": f"{code}\n{_filling(kind, step=2)}{call}"}
+        doubled = "input[{0}] & 0xFE" if kind == "uint8_t" else "(int16_t)input[{0}] * 2"
+        return {"peer.c": f"{code}\n{_filling(kind, '(byte & 1) << 1', doubled)}{call}"}
 
     return files
 
 
-def _mlp(fold: Fold) -> Any:
-    from sklearn.neural_network import MLPClassifier
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
+@dataclass(frozen=True, slots=True)
+class Network:
+    """A network of one hidden layer in integers: weights of 8 bits (F, H) and (H, K), and biases of 32."""
 
-    return make_pipeline(StandardScaler(), MLPClassifier((HIDDEN,), max_iter=600, random_state=1)).fit(fold.X, fold.y)
+    hidden: NDArray[np.int8]
+    hidden_bias: NDArray[np.int32]
+    shift: int
+    output: NDArray[np.int8]
+    output_bias: NDArray[np.int32]
+
+    @classmethod
+    def trained(cls, fold: Fold, neurons: int) -> "Network":
+        """Return the network of a fold's rows, trained in floating point and rounded."""
+        from sklearn.neural_network import MLPClassifier
+        from sklearn.preprocessing import StandardScaler
+
+        X = _levels(fold.X)
+        scaler = StandardScaler().fit(X)
+        network = MLPClassifier((neurons,), solver="lbfgs", alpha=1.0, max_iter=2000, random_state=1).fit(
+            scaler.transform(X), fold.y
+        )
+        first, second = network.coefs_[0] / scaler.scale_[:, np.newaxis], network.coefs_[1]
+        scale, last = (127 / np.abs(weights).max() for weights in (first, second))
+        hidden = np.rint(first * scale).astype(np.int8)
+        bias = np.rint((network.intercepts_[0] - scaler.mean_ @ first) * scale).astype(np.int32)
+        # The largest sum of a row becomes at most a byte.
+        shift = max(0, int((X.astype(np.int64) @ hidden + bias).max()).bit_length() - 8)
+        output_bias = np.rint(network.intercepts_[1] * last * scale / 2**shift).astype(np.int32)
+        return cls(hidden, bias, shift, np.rint(second * last).astype(np.int8), output_bias)
+
+    def __call__(self, rows: Rows) -> NDArray[np.intp]:
+        """Return the type (n,) of each row."""
+        sums = _levels(rows).astype(np.int64) @ self.hidden + self.hidden_bias
+        neurons = np.clip(sums >> self.shift, 0, 255)
+        return np.asarray((neurons @ self.output + self.output_bias).argmax(axis=1))
+
+    def files(self) -> dict[str, str]:
+        """Return the C code: loops over tables in flash, with sums of 24 bits on an AVR."""
+        neurons, classes = self.output.shape
+        return {
+            "peer.c": f"""#include <stdint.h>
+#ifdef __AVR__
+#include <avr/pgmspace.h>
+typedef __int24 wide;
+#else
+typedef int32_t wide;
+#define PROGMEM
+#define pgm_read_byte(at) (*(at))
+#define pgm_read_dword(at) (*(at))
+#endif
+{_filling("uint8_t", "(byte & 1) << 6")}
+static const int8_t hidden[] PROGMEM = {{{_cells(self.hidden)}}}, output[] PROGMEM = {{{_cells(self.output)}}};
+static const int32_t hidden_bias[] PROGMEM = {{{_cells(self.hidden_bias)}}};
+static const int32_t output_bias[] PROGMEM = {{{_cells(self.output_bias)}}};
+static wide sum(const int8_t *weights, wide sum, const uint8_t *values, uint8_t n)
+{{
+    while (n--) sum += (int16_t)((int8_t)pgm_read_byte(weights++) * (int16_t)*values++);
+    return sum;
+}}
+int predict(void)
+{{
+    static uint8_t neurons[{neurons}];
+    wide most = -0x7FFFFF;
+    int best = 0;
+    fill();
+    for (uint8_t j = 0; j < {neurons}; j++) {{
+        wide value = sum(hidden + j * {FEATURES}, (wide)pgm_read_dword(hidden_bias + j), features, {FEATURES});
+        value = value < 0 ? 0 : value >> {self.shift};
+        neurons[j] = value > 255 ? 255 : (uint8_t)value;
+    }}
+    for (uint8_t k = 0; k < {classes}; k++) {{
+        wide score = sum(output + k * {neurons}, (wide)pgm_read_dword(output_bias + k), neurons, {neurons});
+        if (score > most) {{ most = score; best = k; }}
+    }}
+    return best;
+}}
+"""
+        }
 
 
-def _emlearn_mlp(model: Any) -> dict[str, str]:
-    """Return emlearn's network, with the standardisation folded into the weights of its first layer."""
-    import emlearn  # pyright: ignore[reportMissingImports]
-
-    scaler, network = model
-    weights, biases = network.coefs_[0] / scaler.scale_[:, np.newaxis], network.intercepts_[0]
-    network.coefs_[0], network.intercepts_[0] = weights, biases - scaler.mean_ @ weights
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "mlp.h"
-        emlearn.convert(network, method="inline").save(file=str(path), name="mlp")
-        code = path.read_text()
-    call = f"int predict(void) {{ fill(); return (int)mlp_predict(features, {FEATURES}); }}\n"
-    return {"peer.c": f"#include <stdint.h>\n{code}\n{_filling(_FLOATS, step=1)}{call}"}
+def _cells(values: NDArray[np.integer]) -> str:
+    return ", ".join(map(str, values.T.ravel().tolist()))
 
 
-def _include(package: str) -> tuple[str, ...]:
-    found = importlib.util.find_spec(package)
-    return () if found is None or found.origin is None else (str(Path(found.origin).parent),)
+def _levels(X: Rows) -> Rows:
+    """Return rows whose switches are 0 or 64, so that their weights are as large as those of joints."""
+    return np.hstack([X[:, :SWITCHES] * 64, X[:, SWITCHES:]])
 
 
 def _in_cpp(header: str, declared: str, call: str) -> dict[str, str]:
     what = "#include <stdint.h>\n#include <string.h>\n#include <math.h>\n"
-    text = f"{what}{header}\n{_filling(_FLOATS, step=1)}{declared}\n"
+    text = f"{what}{header}\n{_filling('float')}{declared}\n"
     return {"peer.cpp": f'{text}extern "C" int predict(void) {{ fill(); return {call}; }}\n'}
 
 
@@ -176,7 +231,7 @@ def _scores(code: str, classes: int) -> dict[str, str]:
     return {
         "peer.c": f"""#include <stdint.h>
 {code}
-{_filling("double", step=1)}
+{_filling("double")}
 int predict(void) {{
     static double scores[{classes}];
     int best = 0;
@@ -264,7 +319,9 @@ def peers() -> Iterator[Peer]:
         for trees, leaves in FORESTS:
             name = f"emlearn, forest {trees} x {leaves}, {what}"
             yield Peer(name, _with(trees, leaves, features), _emlearn_forest(kind), _of(features), ("emlearn",))
-    yield Peer(f"emlearn, MLP of {HIDDEN}", _mlp, _emlearn_mlp, _of(_plain), ("emlearn",), _include("emlearn"))
+    for neurons in HIDDEN:
+        name, network = f"int8 network by hand, {neurons} hidden", partial(Network.trained, neurons=neurons)
+        yield Peer(name, network, Network.files, lambda made: made, in_c=Network.files)
     small = (10, 40)
     forest = f"forest {small[0]} x {small[1]}"
     yield Peer(f"micromlgen, {forest}", _with(*small), _micromlgen, _of(_plain), ("micromlgen",))
