@@ -49,7 +49,7 @@ def stuck(device: str, code: int | None) -> str:
 
 
 MOST_MESSAGES = 42
-_I2C_SLAVE = 0x0703
+I2C_SLAVE = 0x0703
 
 # The specification reserves 1111 1XX: no chip acknowledges this address.
 NOBODY = 0x7F
@@ -131,7 +131,7 @@ class DeviceNode:
         """Select an address. Raises OSError EBUSY if a kernel driver has it."""
         bus = self._ready()
         assert bus.fd is not None
-        ioctl(bus.fd, _I2C_SLAVE, address)
+        ioctl(bus.fd, I2C_SLAVE, address)
         bus.address = None  # smbus2 caches the last address
 
     def write(self, address: int, data: bytes) -> None:
