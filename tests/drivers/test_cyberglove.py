@@ -63,19 +63,13 @@ def test_whichever_of_the_doubtful_is_true_the_glove_is_read(line: PtyLine, doub
     with EmulatedCyberGlove(line, doubts=doubts) as emulated, CyberGlove(str(line.link)) as glove:
         emulated.set(VALUES[18])
         assert read(glove, lambda record: record.sensors == VALUES[18]).status == 0x81
-        assert glove.ask("U") == b"\1"
+        assert emulated.box.settings["U"] == b"\1"
         assert glove.counts.wrong_start + glove.counts.wrong_length == 0
 
 
-def test_every_query_of_the_box_can_be_asked_while_it_streams(line: PtyLine) -> None:
-    with EmulatedCyberGlove(line), CyberGlove(str(line.link), rate_hz=100) as glove:
-        assert glove.ask("T") == b"\x04\x80\x00\x01"
-        assert read(glove)
-        assert glove.ask("M") == MASK_18
-        assert glove.ask("G") == b"\x03"
-        assert read(glove)
-        with pytest.raises(SettingError, match=r"no query \?Z"):
-            glove.ask("Z")
+def test_the_requested_rate_is_set(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link), rate_hz=100) as glove:
+        assert emulated.box.settings["T"] == b"\x04\x80\x00\x01"
         assert read(glove)
         assert glove.counts.wrong_start + glove.counts.wrong_length == 0
 
@@ -169,7 +163,7 @@ def test_a_stream_left_on_is_stopped_and_set_up_anew(line: PtyLine) -> None:
         assert emulated.box.streaming
         with CyberGlove(str(line.link)) as glove:
             assert read(glove).sensors == VALUES[18]
-            assert glove.ask("D") == b"\0"
+            assert emulated.box.settings["D"] == b"\0"
             assert glove.counts.wrong_start + glove.counts.wrong_length == 0
 
 
@@ -210,17 +204,6 @@ def test_what_the_box_mishears_is_sent_again(line: PtyLine, sent: bytes, heard: 
         altered(line, sent, heard)
         with CyberGlove(str(line.link)) as glove:
             assert read(glove) == Record(VALUES[18], status=0x81)
-
-
-def test_a_question_within_a_record_costs_no_later_record(line: PtyLine) -> None:
-    with EmulatedCyberGlove(line), CyberGlove(str(line.link), rate_hz=0.1) as glove:
-        read(glove)
-        line.send(b"S" + VALUES[18][:5])
-        assert glove.read(0.05) is None
-        assert glove.ask("G") == b"\x03"
-        line.send(b"S" + VALUES[18] + b"\x81\0")
-        read(glove, lambda record: record.sensors == VALUES[18])
-        assert glove.counts.wrong_start + glove.counts.wrong_length == 0
 
 
 def test_a_command_left_half_sent_is_overcome(line: PtyLine) -> None:
@@ -379,7 +362,7 @@ def test_only_requested_sensors_are_sent_until_it_is_closed(line: PtyLine, senso
         with CyberGlove(str(line.link), only=some) as glove:
             for _ in range(3):
                 assert read(glove).sensors == bytes(VALUES[sensors][place] for place in sorted(some))
-            assert glove.ask("M") == mask_of([names[place] for place in some])
+            assert emulated.box.settings["M"] == mask_of([names[place] for place in some])
             assert glove.counts.wrong_length == 0
         end = monotonic() + SOON_S
         while emulated.box.settings["M"] != {18: MASK_18, 22: MASK_22}[sensors] and monotonic() < end:
