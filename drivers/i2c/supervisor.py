@@ -131,17 +131,18 @@ def _behaves_like(node: DeviceNode, chip: Chip, address: int) -> bool:
 
 @dataclass(eq=False, slots=True)
 class PlacedChip:
-    """A chip at its location on the bus at `device`, and its health, which only its supervisor changes.
+    """A chip, its location, the numbers of its used pins, and its health, which only its supervisor changes.
+
+    route  the mux's channel that it is on; None: it is directly on the bus
 
     `errors` counts failures, including those that a retry fixed; `last_error` stays. `due` is the time of its next
     check; `checked` counts its checks; `zeros` is their number when zeros from it were last confirmed.
     """
 
-    device: str
     chip: Chip
     address: int
     used: frozenset[int]
-    route: Route | None
+    route: Route | None = None
     present: bool = False
     errors: int = 0
     last_error: str = ""
@@ -153,11 +154,6 @@ class PlacedChip:
     def watched(self) -> Write | None:
         """The write that a reset would lose."""
         return self.chip.watched(self.used)
-
-    @property
-    def named(self) -> str:
-        """The chip and its location, for messages."""
-        return place(self.device, self.chip.name, self.address, self.route)
 
     def blame(self, error: str) -> None:
         """Count a failure."""
@@ -266,7 +262,8 @@ class ChipSupervisor:
         watched = member.watched
         if watched is None or watched.holds(read_back(self._node, member.chip, member.address, watched)):
             return True
-        member.blame(f"{member.named} had lost its registers (was its supply off for a moment?): it was set up again")
+        named = self._named(member)
+        member.blame(f"{named} had lost its registers (was its supply off for a moment?): it was set up again")
         return False
 
     def _bring_up(self, member: PlacedChip, tries: int) -> None:
@@ -284,7 +281,7 @@ class ChipSupervisor:
                 member.due = monotonic() + self._check_every_s
                 break
         if was or member.present:
-            _LOG.info("%s is %s", member.named, "set up" if member.present else "gone")
+            _LOG.info("%s is %s", self._named(member), "set up" if member.present else "gone")
             self._changed()
 
     def _set_up(self, member: PlacedChip) -> bool:
@@ -296,14 +293,14 @@ class ChipSupervisor:
         if self.fault_message:
             return
         there = identify_chip(self._node, member.address)
-        found = f"{member.named} is not there, but {there}: check the harness and the chip's address pins"
+        found = f"{self._named(member)} is not there, but {there}: check the harness and the chip's address pins"
         # The first failure may also come from an intermittent supply or contact during the set-up.
         member.due = monotonic() + (RETRY_IMPOSTOR_S if found == member.last_error else RETRY_S)
         member.blame(found)
 
     def _note(self, member: PlacedChip, error: OSError) -> None:
         """Count the failure for the mux if it failed, else for the chip."""
-        named = member.named
+        named = self._named(member)
         if member.route and self.routes.selected != member.route and self.routes.mux is not None:
             named = place(self._node.device, "tca9548a", self.routes.mux, None)
         member.blame(failure(named, error.errno))
@@ -327,6 +324,9 @@ class ChipSupervisor:
         self.check_bus_stuck()
         for member in self._members:
             member.due = monotonic() + (RETRY_S if self.fault_message else 0.0)
+
+    def _named(self, member: PlacedChip) -> str:
+        return place(self._node.device, member.chip.name, member.address, member.route)
 
     def _unknown_routes(self) -> Routes:
         return Routes(self._node, {member.route.mux for member in self._members if member.route})

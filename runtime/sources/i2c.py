@@ -3,8 +3,9 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, Interleaved, PortRead
+from thenar.drivers.i2c.bus import I2cBus, Interleaved, PortRead
 from thenar.drivers.i2c.chips import Conversion, Converter
+from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.drivers.spi.chips import SpiChip
 
 from ..frames import PERIODS, BitRemap, Mask, SwitchFrame, now_us
@@ -88,8 +89,7 @@ class I2cDevice(Source):
         self._taxels = len(harness.taxel_names)
         self.owned: Mask = sum(port.targets for port in self._ports)
         chips = sorted({port.chip for port in ports})
-        chips_at = [_chip_at(harness, number, chip, ports) for chip in chips]
-        self.bus = I2cBus(wiring.device, chips_at, clock_hz=wiring.clock_hz)
+        self.bus = I2cBus(wiring.device, [_placed(harness, number, chip, ports) for chip in chips])
         self._reads = [PortRead(chips.index(port.chip), reading_of(port, harness)) for port in ports]
         self._scan: Interleaved | None = None
         self._groups: list[list[int]] = []
@@ -170,12 +170,12 @@ def _takes_time(read: PortRead) -> bool:
     return isinstance(read.reading, Conversion) and bool(read.reading.start)
 
 
-def _chip_at(harness: Harness, bus: int, number: int, ports: list[Port]) -> ChipAt:
+def _placed(harness: Harness, bus: int, number: int, ports: list[Port]) -> PlacedChip:
     chip = harness.buses[bus].chips[number]
     shown = [(reading_of(port, harness), port) for port in ports if port.chip == number]
     used = frozenset(reading.pins[bit] for reading, port in shown for bit in ([b for b, _ in port.switches] or [0]))
-    mux, channel = (None, None) if chip.mux is None else (chip.mux.address, chip.mux.channel)
-    return ChipAt(chip.chip, chip.address, used, mux, channel)
+    route = None if chip.mux is None else Route(chip.mux.address, chip.mux.channel)
+    return PlacedChip(chip.chip, chip.address, used, route)
 
 
 def _bus_period_us(harness: Harness, bus: int, scan: ScanMap) -> int:

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from thenar.drivers.emulated.i2c_wire import Adapter, Message, Station, Wire
 from thenar.drivers.i2c import bus as module
 from thenar.drivers.i2c import supervisor
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
+from thenar.drivers.i2c.bus import I2cBus, PortRead
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.i2c.node import DeviceNode, Query, Run
+from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.scanmap import Port
@@ -80,8 +81,16 @@ def opened(monkeypatch: pytest.MonkeyPatch, world: World, places: Sequence[Place
     for each in (module, supervisor):
         monkeypatch.setattr(each, "monotonic", world.clock)
     monkeypatch.setattr(module, "sleep", world.sleep)
-    chips = [ChipAt(CHIPS[kind], address, frozenset(range(4)), mux, channel) for kind, address, mux, channel in places]
-    bus = I2cBus("/dev/i2c-7", chips, clock_hz=CLOCK_HZ, check_every_s=1e9)
+    chips = [
+        PlacedChip(
+            CHIPS[kind],
+            address,
+            frozenset(range(4)),
+            None if mux is None or channel is None else Route(mux, channel),
+        )
+        for kind, address, mux, channel in places
+    ]
+    bus = I2cBus("/dev/i2c-7", chips, check_every_s=1e9)
     bus.open()
     return bus
 
