@@ -186,23 +186,14 @@ class CyberGloveBox:
 
 
 class EmulatedCyberGlove(Closing):
-    """A glove of 18 or 22 sensors on `line`, in a separate thread.
+    """A glove on `line`, in a separate thread: `box`, or an ordinary one of this number of sensors.
 
-    text, not_ready and doubts are those of its `box`, whose changes take effect with the next record. Raises
-    SettingError for another number of sensors.
+    Changes of the box take effect with the next record. Raises SettingError for another number than 18 or 22.
     """
 
-    def __init__(
-        self,
-        line: PtyLine,
-        *,
-        sensors: int = 18,
-        text: str = "CyberGlove, emulated",
-        not_ready: int = 0,
-        doubts: Doubts | None = None,
-    ) -> None:
+    def __init__(self, line: PtyLine, box: CyberGloveBox | None = None, *, sensors: int = 18) -> None:
         self._line = line
-        self.box = CyberGloveBox(sensors, text, not_ready, doubts)
+        self.box = box or CyberGloveBox(sensors)
         self._changed = Condition()
         self._heard: deque[bytes] = deque()
         self._closing = False

@@ -210,7 +210,8 @@ class Adapter:
 
     def poke_mux(self, mux: int, control: int) -> None:
         """Change a mux's control register; 0 is the effect of a reset."""
-        self.wire.muxes[mux].poke(0, control)
+        self.wire.muxes[mux].write(bytes((control,)))
+        self.wire.muxes[mux].stop()
 
     def claim(self, address: int) -> None:
         """Make a kernel driver hold an address: I2C_SLAVE fails with EBUSY."""

@@ -15,7 +15,7 @@ from .tca9548a import ADDRESSES, CHANNELS
 
 @dataclass(eq=False, slots=True)
 class PlacedPort:
-    """A port to read, and its chip.
+    """A port to read: a chip, and one of its readings.
 
     believed: a suspicious reply that was found to be right, and the number of checks of its chip by then.
     """
@@ -238,14 +238,6 @@ class Interleaved:
             sleep(max(0.0, min(pending) - monotonic()))
 
 
-@dataclass(frozen=True, slots=True)
-class PortRead:
-    """One port to read: the chip's number on its bus, and one of its readings."""
-
-    chip: int
-    reading: Reading
-
-
 class I2cBus(Closing):
     """The chips on one device node, and the health of each. Use it from one thread at a time.
 
@@ -273,19 +265,16 @@ class I2cBus(Closing):
         for _ in BatchMode:
             trial.read()
 
-    def prepare(self, ports: Sequence[PortRead]) -> Scan:
-        """Return a reusable scan of these ports, in this order."""
-        return Scan(self._node, self._keeper, self._made(ports))
+    def prepare(self, ports: Sequence[PlacedPort]) -> Scan:
+        """Return a reusable scan of these ports of its chips, in this order."""
+        return Scan(self._node, self._keeper, ports)
 
-    def interleaved(self, groups: Sequence[Sequence[PortRead]]) -> Interleaved:
+    def interleaved(self, groups: Sequence[Sequence[PlacedPort]]) -> Interleaved:
         """Return a scan of groups of ports, in this order, with conversions overlapped with other transfers.
 
         A conversion that takes time is a separate group.
         """
-        return Interleaved(self._node, self._keeper, [self._made(group) for group in groups])
-
-    def _made(self, ports: Sequence[PortRead]) -> list[PlacedPort]:
-        return [PlacedPort(self.chips[port.chip], port.reading) for port in ports]
+        return Interleaved(self._node, self._keeper, groups)
 
     @property
     def way(self) -> str:

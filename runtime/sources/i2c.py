@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
-from thenar.drivers.i2c.bus import I2cBus, Interleaved, PortRead
+from thenar.drivers.i2c.bus import I2cBus, Interleaved, PlacedPort
 from thenar.drivers.i2c.chips import Conversion, Converter
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.drivers.spi.chips import SpiChip
@@ -89,8 +89,9 @@ class I2cDevice(Source):
         self._taxels = len(harness.taxel_names)
         self.owned: Mask = sum(port.targets for port in self._ports)
         chips = sorted({port.chip for port in ports})
-        self.bus = I2cBus(wiring.device, [_placed(harness, number, chip, ports) for chip in chips])
-        self._reads = [PortRead(chips.index(port.chip), reading_of(port, harness)) for port in ports]
+        placed = {chip: _placed(harness, number, chip, ports) for chip in chips}
+        self.bus = I2cBus(wiring.device, tuple(placed.values()))
+        self._reads = [PlacedPort(placed[port.chip], reading_of(port, harness)) for port in ports]
         self._scan: Interleaved | None = None
         self._groups: list[list[int]] = []
         self._pace, self._held_up = Pace(wiring.rate_hz), 0
@@ -106,9 +107,9 @@ class I2cDevice(Source):
         self._groups = self._grouped(range(len(self._reads)))
         self._scan = self.bus.interleaved([[self._reads[port] for port in group] for group in self._groups])
 
-    def scan(self, chip: int | None = None) -> Interleaved:
-        """Return a reader of all ports, or of those of the bus's chip of this number."""
-        ports = [port for port, read in enumerate(self._reads) if chip is None or read.chip == chip]
+    def scan(self, chip: PlacedChip | None = None) -> Interleaved:
+        """Return a reader of all ports, or of those of this chip of the bus."""
+        ports = [port for port, read in enumerate(self._reads) if chip is None or read.member is chip]
         return self.bus.interleaved([[self._reads[port] for port in group] for group in self._grouped(ports)])
 
     def _grouped(self, ports: Sequence[int]) -> list[list[int]]:
@@ -166,7 +167,7 @@ def taxel_faults(taxels: Sequence[PortLevels]) -> list[str]:
     return [f"taxels with faults: {list_names(faulty)}"] if faulty else []
 
 
-def _takes_time(read: PortRead) -> bool:
+def _takes_time(read: PlacedPort) -> bool:
     return isinstance(read.reading, Conversion) and bool(read.reading.start)
 
 

@@ -42,7 +42,7 @@ def read(glove: CyberGlove, wanted: Callable[[Record], bool] = lambda record: Tr
 
 @pytest.mark.parametrize("sensors", [18, 22])
 def test_a_glove_is_found_and_read(line: PtyLine, sensors: int) -> None:
-    with EmulatedCyberGlove(line, sensors=sensors, text="CyberGlove 2.4") as emulated:
+    with EmulatedCyberGlove(line, CyberGloveBox(sensors, "CyberGlove 2.4")) as emulated:
         emulated.set(VALUES[sensors])
         glove = CyberGlove(str(line.link))
         info = glove.open()
@@ -60,7 +60,7 @@ def test_a_glove_is_found_and_read(line: PtyLine, sensors: int) -> None:
 
 @pytest.mark.parametrize("doubts", DOUBTS, ids=str)
 def test_whichever_of_the_doubtful_is_true_the_glove_is_read(line: PtyLine, doubts: Doubts) -> None:
-    with EmulatedCyberGlove(line, doubts=doubts) as emulated, CyberGlove(str(line.link)) as glove:
+    with EmulatedCyberGlove(line, CyberGloveBox(doubts=doubts)) as emulated, CyberGlove(str(line.link)) as glove:
         emulated.set(VALUES[18])
         assert read(glove, lambda record: record.sensors == VALUES[18]).status == 0x81
         assert emulated.box.settings["U"] == b"\1"
@@ -134,7 +134,7 @@ def test_a_rate_that_is_too_fast_is_noted_and_tried(line: PtyLine) -> None:
 
 @pytest.mark.parametrize("not_ready", [1, 3])
 def test_a_box_that_is_not_ready_yet_is_waited_for(line: PtyLine, not_ready: int) -> None:
-    with EmulatedCyberGlove(line, not_ready=not_ready) as emulated:
+    with EmulatedCyberGlove(line, CyberGloveBox(not_ready=not_ready)) as emulated:
         emulated.set(VALUES[18])
         glove = CyberGlove(str(line.link))
         assert glove.open().notes == ()
@@ -227,7 +227,7 @@ def test_any_answer_may_get_lost_while_it_is_set_up(line: PtyLine, lost: int) ->
     """All ten: ?G twice, ?N, ?M, ?R, ?i, T, D, U, ?F."""
     answers = iter(range(1000))
     line.damage = lambda message: b"" if next(answers) == lost else message
-    with EmulatedCyberGlove(line, text="CyberGlove 2.4") as emulated:
+    with EmulatedCyberGlove(line, CyberGloveBox(text="CyberGlove 2.4")) as emulated:
         glove = CyberGlove(str(line.link))
         info = glove.open()
         assert (info.mask, info.right_hand, info.text, info.status) == (MASK_18, True, "CyberGlove 2.4", True)
@@ -348,7 +348,7 @@ def test_a_leftover_mask_is_removed_or_the_glove_refused(
         emulated.set(VALUES[18])
         with CyberGlove(str(line.link)) as glove:
             assert read(glove).sensors == VALUES[18]
-    with EmulatedCyberGlove(line, doubts=Doubts(mask="unknown")) as emulated:
+    with EmulatedCyberGlove(line, CyberGloveBox(doubts=Doubts(mask="unknown"))) as emulated:
         emulated.box.apply("M", b"\3\0\0")
         with pytest.raises(DeviceError, match="sends 2 sensors, neither 18 nor 22: another program masked some"):
             CyberGlove(str(line.link)).open()
@@ -381,7 +381,7 @@ def test_a_masked_record_comes_as_much_sooner_as_the_formula_says(line: PtyLine)
 def test_an_unconfirmed_mask_sends_all_sensors_and_is_reported(
     line: PtyLine, doubt: Literal["unknown", "ignored"], caplog: pytest.LogCaptureFixture
 ) -> None:
-    with EmulatedCyberGlove(line, doubts=Doubts(mask=doubt)) as emulated:
+    with EmulatedCyberGlove(line, CyberGloveBox(doubts=Doubts(mask=doubt))) as emulated:
         emulated.set(VALUES[18])
         glove = CyberGlove(str(line.link), only=(4, 5))
         info = glove.open()
@@ -393,7 +393,7 @@ def test_an_unconfirmed_mask_sends_all_sensors_and_is_reported(
 
 
 def test_after_a_feigned_mask_the_box_is_read_whole(line: PtyLine) -> None:
-    with EmulatedCyberGlove(line, doubts=Doubts(mask="feigned")) as emulated:
+    with EmulatedCyberGlove(line, CyberGloveBox(doubts=Doubts(mask="feigned"))) as emulated:
         emulated.set(VALUES[18])
         glove = CyberGlove(str(line.link), only=(4, 5))
         assert glove.open().sensors == 2

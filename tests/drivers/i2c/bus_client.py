@@ -10,7 +10,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.i2c.bus import I2cBus, PortRead
+from thenar.drivers.i2c.bus import I2cBus, PlacedPort
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
 
@@ -31,7 +31,9 @@ class Client:
         self._bus.close()
 
     def prepare(self, ports: list[tuple[int, str]]) -> None:
-        self._scan = self._bus.prepare([PortRead(chip, self._reading(chip, name)) for chip, name in ports])
+        self._scan = self._bus.prepare(
+            [PlacedPort(self._members[chip], self._reading(chip, name)) for chip, name in ports]
+        )
 
     def read(self) -> list[int | None]:
         assert self._scan is not None

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.i2c.bus import I2cBus, PlacedPort, PortRead, cut
+from thenar.drivers.i2c.bus import I2cBus, PlacedPort, cut
 from thenar.drivers.i2c.chips import CHIPS, Reading
 from thenar.drivers.i2c.node import MOST_MESSAGES, BatchMode
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
@@ -163,8 +163,8 @@ def test_a_file_is_no_bus_and_is_not_even_opened(tmp_path: Path) -> None:
 
 
 def test_a_bus_that_was_not_opened_or_was_closed_says_so(rig: MakeRig) -> None:
-    chip = CHIPS["mcp23017"]
-    scan = I2cBus("/dev/i2c-7", [PlacedChip(chip, 0x20, frozenset())]).prepare([PortRead(0, chip.readings[0])])
+    chip = PlacedChip(CHIPS["mcp23017"], 0x20, frozenset())
+    scan = I2cBus("/dev/i2c-7", [chip]).prepare([PlacedPort(chip, chip.chip.readings[0])])
     with pytest.raises(DeviceError, match="is not open"):
         scan.read()
     glove = rig(("mcp23017", 0x20))

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from thenar.compiler.frontier.wirings import BOARD, wirings
 from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c, WireCounters
 from thenar.drivers.errors import DeviceError
-from thenar.drivers.i2c.bus import I2cBus, PortRead, Scan
+from thenar.drivers.i2c.bus import I2cBus, PlacedPort, Scan
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
 from thenar.runtime.scanning.ports import whole_scan
@@ -132,7 +132,9 @@ def _scan_of(harness: Harness, number: int, stack: ExitStack) -> Scan:
     bus = stack.enter_context(I2cBus(wiring.device, chips, check_every_s=_NEVER_S))
     bus.open()
     ports = whole_scan(harness, harness.switches).ports
-    return bus.prepare([PortRead(port.chip, reading_of(port, harness)) for port in ports if port.bus == number])
+    return bus.prepare(
+        [PlacedPort(chips[port.chip], reading_of(port, harness)) for port in ports if port.bus == number]
+    )
 
 
 def _behind(chip: ChipWiring) -> tuple[int, int] | tuple[None, None]:
