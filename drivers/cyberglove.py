@@ -17,10 +17,9 @@ from typing import Self
 
 from .closing import Closing
 from .cyberglove_protocol import (
+    GLOVES,
     INFORMATION,
     READY,
-    SENSORS_18,
-    SENSORS_22,
     STOP,
     STREAM,
     Command,
@@ -56,7 +55,6 @@ _TRIES = 3
 BAUD_RATES = (115_200, 38_400, 19_200, 9_600)
 # After power-on, a box reports for a while that it is not ready.
 _READY_S = 1.0
-_NAMES = {18: SENSORS_18, 22: SENSORS_22}
 # After this time without a byte the glove counts as dead: short, since it must be read within a second of its return.
 _SILENT_S = 0.5
 # The same with bytes, but without a record.
@@ -124,7 +122,6 @@ class GloveInfo:
     total       number of sensors of the glove, 18 or 22
     places      places, in wire order, of the sensors in a record: all, or those that the box's mask lets through
     names       the names of these sensors, in wire order
-    mask        the software mask, 3 bytes, the lowest bit of the first one first; empty if the box does not report it
     right_hand  whether it is for the right hand; None if the box does not report it
     text        the box's information text
     status      whether records carry the status byte
@@ -137,7 +134,6 @@ class GloveInfo:
     total: int
     places: tuple[int, ...]
     names: tuple[str, ...]
-    mask: bytes
     right_hand: bool | None
     text: str
     status: bool
@@ -184,13 +180,13 @@ def set_up(
     dialogue = Dialogue(line)
     notes = _until_ready(dialogue, line.url)
     total = _sensors(dialogue, line.url, sensors)
-    mask = _optional(dialogue, query("M")) or b""
-    every = masked if len(masked := masked_sensors(mask)) == total else _NAMES[total]
+    masked = masked_sensors(_optional(dialogue, query("M")) or b"")
+    every = masked if len(masked) == total else GLOVES[total]
     places, unmasked = tuple(range(total)), ""
     if only is not None and 0 < len(only) < total:
         some = tuple(sorted(only))
-        if _masked(dialogue, fewer := mask_of([every[place] for place in some])):
-            places, mask = some, fewer
+        if _masked(dialogue, mask_of([every[place] for place in some])):
+            places = some
         else:
             _masked(dialogue, mask_of(every))
             unmasked = f"it accepts no sensor mask: all {total} sensors are read, though {len(some)} are requested"
@@ -219,7 +215,6 @@ def set_up(
         total=total,
         places=places,
         names=tuple(every[place] for place in places),
-        mask=mask,
         right_hand=None if right is None else right != b"\0",
         text="".join(filter(str.isprintable, text.decode("ascii", "replace"))).strip(),
         status=status,
@@ -253,10 +248,10 @@ def _until_ready(dialogue: Dialogue, url: str) -> list[str]:
 def _sensors(dialogue: Dialogue, url: str, expected: int | None) -> int:
     reply = _optional(dialogue, query("N")) or _optional(dialogue, query("S"))
     count = reply[0] if reply else expected
-    if count not in (None, *_NAMES):
+    if count not in (None, *GLOVES):
         # An interrupted program, usually thenar itself, left a mask behind.
         has = _optional(dialogue, query("S"))
-        if has is not None and has[0] in _NAMES and _masked(dialogue, mask_of(_NAMES[has[0]])):
+        if has is not None and has[0] in GLOVES and _masked(dialogue, mask_of(GLOVES[has[0]])):
             count = has[0]
     if count is None:
         raise DeviceError(f"{url}: the CyberGlove does not report its number of sensors: set `sensors = 18` or 22")
@@ -264,7 +259,7 @@ def _sensors(dialogue: Dialogue, url: str, expected: int | None) -> int:
         raise SettingError(
             f"{url}: the CyberGlove sends {count} sensors, not {expected}: write `sensors = {count}` under [cyberglove]"
         )
-    if count not in _NAMES:
+    if count not in GLOVES:
         raise DeviceError(
             f"{url}: the CyberGlove sends {count} sensors, neither 18 nor 22: another program masked some (its M"
             " setting); switch the box off and on"
@@ -367,7 +362,7 @@ class CyberGlove(Closing):
         if line is not None:
             masked = self._info.sensors < self._info.total
             with suppress(DeviceError):
-                line.write(STOP + setting("M", mask_of(_NAMES[self._info.total])).request if masked else STOP)
+                line.write(STOP + setting("M", mask_of(GLOVES[self._info.total])).request if masked else STOP)
             line.close()
 
     def __enter__(self) -> Self:

@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
-from ..i2c.chips import CHIPS, Converter
+from ..i2c.chips import CHIPS
 from ..spi.chips import SPI_CHIPS
 from .i2c_wire import Place
 
@@ -86,10 +86,6 @@ class EmulatedI2c(Closing):
         wrapper = shutil.which("umockdev-wrapper")
         if wrapper is None:
             raise DeviceError(f"the program umockdev-wrapper is missing: {_INSTALL}")
-        self._levels = [
-            [0 if isinstance(CHIPS[chip.kind], Converter) else (1 << 24) - 1 for chip in bus.chips] for bus in buses
-        ]
-        self._levels += [[0] for _ in spi]
         self._errors = TemporaryFile("w+")  # noqa: SIM115 - it lives as long as the server; a pipe would fill up
         self._server = subprocess.Popen(
             [wrapper, _PYTHON, "-I", "-c", _SERVE, _folder(__name__), f"{__package__}.i2c_server"],
@@ -102,7 +98,8 @@ class EmulatedI2c(Closing):
         self._lock = Lock()
         self._root: str | None = None
         try:
-            self._root = self._tell([*map(_described, buses), *(_spi_described(*device) for device in spi.items())])
+            devices = [_spi_described(*device) for device in spi.items()]
+            self._root = self._tell(([_described(bus) for bus in buses], devices))
         except BaseException:
             self.close()
             raise
@@ -110,13 +107,13 @@ class EmulatedI2c(Closing):
 
     def set_levels(self, bus: int, chip: int, levels: int) -> None:
         """Set the pins of one chip: bit p is pin p, 1 is high or open; or a converter's codes."""
-        self._levels[bus][chip] = levels
-        self.set_all(self._levels)
+        self._tell([(bus, "set_levels", chip, levels)])
 
     def set_all(self, levels: Sequence[Sequence[int]]) -> None:
         """Set the pins of all chips of all buses at one time."""
-        self._levels = [list(values) for values in levels]
-        self._tell([(number, "show", values) for number, values in enumerate(self._levels)])
+        self._tell(
+            [(bus, "set_levels", chip, one) for bus, chips in enumerate(levels) for chip, one in enumerate(chips)]
+        )
 
     def counters(self, bus: int) -> WireCounters:
         """Return the counts of the bus since the start."""
@@ -179,19 +176,15 @@ class EmulatedI2c(Closing):
 
 
 def _described(bus: EmulatedBus) -> dict[str, Any]:
-    """Return a bus in the form of the server's first line, with each chip's model in place of its kind."""
-    chips = [{"model": _model(chip.kind), **asdict(chip)} for chip in bus.chips]
-    for chip in chips:
-        del chip["kind"]
-    return {**asdict(bus), "chips": chips}
+    """Return a bus in the form of the server's first line, with each chip's model as its kind."""
+    return {**asdict(bus), "chips": [{**asdict(chip), "kind": _model(chip.kind)} for chip in bus.chips]}
 
 
-def _spi_described(device: str, kind: str | None) -> dict[str, Any]:
+def _spi_described(device: str, kind: str | None) -> tuple[Any, ...]:
     if kind is None:
-        return {"device": device, "chips": [{"model": None}]}
+        return device, None
     chip = SPI_CHIPS.named(kind)
-    numbers = {"channels": len(chip.pins), "bits": chip.bits}
-    return {"device": device, "chips": [{"model": _place_of(chip.model), **numbers}]}
+    return device, _place_of(chip.model), len(chip.pins), chip.bits
 
 
 def _model(kind: str) -> tuple[str, str, str]:

@@ -1,8 +1,8 @@
 """Serves emulated I2C buses as device nodes through umockdev, controlled by JSON lines on stdin and stdout.
 
 It is started by `umockdev-wrapper /usr/bin/python3 -I`: it needs the system's Python, which has PyGObject, and no other
-package. The first line in lists the nodes, and the reply is the location of the testbed. Each further line is a list of
-calls, [number of the node, method, arguments...]; the reply is the list of their results.
+package. The first line in lists buses and SPI devices; the reply is the location of the testbed. Each further line is a
+list of calls, [number of the node, method, arguments...]; the reply is the list of their results.
 """
 
 import errno
@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from abc import ABC, abstractmethod
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,6 @@ gi.require_version("UMockdev", "1.0")
 from gi.repository import GLib, UMockdev  # noqa: E402
 
 from ..i2c.node import I2C_SLAVE  # noqa: E402
-from ..spi.chips.base import SpiModel  # noqa: E402
 from ..spi.device import MODE, SPEED, TRANSFER, message  # noqa: E402
 from .i2c_wire import Adapter, Message, Station, Wire  # noqa: E402
 
@@ -53,8 +53,8 @@ class EmulatedNode(ABC):
         self._away = self._path.with_name(f".{name}")
 
     @abstractmethod
-    def show(self, levels: list[int]) -> None:
-        """Set the pins of all its chips."""
+    def set_levels(self, chip: int, levels: int) -> None:
+        """Set the pins of a chip, or its channels' codes."""
 
     @abstractmethod
     def counters(self) -> tuple[int, int, int, list[Any]]:
@@ -118,15 +118,17 @@ class EmulatedNode(ABC):
 class I2cNode(EmulatedNode):
     """One /dev/i2c-N."""
 
-    def __init__(self, testbed: Any, device: str, adapter: Adapter, paced: bool) -> None:
+    def __init__(
+        self, testbed: Any, device: str, chips: list[dict[str, Any]], clock_hz: int, adapter: str, paced: bool
+    ) -> None:
         minor = device.rpartition("-")[2]
         super().__init__(testbed, device, f"E: MAJOR=89\nE: MINOR={minor}\n", "i2c-dev")
-        self._adapter, self._paced = adapter, paced
+        stations = [Station(_model(*chip.pop("kind")), **chip) for chip in chips]
+        self._adapter, self._paced = Adapter(Wire(stations, clock_hz), adapter), paced
 
-    def show(self, levels: list[int]) -> None:
-        """Set the pins of all its chips."""
-        for station, value in zip(self._adapter.wire.stations, levels, strict=True):
-            station.device.levels = value
+    def set_levels(self, chip: int, levels: int) -> None:
+        """Set the pins of a chip, or its channels' codes."""
+        self._adapter.wire.stations[chip].device.levels = levels
 
     def counters(self) -> tuple[int, int, int, list[Any]]:
         """Return the numbers of calls, transfers and SCL periods, and the traffic by place."""
@@ -178,14 +180,15 @@ class I2cNode(EmulatedNode):
 class SpiNode(EmulatedNode):
     """One /dev/spidevB.C with a chip behind it, at the clock that its client requests; None: no chip."""
 
-    def __init__(self, testbed: Any, device: str, chip: SpiModel | None) -> None:
+    def __init__(self, testbed: Any, device: str, kind: tuple[str, str, str] | None, *numbers: int) -> None:
         super().__init__(testbed, device, "E: MAJOR=153\nE: MINOR=0\n", "spidev")
-        self._chip, self._spent, self._calls, self._transfers, self._bytes = chip, 0.0, 0, 0, 0
+        self._chip = None if kind is None else _model(*kind)(*numbers)
+        self._spent, self._calls, self._transfers, self._bytes = 0.0, 0, 0, 0
 
-    def show(self, levels: list[int]) -> None:
-        """Set the codes at the chip's channels."""
+    def set_levels(self, chip: int, levels: int) -> None:
+        """Set the codes at the channels of its only chip."""
         if self._chip is not None:
-            (self._chip.levels,) = levels
+            self._chip.levels = levels
 
     def counters(self) -> tuple[int, int, int, list[Any]]:
         """Return the numbers of calls, transfers and SCLK periods."""
@@ -214,18 +217,6 @@ class SpiNode(EmulatedNode):
         return total
 
 
-def _node(
-    testbed: Any, device: str, chips: list[dict[str, Any]], clock_hz: int = 0, adapter: str = "", paced: bool = True
-) -> EmulatedNode:
-    """Return a bus, or, without an adapter, an SPI device; no chip there is a chip without a model."""
-    if not adapter:
-        (chip,) = chips
-        place = chip.pop("model")
-        return SpiNode(testbed, device, None if place is None else _model(*place)(**chip))
-    stations = [Station(_model(*chip.pop("model")), **chip) for chip in chips]
-    return I2cNode(testbed, device, Adapter(Wire(stations, clock_hz), adapter), paced)
-
-
 def _model(folder: str, module: str, name: str) -> Any:
     """Return the class `name` of a chip's module, imported from `folder`."""
     if folder not in sys.path:
@@ -242,13 +233,15 @@ def _wait_until(moment: float) -> None:
 def main() -> None:
     """Create the nodes of the first line, print the location of the testbed, and execute every further line."""
     testbed = UMockdev.Testbed.new()
-    nodes = [_node(testbed, **described) for described in json.loads(sys.stdin.readline())]
+    buses, devices = json.loads(sys.stdin.readline())
+    nodes: list[EmulatedNode] = [I2cNode(testbed, **bus) for bus in buses]
+    nodes += [SpiNode(testbed, *device) for device in devices]
     print(json.dumps(testbed.get_root_dir()), flush=True)
     for line in sys.stdin:
-        results = []
-        for number, method, *arguments in json.loads(line):
-            with nodes[number].lock:
-                results.append(getattr(nodes[number], method)(*arguments))
+        with ExitStack() as locks:  # of all nodes: the calls of a line happen at one time
+            for node in nodes:
+                locks.enter_context(node.lock)
+            results = [getattr(nodes[number], method)(*arguments) for number, method, *arguments in json.loads(line)]
         print(json.dumps(results), flush=True)
 
 

@@ -107,15 +107,12 @@ class Wire:
             commands[device] = message.data[0]
         size = message.length if message.data is None else len(message.data)
         self._count(Place(message.address, mux, channel, commands.get(device)), size)
-        return self._exchange(message, [device for device, _, _ in responding])
-
-    def _exchange(self, message: Message, devices: list[Device]) -> bytes:
         if message.data is not None:
-            for device in devices:
+            for device, _, _ in responding:
                 device.write(message.data)
             return b""
-        reply = bytes(b"\xff" * message.length)
-        for device in devices:
+        reply = b"\xff" * message.length
+        for device, _, _ in responding:
             reply = bytes(a & b for a, b in zip(reply, device.read(message.length), strict=True))
         return reply
 

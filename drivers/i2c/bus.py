@@ -72,12 +72,10 @@ def _fits(port: PlacedPort, gathered: Sequence[PlacedPort], way: BatchMode) -> b
 class Scan:
     """Ports in a fixed order, read by as few transfers as the adapter allows."""
 
-    def __init__(self, node: DeviceNode, keeper: ChipSupervisor, ports: Sequence[PlacedPort]) -> None:
-        self._node = node
-        self._keeper = keeper
-        self._ports = ports
+    def __init__(self, keeper: ChipSupervisor, ports: Sequence[PlacedPort]) -> None:
+        self._node, self._keeper, self._ports = keeper.node, keeper, ports
         self._revision = -1
-        self._way = node.way
+        self._way = self._node.way
         self._groups: list[tuple[Group, Run]] = []
 
     def read(self) -> list[int | None]:
@@ -88,7 +86,8 @@ class Scan:
         """
         keeper = self._keeper
         if monotonic() >= keeper.due:
-            self._attend()
+            self._need_open()
+            keeper.attend()
         if self._revision != keeper.revision or self._way is not self._node.way:
             self._plan()
         replies: list[int | None] = [None] * len(self._ports)
@@ -104,10 +103,6 @@ class Scan:
                     continue
                 replies[number] = self._doubt(port, reply) if port.doubtful(reply) else port.value(reply)
         return replies
-
-    def _attend(self) -> None:
-        self._need_open()
-        self._keeper.attend()
 
     def _need_open(self) -> None:
         if not self._node.is_open:
@@ -160,8 +155,8 @@ class _Converting:
     it is busy.
     """
 
-    def __init__(self, node: DeviceNode, keeper: ChipSupervisor, member: PlacedChip) -> None:
-        self._node, self._keeper, self._member = node, keeper, member
+    def __init__(self, keeper: ChipSupervisor, member: PlacedChip) -> None:
+        self._keeper, self._member = keeper, member
         self.conversions: dict[int, Conversion] = {}
         self.left: deque[int] = deque()
         self.converts: int | None = None
@@ -178,7 +173,7 @@ class _Converting:
             self.until = monotonic() + conversion.us * 1e-6
 
     def _start(self, conversion: Conversion) -> bool:
-        self._node.write(self._member.address, conversion.start)
+        self._keeper.node.write(self._member.address, conversion.start)
         return True
 
 
@@ -189,14 +184,14 @@ class Interleaved:
     the first later one that is ready is read ahead. `thenar.runtime.scanning.timing` models the same order.
     """
 
-    def __init__(self, node: DeviceNode, keeper: ChipSupervisor, groups: Sequence[Sequence[PlacedPort]]) -> None:
-        self._scans = [Scan(node, keeper, group) for group in groups]
+    def __init__(self, keeper: ChipSupervisor, groups: Sequence[Sequence[PlacedPort]]) -> None:
+        self._scans = [Scan(keeper, group) for group in groups]
         slow: dict[PlacedChip, _Converting] = {}
         self._slow: dict[int, _Converting] = {}
         for step, group in enumerate(groups):
             for port in group:
                 if isinstance(port.reading, Conversion) and port.reading.start:
-                    chip = slow.setdefault(port.member, _Converting(node, keeper, port.member))
+                    chip = slow.setdefault(port.member, _Converting(keeper, port.member))
                     chip.conversions[step] = port.reading
                     self._slow[step] = chip
         self._chips = tuple(slow.values())
@@ -238,7 +233,7 @@ class Interleaved:
             sleep(max(0.0, min(pending) - monotonic()))
 
 
-class I2cBus(Closing):
+class I2cBus(ChipSupervisor, Closing):
     """The chips on one device node, and the health of each. Use it from one thread at a time.
 
     Raises SettingError for two chips at one address, or an impossible mux.
@@ -248,57 +243,50 @@ class I2cBus(Closing):
         """Every check_every_s the registers of each chip and its mux are read back in one or two transfers, to detect
         resets.
         """
-        self.device, self.chips = device, tuple(chips)
         _refuse_clashes(device, chips)
-        self._node = DeviceNode(device)
-        self._keeper = ChipSupervisor(self._node, self.chips, check_every_s)
+        super().__init__(DeviceNode(device), chips, check_every_s)
 
     def open(self) -> None:
         """Set up every chip and detect which batches the adapter supports. A missing chip is absent, not an error.
 
         Raises DeviceError if the device node cannot be used. May be called again afterwards, and at any time.
         """
-        self._keeper.begin()
+        self.begin()
         # Registers, not ports, each twice: this tests batches of two chips and of two reads of one chip.
         control = [_control(member) for member in self.chips]
-        trial = Scan(self._node, self._keeper, [port for port in control for _ in range(2)])
+        trial = Scan(self, [port for port in control for _ in range(2)])
         for _ in BatchMode:
             trial.read()
 
     def prepare(self, ports: Sequence[PlacedPort]) -> Scan:
         """Return a reusable scan of these ports of its chips, in this order."""
-        return Scan(self._node, self._keeper, ports)
+        return Scan(self, ports)
 
     def interleaved(self, groups: Sequence[Sequence[PlacedPort]]) -> Interleaved:
         """Return a scan of groups of ports, in this order, with conversions overlapped with other transfers.
 
         A conversion that takes time is a separate group.
         """
-        return Interleaved(self._node, self._keeper, groups)
+        return Interleaved(self, groups)
 
     @property
     def way(self) -> str:
         """A description of how reads are batched."""
-        return self._node.way.value
-
-    @property
-    def fault_message(self) -> str:
-        """A fault of the whole bus and its remedy; "" if there is none."""
-        return self._keeper.fault_message
+        return self.node.way.value
 
     @property
     def transfers(self) -> int:
         """Number of transfers requested from the kernel."""
-        return self._node.transfers
+        return self.node.transfers
 
     def close(self) -> None:
         """Close the device node."""
-        self._node.close()
-        self._keeper.revision += 1
+        self.node.close()
+        self.revision += 1
 
 
 def _control(member: PlacedChip) -> PlacedPort:
-    watched = member.watched
+    watched = member.chip.watched(member.used)
     if watched is None:
         return PlacedPort(member, member.chip.readings[0])
     return PlacedPort(member, Reading("registers", watched.data[:1], (-1,) * 8 * len(watched.expect)))

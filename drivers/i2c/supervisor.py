@@ -150,11 +150,6 @@ class PlacedChip:
     checked: int = 0
     zeros: int = -1
 
-    @property
-    def watched(self) -> Write | None:
-        """The write that a reset would lose."""
-        return self.chip.watched(self.used)
-
     def blame(self, error: str) -> None:
         """Count a failure."""
         self.errors += 1
@@ -169,9 +164,8 @@ class ChipSupervisor:
     is gone, and no other error.
     """
 
-    def __init__(self, node: DeviceNode, members: Sequence[PlacedChip], check_every_s: float) -> None:
-        self._node = node
-        self._members = members
+    def __init__(self, node: DeviceNode, chips: Sequence[PlacedChip], check_every_s: float) -> None:
+        self.node, self.chips = node, tuple(chips)
         self._check_every_s = check_every_s
         self.routes = self._unknown_routes()
         self.revision = 0
@@ -182,28 +176,28 @@ class ChipSupervisor:
         """Open the node and set up every chip."""
         self._renew()
         self.routes = self._unknown_routes()
-        self._node.way = BatchMode.CHANNEL
+        self.node.way = BatchMode.CHANNEL
         self.fault_message = ""
-        for member in self._members:
+        for member in self.chips:
             member.present = False
-        for number, member in enumerate(self._members):
+        for number, member in enumerate(self.chips):
             if not self.fault_message:
                 self._bring_up(member, TRIES)
             if member.present:  # spread checks, so that no scan waits for more than one
-                member.due = monotonic() + self._check_every_s * (number + 1) / len(self._members)
+                member.due = monotonic() + self._check_every_s * (number + 1) / len(self.chips)
         self._schedule()
 
     def attend(self) -> None:
         """Check the chip that has waited longest, or test whether it is back. A stuck bus comes first."""
         if self.fault_message:
             self._unstick()
-        elif self._members:
-            member = min(self._members, key=lambda member: member.due)
+        elif self.chips:
+            member = min(self.chips, key=lambda member: member.due)
             if member.present:
                 member.due = monotonic() + self._check_every_s
                 self.check(member)
             else:
-                if not any(other.present for other in self._members):
+                if not any(other.present for other in self.chips):
                     self._renew()  # not every adapter returns ENODEV once unplugged: test its node
                 self._bring_up(member, 1)
         self._schedule()
@@ -235,18 +229,18 @@ class ChipSupervisor:
         """Detect a stuck bus: an unused address must not be acknowledged."""
         code: int | None = None
         try:
-            self._node.query(Query(NOBODY, b"", 1))
+            self.node.query(Query(NOBODY, b"", 1))
         except OSError as error:
             code = error.errno
             if code not in STUCK:  # no acknowledge, whichever errno this adapter uses for it
                 if self.fault_message:
-                    _LOG.warning("%s: the bus is free again", self._node.device)
+                    _LOG.warning("%s: the bus is free again", self.node.device)
                 self.fault_message = ""
                 return
         if not self.fault_message:
-            _LOG.warning("%s", stuck(self._node.device, code))
-        self.fault_message = stuck(self._node.device, code)
-        for member in self._members:
+            _LOG.warning("%s", stuck(self.node.device, code))
+        self.fault_message = stuck(self.node.device, code)
+        for member in self.chips:
             member.present = False
             member.last_error = self.fault_message
             member.due = monotonic()
@@ -255,12 +249,12 @@ class ChipSupervisor:
     def _in_order(self, member: PlacedChip) -> bool:
         """Return whether the chip still has its register values. A mux with another selection is set again."""
         if member.route and not self.routes.holds():
-            named = place(self._node.device, "tca9548a", member.route.mux, None)
+            named = place(self.node.device, "tca9548a", member.route.mux, None)
             member.blame(f"{named} had lost its channel (a reset, or another program): it was selected again")
             self.routes.forget()
             self.routes.select(member.route)
-        watched = member.watched
-        if watched is None or watched.holds(read_back(self._node, member.chip, member.address, watched)):
+        watched = member.chip.watched(member.used)
+        if watched is None or watched.holds(read_back(self.node, member.chip, member.address, watched)):
             return True
         named = self._named(member)
         member.blame(f"{named} had lost its registers (was its supply off for a moment?): it was set up again")
@@ -285,14 +279,14 @@ class ChipSupervisor:
             self._changed()
 
     def _set_up(self, member: PlacedChip) -> bool:
-        self._node.claim(member.address)
-        return set_up(self._node, member.chip, member.address, member.used)
+        self.node.claim(member.address)
+        return set_up(self.node, member.chip, member.address, member.used)
 
     def _refuse(self, member: PlacedChip) -> None:
         self.check_bus_stuck()  # a line held low looks like a reply of every chip
         if self.fault_message:
             return
-        there = identify_chip(self._node, member.address)
+        there = identify_chip(self.node, member.address)
         found = f"{self._named(member)} is not there, but {there}: check the harness and the chip's address pins"
         # The first failure may also come from an intermittent supply or contact during the set-up.
         member.due = monotonic() + (RETRY_IMPOSTOR_S if found == member.last_error else RETRY_S)
@@ -302,7 +296,7 @@ class ChipSupervisor:
         """Count the failure for the mux if it failed, else for the chip."""
         named = self._named(member)
         if member.route and self.routes.selected != member.route and self.routes.mux is not None:
-            named = place(self._node.device, "tca9548a", self.routes.mux, None)
+            named = place(self.node.device, "tca9548a", self.routes.mux, None)
         member.blame(failure(named, error.errno))
 
     def _lose(self, member: PlacedChip, error: OSError) -> None:
@@ -322,23 +316,23 @@ class ChipSupervisor:
         """Reopen the node; then reads that clock SCL free a chip that waits within a byte."""
         self._renew()
         self.check_bus_stuck()
-        for member in self._members:
+        for member in self.chips:
             member.due = monotonic() + (RETRY_S if self.fault_message else 0.0)
 
     def _named(self, member: PlacedChip) -> str:
-        return place(self._node.device, member.chip.name, member.address, member.route)
+        return place(self.node.device, member.chip.name, member.address, member.route)
 
     def _unknown_routes(self) -> Routes:
-        return Routes(self._node, {member.route.mux for member in self._members if member.route})
+        return Routes(self.node, {member.route.mux for member in self.chips if member.route})
 
     def _renew(self) -> None:
         self._changed()
         self.routes.forget()
-        self._node.open()
+        self.node.open()
 
     def _changed(self) -> None:
         self.revision += 1
         self._schedule()
 
     def _schedule(self) -> None:
-        self.due = min((member.due for member in self._members), default=float("inf"))
+        self.due = min((member.due for member in self.chips), default=float("inf"))

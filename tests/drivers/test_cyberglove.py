@@ -48,7 +48,6 @@ def test_a_glove_is_found_and_read(line: PtyLine, sensors: int) -> None:
         info = glove.open()
         assert (info.sensors, info.baud, info.right_hand) == (sensors, 115_200, True)
         assert info.names == {18: SENSORS_18, 22: SENSORS_22}[sensors]
-        assert info.mask == {18: MASK_18, 22: MASK_22}[sensors]
         assert info.text == "CyberGlove 2.4"
         assert info.status
         assert info.notes == ()
@@ -111,9 +110,7 @@ def test_records_that_waited_keep_their_age(line: PtyLine, count: int) -> None:
 def test_a_glove_that_is_unplugged_and_plugged_in_again_says_so(line: PtyLine) -> None:
     with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link)) as glove:
         emulated.box.plugged = False
-        assert read(glove, lambda record: record.fault is not None) == Record(
-            bytes([100] * 18), True, "unplugged", 0x80
-        )
+        assert read(glove, lambda record: record.fault is not None) == Record(bytes([100] * 18), "unplugged", 0x80)
         emulated.box.plugged = True
         read(glove, lambda record: record.fault is None)
         assert glove.counts.unplugged >= 1
@@ -230,7 +227,7 @@ def test_any_answer_may_get_lost_while_it_is_set_up(line: PtyLine, lost: int) ->
     with EmulatedCyberGlove(line, CyberGloveBox(text="CyberGlove 2.4")) as emulated:
         glove = CyberGlove(str(line.link))
         info = glove.open()
-        assert (info.mask, info.right_hand, info.text, info.status) == (MASK_18, True, "CyberGlove 2.4", True)
+        assert (info.names, info.right_hand, info.text, info.status) == (SENSORS_18, True, "CyberGlove 2.4", True)
         assert info.notes == ()
         assert read(glove) == Record(bytes([100] * 18), status=0x81)
         assert emulated.box.streaming
@@ -425,7 +422,7 @@ def test_an_old_box_of_few_commands_is_read_without_its_status(line: PtyLine) ->
     answering(line, {b"?G": b"?G\3\0", b"?S": b"?S\x12\0", **period})
     glove = CyberGlove(str(line.link))
     info = glove.open()
-    assert (info.sensors, info.names, info.mask) == (18, SENSORS_18, b"")
+    assert (info.sensors, info.names) == (18, SENSORS_18)
     assert (info.right_hand, info.text, info.status) == (None, "", False)
     assert "no status byte" in info.notes[0]
     line.send(b"S" + VALUES[18] + b"\0")
@@ -451,7 +448,7 @@ def test_any_answers_give_a_glove_or_our_error(tmp_path: Path, seed: int) -> Non
     with PtyLine(tmp_path / "glove", paced=False) as line:
 
         def garbled(data: bytes) -> None:
-            said = b"".join(part for part in box.feed(data) if isinstance(part, bytes))
+            said = b"".join(box.feed(data))
             place = random.randrange(len(said) + 1)
             start, end = said[:place], said[place:]
             line.send(random.choice([said, start, said + said, start + random.randbytes(3) + end]))

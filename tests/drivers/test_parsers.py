@@ -44,9 +44,11 @@ def glove(sensors: int, status: bool) -> Parser:
         return decoder.feed, lambda: len(decoder._pieces._rest)
 
     byte = 0x83 if status else None
-    records = [Record(bytes([value] * sensors), value % 2 == 0, None, byte) for value in (1, 71, 83, 101, 255)]
-    records += [Record(b"S" * sensors, True, fault, byte) for fault in ("too fast", "unplugged")]
-    return Parser(make, tuple(map(cyberglove_protocol.encode, records)), sensors + 5)
+    records = [Record(bytes([value] * sensors), None, byte) for value in (1, 71, 83, 101, 255)]
+    records += [Record(b"S" * sensors, fault, byte) for fault in ("too fast", "unplugged")]
+    streamed = tuple(map(cyberglove_protocol.encode, records))
+    polled = tuple(b"G" + record[1:] for record in streamed)
+    return Parser(make, streamed + polled, sensors + 5)
 
 
 PARSERS = {
