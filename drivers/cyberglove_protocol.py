@@ -25,12 +25,12 @@ byte is always 1. Time stamps, which may hold zeros, are left switched off.
 import logging
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import ceil, isfinite
 from typing import Literal
 
 from .errors import SettingError
-from .serial_line import Pieces, sending_us
+from .serial_line import sending_us
 
 _LOG = logging.getLogger(__name__)
 
@@ -238,26 +238,23 @@ def encode(record: Record) -> bytes:
     return STREAM + record.sensors + status + _ENDINGS[record.fault] + b"\0"
 
 
-@dataclass(slots=True)
 class RecordDecoder:
     """Decodes bytes to records of `sensors` sensors; other bytes are counted and skipped to the next NUL. Never raises.
 
     status: whether the glove appends its status byte.
     """
 
-    sensors: int = SENSORS
-    counts: RecordCounts = field(default_factory=RecordCounts)
-    status: bool = False
-    _pieces: Pieces = field(init=False)
-    _body: int = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._body = 1 + self.sensors + self.status
-        self._pieces = Pieces(self._body + 2)
+    def __init__(self, sensors: int = SENSORS, counts: RecordCounts | None = None, status: bool = False) -> None:
+        self.counts = counts or RecordCounts()
+        self._sensors, self._status, self._body = sensors, status, 1 + sensors + status
+        self._rest = b""
 
     def feed(self, chunk: bytes) -> list[Record]:
         """Return the records that `chunk` completes, oldest first."""
-        pieces = self._pieces.feed(chunk)
+        pieces = chunk.split(b"\0")
+        pieces[0] = self._rest + pieces[0]
+        # A byte more than any record: the length shows that it is none, and no stream without NULs fills the memory.
+        self._rest = pieces.pop()[: self._body + 3]
         return [record for piece in pieces if piece and (record := self._record(piece)) is not None]
 
     def _record(self, piece: bytes) -> Record | None:
@@ -275,5 +272,5 @@ class RecordDecoder:
         if fault is not None:
             self.counts.too_fast += fault == "too fast"
             self.counts.unplugged += fault == "unplugged"
-        status = piece[self._body - 1] if self.status else None
-        return Record(piece[1 : self.sensors + 1], fault, status)
+        status = piece[self._body - 1] if self._status else None
+        return Record(piece[1 : self._sensors + 1], fault, status)

@@ -41,7 +41,7 @@ class Parser:
 def glove(sensors: int, status: bool) -> Parser:
     def make() -> tuple[Feed, Callable[[], int]]:
         decoder = cyberglove_protocol.RecordDecoder(sensors, status=status)
-        return decoder.feed, lambda: len(decoder._pieces._rest)
+        return decoder.feed, lambda: len(decoder._rest)
 
     byte = 0x83 if status else None
     records = [Record(bytes([value] * sensors), None, byte) for value in (1, 71, 83, 101, 255)]
