@@ -69,7 +69,7 @@ def _fits(port: PlacedPort, gathered: Sequence[PlacedPort], way: BatchMode) -> b
     return sum(other.query.messages for other in gathered) + port.query.messages <= MOST_MESSAGES
 
 
-class Scan:
+class GroupScan:
     """Ports in a fixed order, read by as few transfers as the adapter allows."""
 
     def __init__(self, keeper: ChipSupervisor, ports: Sequence[PlacedPort]) -> None:
@@ -177,7 +177,7 @@ class _Converting:
         return True
 
 
-class Interleaved:
+class Scan:
     """Groups of ports, read in order; conversions that take time are groups of one port.
 
     Each converter starts its next conversion as soon as its last was read. While the next port of the scan converts,
@@ -185,7 +185,7 @@ class Interleaved:
     """
 
     def __init__(self, keeper: ChipSupervisor, groups: Sequence[Sequence[PlacedPort]]) -> None:
-        self._scans = [Scan(keeper, group) for group in groups]
+        self._scans = [GroupScan(keeper, group) for group in groups]
         slow: dict[PlacedChip, _Converting] = {}
         self._slow: dict[int, _Converting] = {}
         for step, group in enumerate(groups):
@@ -197,7 +197,7 @@ class Interleaved:
         self._chips = tuple(slow.values())
 
     def read(self) -> list[int | None]:
-        """Return the values of all ports, as `Scan.read` does."""
+        """Return the values of all ports, as `GroupScan.read` does."""
         return [reply for replies in self for reply in replies]
 
     def __iter__(self) -> Iterator[list[int | None]]:
@@ -254,20 +254,16 @@ class I2cBus(ChipSupervisor, Closing):
         self.begin()
         # Registers, not ports, each twice: this tests batches of two chips and of two reads of one chip.
         control = [_control(member) for member in self.chips]
-        trial = Scan(self, [port for port in control for _ in range(2)])
+        trial = GroupScan(self, [port for port in control for _ in range(2)])
         for _ in BatchMode:
             trial.read()
 
-    def prepare(self, ports: Sequence[PlacedPort]) -> Scan:
-        """Return a reusable scan of these ports of its chips, in this order."""
-        return Scan(self, ports)
-
-    def interleaved(self, groups: Sequence[Sequence[PlacedPort]]) -> Interleaved:
-        """Return a scan of groups of ports, in this order, with conversions overlapped with other transfers.
+    def prepare(self, groups: Sequence[Sequence[PlacedPort]]) -> Scan:
+        """Return a reusable scan of groups of ports, in this order, with conversions overlapped with other transfers.
 
         A conversion that takes time is a separate group.
         """
-        return Interleaved(self, groups)
+        return Scan(self, groups)
 
     @property
     def way(self) -> str:

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
-from thenar.drivers.i2c.bus import I2cBus, Interleaved, PlacedPort
+from thenar.drivers.i2c.bus import I2cBus, PlacedPort, Scan
 from thenar.drivers.i2c.chips import Conversion, Converter
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.drivers.spi.chips import SpiChip
@@ -92,7 +92,7 @@ class I2cDevice(Source):
         placed = {chip: _placed(harness, number, chip, ports) for chip in chips}
         self.bus = I2cBus(wiring.device, tuple(placed.values()))
         self._reads = [PlacedPort(placed[port.chip], reading_of(port, harness)) for port in ports]
-        self._scan: Interleaved | None = None
+        self._scan: Scan | None = None
         self._groups: list[list[int]] = []
         self._pace, self._held_up = Pace(wiring.rate_hz), 0
 
@@ -105,12 +105,12 @@ class I2cDevice(Source):
         """Open the bus and set up its chips."""
         self.bus.open()
         self._groups = self._grouped(range(len(self._reads)))
-        self._scan = self.bus.interleaved([[self._reads[port] for port in group] for group in self._groups])
+        self._scan = self.bus.prepare([[self._reads[port] for port in group] for group in self._groups])
 
-    def scan(self, chip: PlacedChip | None = None) -> Interleaved:
+    def scan(self, chip: PlacedChip | None = None) -> Scan:
         """Return a reader of all ports, or of those of this chip of the bus."""
         ports = [port for port, read in enumerate(self._reads) if chip is None or read.member is chip]
-        return self.bus.interleaved([[self._reads[port] for port in group] for group in self._grouped(ports)])
+        return self.bus.prepare([[self._reads[port] for port in group] for group in self._grouped(ports)])
 
     def _grouped(self, ports: Sequence[int]) -> list[list[int]]:
         """Return the ports that are read together: all but slow conversions."""

@@ -144,7 +144,7 @@ def test_a_scan_takes_the_planned_time_and_gives_every_code(
             for station, four, (kind, *_) in zip(world.stations, codes, places, strict=True):
                 if kind.startswith("ads"):
                     station.device.levels = sum(code << 16 * channel for channel, code in enumerate(four))
-            reads = bus.interleaved(groups_of(bus, ports, harness))
+            reads = bus.prepare(groups_of(bus, ports, harness))
             reads.read()
             before, found = world.now, reads.read()
         assert (world.now - before) * 1e6 == pytest.approx(overlapped_us(ports, harness), abs=0.01)
@@ -161,7 +161,7 @@ def test_a_scan_that_ended_early_leaves_no_old_codes_behind(monkeypatch: pytest.
     world, harness = World(*places), harness_of(places)
     bus = opened(monkeypatch, world, places)
     scan = whole_scan(harness, [f"{name}>1" for name in harness.taxel_names])
-    reads = bus.interleaved(groups_of(bus, scan.ports, harness))
+    reads = bus.prepare(groups_of(bus, scan.ports, harness))
     device = world.stations[0].device
     for code in (100, 200, 300):
         device.levels = sum(code + channel << 16 * channel for channel in range(4))
@@ -180,7 +180,7 @@ def test_a_converter_that_is_gone_is_no_answer_and_holds_nobody_up(monkeypatch: 
     scan = whole_scan(harness, [*harness.switches, *(f"{name}>1" for name in harness.taxel_names)])
     for station, (kind, *_) in zip(world.stations, places, strict=True):
         station.device.levels = 0x0004_0003_0002_0001 if kind.startswith("ads") else 0xFFFF
-    reads = bus.interleaved(groups_of(bus, scan.ports, harness))
+    reads = bus.prepare(groups_of(bus, scan.ports, harness))
     whole = reads.read()
     assert [answer for port, answer in zip(scan.ports, whole, strict=True) if port.chip == 2] == [1, 2, 3, 4]
     world.stations[2].absent = True
@@ -200,7 +200,7 @@ def test_channels_at_rest_are_looked_into_once_a_check(monkeypatch: pytest.Monke
     world, harness = World(*places), harness_of(places)
     bus = opened(monkeypatch, world, places)
     scan = whole_scan(harness, [f"{name}>1" for name in harness.taxel_names])
-    reads = bus.interleaved(groups_of(bus, scan.ports, harness))
+    reads = bus.prepare(groups_of(bus, scan.ports, harness))
     wire = world.adapter.wire
     bus.chips[0].checked += 1
     before = wire.transfers
