@@ -10,7 +10,7 @@ Where the sources of the protocol disagree, each variant is accepted or selectab
 import logging
 from collections import deque
 from collections.abc import Collection, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from time import monotonic, monotonic_ns
 from typing import Self
@@ -150,21 +150,19 @@ class GloveInfo:
 def find_line(url: str, rates: Sequence[int]) -> SerialLine:
     """Return an open line at the first of `rates` at which the box replies. Raises DeviceError if it never does."""
     for baud in rates:
-        line = SerialLine(url, baud)
-        try:
+        with ExitStack() as opened:
+            line = opened.enter_context(SerialLine(url, baud))
             dialogue = Dialogue(line)
-            dialogue.stop_stream()
-            dialogue.ask(query("G"))
-        except DeviceError as reason:
-            line.close()
-            if len(rates) == 1:
-                raise
-            failure = reason
-        except BaseException:
-            line.close()
-            raise
-        else:
-            return line
+            try:
+                dialogue.stop_stream()
+                dialogue.ask(query("G"))
+            except DeviceError as reason:
+                if len(rates) == 1:
+                    raise
+                failure = reason
+            else:
+                opened.pop_all()
+                return line
     tried = ", ".join(map(str, rates))
     raise DeviceError(f"{url}: no CyberGlove replies at {tried} baud: check its power and the cable") from failure
 

@@ -3,6 +3,7 @@
 import errno
 import logging
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from time import monotonic
 from typing import TypeVar
@@ -117,16 +118,10 @@ def identify_chip(node: DeviceNode, address: int) -> str:
     Kinds without registers come last, since probing for registers drives their pins.
     """
     for chip in sorted(CHIPS.values(), key=lambda chip: chip.registers, reverse=True):
-        if address in chip.addresses and _behaves_like(node, chip, address):
-            return f"something that behaves like a {chip.name}"
+        with suppress(OSError):
+            if address in chip.addresses and set_up(node, chip, address, frozenset()):
+                return f"something that behaves like a {chip.name}"
     return "something unknown"
-
-
-def _behaves_like(node: DeviceNode, chip: Chip, address: int) -> bool:
-    try:
-        return set_up(node, chip, address, frozenset())
-    except OSError:
-        return False
 
 
 @dataclass(eq=False, slots=True)
