@@ -10,17 +10,16 @@ Where the sources of the protocol disagree, each variant is accepted or selectab
 import logging
 from collections import deque
 from collections.abc import Collection, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from time import monotonic, monotonic_ns
 from typing import Self
 
 from .closing import Closing
 from .cyberglove_protocol import (
+    GLOVES,
     INFORMATION,
     READY,
-    SENSORS_18,
-    SENSORS_22,
     STOP,
     STREAM,
     Command,
@@ -56,7 +55,6 @@ _TRIES = 3
 BAUD_RATES = (115_200, 38_400, 19_200, 9_600)
 # After power-on, a box reports for a while that it is not ready.
 _READY_S = 1.0
-_NAMES = {18: SENSORS_18, 22: SENSORS_22}
 # After this time without a byte the glove counts as dead: short, since it must be read within a second of its return.
 _SILENT_S = 0.5
 # The same with bytes, but without a record.
@@ -96,7 +94,14 @@ class Dialogue:
             reply = self._asked_once(command)
             if reply is not None and reply.error is None:
                 return reply.values
-        raise DeviceError(f"{self._line.url}: {_complaint(command, reply, self._line.baud)}")
+        if reply is not None:
+            raise DeviceError(
+                f"{self._line.url}: the CyberGlove replies to {command.name} with an error: {reply.error}"
+            )
+        raise DeviceError(
+            f"{self._line.url}: no CyberGlove replies to {command.name} at {self._line.baud} baud: check its power, the"
+            " cable and the baud rate"
+        )
 
     def _asked_once(self, command: Command) -> Reply | None:
         self._line.write(command.request)
@@ -109,28 +114,6 @@ class Dialogue:
         return find_reply(command, received, last=True)
 
 
-def _complaint(command: Command, reply: Reply | None, baud: int) -> str:
-    if reply is not None:
-        return f"the CyberGlove replies to {command.name} with an error: {reply.error}"
-    return f"no CyberGlove replies to {command.name} at {baud} baud: check its power, the cable and the baud rate"
-
-
-@dataclass(frozen=True, slots=True)
-class GloveSetup:
-    """The requested configuration of a glove.
-
-    words    the period (`cyberglove_protocol.period_words`)
-    sensors  the required number of sensors; None: as reported
-    only     places, in wire order, of the sensors to send; None: all
-    filtered  whether its digital filter is on; None: unchanged
-    """
-
-    words: Words
-    sensors: int | None
-    only: frozenset[int] | None = None
-    filtered: bool | None = None
-
-
 @dataclass(frozen=True, slots=True)
 class GloveInfo:
     """A detected glove and its configuration.
@@ -139,7 +122,6 @@ class GloveInfo:
     total       number of sensors of the glove, 18 or 22
     places      places, in wire order, of the sensors in a record: all, or those that the box's mask lets through
     names       the names of these sensors, in wire order
-    mask        the software mask, 3 bytes, the lowest bit of the first one first; empty if the box does not report it
     right_hand  whether it is for the right hand; None if the box does not report it
     text        the box's information text
     status      whether records carry the status byte
@@ -152,7 +134,6 @@ class GloveInfo:
     total: int
     places: tuple[int, ...]
     names: tuple[str, ...]
-    mask: bytes
     right_hand: bool | None
     text: str
     status: bool
@@ -169,62 +150,75 @@ class GloveInfo:
 def find_line(url: str, rates: Sequence[int]) -> SerialLine:
     """Return an open line at the first of `rates` at which the box replies. Raises DeviceError if it never does."""
     for baud in rates:
-        line = SerialLine(url, baud)
-        try:
+        with ExitStack() as opened:
+            line = opened.enter_context(SerialLine(url, baud))
             dialogue = Dialogue(line)
-            dialogue.stop_stream()
-            dialogue.ask(query("G"))
-        except DeviceError as reason:
-            line.close()
-            if len(rates) == 1:
-                raise
-            failure = reason
-        except BaseException:
-            line.close()
-            raise
-        else:
-            return line
+            try:
+                dialogue.stop_stream()
+                dialogue.ask(query("G"))
+            except DeviceError as reason:
+                if len(rates) == 1:
+                    raise
+                failure = reason
+            else:
+                opened.pop_all()
+                return line
     tried = ", ".join(map(str, rates))
     raise DeviceError(f"{url}: no CyberGlove replies at {tried} baud: check its power and the cable") from failure
 
 
-def set_up(line: SerialLine, wanted: GloveSetup) -> GloveInfo:
+def set_up(
+    line: SerialLine, words: Words, sensors: int | None, only: Collection[int] | None, filtered: bool | None
+) -> GloveInfo:
     """Identify a box that replies, and configure how it sends records.
 
-    Raises DeviceError if it does not reply or is not a supported glove.
+    words is the period (`cyberglove_protocol.period_words`), the others are as for `CyberGlove`. Raises DeviceError if
+    it does not reply or is not a supported glove.
     """
     dialogue = Dialogue(line)
     notes = _until_ready(dialogue, line.url)
-    total = _sensors(dialogue, line.url, wanted.sensors)
-    mask = _optional(dialogue, query("M")) or b""
-    every = masked if len(masked := masked_sensors(mask)) == total else _NAMES[total]
+    total = _sensors(dialogue, line.url, sensors)
+    masked = masked_sensors(_optional(dialogue, query("M")) or b"")
+    every = masked if len(masked) == total else GLOVES[total]
     places, unmasked = tuple(range(total)), ""
-    if wanted.only is not None and 0 < len(wanted.only) < total:
-        some = tuple(sorted(wanted.only))
-        if _masked(dialogue, fewer := mask_of([every[place] for place in some])):
-            places, mask = some, fewer
+    if only is not None and 0 < len(only) < total:
+        some = tuple(sorted(only))
+        if _masked(dialogue, mask_of([every[place] for place in some])):
+            places = some
         else:
             _masked(dialogue, mask_of(every))
             unmasked = f"it accepts no sensor mask: all {total} sensors are read, though {len(some)} are requested"
     right, text = _optional(dialogue, query("R")), _optional(dialogue, INFORMATION) or b""
-    status, odd = _configured(dialogue, wanted)
-    filtered = _optional(dialogue, query("F")) not in (None, b"\0")
-    if wanted.filtered not in (None, filtered):
-        odd += (f"Its digital filter stays {'on' if filtered else 'off'}, contrary to the setting.",)
-    period = period_us(wanted.words)
-    shortest = shortest_us(len(places), line.baud, status=status, filtered=filtered)
+    dialogue.ask(setting("T", packed := b"".join(word.to_bytes(2, "big") for word in words)))
+    if _optional(dialogue, query("T")) not in (None, packed):
+        notes.append("It keeps a period other than the one set.")
+    if filtered is not None:
+        _optional(dialogue, setting("F", bytes([filtered])))
+    _optional(dialogue, setting("D", b"\0"))  # fails on a box without time stamps
+    status = _optional(dialogue, setting("U", b"\1")) is not None
+    if not status:
+        notes.append("It sends no status byte: plug and wrist switch cannot be seen while it streams.")
+    filters = _optional(dialogue, query("F")) not in (None, b"\0")
+    if filtered not in (None, filters):
+        notes.append(f"Its digital filter stays {'on' if filters else 'off'}, contrary to the setting.")
+    period = period_us(words)
+    shortest = shortest_us(len(places), line.baud, status=status, filtered=filters)
+    if 0.0 < period < shortest:
+        notes.append(
+            f"{1e6 / period:.0f} records a second are requested, and box and line should manage {1e6 / shortest:.0f}:"
+            " request fewer if records come with the fault 'too fast'."
+        )
     return GloveInfo(
         baud=line.baud,
         total=total,
         places=places,
         names=tuple(every[place] for place in places),
-        mask=mask,
         right_hand=None if right is None else right != b"\0",
         text="".join(filter(str.isprintable, text.decode("ascii", "replace"))).strip(),
         status=status,
         period_us=round(max(period, shortest)),
         unmasked=unmasked,
-        notes=notes + odd + _rate_note(period, shortest),
+        notes=tuple(notes),
     )
 
 
@@ -239,39 +233,23 @@ def _masked(dialogue: Dialogue, mask: bytes) -> bool:
     return masked_sensors(says) == masked_sensors(mask) and _optional(dialogue, query("N")) == count
 
 
-def _configured(dialogue: Dialogue, wanted: GloveSetup) -> tuple[bool, tuple[str, ...]]:
-    """Configure the box; return whether its records will carry the status byte, and notes on rejected settings."""
-    words = b"".join(word.to_bytes(2, "big") for word in wanted.words)
-    dialogue.ask(setting("T", words))
-    odd: tuple[str, ...] = ()
-    if _optional(dialogue, query("T")) not in (None, words):
-        odd = ("It keeps a period other than the one set.",)
-    if wanted.filtered is not None:
-        _optional(dialogue, setting("F", bytes([wanted.filtered])))
-    _optional(dialogue, setting("D", b"\0"))  # fails on a box without time stamps
-    status = _optional(dialogue, setting("U", b"\1")) is not None
-    if not status:
-        odd += ("It sends no status byte: plug and wrist switch cannot be seen while it streams.",)
-    return status, odd
-
-
-def _until_ready(dialogue: Dialogue, url: str) -> tuple[str, ...]:
+def _until_ready(dialogue: Dialogue, url: str) -> list[str]:
     """Poll until the box is ready. Sources disagree on the meanings of 1 and 2: both pass, with a note."""
     end = monotonic() + _READY_S
     while (state := dialogue.ask(query("G"))[0]) != READY and monotonic() < end:
         dialogue.stop_stream()
     if state == 0:
         raise DeviceError(f"{url}: the CyberGlove's box is not initialised and has no glove: is one plugged in?")
-    return () if state == READY else (f"?G returns {state}, not {READY}: the glove is unplugged or not initialised.",)
+    return [] if state == READY else [f"?G returns {state}, not {READY}: the glove is unplugged or not initialised."]
 
 
 def _sensors(dialogue: Dialogue, url: str, expected: int | None) -> int:
     reply = _optional(dialogue, query("N")) or _optional(dialogue, query("S"))
     count = reply[0] if reply else expected
-    if count not in (None, *_NAMES):
+    if count not in (None, *GLOVES):
         # An interrupted program, usually thenar itself, left a mask behind.
         has = _optional(dialogue, query("S"))
-        if has is not None and has[0] in _NAMES and _masked(dialogue, mask_of(_NAMES[has[0]])):
+        if has is not None and has[0] in GLOVES and _masked(dialogue, mask_of(GLOVES[has[0]])):
             count = has[0]
     if count is None:
         raise DeviceError(f"{url}: the CyberGlove does not report its number of sensors: set `sensors = 18` or 22")
@@ -279,21 +257,12 @@ def _sensors(dialogue: Dialogue, url: str, expected: int | None) -> int:
         raise SettingError(
             f"{url}: the CyberGlove sends {count} sensors, not {expected}: write `sensors = {count}` under [cyberglove]"
         )
-    if count not in _NAMES:
+    if count not in GLOVES:
         raise DeviceError(
             f"{url}: the CyberGlove sends {count} sensors, neither 18 nor 22: another program masked some (its M"
             " setting); switch the box off and on"
         )
     return count
-
-
-def _rate_note(period: float, shortest: float) -> tuple[str, ...]:
-    if not 0.0 < period < shortest:
-        return ()
-    return (
-        f"{1e6 / period:.0f} records a second are requested, and box and line should manage {1e6 / shortest:.0f}:"
-        " request fewer if records come with the fault 'too fast'.",
-    )
 
 
 def _optional(dialogue: Dialogue, command: Command) -> bytes | None:
@@ -331,12 +300,7 @@ class CyberGlove(Closing):
         self.url = url
         self.counts = RecordCounts()
         self._rates = BAUD_RATES if baud is None else (baud,)
-        self._wanted = GloveSetup(
-            period_words(rate_hz),
-            sensors=sensors,
-            only=None if only is None else frozenset(only),
-            filtered=filtered,
-        )
+        self._words, self._sensors, self._only, self._filtered = period_words(rate_hz), sensors, only, filtered
         self._line: SerialLine | None = None
         self._misfits = 0
         self._unmasked = ""
@@ -350,7 +314,7 @@ class CyberGlove(Closing):
         self.close()
         line = find_line(self.url, self._rates)
         try:
-            info = self._info = set_up(line, self._wanted)
+            info = self._info = set_up(line, self._words, self._sensors, self._only, self._filtered)
             if self._unmasked:
                 info = self._info = replace(info, unmasked=self._unmasked)
             if info.unmasked:
@@ -360,7 +324,10 @@ class CyberGlove(Closing):
             self._misfits = self.counts.wrong_length
             periods_s = _SILENT_PERIODS * info.period_us / 1e6
             self._silent_s, self._noisy_s = max(_SILENT_S, periods_s), max(_NOISY_S, periods_s)
-            self._start(line)
+            self._decoder = RecordDecoder(info.sensors, self.counts, info.status)
+            self._ready: deque[Timed] = deque()
+            self._heard_at = self._quiet_from = monotonic()
+            line.write(STREAM)
         except BaseException:
             line.close()
             raise
@@ -377,26 +344,15 @@ class CyberGlove(Closing):
         Raises DeviceError if the line is gone, no byte came for half a second, or no record for a second (or for four
         periods, if these are longer).
         """
-        line, end = self._opened(), monotonic() + timeout_s
+        if self._line is None:
+            raise DeviceError(f"{self.url}: the CyberGlove is not open: open() it first")
+        end = monotonic() + timeout_s
         while not self._ready:
             now = monotonic()
-            self._receive(line, min(end, self._given_up_at) - now)
+            self._receive(self._line, min(end, self._given_up_at) - now)
             if not self._ready and now >= end:
                 return None
         return self._ready.popleft()
-
-    def ask(self, letter: str) -> bytes:
-        """Return the values of the box's reply to the query of this letter. A stream pauses meanwhile.
-
-        Raises DeviceError if the line is gone or the box does not reply, SettingError if there is no such query.
-        """
-        command, line = query(letter), self._opened()
-        dialogue = Dialogue(line)
-        dialogue.stop_stream()
-        try:
-            return dialogue.ask(command)
-        finally:
-            self._start(line)
 
     def close(self) -> None:
         """Stop the stream, unmask all sensors, if that is still possible, and close the line."""
@@ -404,24 +360,12 @@ class CyberGlove(Closing):
         if line is not None:
             masked = self._info.sensors < self._info.total
             with suppress(DeviceError):
-                line.write(STOP + setting("M", mask_of(_NAMES[self._info.total])).request if masked else STOP)
+                line.write(STOP + setting("M", mask_of(GLOVES[self._info.total])).request if masked else STOP)
             line.close()
 
     def __enter__(self) -> Self:
         self.open()
         return self
-
-    def _opened(self) -> SerialLine:
-        if self._line is None:
-            raise DeviceError(f"{self.url}: the CyberGlove is not open: open() it first")
-        return self._line
-
-    def _start(self, line: SerialLine) -> None:
-        """Start, or start again after another command."""
-        self._decoder = RecordDecoder(self._info.sensors, self.counts, self._info.status)
-        self._ready: deque[Timed] = deque()
-        self._heard_at = self._quiet_from = monotonic()
-        line.write(STREAM)
 
     @property
     def _given_up_at(self) -> float:
@@ -442,8 +386,8 @@ class CyberGlove(Closing):
         elif now_us / 1e6 > self._given_up_at:
             line.check_plugged()
             if self._info.sensors < self._info.total and self.counts.wrong_length > self._misfits:
-                total, self._wanted = self._info.total, replace(self._wanted, only=None)
-                self._unmasked = f"its records do not match its sensor mask: all {total} sensors are read"
+                self._only = None
+                self._unmasked = f"its records do not match its sensor mask: all {self._info.total} sensors are read"
             silent = now_us / 1e6 - self._heard_at > self._silent_s
             said = f"no byte for {self._silent_s:g}" if silent else f"no record for {self._noisy_s:g}"
             raise DeviceError(f"{self.url}: the CyberGlove has sent {said} s: check its power and the cable")

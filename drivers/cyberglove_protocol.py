@@ -25,12 +25,12 @@ byte is always 1. Time stamps, which may hold zeros, are left switched off.
 import logging
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import ceil, isfinite
 from typing import Literal
 
 from .errors import SettingError
-from .serial_line import Pieces, sending_us
+from .serial_line import sending_us
 
 _LOG = logging.getLogger(__name__)
 
@@ -55,7 +55,7 @@ STOP = b"\x03"  # Ctrl-C
 POLL, STREAM = b"G", b"S"  # also what their records begin with
 # The reply to ?G when all is well: bit 0 initialised, bit 1 glove connected (two of seven sources swap the bits).
 READY = 3
-_TEXT_END = b"\r\n\0"
+TEXT_END = b"\r\n\0"
 _ERRORS = {
     b"?": "unknown command",
     b"n": "wrong number of values, or a wrong value",
@@ -96,11 +96,12 @@ def mask_of(names: Collection[str]) -> bytes:
 # The order on the wire. The 18-sensor glove has no sensors on the outermost finger joints; the wrist's are always last.
 SENSORS_18 = masked_sensors(MASK_18)
 SENSORS_22 = masked_sensors(MASK_22)
+GLOVES = {18: SENSORS_18, 22: SENSORS_22}
 
 
 def sensors_with(joints: Collection[str]) -> int | None:
     """Return the sensor count of the smallest CyberGlove that measures all of `joints`; None if there is none."""
-    return next((len(names) for names in (SENSORS_18, SENSORS_22) if joints and set(joints) <= set(names)), None)
+    return next((len(names) for names in GLOVES.values() if joints and set(joints) <= set(names)), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +166,7 @@ def find_reply(command: Command, received: bytes, *, last: bool = False) -> Repl
 
 def _at_start(command: Command, received: bytes, last: bool) -> Reply | None:
     begin, values = len(command.echo), command.values
-    end = received.find(_TEXT_END) if values is None else begin + values
+    end = received.find(TEXT_END) if values is None else begin + values
     if received.startswith(command.echo) and end >= 0 and (values is None or received[end : end + 1] == b"\0"):
         return Reply(received[begin:end])
     found = re.match(rb"(%b)?e([?nygs])(\r\n)?\0" % re.escape(command.echo), received)
@@ -206,13 +207,12 @@ def shortest_us(sensors: int, baud: int, *, status: bool = False, filtered: bool
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One reading: the sensors' bytes in wire order, whether streamed or polled, a fault, the status byte.
+    """One reading: the sensors' bytes in wire order, a fault, the status byte.
 
     The sensor values of an unplugged glove are meaningless.
     """
 
     sensors: bytes
-    streamed: bool = True
     fault: RecordFault | None = None
     status: int | None = None
 
@@ -229,41 +229,37 @@ class RecordCounts:
 
 
 def encode(record: Record) -> bytes:
-    """Return the record's bytes on the wire, with its NUL. Raises ValueError if a sensor or the status is 0."""
+    """Return the streamed record's bytes, with its NUL. Raises ValueError if a sensor or the status is 0."""
     if 0 in record.sensors:
         raise ValueError(f"sensor {record.sensors.index(0)} is 0, which ends a CyberGlove record: values are 1 to 255")
     if record.status == 0:
         raise ValueError("a status byte of 0 would end the CyberGlove record: its highest bit is always 1")
-    start = STREAM if record.streamed else POLL
     status = b"" if record.status is None else bytes([record.status])
-    return start + record.sensors + status + _ENDINGS[record.fault] + b"\0"
+    return STREAM + record.sensors + status + _ENDINGS[record.fault] + b"\0"
 
 
-@dataclass(slots=True)
 class RecordDecoder:
     """Decodes bytes to records of `sensors` sensors; other bytes are counted and skipped to the next NUL. Never raises.
 
     status: whether the glove appends its status byte.
     """
 
-    sensors: int = SENSORS
-    counts: RecordCounts = field(default_factory=RecordCounts)
-    status: bool = False
-    _pieces: Pieces = field(init=False)
-    _body: int = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._body = 1 + self.sensors + self.status
-        self._pieces = Pieces(self._body + 2)
+    def __init__(self, sensors: int = SENSORS, counts: RecordCounts | None = None, status: bool = False) -> None:
+        self.counts = counts or RecordCounts()
+        self._sensors, self._status, self._body = sensors, status, 1 + sensors + status
+        self._rest = b""
 
     def feed(self, chunk: bytes) -> list[Record]:
         """Return the records that `chunk` completes, oldest first."""
-        pieces = self._pieces.feed(chunk)
+        pieces = chunk.split(b"\0")
+        pieces[0] = self._rest + pieces[0]
+        # A byte more than any record: the length shows that it is none, and no stream without NULs fills the memory.
+        self._rest = pieces.pop()[: self._body + 3]
         return [record for piece in pieces if piece and (record := self._record(piece)) is not None]
 
     def _record(self, piece: bytes) -> Record | None:
-        start, ending = piece[:1], piece[self._body :]
-        if start not in (POLL, STREAM):
+        ending = piece[self._body :]
+        if piece[:1] not in (POLL, STREAM):
             self.counts.wrong_start += 1
             _LOG.debug("%d bytes that do not begin with G or S were skipped", len(piece))
             return None
@@ -276,5 +272,5 @@ class RecordDecoder:
         if fault is not None:
             self.counts.too_fast += fault == "too fast"
             self.counts.unplugged += fault == "unplugged"
-        status = piece[self._body - 1] if self.status else None
-        return Record(piece[1 : self.sensors + 1], start == STREAM, fault, status)
+        status = piece[self._body - 1] if self._status else None
+        return Record(piece[1 : self._sensors + 1], fault, status)

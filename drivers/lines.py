@@ -69,34 +69,6 @@ class ColumnHeader(NamedTuple):
     names: tuple[str, ...]
 
 
-class Splitter:
-    """Splits a stream of bytes at line feeds and carriage returns.
-
-    A line of more than LONGEST bytes is dropped and counted in `overlong`, so a stream without line ends cannot fill
-    the memory.
-    """
-
-    def __init__(self) -> None:
-        self.overlong = 0
-        self._rest, self._dropping = b"", False
-
-    def feed(self, chunk: bytes) -> list[bytes]:
-        """Return the lines that `chunk` completes, without line ends and without empty lines."""
-        pieces = chunk.replace(b"\r", b"\n").split(b"\n")
-        pieces[0] = self._rest + pieces[0]
-        self._rest = pieces.pop()
-        if self._dropping and pieces:
-            pieces, self._dropping = pieces[1:], False
-        if self._dropping:
-            self._rest = b""
-        elif len(self._rest) > LONGEST:
-            self._rest, self._dropping = b"", True
-            self.overlong += 1
-        lines = [line.strip() for line in pieces if len(line) <= LONGEST]
-        self.overlong += len(pieces) - len(lines)
-        return [line for line in lines if line]
-
-
 def checked(fields: Iterable[str]) -> bytes:
     """Return the line of a board with these fields, with its checksum and its end."""
     body = ",".join(fields).encode()
@@ -264,7 +236,7 @@ class LineParser:
 
     def begin(self) -> None:
         """Reset: an incomplete line, the names of the columns and the clock of a board are forgotten."""
-        self._splitter = Splitter()
+        self._rest, self._dropping = b"", False
         self._names: tuple[str, ...] | None = None
         # A header that no row has followed yet, and the misfit before it: it may be a message.
         self._header: tuple[str, ...] = ()
@@ -275,13 +247,30 @@ class LineParser:
     def feed(self, chunk: bytes) -> list[Row]:
         """Return the rows whose lines `chunk` completes, with names if a header came before them."""
         rows = []
-        before = self._splitter.overlong
-        for line in self._splitter.feed(chunk):
+        for line in self._lines(chunk):
             found = self._of_board(line) if _is_of_board(line) else self._of_line(line)
             if found is not None:
                 rows.append(found)
-        self.counts.overlong += self._splitter.overlong - before
         return rows
+
+    def _lines(self, chunk: bytes) -> list[bytes]:
+        """Return the lines that `chunk` completes, without line ends and without empty lines.
+
+        A line of more than LONGEST bytes is dropped and counted, so a stream without line ends cannot fill the memory.
+        """
+        pieces = chunk.replace(b"\r", b"\n").split(b"\n")
+        pieces[0] = self._rest + pieces[0]
+        self._rest = pieces.pop()
+        if self._dropping and pieces:
+            pieces, self._dropping = pieces[1:], False
+        if self._dropping:
+            self._rest = b""
+        elif len(self._rest) > LONGEST:
+            self._rest, self._dropping = b"", True
+            self.counts.overlong += 1
+        lines = [line.strip() for line in pieces if len(line) <= LONGEST]
+        self.counts.overlong += len(pieces) - len(lines)
+        return [line for line in lines if line]
 
     def _of_board(self, line: bytes) -> Row | None:
         found = parsed(line, self._known)

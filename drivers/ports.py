@@ -3,12 +3,15 @@
 pySerial accepts more than serial lines: `spy://` writes to any file, `alt://` loads any of its classes.
 """
 
+import errno
+import os
 import re
 import stat
 from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
-from .errors import DeviceError
+from .errors import DeviceError, SettingError
+from .names import shortened
 
 _HOST = re.compile(r"[A-Za-z0-9._-]+|[0-9A-Fa-f:.]+(%[A-Za-z0-9._-]+)?")
 _WAYS = "a port is a device such as /dev/ttyUSB0 or socket://HOST:PORT"
@@ -31,6 +34,21 @@ def device_fault(path: str) -> str:
     if "://" in path or not path.isprintable():
         return "is not the path of a device, such as /dev/ttyUSB0 or /dev/i2c-1"
     return ""
+
+
+def check_device(path: str) -> None:
+    """Raise SettingError if `path` is not the path of a device."""
+    if fault := device_fault(path):
+        raise SettingError(f"{shortened(repr(path))} {fault}")
+
+
+def cause(error: OSError, kind: str, missing: str) -> str:
+    """Return why the node of a bus of this kind, such as "I2C", cannot be used; `missing` is for one that is gone."""
+    if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        return missing
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return f"permission denied; is your user in the group {kind.lower()}?"
+    return f"{os.strerror(error.errno or errno.EIO)}; is it an {kind} device?"
 
 
 def check_node(path: str) -> None:

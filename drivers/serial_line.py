@@ -36,25 +36,6 @@ _ADVICE = {
 }
 
 
-class Pieces:
-    """Splits a stream at 00, which ends a frame and occurs nowhere else: a reliable point to resynchronise.
-
-    Of a piece longer than `longest`, `longest` + 1 bytes are kept, so its length shows that it is too long and a stream
-    without zeros cannot fill the memory.
-    """
-
-    def __init__(self, longest: int) -> None:
-        self._keep = longest + 1
-        self._rest = b""
-
-    def feed(self, chunk: bytes) -> list[bytes]:
-        """Return the pieces that `chunk` completes, in order, without their zeros; empty ones too."""
-        pieces = chunk.split(b"\0")
-        pieces[0] = self._rest + pieces[0]
-        self._rest = pieces.pop()[: self._keep]
-        return [piece[: self._keep] for piece in pieces]
-
-
 class SerialLine(Closing):
     """An open serial line. Closing it twice is harmless; a context manager closes it at its end.
 

@@ -82,7 +82,7 @@ def open_transport(port: str, baud: int) -> "Transport":
         return WebSocket(port)
     try:
         if port.startswith("unix:"):
-            return Descriptor(port, _connected(socket.AF_UNIX, port.removeprefix("unix:")))
+            return Descriptor(port, _unix(port.removeprefix("unix:")))
         if found := _NET.fullmatch(port):
             host, number = found[2].strip("[]"), int(found[3])
             return Datagrams(port, _bound(host, number)) if found[1] == "udp" else Descriptor(port, _tcp(host, number))
@@ -103,8 +103,8 @@ def _advice(port: str, reason: OSError) -> str:
     return f"{said}: is the sender running, and does it listen?"
 
 
-def _connected(family: socket.AddressFamily, path: str) -> socket.socket:
-    line = socket.socket(family, socket.SOCK_STREAM)
+def _unix(path: str) -> socket.socket:
+    line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         line.settimeout(_CONNECT_S)
         line.connect(path)

@@ -1,4 +1,4 @@
-"""An emulated CyberGlove at the end of a serial line: it replies, is polled and streams as fast as a real one.
+"""An emulated CyberGlove at the end of a serial line: it replies and streams as fast as a real one.
 
     with PtyLine(Path("glove")) as line, EmulatedCyberGlove(line) as glove:
         glove.set(bytes(range(60, 78)))
@@ -15,20 +15,20 @@ from typing import Literal
 from ..closing import Closing
 from ..cyberglove_protocol import (
     ALWAYS,
+    GLOVES,
     INFORMATION,
-    MASK_18,
-    MASK_22,
     PLUGGED,
-    POLL,
     READY,
     REPLY_BYTES,
     SET,
     STOP,
     STREAM,
+    TEXT_END,
     Record,
     RecordFault,
     digitising_us,
     encode,
+    mask_of,
     masked_sensors,
     period_us,
     shortest_us,
@@ -36,10 +36,8 @@ from ..cyberglove_protocol import (
 from ..errors import SettingError
 from .serial_line import PtyLine
 
-MASKS = {18: MASK_18, 22: MASK_22}
 _SWITCHES = "DFU"  # settings that are 0 or 1
 _NOT_READY = 1
-_TEXT_END = b"\r\n\0"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,15 +73,19 @@ class CyberGloveBox:
     def __init__(
         self, sensors: int = 18, text: str = "CyberGlove, emulated", not_ready: int = 0, doubts: Doubts | None = None
     ) -> None:
-        if sensors not in MASKS:
+        if sensors not in GLOVES:
             raise SettingError(f"there are CyberGloves of 18 and of 22 sensors, not of {sensors}")
         self.sensors, self.text, self.doubts = sensors, text, doubts or Doubts()
         self.plugged, self.streaming = True, False
         self._not_ready, self._pending = not_ready, b""
-        self._all = masked_sensors(MASKS[sensors])
+        self._all = GLOVES[sensors]
         self.values = bytes([100] * sensors)
         # The state after power-up. (No source gives a real box's settings then.)
-        self.settings = dict.fromkeys(_SWITCHES, b"\0") | {"T": bytes(4), "M": MASKS[sensors], "N": bytes([sensors])}
+        self.settings = dict.fromkeys(_SWITCHES, b"\0") | {
+            "T": bytes(4),
+            "M": mask_of(self._all),
+            "N": bytes([sensors]),
+        }
 
     def set(self, values: bytes) -> None:
         """Set the sensor values, one byte of 1 to 255 per sensor. Raises SettingError for others."""
@@ -106,11 +108,11 @@ class CyberGloveBox:
         self.settings[letter] = values
         return True
 
-    def record(self, *, streamed: bool, too_fast: bool = False) -> bytes:
+    def record(self, *, too_fast: bool = False) -> bytes:
         """Return a record's bytes on the wire."""
         status = ALWAYS | PLUGGED * self.plugged if self.is_on("U") else None
         fault: RecordFault | None = "unplugged" if not self.plugged else "too fast" if too_fast else None
-        return encode(Record(self.sent(), streamed, fault, status))
+        return encode(Record(self.sent(), fault, status))
 
     def sent(self) -> bytes:
         """Return the values of the sensors that mask and number let through, or all if the box ignores its mask."""
@@ -122,10 +124,10 @@ class CyberGloveBox:
     def _masked(self, mask: bytes) -> list[str]:
         return [name for name in masked_sensors(mask) if name in self._all]
 
-    def feed(self, data: bytes) -> list[bytes | None]:
-        """Return the effects of `data`, in order: bytes to send at once; None: a record is requested."""
+    def feed(self, data: bytes) -> list[bytes]:
+        """Return the replies to `data`, in order."""
         self._pending += data
-        out: list[bytes | None] = []
+        out: list[bytes] = []
         while self._pending:
             used = self._command(out)
             if not used:
@@ -133,7 +135,7 @@ class CyberGloveBox:
             self._pending = self._pending[used:]
         return out
 
-    def _command(self, out: list[bytes | None]) -> int:
+    def _command(self, out: list[bytes]) -> int:
         """Execute the first pending command; return its length, 0 while it is incomplete."""
         first = self._pending[:1]
         letter = first.decode("latin-1")
@@ -145,9 +147,8 @@ class CyberGloveBox:
             return 1
         if first == b"?":
             return self._query(out)
-        if first in (POLL, STREAM):
-            self.streaming = first == STREAM
-            out += [] if self.streaming else [None]
+        if first == STREAM:
+            self.streaming = True
             return 1
         if letter not in SET or (letter == "M" and self.doubts.mask == "unknown"):
             out.append(self._error(first, b"?"))
@@ -160,13 +161,13 @@ class CyberGloveBox:
         out.append(first + b"\0" if is_set else self._error(first, b"n"))
         return size
 
-    def _query(self, out: list[bytes | None]) -> int:
+    def _query(self, out: list[bytes]) -> int:
         echo = self._pending[:2]
         if len(echo) < 2:
             return 0
         letter = echo[1:].decode("latin-1")
         if echo == INFORMATION.echo:
-            out.append(echo + self.text.encode("ascii") + _TEXT_END + b"\0" * self.doubts.stray_nul)
+            out.append(echo + self.text.encode("ascii") + TEXT_END + b"\0" * self.doubts.stray_nul)
         elif letter in REPLY_BYTES:
             constant = {"S": bytes([self.sensors]), "R": b"\1"}
             values = self._readiness() if letter == "G" else constant.get(letter) or self.settings[letter]
@@ -186,23 +187,14 @@ class CyberGloveBox:
 
 
 class EmulatedCyberGlove(Closing):
-    """A glove of 18 or 22 sensors on `line`, in a separate thread.
+    """A glove on `line`, in a separate thread: `box`, or an ordinary one of this number of sensors.
 
-    text, not_ready and doubts are those of its `box`, whose changes take effect with the next record. Raises
-    SettingError for another number of sensors.
+    Changes of the box take effect with the next record. Raises SettingError for another number than 18 or 22.
     """
 
-    def __init__(
-        self,
-        line: PtyLine,
-        *,
-        sensors: int = 18,
-        text: str = "CyberGlove, emulated",
-        not_ready: int = 0,
-        doubts: Doubts | None = None,
-    ) -> None:
+    def __init__(self, line: PtyLine, box: CyberGloveBox | None = None, *, sensors: int = 18) -> None:
         self._line = line
-        self.box = CyberGloveBox(sensors, text, not_ready, doubts)
+        self.box = box or CyberGloveBox(sensors)
         self._changed = Condition()
         self._heard: deque[bytes] = deque()
         self._closing = False
@@ -248,18 +240,9 @@ class EmulatedCyberGlove(Closing):
     def _hear(self, data: bytes) -> None:
         was_streaming = self.box.streaming
         for reply in self.box.feed(data):
-            if reply is not None:
-                self._line.send(reply)
-                continue
-            with self._changed:
-                self._changed.wait_for(lambda: self._closing, self._digitising_s)
-            self._send(self.box.record(streamed=False))
+            self._line.send(reply)
         if self.box.streaming and not was_streaming:
-            self._next = monotonic() + self._digitising_s
-
-    @property
-    def _digitising_s(self) -> float:
-        return digitising_us(len(self.box.sent()), self.box.is_on("F")) / 1e6
+            self._next = monotonic() + digitising_us(len(self.box.sent()), self.box.is_on("F")) / 1e6
 
     def _stream(self) -> None:
         """Send a record when it is due, and schedule the next by the set period or the shortest possible one."""
@@ -268,10 +251,7 @@ class EmulatedCyberGlove(Closing):
         box, words = self.box, self.box.settings["T"]
         period = period_us((int.from_bytes(words[:2], "big"), int.from_bytes(words[2:], "big")))
         shortest = shortest_us(len(box.sent()), self._line.baud, status=box.is_on("U"), filtered=box.is_on("F"))
-        self._send(box.record(streamed=True, too_fast=0 < period < shortest))
+        self._line.send(box.record(too_fast=0 < period < shortest))
+        self.records += 1
         # If the host wakes this thread late, there is no burst to catch up.
         self._next = max(self._next + max(period, shortest) / 1e6, monotonic())
-
-    def _send(self, record: bytes) -> None:
-        self.records += 1
-        self._line.send(record)

@@ -8,18 +8,20 @@ import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
 from threading import Lock
+from types import MappingProxyType
 from typing import Any, Literal
 
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
-from ..i2c.chips import CHIPS, Converter
+from ..i2c.chips import CHIPS
 from ..spi.chips import SPI_CHIPS
+from .i2c_wire import Place
 
 _PYTHON = "/usr/bin/python3"
 # Isolated: neither the current folder nor the user's, with foreign modules, is on its path.
@@ -51,41 +53,24 @@ class EmulatedBus:
 
 
 @dataclass(frozen=True, slots=True)
-class EmulatedSpi:
-    """A converter of a kind at `device` (/dev/spidevB.C); None: no chip, and the line is high."""
-
-    device: str
-    kind: str | None
-
-
-@dataclass(frozen=True, slots=True)
-class Traffic:
-    """Bytes to and from one place, including addresses; `register` if the chip has registers."""
-
-    address: int
-    mux: int | None
-    channel: int | None
-    register: int | None
-    count: int
-
-
-@dataclass(frozen=True, slots=True)
 class WireCounters:
     """Counts of a bus: ioctl calls, transfers (each ended by a STOP), SCL periods, and bytes by place."""
 
     calls: int
     transfers: int
     scl_periods: int
-    traffic: tuple[Traffic, ...]
+    traffic: Mapping[Place, int]
 
     @property
     def total_bytes(self) -> int:
         """Bytes on the wire, including addresses."""
-        return sum(place.count for place in self.traffic)
+        return sum(self.traffic.values())
 
 
 class EmulatedI2c(Closing):
-    """The buses of a glove, served by a separate process.
+    """The buses and SPI devices of a glove, served by a separate process.
+
+    spi  the kind of the converter at each device (/dev/spidevB.C); None: no chip, and the line is high
 
     Chips are numbered in the order of their bus; SPI devices are numbered after the buses, with one chip each. A client
     sees them if it runs with `environment`. Pins start high, and channels at 0 V; the levels of a converter are its
@@ -93,18 +78,14 @@ class EmulatedI2c(Closing):
     SettingError for a chip that cannot be emulated.
     """
 
-    def __init__(self, buses: Sequence[EmulatedBus], spi: Sequence[EmulatedSpi] = ()) -> None:
+    def __init__(self, buses: Sequence[EmulatedBus], spi: Mapping[str, str | None] = MappingProxyType({})) -> None:
         unknown = sorted({chip.kind for bus in buses for chip in bus.chips} - set(CHIPS))
-        unknown += sorted({chip.kind for chip in spi if chip.kind} - set(SPI_CHIPS))
+        unknown += sorted({kind for kind in spi.values() if kind} - set(SPI_CHIPS))
         if unknown:
             raise SettingError(f"cannot emulate {', '.join(unknown)}; supported: {', '.join(CHIPS)}")
         wrapper = shutil.which("umockdev-wrapper")
         if wrapper is None:
             raise DeviceError(f"the program umockdev-wrapper is missing: {_INSTALL}")
-        self._levels = [
-            [0 if isinstance(CHIPS[chip.kind], Converter) else (1 << 24) - 1 for chip in bus.chips] for bus in buses
-        ]
-        self._levels += [[0] for _ in spi]
         self._errors = TemporaryFile("w+")  # noqa: SIM115 - it lives as long as the server; a pipe would fill up
         self._server = subprocess.Popen(
             [wrapper, _PYTHON, "-I", "-c", _SERVE, _folder(__name__), f"{__package__}.i2c_server"],
@@ -117,7 +98,8 @@ class EmulatedI2c(Closing):
         self._lock = Lock()
         self._root: str | None = None
         try:
-            self._root = self._tell([*map(_described, buses), *map(_spi_described, spi)])
+            devices = [_spi_described(*device) for device in spi.items()]
+            self._root = self._tell(([_described(bus) for bus in buses], devices))
         except BaseException:
             self.close()
             raise
@@ -125,73 +107,34 @@ class EmulatedI2c(Closing):
 
     def set_levels(self, bus: int, chip: int, levels: int) -> None:
         """Set the pins of one chip: bit p is pin p, 1 is high or open; or a converter's codes."""
-        self._levels[bus][chip] = levels
-        self.set_all(self._levels)
+        self._tell([(bus, "set_levels", chip, levels)])
 
     def set_all(self, levels: Sequence[Sequence[int]]) -> None:
         """Set the pins of all chips of all buses at one time."""
-        self._levels = [list(values) for values in levels]
-        self._tell(["levels", self._levels])
+        self._tell(
+            [(bus, "set_levels", chip, one) for bus, chips in enumerate(levels) for chip, one in enumerate(chips)]
+        )
 
     def counters(self, bus: int) -> WireCounters:
         """Return the counts of the bus since the start."""
-        seen = self._tell(["counters", bus])
-        traffic = tuple(Traffic(*place) for place in seen.pop("traffic"))
-        return WireCounters(**seen, traffic=traffic)
+        ((calls, transfers, periods, traffic),) = self._tell([(bus, "counters")])
+        return WireCounters(calls, transfers, periods, {Place(*place): count for place, count in traffic})
 
-    def fail(
-        self, bus: int, code: int, *, address: int | None = None, times: int | None = None, batches: bool = False
-    ) -> None:
-        """Make transfers fail with errno `code`: to one address or all, `times` times or until healed, batches only."""
-        self._fault(bus, "error", code, address, times, batches)
-
-    def remove(self, bus: int, chip: int) -> None:
-        """Make a chip stop acknowledging; `heal` restores it with its state."""
-        self._fault(bus, "absent", chip, True)
-
-    def bring_back(self, bus: int, chip: int) -> None:
-        """End `remove` of this chip alone."""
-        self._fault(bus, "absent", chip, False)
-
-    def remove_mux(self, bus: int, mux: int) -> None:
-        """Make a mux and the chips behind it stop acknowledging."""
-        self._fault(bus, "absent_mux", mux)
+    def fault(self, bus: int, name: str, *arguments: Any, **options: Any) -> None:
+        """Inject a fault: call this method of the bus's `i2c_wire.Adapter`, such as "fail", "remove" or "heal"."""
+        self._tell([(bus, "fault", name, arguments, options)])
 
     def replace(self, bus: int, chip: int, kind: str) -> None:
         """Replace a chip by a new one of another kind."""
-        self._fault(bus, "become", chip, _model(kind))
-
-    def reset(self, bus: int, chip: int) -> None:
-        """Reset a chip to its defaults, as a power glitch does."""
-        self._fault(bus, "reset", chip)
-
-    def poke(self, bus: int, chip: int, register: int, value: int) -> None:
-        """Write a register behind the client's back."""
-        self._fault(bus, "poke", chip, register, value)
-
-    def poke_mux(self, bus: int, mux: int, control: int) -> None:
-        """Change a mux's control register; 0 is the effect of a reset."""
-        self._fault(bus, "poke_mux", mux, control)
-
-    def claim(self, bus: int, address: int) -> None:
-        """Make a kernel driver hold an address: I2C_SLAVE fails with EBUSY."""
-        self._fault(bus, "claim", address)
-
-    def hold_sda(self, bus: int, transfers: int | None = None) -> None:
-        """Hold SDA low until healed, or until this number of transfers has clocked it free."""
-        self._fault(bus, "stick", transfers)
-
-    def heal(self, bus: int) -> None:
-        """End all persistent faults."""
-        self._fault(bus, "heal")
+        self._tell([(bus, "replace", chip, _model(kind))])
 
     def unplug(self, bus: int) -> None:
         """Remove the adapter: its node is gone, and clients that have it open get ENODEV."""
-        self._tell(["unplug", bus])
+        self._tell([(bus, "unplug")])
 
     def replug(self, bus: int) -> None:
         """Bring the adapter back."""
-        self._tell(["plug", bus])
+        self._tell([(bus, "replug")])
 
     def close(self) -> None:
         """End the server and its device nodes. Closing twice is harmless."""
@@ -200,9 +143,6 @@ class EmulatedI2c(Closing):
             self._errors.close()
             if self._root is not None:  # a killed server leaves it behind
                 shutil.rmtree(self._root, ignore_errors=True)
-
-    def _fault(self, bus: int, name: str, *arguments: Any) -> None:
-        self._tell(["fault", bus, name, arguments])
 
     def _tell(self, line: Any) -> Any:
         assert self._server.stdin is not None
@@ -236,19 +176,15 @@ class EmulatedI2c(Closing):
 
 
 def _described(bus: EmulatedBus) -> dict[str, Any]:
-    """Return a bus in the form of the server's first line, with each chip's model in place of its kind."""
-    chips = [{"model": _model(chip.kind), **asdict(chip)} for chip in bus.chips]
-    for chip in chips:
-        del chip["kind"]
-    return {**asdict(bus), "chips": chips}
+    """Return a bus in the form of the server's first line, with each chip's model as its kind."""
+    return {**asdict(bus), "chips": [{**asdict(chip), "kind": _model(chip.kind)} for chip in bus.chips]}
 
 
-def _spi_described(chip: EmulatedSpi) -> dict[str, Any]:
-    if chip.kind is None:
-        return {"device": chip.device, "chips": [{"model": None}]}
-    kind = SPI_CHIPS.named(chip.kind)
-    numbers = {"channels": len(kind.pins), "bits": kind.bits}
-    return {"device": chip.device, "chips": [{"model": _place_of(kind.model), **numbers}]}
+def _spi_described(device: str, kind: str | None) -> tuple[Any, ...]:
+    if kind is None:
+        return device, None
+    chip = SPI_CHIPS.named(kind)
+    return device, _place_of(chip.model), len(chip.pins), chip.bits
 
 
 def _model(kind: str) -> tuple[str, str, str]:

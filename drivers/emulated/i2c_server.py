@@ -1,7 +1,8 @@
 """Serves emulated I2C buses as device nodes through umockdev, controlled by JSON lines on stdin and stdout.
 
 It is started by `umockdev-wrapper /usr/bin/python3 -I`: it needs the system's Python, which has PyGObject, and no other
-package. Each line in is [verb, arguments...] of `EmulationServer`; each line out is the reply.
+package. The first line in lists buses and SPI devices; the reply is the location of the testbed. Each further line is a
+list of calls, [number of the node, method, arguments...]; the reply is the list of their results.
 """
 
 import errno
@@ -12,7 +13,7 @@ import sys
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +22,15 @@ import gi
 gi.require_version("UMockdev", "1.0")
 from gi.repository import GLib, UMockdev  # noqa: E402
 
-from ..spi.chips.base import SpiModel  # noqa: E402
-from .i2c_wire import FUNCTIONS, I2C_BLOCK, Adapter, Message, Station, TransferFault, Wire  # noqa: E402
+from ..i2c.node import I2C_SLAVE  # noqa: E402
+from ..spi.device import MODE, SPEED, TRANSFER, message  # noqa: E402
+from .i2c_wire import Adapter, Message, Station, Wire  # noqa: E402
 
-I2C_SLAVE, I2C_SLAVE_FORCE, I2C_FUNCS, I2C_RDWR, I2C_SMBUS = 0x703, 0x706, 0x705, 0x707, 0x720
+_I2C_FUNCS, _I2C_RDWR = 0x705, 0x707
+# The reply to I2C_FUNCS: messages, and no SMBus transfers made of them.
+_FUNCTIONS = 0x0001
 _READS = 0x0001
 _MESSAGE = struct.Struct("=HHHxxQ")
-SPI_MODE, SPI_SPEED, SPI_MESSAGE = 0x40016B01, 0x40046B04, 0x40006B00
-_SPI_TRANSFER = struct.Struct("=QQIIHBBBBBB")
 # Sleep this much less than the wait, then spin: a plain sleep ends late by about this time.
 _SPIN_S = 100e-6
 
@@ -51,12 +53,12 @@ class EmulatedNode(ABC):
         self._away = self._path.with_name(f".{name}")
 
     @abstractmethod
-    def show(self, levels: list[int]) -> None:
-        """Set the pins of all its chips."""
+    def set_levels(self, chip: int, levels: int) -> None:
+        """Set the pins of a chip, or its channels' codes."""
 
     @abstractmethod
-    def counters(self) -> dict[str, Any]:
-        """Return the traffic counts."""
+    def counters(self) -> tuple[int, int, int, list[Any]]:
+        """Return the numbers of calls, transfers and clock periods, and the traffic by place."""
 
     @abstractmethod
     def _do(self, client: Any) -> int:
@@ -73,7 +75,7 @@ class EmulatedNode(ABC):
         self._strangers |= self._clients
         self._clients.clear()
 
-    def plug(self) -> None:
+    def replug(self) -> None:
         """Bring the node back for clients that open it from now on."""
         if self._away.is_symlink():
             self._away.rename(self._path)
@@ -116,53 +118,50 @@ class EmulatedNode(ABC):
 class I2cNode(EmulatedNode):
     """One /dev/i2c-N."""
 
-    def __init__(self, testbed: Any, device: str, adapter: Adapter, paced: bool) -> None:
+    def __init__(
+        self, testbed: Any, device: str, chips: list[dict[str, Any]], clock_hz: int, adapter: str, paced: bool
+    ) -> None:
         minor = device.rpartition("-")[2]
         super().__init__(testbed, device, f"E: MAJOR=89\nE: MINOR={minor}\n", "i2c-dev")
-        self.adapter, self._paced = adapter, paced
-        self._addresses: dict[int, int] = {}
+        stations = [Station(_model(*chip.pop("kind")), **chip) for chip in chips]
+        self._adapter, self._paced = Adapter(Wire(stations, clock_hz), adapter), paced
 
-    def show(self, levels: list[int]) -> None:
-        """Set the pins of all its chips."""
-        for station, value in zip(self.adapter.wire.stations, levels, strict=True):
-            station.device.levels = value
+    def set_levels(self, chip: int, levels: int) -> None:
+        """Set the pins of a chip, or its channels' codes."""
+        self._adapter.wire.stations[chip].device.levels = levels
 
-    def counters(self) -> dict[str, Any]:
-        """Return the traffic counts."""
-        wire = self.adapter.wire
-        return {
-            "calls": self.adapter.calls,
-            "transfers": wire.transfers,
-            "scl_periods": wire.scl_periods,
-            "traffic": [(*place, count) for place, count in wire.traffic.items()],
-        }
+    def counters(self) -> tuple[int, int, int, list[Any]]:
+        """Return the numbers of calls, transfers and SCL periods, and the traffic by place."""
+        wire = self._adapter.wire
+        return self._adapter.calls, wire.transfers, wire.scl_periods, list(wire.traffic.items())
+
+    def fault(self, name: str, arguments: list[Any], options: dict[str, Any]) -> None:
+        """Inject a fault: call this method of the adapter."""
+        getattr(self._adapter, name)(*arguments, **options)
+
+    def replace(self, chip: int, model: tuple[str, str, str]) -> None:
+        """Replace a chip by a new one of another kind."""
+        self._adapter.wire.stations[chip].become(_model(*model))
 
     def _spent_s(self) -> float:
-        wire = self.adapter.wire
+        wire = self._adapter.wire
         return wire.duration_s(wire.scl_periods, wire.transfers) if self._paced else 0.0
 
     def _do(self, client: Any) -> int:
         request, arg = client.get_request(), client.get_arg()
-        self.adapter.calls += 1
-        if request in (I2C_SLAVE, I2C_SLAVE_FORCE):
-            address = struct.unpack("L", bytes(arg.retrieve()))[0] & 0x7F
-            if request == I2C_SLAVE:
-                self.adapter.slave(address)
-            self._addresses[hash(client)] = address
+        self._adapter.calls += 1
+        if request == I2C_SLAVE:
+            self._adapter.slave(struct.unpack("L", bytes(arg.retrieve()))[0] & 0x7F)
             return 0
-        if request == I2C_FUNCS:
-            arg.resolve(0, 8).update(0, struct.pack("L", FUNCTIONS))
+        if request == _I2C_FUNCS:
+            arg.resolve(0, 8).update(0, struct.pack("L", _FUNCTIONS))
             return 0
-        if request == I2C_RDWR:
+        if request == _I2C_RDWR:
             return self._rdwr(arg.resolve(0, 16))
-        if request == I2C_SMBUS:
-            return self._smbus(arg.resolve(0, 16), self._addresses.get(hash(client), 0))
         raise OSError(errno.ENOTTY, "no such request")
 
     def _rdwr(self, data: Any) -> int:
         _, count = struct.unpack_from("=QI", bytes(data.retrieve()))
-        if count > 42:
-            raise OSError(errno.EINVAL, "too many messages")
         table = data.resolve(0, _MESSAGE.size * count)
         messages, buffers = [], []
         for number, (address, flags, length, _) in enumerate(_MESSAGE.iter_unpack(bytes(table.retrieve()))):
@@ -172,121 +171,50 @@ class I2cNode(EmulatedNode):
                 buffers.append((number, buffer))
             else:
                 messages.append(Message(address, bytes(buffer.retrieve())))
-        replies = self.adapter.rdwr(messages)
+        replies = self._adapter.rdwr(messages)
         for number, buffer in buffers:
             buffer.update(0, replies[number])
         return int(count)
-
-    def _smbus(self, data: Any, address: int) -> int:
-        reads, command, size = struct.unpack_from("=BBxxI", bytes(data.retrieve()))
-        pointer = data.resolve(8, 34) if size else None
-        content = bytes(pointer.retrieve()) if pointer is not None else b""
-        block = content[1 : 1 + content[0]] if size == I2C_BLOCK else content[: max(0, size - 1)]
-        reply = self.adapter.smbus(address, bool(reads), command, size, block)
-        if reads and pointer is not None:
-            pointer.update(1 if size == I2C_BLOCK else 0, reply)
-        return 0
 
 
 class SpiNode(EmulatedNode):
     """One /dev/spidevB.C with a chip behind it, at the clock that its client requests; None: no chip."""
 
-    def __init__(self, testbed: Any, device: str, chip: SpiModel | None) -> None:
+    def __init__(self, testbed: Any, device: str, kind: tuple[str, str, str] | None, *numbers: int) -> None:
         super().__init__(testbed, device, "E: MAJOR=153\nE: MINOR=0\n", "spidev")
-        self._chip, self._spent, self._calls, self._transfers, self._bytes = chip, 0.0, 0, 0, 0
+        self._chip = None if kind is None else _model(*kind)(*numbers)
+        self._spent, self._calls, self._transfers, self._bytes = 0.0, 0, 0, 0
 
-    def show(self, levels: list[int]) -> None:
-        """Set the codes at the chip's channels."""
+    def set_levels(self, chip: int, levels: int) -> None:
+        """Set the codes at the channels of its only chip."""
         if self._chip is not None:
-            (self._chip.levels,) = levels
+            self._chip.levels = levels
 
-    def counters(self) -> dict[str, Any]:
-        """Return the traffic counts."""
-        return {"calls": self._calls, "transfers": self._transfers, "scl_periods": 8 * self._bytes, "traffic": []}
+    def counters(self) -> tuple[int, int, int, list[Any]]:
+        """Return the numbers of calls, transfers and SCLK periods."""
+        return self._calls, self._transfers, 8 * self._bytes, []
 
     def _spent_s(self) -> float:
         return self._spent
 
     def _do(self, client: Any) -> int:
         request, arg = client.get_request(), client.get_arg()
-        if request in (SPI_MODE, SPI_SPEED):
+        if request in (MODE, SPEED):
             return 0
         size = request >> 16 & 0x3FFF
-        if request & 0xC000FFFF != SPI_MESSAGE or not size or size % _SPI_TRANSFER.size:
+        if not size or request != message(size // TRANSFER.size):
             raise OSError(errno.ENOTTY, "no such request")
         self._calls += 1
         table = arg.resolve(0, size)
         total = 0
-        for number, (_, _, length, hz, *_) in enumerate(_SPI_TRANSFER.iter_unpack(bytes(table.retrieve()))):
-            at = _SPI_TRANSFER.size * number
+        for number, (_, _, length, hz, *_) in enumerate(TRANSFER.iter_unpack(bytes(table.retrieve()))):
+            at = TRANSFER.size * number
             sent = bytes(table.resolve(at, length).retrieve())
             came = b"\xff" * length if self._chip is None else self._chip.transfer(sent)
             table.resolve(at + 8, length).update(0, came)
             self._transfers, self._bytes, total = self._transfers + 1, self._bytes + length, total + length
             self._spent += 8 * length / hz
         return total
-
-
-class EmulationServer:
-    """The verbs of lines on stdin; a chip is its number on its bus. SPI devices follow the buses."""
-
-    def __init__(self, testbed: Any, buses: list[dict[str, Any]]) -> None:
-        self._nodes = [_node(testbed, **bus) for bus in buses]
-
-    def levels(self, every: list[list[int]]) -> None:
-        """Set the pins of all chips of all buses."""
-        for node, values in zip(self._nodes, every, strict=True):
-            with node.lock:
-                node.show(values)
-
-    def unplug(self, bus: int) -> None:
-        """Remove the adapter."""
-        with self._nodes[bus].lock:
-            self._nodes[bus].unplug()
-
-    def plug(self, bus: int) -> None:
-        """Bring the adapter back."""
-        with self._nodes[bus].lock:
-            self._nodes[bus].plug()
-
-    def fault(self, bus: int, name: str, arguments: list[Any]) -> None:
-        """Inject a fault: see `i2c.EmulatedI2c`, which has a method for each."""
-        node = self._nodes[bus]
-        assert isinstance(node, I2cNode)
-        with node.lock:
-            _FAULTS[name](node.adapter, *arguments)
-
-    def counters(self, bus: int) -> dict[str, Any]:
-        """Return the traffic counts."""
-        node = self._nodes[bus]
-        with node.lock:
-            return node.counters()
-
-
-def _node(
-    testbed: Any, device: str, chips: list[dict[str, Any]], clock_hz: int = 0, adapter: str = "", paced: bool = True
-) -> EmulatedNode:
-    """Return a bus, or, without an adapter, an SPI device; no chip there is a chip without a model."""
-    if not adapter:
-        (chip,) = chips
-        place = chip.pop("model")
-        return SpiNode(testbed, device, None if place is None else _model(*place)(**chip))
-    stations = [Station(_model(*chip.pop("model")), **chip) for chip in chips]
-    return I2cNode(testbed, device, Adapter(Wire(stations, clock_hz), adapter), paced)
-
-
-_FAULTS: dict[str, Callable[..., None]] = {
-    "error": lambda adapter, *fault: adapter.faults.append(TransferFault(*fault)),
-    "absent": lambda adapter, chip, absent: setattr(adapter.wire.stations[chip], "absent", absent),
-    "absent_mux": lambda adapter, mux: adapter.wire.absent_muxes.add(mux),
-    "become": lambda adapter, chip, model: adapter.wire.stations[chip].become(_model(*model)),
-    "reset": lambda adapter, chip: adapter.wire.stations[chip].device.reset(),
-    "poke": lambda adapter, chip, register, value: adapter.wire.stations[chip].device.poke(register, value),
-    "poke_mux": lambda adapter, mux, value: adapter.wire.muxes[mux].poke(0, value),
-    "claim": lambda adapter, address: adapter.claimed.add(address),
-    "stick": Adapter.stick,
-    "heal": Adapter.heal,
-}
 
 
 def _model(folder: str, module: str, name: str) -> Any:
@@ -303,13 +231,18 @@ def _wait_until(moment: float) -> None:
 
 
 def main() -> None:
-    """Read the buses from the first line, print the location of the testbed, and execute every further line."""
+    """Create the nodes of the first line, print the location of the testbed, and execute every further line."""
     testbed = UMockdev.Testbed.new()
-    server = EmulationServer(testbed, json.loads(sys.stdin.readline()))
+    buses, devices = json.loads(sys.stdin.readline())
+    nodes: list[EmulatedNode] = [I2cNode(testbed, **bus) for bus in buses]
+    nodes += [SpiNode(testbed, *device) for device in devices]
     print(json.dumps(testbed.get_root_dir()), flush=True)
     for line in sys.stdin:
-        verb, *arguments = json.loads(line)
-        print(json.dumps(getattr(server, verb)(*arguments)), flush=True)
+        with ExitStack() as locks:  # of all nodes: the calls of a line happen at one time
+            for node in nodes:
+                locks.enter_context(node.lock)
+            results = [getattr(nodes[number], method)(*arguments) for number, method, *arguments in json.loads(line)]
+        print(json.dumps(results), flush=True)
 
 
 if __name__ == "__main__":

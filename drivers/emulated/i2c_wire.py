@@ -10,8 +10,10 @@ It needs only the standard library: the system's Python serves it to /dev/i2c-N.
 import errno
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from ..i2c.chips.base import Device
+from ..i2c.node import MOST_MESSAGES
 from ..i2c.tca9548a import MuxModel
 
 # Nine SCL periods a byte, one a START and one the STOP; then the bus free time, by speed class.
@@ -51,7 +53,13 @@ class Station:
         self.device.levels = levels & (1 << self.device.pins) - 1
 
 
-Place = tuple[int, int | None, int | None, int | None]  # address, mux, channel, register (if there are registers)
+class Place(NamedTuple):
+    """Where bytes go to and come from; `register` if the chip has registers."""
+
+    address: int
+    mux: int | None = None
+    channel: int | None = None
+    register: int | None = None
 
 
 class Wire:
@@ -88,26 +96,23 @@ class Wire:
     def _send(self, message: Message, commands: dict[Device, int]) -> bytes:
         self.scl_periods += 10
         if self.sda_low:
-            self._count((message.address, None, None, None), 0 if message.data is None else len(message.data))
+            self._count(Place(message.address), 0 if message.data is None else len(message.data))
             return bytes(message.length)
         responding = self._responding(message.address)
         if not responding:
-            self.traffic[(message.address, None, None, None)] += 1
+            self.traffic[Place(message.address)] += 1
             raise NakError(message.address)
         (device, mux, channel) = responding[0]
         if message.data and device.has_registers:
             commands[device] = message.data[0]
         size = message.length if message.data is None else len(message.data)
-        self._count((message.address, mux, channel, commands.get(device)), size)
-        return self._exchange(message, [device for device, _, _ in responding])
-
-    def _exchange(self, message: Message, devices: list[Device]) -> bytes:
+        self._count(Place(message.address, mux, channel, commands.get(device)), size)
         if message.data is not None:
-            for device in devices:
+            for device, _, _ in responding:
                 device.write(message.data)
             return b""
-        reply = bytes(b"\xff" * message.length)
-        for device in devices:
+        reply = b"\xff" * message.length
+        for device, _, _ in responding:
             reply = bytes(a & b for a, b in zip(reply, device.read(message.length), strict=True))
         return reply
 
@@ -127,14 +132,6 @@ class Wire:
         if station.mux is None or station.channel is None:
             return True
         return station.mux not in self.absent_muxes and bool(self.muxes[station.mux].connected >> station.channel & 1)
-
-
-MOST_MESSAGES = 42
-# The reply to I2C_FUNCS: messages, and SMBus transfers made of them.
-FUNCTIONS = 0x0EFF0009
-
-QUICK, BYTE, BYTE_DATA, WORD_DATA, I2C_BLOCK = 0, 1, 2, 3, 8
-_READ_SIZES = {BYTE: 1, BYTE_DATA: 1, WORD_DATA: 2}
 
 
 # The error codes of each adapter: errno of a NAK; errno with SDA held low (None: not detected).
@@ -169,7 +166,10 @@ class TransferFault:
 
 
 class Adapter:
-    """One bus as the kernel presents it: every error is an OSError with the errno of this adapter."""
+    """One bus as the kernel presents it: every error is an OSError with the errno of this adapter.
+
+    Its faults are injected from outside; a chip is its number on the bus.
+    """
 
     def __init__(self, wire: Wire, kind: str) -> None:
         self.wire = wire
@@ -185,12 +185,41 @@ class Adapter:
         if address in self.claimed:
             raise OSError(errno.EBUSY, "claimed")
 
-    def stick(self, transfers: int | None) -> None:
+    def fail(self, code: int, *, address: int | None = None, times: int | None = None, batches: bool = False) -> None:
+        """Make transfers fail: see `TransferFault`."""
+        self.faults.append(TransferFault(code, address, times, batches))
+
+    def remove(self, chip: int) -> None:
+        """Make a chip stop acknowledging; `heal` restores it with its state."""
+        self.wire.stations[chip].absent = True
+
+    def remove_mux(self, mux: int) -> None:
+        """Make a mux and the chips behind it stop acknowledging."""
+        self.wire.absent_muxes.add(mux)
+
+    def reset(self, chip: int) -> None:
+        """Reset a chip to its defaults, as a power glitch does."""
+        self.wire.stations[chip].device.reset()
+
+    def poke(self, chip: int, register: int, value: int) -> None:
+        """Write a register behind the client's back."""
+        self.wire.stations[chip].device.poke(register, value)
+
+    def poke_mux(self, mux: int, control: int) -> None:
+        """Change a mux's control register; 0 is the effect of a reset."""
+        self.wire.muxes[mux].write(bytes((control,)))
+        self.wire.muxes[mux].stop()
+
+    def claim(self, address: int) -> None:
+        """Make a kernel driver hold an address: I2C_SLAVE fails with EBUSY."""
+        self.claimed.add(address)
+
+    def hold_sda(self, transfers: int | None = None) -> None:
         """Hold SDA low until healed, or until this number of transfers has clocked it free."""
         self.stuck_for, self.wire.sda_low = transfers, True
 
     def heal(self) -> None:
-        """End every fault of the wire."""
+        """End all persistent faults."""
         self.faults.clear()
         self.claimed.clear()
         self.stuck_for, self.wire.sda_low = None, False
@@ -206,20 +235,6 @@ class Adapter:
             raise OSError(errno.EOPNOTSUPP, "one read, and it must be the last")
         if self.kind == "designware" and len({message.address for message in messages}) > 1:
             raise OSError(errno.EINVAL, "one address a transfer")
-        return self._transfer(messages)
-
-    def smbus(self, address: int, reads: bool, command: int, size: int, block: bytes) -> bytes:
-        """I2C_SMBUS, built from messages as in the kernel: `block` is the data to write, or has the length to read."""
-        if size == QUICK:
-            return self._transfer([Message(address, None if reads else b"")])[0]
-        if size not in (*_READ_SIZES, I2C_BLOCK):
-            raise OSError(errno.EOPNOTSUPP, "no such SMBus transfer")
-        if not reads:
-            return self._transfer([Message(address, bytes((command,)) + (b"" if size == BYTE else block))])[0]
-        read = Message(address, None, _READ_SIZES.get(size, len(block)))
-        return self._transfer([read] if size == BYTE else [Message(address, bytes((command,))), read])[-1]
-
-    def _transfer(self, messages: list[Message]) -> list[bytes]:
         for fault in self.faults:
             if fault.hits(messages):
                 raise OSError(fault.code, "injected")

@@ -33,7 +33,7 @@ class Outgoing:
         self.byte_s = byte_s
         self.most = most
         self.damage: Callable[[bytes], bytes] | None = None
-        self.dropped = 0
+        self.dropped = self.sent_bytes = 0
         self._lock = Lock()
         self._waiting: deque[tuple[float, bytes]] = deque()
         self._waiting_bytes = 0
@@ -68,6 +68,7 @@ class Outgoing:
 
     def take(self, count: int) -> None:
         """Record that `count` arrived bytes were delivered."""
+        self.sent_bytes += count
         self._rest = self._rest[count:]
         self._from += count * self.byte_s
 
@@ -105,8 +106,8 @@ class PtyWire:
     a real port.
     """
 
-    def __init__(self, outgoing: Outgoing, heard: Callable[[bytes], None], sent: Callable[[int], None]) -> None:
-        self._outgoing, self._heard, self._sent = outgoing, heard, sent
+    def __init__(self, outgoing: Outgoing, heard: Callable[[bytes], None]) -> None:
+        self._outgoing, self._heard = outgoing, heard
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
@@ -154,7 +155,6 @@ class PtyWire:
                 self._outgoing.hold(monotonic())
                 return
             self._outgoing.take(written)
-            self._sent(written)
 
     def _hear(self) -> None:
         if self._incoming is None:
@@ -202,7 +202,6 @@ class PtyLine(Closing):
     def __init__(self, link: Path, baud: int = 115200, *, paced: bool = True) -> None:
         self.link, self.baud = link, baud
         self.receive: Callable[[bytes], None] | None = None
-        self.sent_bytes = 0
         self._outgoing = Outgoing(BITS_A_BYTE / baud if paced else 0.0, _MOST_WAITING)
         self._unplugged = 0
         self._lock = Lock()
@@ -222,6 +221,11 @@ class PtyLine(Closing):
     def dropped_messages(self) -> int:
         """Number of messages never sent: too many waited, or the line was unplugged."""
         return self._outgoing.dropped + self._unplugged
+
+    @property
+    def sent_bytes(self) -> int:
+        """Number of bytes delivered to clients."""
+        return self._outgoing.sent_bytes
 
     @property
     def plugged(self) -> bool:
@@ -258,7 +262,7 @@ class PtyLine(Closing):
 
     def _plug(self) -> PtyWire:
         try:
-            wire = PtyWire(self._outgoing, self._heard, self._sent)
+            wire = PtyWire(self._outgoing, self._heard)
         except OSError as error:
             raise DeviceError(f"no pty for {self.link}: {error.strerror}; is /dev/pts mounted and not full?") from error
         try:
@@ -273,13 +277,11 @@ class PtyLine(Closing):
         if receive is not None:
             receive(data)
 
-    def _sent(self, count: int) -> None:
-        self.sent_bytes += count
-
 
 def _link(link: Path, target: str) -> None:
     """Make `link` point to `target`. Replace only a link to a pty from an earlier run."""
-    if (link.exists() or link.is_symlink()) and not _leads_to_a_pty(link):
+    from_earlier = link.is_symlink() and str(link.readlink()).startswith("/dev/pts/")
+    if (link.exists() or link.is_symlink()) and not from_earlier:
         raise DeviceError(f"{link} exists and is not an emulated port: remove it, or use another path")
     fresh = link.with_name(f".{link.name}.{os.getpid()}")
     try:
@@ -288,10 +290,6 @@ def _link(link: Path, target: str) -> None:
     except OSError as error:
         fresh.unlink(missing_ok=True)
         raise DeviceError(f"{link}: cannot link a port there: {error.strerror}") from error
-
-
-def _leads_to_a_pty(link: Path) -> bool:
-    return link.is_symlink() and str(link.readlink()).startswith("/dev/pts/")
 
 
 def _unlink(link: Path, target: str) -> None:

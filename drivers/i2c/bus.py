@@ -7,7 +7,7 @@ from time import monotonic, sleep
 
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
-from .chips import Chip, Conversion, Converter, Reading
+from .chips import Conversion, Converter, Reading
 from .node import MOST_MESSAGES, REFUSED, BatchMode, DeviceNode, Query, Run
 from .supervisor import ChipSupervisor, PlacedChip, Route
 from .tca9548a import ADDRESSES, CHANNELS
@@ -15,15 +15,19 @@ from .tca9548a import ADDRESSES, CHANNELS
 
 @dataclass(eq=False, slots=True)
 class PlacedPort:
-    """A port to read, and its chip.
+    """A port to read: a chip, and one of its readings.
 
     believed: a suspicious reply that was found to be right, and the number of checks of its chip by then.
     """
 
     member: PlacedChip
-    query: Query
     reading: Reading
     believed: tuple[bytes, int] | None = None
+
+    @property
+    def query(self) -> Query:
+        """What reads it."""
+        return Query(self.member.address, self.reading.command, self.reading.length)
 
     def value(self, reply: bytes) -> int:
         """Return a reply as a number: the code of a converter, else bit i for pin reading.pins[i]."""
@@ -65,15 +69,13 @@ def _fits(port: PlacedPort, gathered: Sequence[PlacedPort], way: BatchMode) -> b
     return sum(other.query.messages for other in gathered) + port.query.messages <= MOST_MESSAGES
 
 
-class Scan:
+class GroupScan:
     """Ports in a fixed order, read by as few transfers as the adapter allows."""
 
-    def __init__(self, node: DeviceNode, keeper: ChipSupervisor, ports: Sequence[PlacedPort]) -> None:
-        self._node = node
-        self._keeper = keeper
-        self._ports = ports
+    def __init__(self, keeper: ChipSupervisor, ports: Sequence[PlacedPort]) -> None:
+        self._node, self._keeper, self._ports = keeper.node, keeper, ports
         self._revision = -1
-        self._way = node.way
+        self._way = self._node.way
         self._groups: list[tuple[Group, Run]] = []
 
     def read(self) -> list[int | None]:
@@ -84,7 +86,8 @@ class Scan:
         """
         keeper = self._keeper
         if monotonic() >= keeper.due:
-            self._attend()
+            self._need_open()
+            keeper.attend()
         if self._revision != keeper.revision or self._way is not self._node.way:
             self._plan()
         replies: list[int | None] = [None] * len(self._ports)
@@ -100,10 +103,6 @@ class Scan:
                     continue
                 replies[number] = self._doubt(port, reply) if port.doubtful(reply) else port.value(reply)
         return replies
-
-    def _attend(self) -> None:
-        self._need_open()
-        self._keeper.attend()
 
     def _need_open(self) -> None:
         if not self._node.is_open:
@@ -152,74 +151,53 @@ class Scan:
 
 
 class _Converting:
-    """A converter in a scan: its remaining steps, the one that converts, and the time until which it is busy."""
+    """A converter in a scan: its conversions by step, the steps left, the one that converts, and the time until which
+    it is busy.
+    """
 
-    def __init__(self, node: DeviceNode, keeper: ChipSupervisor, member: PlacedChip) -> None:
-        self._node, self._keeper, self._member = node, keeper, member
-        self._conversions: dict[int, Conversion] = {}
-        self._left: deque[int] = deque()
+    def __init__(self, keeper: ChipSupervisor, member: PlacedChip) -> None:
+        self._keeper, self._member = keeper, member
+        self.conversions: dict[int, Conversion] = {}
+        self.left: deque[int] = deque()
         self.converts: int | None = None
         # A conversion from a scan that was broken off is not stopped: the chip accepts no other before it is over.
         self.until = 0.0
 
-    def add(self, step: int, conversion: Conversion) -> None:
-        """Add a step of the scan."""
-        self._conversions[step] = conversion
-
-    def restart(self) -> None:
-        """Start a scan."""
-        self._left = deque(self._conversions)
-        self.converts = None
-
-    @property
-    def pending(self) -> bool:
-        """Whether steps remain in this scan."""
-        return self.converts is not None or bool(self._left)
-
     def begin(self) -> None:
         """Start the next conversion, if one is left and none is running. An absent chip has nothing to wait for."""
-        if self.converts is not None or not self._left or monotonic() < self.until:
+        if self.converts is not None or not self.left or monotonic() < self.until:
             return
-        self.converts = step = self._left.popleft()
-        conversion, member = self._conversions[step], self._member
+        self.converts = step = self.left.popleft()
+        conversion, member = self.conversions[step], self._member
         if member.present and self._keeper.attempt(member, lambda: self._start(conversion)):
             self.until = monotonic() + conversion.us * 1e-6
 
     def _start(self, conversion: Conversion) -> bool:
-        self._node.write(self._member.address, conversion.start)
+        self._keeper.node.write(self._member.address, conversion.start)
         return True
 
-    def ready(self, step: int) -> bool:
-        """Return whether this step can be read."""
-        return self.converts == step and monotonic() >= self.until
 
-    def was_read(self) -> None:
-        """Advance to the next step."""
-        self.converts = None
-        self.begin()
-
-
-class Interleaved:
+class Scan:
     """Groups of ports, read in order; conversions that take time are groups of one port.
 
     Each converter starts its next conversion as soon as its last was read. While the next port of the scan converts,
     the first later one that is ready is read ahead. `thenar.runtime.scanning.timing` models the same order.
     """
 
-    def __init__(self, node: DeviceNode, keeper: ChipSupervisor, groups: Sequence[Sequence[PlacedPort]]) -> None:
-        self._scans = [Scan(node, keeper, group) for group in groups]
+    def __init__(self, keeper: ChipSupervisor, groups: Sequence[Sequence[PlacedPort]]) -> None:
+        self._scans = [GroupScan(keeper, group) for group in groups]
         slow: dict[PlacedChip, _Converting] = {}
         self._slow: dict[int, _Converting] = {}
         for step, group in enumerate(groups):
             for port in group:
                 if isinstance(port.reading, Conversion) and port.reading.start:
-                    chip = slow.setdefault(port.member, _Converting(node, keeper, port.member))
-                    chip.add(step, port.reading)
+                    chip = slow.setdefault(port.member, _Converting(keeper, port.member))
+                    chip.conversions[step] = port.reading
                     self._slow[step] = chip
         self._chips = tuple(slow.values())
 
     def read(self) -> list[int | None]:
-        """Return the values of all ports, as `Scan.read` does."""
+        """Return the values of all ports, as `GroupScan.read` does."""
         return [reply for replies in self for reply in replies]
 
     def __iter__(self) -> Iterator[list[int | None]]:
@@ -229,7 +207,7 @@ class Interleaved:
                 yield scan.read()
             return
         for chip in self._chips:
-            chip.restart()
+            chip.left, chip.converts = deque(chip.conversions), None
         left, found = list(range(len(self._scans))), dict[int, list[int | None]]()
         for step in range(len(self._scans)):
             while step not in found:
@@ -237,7 +215,8 @@ class Interleaved:
                 found[able] = self._scans[able].read()
                 left.remove(able)
                 if able in self._slow:
-                    self._slow[able].was_read()
+                    self._slow[able].converts = None
+                    self._slow[able].begin()
             yield found.pop(step)
 
     def _able(self, left: Sequence[int]) -> int:
@@ -245,124 +224,81 @@ class Interleaved:
         while True:
             for chip in self._chips:
                 chip.begin()
-            able = next((step for step in left if step not in self._slow or self._slow[step].ready(step)), None)
-            if able is not None:
-                return able
-            sleep(max(0.0, min(chip.until for chip in self._chips if chip.pending) - monotonic()))
+            now = monotonic()
+            for step in left:
+                slow = self._slow.get(step)
+                if slow is None or (slow.converts == step and now >= slow.until):
+                    return step
+            pending = [chip.until for chip in self._chips if chip.left or chip.converts is not None]
+            sleep(max(0.0, min(pending) - monotonic()))
 
 
-@dataclass(frozen=True, slots=True)
-class ChipAt:
-    """A chip, its location (on the bus, or on a channel of the TCA9548A at address `mux`) and its used pins."""
-
-    chip: Chip
-    address: int
-    used: frozenset[int]
-    mux: int | None = None
-    channel: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class PortRead:
-    """One port to read: the chip's number on its bus, and one of its readings."""
-
-    chip: int
-    reading: Reading
-
-
-class I2cBus(Closing):
+class I2cBus(ChipSupervisor, Closing):
     """The chips on one device node, and the health of each. Use it from one thread at a time.
 
     Raises SettingError for two chips at one address, or an impossible mux.
     """
 
-    def __init__(
-        self, device: str, chips: Sequence[ChipAt], *, clock_hz: int = 100_000, check_every_s: float = 1.0
-    ) -> None:
-        """clock_hz is the bus clock, which only the adapter's driver can set; it is stored for information.
-
-        Every check_every_s the registers of each chip and its mux are read back in one or two transfers, to detect
+    def __init__(self, device: str, chips: Sequence[PlacedChip], *, check_every_s: float = 1.0) -> None:
+        """Every check_every_s the registers of each chip and its mux are read back in one or two transfers, to detect
         resets.
         """
-        self.device, self.clock_hz = device, clock_hz
         _refuse_clashes(device, chips)
-        self.chips = tuple(PlacedChip(device, at.chip, at.address, at.used, _route(at)) for at in chips)
-        self._node = DeviceNode(device)
-        self._keeper = ChipSupervisor(self._node, self.chips, check_every_s)
+        super().__init__(DeviceNode(device), chips, check_every_s)
 
     def open(self) -> None:
         """Set up every chip and detect which batches the adapter supports. A missing chip is absent, not an error.
 
         Raises DeviceError if the device node cannot be used. May be called again afterwards, and at any time.
         """
-        self._keeper.begin()
+        self.begin()
         # Registers, not ports, each twice: this tests batches of two chips and of two reads of one chip.
         control = [_control(member) for member in self.chips]
-        trial = Scan(self._node, self._keeper, [port for port in control for _ in range(2)])
+        trial = GroupScan(self, [port for port in control for _ in range(2)])
         for _ in BatchMode:
             trial.read()
 
-    def prepare(self, ports: Sequence[PortRead]) -> Scan:
-        """Return a reusable scan of these ports, in this order."""
-        return Scan(self._node, self._keeper, self._made(ports))
-
-    def interleaved(self, groups: Sequence[Sequence[PortRead]]) -> Interleaved:
-        """Return a scan of groups of ports, in this order, with conversions overlapped with other transfers.
+    def prepare(self, groups: Sequence[Sequence[PlacedPort]]) -> Scan:
+        """Return a reusable scan of groups of ports, in this order, with conversions overlapped with other transfers.
 
         A conversion that takes time is a separate group.
         """
-        return Interleaved(self._node, self._keeper, [self._made(group) for group in groups])
-
-    def _made(self, ports: Sequence[PortRead]) -> list[PlacedPort]:
-        read = ((self.chips[port.chip], port.reading) for port in ports)
-        return [PlacedPort(chip, Query(chip.address, one.command, one.length), one) for chip, one in read]
+        return Scan(self, groups)
 
     @property
     def way(self) -> str:
         """A description of how reads are batched."""
-        return self._node.way.value
-
-    @property
-    def fault_message(self) -> str:
-        """A fault of the whole bus and its remedy; "" if there is none."""
-        return self._keeper.fault_message
+        return self.node.way.value
 
     @property
     def transfers(self) -> int:
         """Number of transfers requested from the kernel."""
-        return self._node.transfers
+        return self.node.transfers
 
     def close(self) -> None:
         """Close the device node."""
-        self._node.close()
-        self._keeper.revision += 1
-
-
-_REGISTERS = Reading("registers", b"", ())
+        self.node.close()
+        self.revision += 1
 
 
 def _control(member: PlacedChip) -> PlacedPort:
-    watched = member.watched
+    watched = member.chip.watched(member.used)
     if watched is None:
-        reading = member.chip.readings[0]
-        return PlacedPort(member, Query(member.address, reading.command, reading.length), reading)
-    return PlacedPort(member, Query(member.address, watched.data[:1], len(watched.expect)), _REGISTERS)
+        return PlacedPort(member, member.chip.readings[0])
+    return PlacedPort(member, Reading("registers", watched.data[:1], (-1,) * 8 * len(watched.expect)))
 
 
-def _route(at: ChipAt) -> Route | None:
-    return None if at.mux is None or at.channel is None else Route(at.mux, at.channel)
-
-
-def _refuse_clashes(device: str, chips: Sequence[ChipAt]) -> None:
-    direct = {at.address for at in chips if at.mux is None}
+def _refuse_clashes(device: str, chips: Sequence[PlacedChip]) -> None:
+    direct = {member.address for member in chips if member.route is None}
     seen: set[tuple[int, Route | None]] = set()
-    for at in chips:
-        at.chip.check_address(at.address)
-        address, route = at.address, _route(at)
-        if (at.mux is None) != (at.channel is None) or (
-            route and not (route.mux in ADDRESSES and route.channel in CHANNELS)
-        ):
-            raise SettingError(f"{device}: a tca9548a is at 0x70 to 0x77 and has channels 0 to 7, which excludes {at}")
+    for member in chips:
+        member.chip.check_address(member.address)
+        address, route = member.address, member.route
+        if route and not (route.mux in ADDRESSES and route.channel in CHANNELS):
+            raise SettingError(
+                f"{device}: a tca9548a is at 0x70 to 0x77 and has channels 0 to 7, which excludes channel"
+                f" {route.channel} at 0x{route.mux:02X}"
+            )
         if (address, route) in seen or (route and address in direct):
             raise SettingError(f"{device}: two chips would respond at 0x{address:02X}: give one another address")
         seen.add((address, route))

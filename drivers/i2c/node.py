@@ -1,16 +1,14 @@
 """A device node /dev/i2c-N: transfers in the form of the kernel, and the meaning of their errno."""
 
 import errno
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from fcntl import ioctl
 from typing import TYPE_CHECKING
 
-from ..errors import DeviceError, SettingError
-from ..names import shortened
-from ..ports import check_node, device_fault
+from ..errors import DeviceError
+from ..ports import cause, check_device, check_node
 
 if TYPE_CHECKING:
     from smbus2 import SMBus
@@ -29,6 +27,7 @@ _MEANINGS = {
     errno.EBUSY: "busy: a kernel driver has the address (unbind it), or SDA is held low",
     errno.EOPNOTSUPP: "this adapter cannot do such a transfer: use another adapter",
 }
+_MISSING = "there is no such bus; is the adapter plugged in, is I2C switched on, is the module i2c-dev loaded?"
 
 
 def failure(named: str, code: int | None) -> str:
@@ -49,7 +48,7 @@ def stuck(device: str, code: int | None) -> str:
 
 
 MOST_MESSAGES = 42
-_I2C_SLAVE = 0x0703
+I2C_SLAVE = 0x0703
 
 # The specification reserves 1111 1XX: no chip acknowledges this address.
 NOBODY = 0x7F
@@ -97,8 +96,7 @@ class DeviceNode:
 
     def __init__(self, device: str) -> None:
         """Raise SettingError if `device` is not the path of a device."""
-        if fault := device_fault(device):
-            raise SettingError(f"{shortened(repr(device))} {fault}")
+        check_device(device)
         self.device = device
         self.transfers = 0
         self.way = BatchMode.CHANNEL
@@ -120,7 +118,7 @@ class DeviceNode:
             bus.open(self.device)
         except OSError as error:
             bus.close()
-            raise DeviceError(f"{self.device} cannot be opened: {_cause(error)}") from None
+            raise DeviceError(f"{self.device} cannot be opened: {cause(error, 'I2C', _MISSING)}") from None
 
     def close(self) -> None:
         """Close the node; no transfers are possible until it is reopened."""
@@ -131,7 +129,7 @@ class DeviceNode:
         """Select an address. Raises OSError EBUSY if a kernel driver has it."""
         bus = self._ready()
         assert bus.fd is not None
-        ioctl(bus.fd, _I2C_SLAVE, address)
+        ioctl(bus.fd, I2C_SLAVE, address)
         bus.address = None  # smbus2 caches the last address
 
     def write(self, address: int, data: bytes) -> None:
@@ -171,11 +169,3 @@ class DeviceNode:
         if self._bus is None or not self.is_open:
             raise OSError(errno.EBADF, f"{self.device} is not open")
         return self._bus
-
-
-def _cause(error: OSError) -> str:
-    if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        return "there is no such bus; is the adapter plugged in, is I2C switched on, is the module i2c-dev loaded?"
-    if error.errno in (errno.EACCES, errno.EPERM):
-        return "permission denied; is your user in the group i2c?"
-    return f"{os.strerror(error.errno or errno.EIO)}; is it an I2C device?"

@@ -3,6 +3,7 @@
 import errno
 import logging
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from time import monotonic
 from typing import TypeVar
@@ -117,47 +118,32 @@ def identify_chip(node: DeviceNode, address: int) -> str:
     Kinds without registers come last, since probing for registers drives their pins.
     """
     for chip in sorted(CHIPS.values(), key=lambda chip: chip.registers, reverse=True):
-        if address in chip.addresses and _behaves_like(node, chip, address):
-            return f"something that behaves like a {chip.name}"
+        with suppress(OSError):
+            if address in chip.addresses and set_up(node, chip, address, frozenset()):
+                return f"something that behaves like a {chip.name}"
     return "something unknown"
-
-
-def _behaves_like(node: DeviceNode, chip: Chip, address: int) -> bool:
-    try:
-        return set_up(node, chip, address, frozenset())
-    except OSError:
-        return False
 
 
 @dataclass(eq=False, slots=True)
 class PlacedChip:
-    """A chip at its location on the bus at `device`, and its health, which only its supervisor changes.
+    """A chip, its location, the numbers of its used pins, and its health, which only its supervisor changes.
+
+    route  the mux's channel that it is on; None: it is directly on the bus
 
     `errors` counts failures, including those that a retry fixed; `last_error` stays. `due` is the time of its next
     check; `checked` counts its checks; `zeros` is their number when zeros from it were last confirmed.
     """
 
-    device: str
     chip: Chip
     address: int
     used: frozenset[int]
-    route: Route | None
+    route: Route | None = None
     present: bool = False
     errors: int = 0
     last_error: str = ""
     due: float = 0.0
     checked: int = 0
     zeros: int = -1
-
-    @property
-    def watched(self) -> Write | None:
-        """The write that a reset would lose."""
-        return self.chip.watched(self.used)
-
-    @property
-    def named(self) -> str:
-        """The chip and its location, for messages."""
-        return place(self.device, self.chip.name, self.address, self.route)
 
     def blame(self, error: str) -> None:
         """Count a failure."""
@@ -173,9 +159,8 @@ class ChipSupervisor:
     is gone, and no other error.
     """
 
-    def __init__(self, node: DeviceNode, members: Sequence[PlacedChip], check_every_s: float) -> None:
-        self._node = node
-        self._members = members
+    def __init__(self, node: DeviceNode, chips: Sequence[PlacedChip], check_every_s: float) -> None:
+        self.node, self.chips = node, tuple(chips)
         self._check_every_s = check_every_s
         self.routes = self._unknown_routes()
         self.revision = 0
@@ -186,28 +171,28 @@ class ChipSupervisor:
         """Open the node and set up every chip."""
         self._renew()
         self.routes = self._unknown_routes()
-        self._node.way = BatchMode.CHANNEL
+        self.node.way = BatchMode.CHANNEL
         self.fault_message = ""
-        for member in self._members:
+        for member in self.chips:
             member.present = False
-        for number, member in enumerate(self._members):
+        for number, member in enumerate(self.chips):
             if not self.fault_message:
                 self._bring_up(member, TRIES)
             if member.present:  # spread checks, so that no scan waits for more than one
-                member.due = monotonic() + self._check_every_s * (number + 1) / len(self._members)
+                member.due = monotonic() + self._check_every_s * (number + 1) / len(self.chips)
         self._schedule()
 
     def attend(self) -> None:
         """Check the chip that has waited longest, or test whether it is back. A stuck bus comes first."""
         if self.fault_message:
             self._unstick()
-        elif self._members:
-            member = min(self._members, key=lambda member: member.due)
+        elif self.chips:
+            member = min(self.chips, key=lambda member: member.due)
             if member.present:
                 member.due = monotonic() + self._check_every_s
                 self.check(member)
             else:
-                if not any(other.present for other in self._members):
+                if not any(other.present for other in self.chips):
                     self._renew()  # not every adapter returns ENODEV once unplugged: test its node
                 self._bring_up(member, 1)
         self._schedule()
@@ -239,18 +224,18 @@ class ChipSupervisor:
         """Detect a stuck bus: an unused address must not be acknowledged."""
         code: int | None = None
         try:
-            self._node.query(Query(NOBODY, b"", 1))
+            self.node.query(Query(NOBODY, b"", 1))
         except OSError as error:
             code = error.errno
             if code not in STUCK:  # no acknowledge, whichever errno this adapter uses for it
                 if self.fault_message:
-                    _LOG.warning("%s: the bus is free again", self._node.device)
+                    _LOG.warning("%s: the bus is free again", self.node.device)
                 self.fault_message = ""
                 return
         if not self.fault_message:
-            _LOG.warning("%s", stuck(self._node.device, code))
-        self.fault_message = stuck(self._node.device, code)
-        for member in self._members:
+            _LOG.warning("%s", stuck(self.node.device, code))
+        self.fault_message = stuck(self.node.device, code)
+        for member in self.chips:
             member.present = False
             member.last_error = self.fault_message
             member.due = monotonic()
@@ -259,14 +244,15 @@ class ChipSupervisor:
     def _in_order(self, member: PlacedChip) -> bool:
         """Return whether the chip still has its register values. A mux with another selection is set again."""
         if member.route and not self.routes.holds():
-            named = place(self._node.device, "tca9548a", member.route.mux, None)
+            named = place(self.node.device, "tca9548a", member.route.mux, None)
             member.blame(f"{named} had lost its channel (a reset, or another program): it was selected again")
             self.routes.forget()
             self.routes.select(member.route)
-        watched = member.watched
-        if watched is None or watched.holds(read_back(self._node, member.chip, member.address, watched)):
+        watched = member.chip.watched(member.used)
+        if watched is None or watched.holds(read_back(self.node, member.chip, member.address, watched)):
             return True
-        member.blame(f"{member.named} had lost its registers (was its supply off for a moment?): it was set up again")
+        named = self._named(member)
+        member.blame(f"{named} had lost its registers (was its supply off for a moment?): it was set up again")
         return False
 
     def _bring_up(self, member: PlacedChip, tries: int) -> None:
@@ -284,28 +270,28 @@ class ChipSupervisor:
                 member.due = monotonic() + self._check_every_s
                 break
         if was or member.present:
-            _LOG.info("%s is %s", member.named, "set up" if member.present else "gone")
+            _LOG.info("%s is %s", self._named(member), "set up" if member.present else "gone")
             self._changed()
 
     def _set_up(self, member: PlacedChip) -> bool:
-        self._node.claim(member.address)
-        return set_up(self._node, member.chip, member.address, member.used)
+        self.node.claim(member.address)
+        return set_up(self.node, member.chip, member.address, member.used)
 
     def _refuse(self, member: PlacedChip) -> None:
         self.check_bus_stuck()  # a line held low looks like a reply of every chip
         if self.fault_message:
             return
-        there = identify_chip(self._node, member.address)
-        found = f"{member.named} is not there, but {there}: check the harness and the chip's address pins"
+        there = identify_chip(self.node, member.address)
+        found = f"{self._named(member)} is not there, but {there}: check the harness and the chip's address pins"
         # The first failure may also come from an intermittent supply or contact during the set-up.
         member.due = monotonic() + (RETRY_IMPOSTOR_S if found == member.last_error else RETRY_S)
         member.blame(found)
 
     def _note(self, member: PlacedChip, error: OSError) -> None:
         """Count the failure for the mux if it failed, else for the chip."""
-        named = member.named
+        named = self._named(member)
         if member.route and self.routes.selected != member.route and self.routes.mux is not None:
-            named = place(self._node.device, "tca9548a", self.routes.mux, None)
+            named = place(self.node.device, "tca9548a", self.routes.mux, None)
         member.blame(failure(named, error.errno))
 
     def _lose(self, member: PlacedChip, error: OSError) -> None:
@@ -325,20 +311,23 @@ class ChipSupervisor:
         """Reopen the node; then reads that clock SCL free a chip that waits within a byte."""
         self._renew()
         self.check_bus_stuck()
-        for member in self._members:
+        for member in self.chips:
             member.due = monotonic() + (RETRY_S if self.fault_message else 0.0)
 
+    def _named(self, member: PlacedChip) -> str:
+        return place(self.node.device, member.chip.name, member.address, member.route)
+
     def _unknown_routes(self) -> Routes:
-        return Routes(self._node, {member.route.mux for member in self._members if member.route})
+        return Routes(self.node, {member.route.mux for member in self.chips if member.route})
 
     def _renew(self) -> None:
         self._changed()
         self.routes.forget()
-        self._node.open()
+        self.node.open()
 
     def _changed(self) -> None:
         self.revision += 1
         self._schedule()
 
     def _schedule(self) -> None:
-        self.due = min((member.due for member in self._members), default=float("inf"))
+        self.due = min((member.due for member in self.chips), default=float("inf"))

@@ -51,7 +51,3 @@ class MuxModel(Device):
     def stop(self) -> None:
         """Process a STOP."""
         self.connected = self.control
-
-    def poke(self, register: int, value: int) -> None:
-        """Set a register to `value` without a bus write."""
-        self.control = self.connected = value

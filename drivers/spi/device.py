@@ -1,17 +1,15 @@
 """A converter at a device node /dev/spidevB.C: all its channels in one kernel call."""
 
 import ctypes
-import errno
 import os
 import struct
 from collections.abc import Callable, Sequence
 from fcntl import ioctl
 
 from ..closing import Closing
-from ..errors import DeviceError, SettingError
+from ..errors import DeviceError
 from ..i2c.chips import Reading
-from ..names import shortened
-from ..ports import check_node, device_fault
+from ..ports import cause, check_device, check_node
 from .chips import SpiChip
 
 # The kernel's linux/spi/spidev.h: struct spi_ioc_transfer, and _IOW('k', number, size of the argument).
@@ -19,6 +17,7 @@ TRANSFER = struct.Struct("=QQIIHBBBBBB")
 MODE, SPEED = 0x40016B01, 0x40046B04
 _BITS = 8
 _MESSAGE, _SIZE_BITS = 0x40006B00, 16
+_MISSING = "there is no such device; is SPI switched on, is the module spidev loaded?"
 
 
 def message(transfers: int) -> int:
@@ -35,8 +34,7 @@ class SpiDevice(Closing):
 
     def __init__(self, device: str, chip: SpiChip, clock_hz: int) -> None:
         """Raise SettingError if `device` is not the path of a device."""
-        if fault := device_fault(device):
-            raise SettingError(f"{shortened(repr(device))} {fault}")
+        check_device(device)
         self.device, self.chip, self.clock_hz = device, chip, clock_hz
         self.calls = self.silent = 0
         self._file: int | None = None
@@ -51,7 +49,7 @@ class SpiDevice(Closing):
             ioctl(self._file, SPEED, struct.pack("=I", self.clock_hz))
         except OSError as error:
             self.close()
-            raise DeviceError(f"{self.device} cannot be opened: {_cause(error)}") from None
+            raise DeviceError(f"{self.device} cannot be opened: {cause(error, 'SPI', _MISSING)}") from None
 
     def prepare(self, transfers: Sequence[Reading]) -> Callable[[], list[int | None]]:
         """Return a function that makes these transfers in one call, with chip select high in between.
@@ -78,7 +76,7 @@ class SpiDevice(Closing):
             try:
                 ioctl(self._file, request, table)
             except OSError as error:
-                raise DeviceError(f"{self.device} does not work: {_cause(error)}") from None
+                raise DeviceError(f"{self.device} does not work: {cause(error, 'SPI', _MISSING)}") from None
             codes = [self.chip.code(reply.raw) for reply in buffers[1]]
             self.silent += codes.count(None)
             return codes
@@ -90,11 +88,3 @@ class SpiDevice(Closing):
         if self._file is not None:
             os.close(self._file)
             self._file = None
-
-
-def _cause(error: OSError) -> str:
-    if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        return "there is no such device; is SPI switched on, is the module spidev loaded?"
-    if error.errno in (errno.EACCES, errno.EPERM):
-        return "permission denied; is your user in the group spi?"
-    return f"{os.strerror(error.errno or errno.EIO)}; is it an SPI device?"

@@ -8,6 +8,7 @@ from time import monotonic, perf_counter
 import msgspec
 
 from thenar.drivers.errors import ThenarError
+from thenar.drivers.i2c.supervisor import PlacedChip
 
 from ..frames import SwitchFrame
 from ..harness.wiring import GloveWiring, Harness
@@ -186,8 +187,9 @@ def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[CheckResult, ...
     times = scan_us(msgspec.structs.replace(scan, ports=ports), harness)
     try:
         device.open()
-        found = [_chip(device, place, time) for place, time in enumerate(times.chips)]
-        whole = _duration(device.scan(None).read)
+        chips = dict(zip(sorted(time.chip for time in times.chips), device.bus.chips, strict=True))
+        found = [_chip(device, chips[time.chip], time) for time in times.chips]
+        whole = _duration(device.scan().read)
         frames = [device.read(_LISTEN_S) for _ in range(_SCANS)] if device.taxels else []
         way = (device.bus.fault_message,) if device.bus.fault_message else (f"reads {device.bus.way}",)
     except ThenarError as wrong:
@@ -226,12 +228,11 @@ def _taxels(
         yield from taxel_findings(device, [taxel.name], harness, came, taxel.highest)
 
 
-def _chip(device: I2cDevice, place: int, time: ChipTime) -> CheckResult:
-    taken = _duration(device.scan(place).read)
-    state = device.bus.chips[place]
-    if not state.present:
-        return CheckResult(device.name, time.place, False, time.us, None, (state.last_error,))
-    remarks = (f"{state.errors} failures, the last: {state.last_error}",) if state.errors else ()
+def _chip(device: I2cDevice, chip: PlacedChip, time: ChipTime) -> CheckResult:
+    taken = _duration(device.scan(chip).read)
+    if not chip.present:
+        return CheckResult(device.name, time.place, False, time.us, None, (chip.last_error,))
+    remarks = (f"{chip.errors} failures, the last: {chip.last_error}",) if chip.errors else ()
     return _remarked(CheckResult(device.name, time.place, True, time.us, taken, remarks))
 
 

@@ -3,8 +3,9 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, Interleaved, PortRead
+from thenar.drivers.i2c.bus import I2cBus, PlacedPort, Scan
 from thenar.drivers.i2c.chips import Conversion, Converter
+from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.drivers.spi.chips import SpiChip
 
 from ..frames import PERIODS, BitRemap, Mask, SwitchFrame, now_us
@@ -88,10 +89,10 @@ class I2cDevice(Source):
         self._taxels = len(harness.taxel_names)
         self.owned: Mask = sum(port.targets for port in self._ports)
         chips = sorted({port.chip for port in ports})
-        chips_at = [_chip_at(harness, number, chip, ports) for chip in chips]
-        self.bus = I2cBus(wiring.device, chips_at, clock_hz=wiring.clock_hz)
-        self._reads = [PortRead(chips.index(port.chip), reading_of(port, harness)) for port in ports]
-        self._scan: Interleaved | None = None
+        placed = {chip: _placed(harness, number, chip, ports) for chip in chips}
+        self.bus = I2cBus(wiring.device, tuple(placed.values()))
+        self._reads = [PlacedPort(placed[port.chip], reading_of(port, harness)) for port in ports]
+        self._scan: Scan | None = None
         self._groups: list[list[int]] = []
         self._pace, self._held_up = Pace(wiring.rate_hz), 0
 
@@ -104,12 +105,12 @@ class I2cDevice(Source):
         """Open the bus and set up its chips."""
         self.bus.open()
         self._groups = self._grouped(range(len(self._reads)))
-        self._scan = self.bus.interleaved([[self._reads[port] for port in group] for group in self._groups])
+        self._scan = self.bus.prepare([[self._reads[port] for port in group] for group in self._groups])
 
-    def scan(self, chip: int | None = None) -> Interleaved:
-        """Return a reader of all ports, or of those of the bus's chip of this number."""
-        ports = [port for port, read in enumerate(self._reads) if chip is None or read.chip == chip]
-        return self.bus.interleaved([[self._reads[port] for port in group] for group in self._grouped(ports)])
+    def scan(self, chip: PlacedChip | None = None) -> Scan:
+        """Return a reader of all ports, or of those of this chip of the bus."""
+        ports = [port for port, read in enumerate(self._reads) if chip is None or read.member is chip]
+        return self.bus.prepare([[self._reads[port] for port in group] for group in self._grouped(ports)])
 
     def _grouped(self, ports: Sequence[int]) -> list[list[int]]:
         """Return the ports that are read together: all but slow conversions."""
@@ -166,16 +167,16 @@ def taxel_faults(taxels: Sequence[PortLevels]) -> list[str]:
     return [f"taxels with faults: {list_names(faulty)}"] if faulty else []
 
 
-def _takes_time(read: PortRead) -> bool:
+def _takes_time(read: PlacedPort) -> bool:
     return isinstance(read.reading, Conversion) and bool(read.reading.start)
 
 
-def _chip_at(harness: Harness, bus: int, number: int, ports: list[Port]) -> ChipAt:
+def _placed(harness: Harness, bus: int, number: int, ports: list[Port]) -> PlacedChip:
     chip = harness.buses[bus].chips[number]
     shown = [(reading_of(port, harness), port) for port in ports if port.chip == number]
     used = frozenset(reading.pins[bit] for reading, port in shown for bit in ([b for b, _ in port.switches] or [0]))
-    mux, channel = (None, None) if chip.mux is None else (chip.mux.address, chip.mux.channel)
-    return ChipAt(chip.chip, chip.address, used, mux, channel)
+    route = None if chip.mux is None else Route(chip.mux.address, chip.mux.channel)
+    return PlacedChip(chip.chip, chip.address, used, route)
 
 
 def _bus_period_us(harness: Harness, bus: int, scan: ScanMap) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 from thenar.drivers.calibration import SensorCalibration
 from thenar.drivers.closing import Closing
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c, EmulatedSpi
+from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
 from thenar.drivers.emulated.lines import BoardSender, LineSender, lines_like
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.calibration import load_calibration
@@ -105,7 +105,7 @@ class Bench(Closing):
                 self.glove = stack.enter_context(EmulatedCyberGlove(line, sensors=harness.cyberglove.all_sensors))
             self.i2c: EmulatedI2c | None = None
             if harness.buses or harness.spi:
-                spi = [EmulatedSpi(wiring.device, wiring.kind) for wiring in harness.spi]
+                spi = {wiring.device: wiring.kind for wiring in harness.spi}
                 self.i2c = stack.enter_context(EmulatedI2c([_emulated(bus, adapter) for bus in harness.buses], spi))
             self._joints = {name: (number, unit) for number, (name, unit) in enumerate(joints)}
             self.streams, ports = list[LineSender](), list[str]()

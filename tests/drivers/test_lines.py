@@ -17,7 +17,6 @@ from thenar.drivers.lines import (
     LineCounts,
     LineParser,
     Row,
-    Splitter,
     checked,
     parsed,
     switches_field,
@@ -141,14 +140,14 @@ def test_nothing_that_comes_raises(line: bytes, columns: int) -> None:
 
 
 def test_ten_megabytes_without_line_feed_fill_no_memory() -> None:
-    splitter = Splitter()
+    parser = LineParser()
     for _ in range(160):
-        assert splitter.feed(b"7" * 65_536) == []
-        assert len(splitter._rest) <= LONGEST
-    assert splitter.feed(b"7\n1,2\n") == [b"1,2"]
-    assert splitter.overlong == 1
-    assert splitter.feed(b"7" * (LONGEST + 1) + b"\n3,4\n") == [b"3,4"]
-    assert splitter.overlong == 2
+        assert parser.feed(b"7" * 65_536) == []
+        assert len(parser._rest) <= LONGEST
+    assert parser.feed(b"7\n1,2\n") == [Row(None, (1, 2))]
+    assert parser.counts == LineCounts(overlong=1)
+    assert parser.feed(b"7" * (LONGEST + 1) + b"\n3,4\n") == [Row(None, (3, 4))]
+    assert parser.counts == LineCounts(overlong=2)
 
 
 class Sent(NamedTuple):

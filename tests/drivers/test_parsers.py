@@ -41,12 +41,14 @@ class Parser:
 def glove(sensors: int, status: bool) -> Parser:
     def make() -> tuple[Feed, Callable[[], int]]:
         decoder = cyberglove_protocol.RecordDecoder(sensors, status=status)
-        return decoder.feed, lambda: len(decoder._pieces._rest)
+        return decoder.feed, lambda: len(decoder._rest)
 
     byte = 0x83 if status else None
-    records = [Record(bytes([value] * sensors), value % 2 == 0, None, byte) for value in (1, 71, 83, 101, 255)]
-    records += [Record(b"S" * sensors, True, fault, byte) for fault in ("too fast", "unplugged")]
-    return Parser(make, tuple(map(cyberglove_protocol.encode, records)), sensors + 5)
+    records = [Record(bytes([value] * sensors), None, byte) for value in (1, 71, 83, 101, 255)]
+    records += [Record(b"S" * sensors, fault, byte) for fault in ("too fast", "unplugged")]
+    streamed = tuple(map(cyberglove_protocol.encode, records))
+    polled = tuple(b"G" + record[1:] for record in streamed)
+    return Parser(make, streamed + polled, sensors + 5)
 
 
 PARSERS = {

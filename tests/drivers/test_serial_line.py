@@ -9,12 +9,10 @@ from pathlib import Path
 from time import monotonic
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.serial_line import Pieces, SerialLine
+from thenar.drivers.serial_line import SerialLine
 
 EVERY_BYTE = bytes(range(256))
 SOON_S = 60.0
@@ -169,34 +167,3 @@ def test_a_redirected_port_name_is_an_error_a_missing_one_not(tmp_path: Path) ->
             threading.Event().wait(0.2)
             with pytest.raises(DeviceError, match="another port than the one that was opened"):
                 line.read(SOON_S)
-
-
-# Zeros often enough that there are pieces of every length.
-STREAMS = st.lists(st.sampled_from([0, 0, 1, 2, 255])).map(bytes)
-
-
-def fed(pieces: Pieces, chunks: list[bytes]) -> list[bytes]:
-    return [piece for chunk in chunks for piece in pieces.feed(chunk)]
-
-
-@given(st.lists(STREAMS), st.integers(1, 5))
-def test_chunks_do_not_matter(chunks: list[bytes], longest: int) -> None:
-    assert fed(Pieces(longest), chunks) == Pieces(longest).feed(b"".join(chunks))
-
-
-@given(STREAMS)
-def test_pieces_are_what_lies_between_zeros(stream: bytes) -> None:
-    assert Pieces(1000).feed(stream + b"\0") == stream.split(b"\0")
-
-
-@given(STREAMS, st.integers(1, 5))
-def test_overlong_pieces_are_cut_to_the_longest_plus_one(stream: bytes, longest: int) -> None:
-    whole = stream.split(b"\0")
-    assert Pieces(longest).feed(stream + b"\0") == [piece[: longest + 1] for piece in whole]
-
-
-def test_a_stream_without_zeros_does_not_fill_the_memory() -> None:
-    pieces = Pieces(20)
-    for _ in range(1000):
-        pieces.feed(b"\xff" * 100)
-        assert len(pieces._rest) <= 21

@@ -43,7 +43,7 @@ def _records(data: bytes) -> None:
         whole, parts = (cyberglove_protocol.RecordDecoder(sensors, status=status) for _ in range(2))
         half = len(data) // 2
         assert whole.feed(data) == parts.feed(data[:half]) + parts.feed(data[half:])
-        assert len(whole._pieces._rest) < 30
+        assert len(whole._rest) < 30
     decoder = cyberglove_protocol.RecordDecoder()
     decoder.feed(data + b"\0")
     assert decoder.feed(cyberglove_protocol.encode(_RECORD)) == [_RECORD]
@@ -86,7 +86,7 @@ def _board(data: bytes, _folder: Path) -> None:
     half = len(data) // 2
     assert whole.feed(data) == parts.feed(data[:half]) + parts.feed(data[half:])
     assert whole.counts == parts.counts
-    assert len(whole._splitter._rest) <= LONGEST
+    assert len(whole._rest) <= LONGEST
     (row,) = whole.feed(b"\n" + _COLUMNS + _ROW)[-1:]
     assert (row.sequence, row.values) == (9, (1, 1, 1, 1, 1, 512))
 

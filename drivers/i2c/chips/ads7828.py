@@ -34,10 +34,6 @@ class Ads7828Model(ConverterModel):
         code = min(self.at(channel), 0xFFF) if self._command & _SINGLE else 0
         return (code.to_bytes(2, "big") * length)[:length]
 
-    def poke(self, register: int, value: int) -> None:
-        """Set a register to `value` without a bus write."""
-        self._command = value
-
 
 class Ads7828(Converter):
     """Channels CH0 to CH7 against COM, code 4096 at the supply. SCL up to 400 kHz (3.4 MHz in high-speed mode)."""

@@ -122,6 +122,40 @@ class Device(ABC):
         return self.levels >> 8 * number & 0xFF
 
 
+class RegisterModel(Device):
+    """A device with registers of a byte each, behind a pointer that the first byte of a write message sets, and that
+    moves on with every other byte.
+    """
+
+    def write(self, data: bytes) -> None:
+        """Process the bytes of one write message."""
+        if data:
+            self._point(data[0])
+        for byte in data[1:]:
+            self._store(byte)
+            self._advance()
+
+    def read(self, length: int) -> bytes:
+        """Return the bytes of one read message."""
+        reply = bytearray()
+        for _ in range(length):
+            reply.append(self._load())
+            self._advance()
+        return bytes(reply)
+
+    @abstractmethod
+    def _point(self, byte: int) -> None: ...
+
+    @abstractmethod
+    def _store(self, byte: int) -> None: ...
+
+    @abstractmethod
+    def _load(self) -> int: ...
+
+    @abstractmethod
+    def _advance(self) -> None: ...
+
+
 @dataclass(frozen=True, slots=True)
 class ChipPackage:
     """A chip as a part to buy and to solder: part number, maker, KiCad's symbol and footprint.

@@ -1,6 +1,6 @@
 """Microchip MCP23017: two ports of eight pins, of which seven each may be inputs (DS20001952, BANK = 0)."""
 
-from .base import Chip, ChipPackage, Device, Reading, Write, byte_pins
+from .base import Chip, ChipPackage, Reading, RegisterModel, Write, byte_pins
 
 _IODIRA, _IOCON, _GPIOA, _GPIOB = 0x00, 0x0A, 0x12, 0x13
 _IOCON_OF_BANK_1 = 0x05
@@ -13,7 +13,7 @@ NOT_AN_INPUT = (
 )
 
 
-class Mcp230xxModel(Device):
+class Mcp230xxModel(RegisterModel):
     """Registers with an automatically incremented pointer; pins without pull-up float, and read 0 here."""
 
     _INPUTS, _POLARITY, _CONTROL, _PULL_UPS, _FLAGS, _CAPTURE, _PINS, _LATCH = 0, 1, 5, 6, 7, 8, 9, 10
@@ -26,21 +26,8 @@ class Mcp230xxModel(Device):
             values[self._INPUTS] = 0xFF
         self._pointer = 0
 
-    def write(self, data: bytes) -> None:
-        """Process the bytes of one write message."""
-        if data:
-            self._pointer = data[0] & 0x1F
-        for byte in data[1:]:
-            self._store(*self._decode(self._pointer), byte)
-            self._advance()
-
-    def read(self, length: int) -> bytes:
-        """Return the bytes of one read message."""
-        reply = bytearray()
-        for _ in range(length):
-            reply.append(self._load(*self._decode(self._pointer)))
-            self._advance()
-        return bytes(reply)
+    def _point(self, byte: int) -> None:
+        self._pointer = byte & 0x1F
 
     def _decode(self, address: int) -> tuple[int, int]:
         """Return port and register; an invalid register for an unused address."""
@@ -50,7 +37,8 @@ class Mcp230xxModel(Device):
         if not self._values[0][self._CONTROL] & 0x20:
             self._pointer = (self._pointer + 1) % self._REGISTERS
 
-    def _store(self, port: int, register: int, byte: int) -> None:
+    def _store(self, byte: int) -> None:
+        port, register = self._decode(self._pointer)
         if register == self._CONTROL:
             for values in self._values:
                 values[register] = byte
@@ -59,7 +47,8 @@ class Mcp230xxModel(Device):
         elif register < self._REGISTERS and register not in (self._FLAGS, self._CAPTURE):
             self._values[port][register] = byte
 
-    def _load(self, port: int, register: int) -> int:
+    def _load(self) -> int:
+        port, register = self._decode(self._pointer)
         if register >= self._REGISTERS:
             return 0
         values = self._values[port]

@@ -1,9 +1,8 @@
 """NXP PCA9555 and TI TCA9555: two ports of eight pins with pull-ups of 100 kohm, in pairs of registers."""
 
-from abc import abstractmethod
 from typing import ClassVar
 
-from .base import TSSOP24, Chip, ChipPackage, Device, Reading, Write, byte_pins, pins_of_24, port_pins
+from .base import TSSOP24, Chip, ChipPackage, Reading, RegisterModel, Write, byte_pins, pins_of_24, port_pins
 
 _INPUT_0, _INPUT_1, _OUTPUT, _POLARITY, _CONFIGURATION = 0, 1, 2, 4, 6
 
@@ -11,7 +10,7 @@ _INPUT_0, _INPUT_1, _OUTPUT, _POLARITY, _CONFIGURATION = 0, 1, 2, 4, 6
 _SIGNATURE = b"\xaa\x55"
 
 
-class BankedModel(Device):
+class BankedModel(RegisterModel):
     """Banks of inputs, outputs, polarities and configurations, `stride` registers apart; pins as driven externally."""
 
     _ports: ClassVar[int]
@@ -25,27 +24,10 @@ class BankedModel(Device):
         self._pointer = 0
         self._moves = True
 
-    def read(self, length: int) -> bytes:
-        """Return the bytes of one read message."""
-        reply = bytearray()
-        for _ in range(length):
-            reply.append(self._load())
-            self._advance()
-        return bytes(reply)
-
-    def write(self, data: bytes) -> None:
-        """Process the bytes of one write message."""
-        if data:
-            self._command(data[0])
-        for byte in data[1:]:
-            bank, port = divmod(self._pointer, self._stride)
-            if bank and port < self._ports:
-                (self._outputs, self._polarities, self._inputs)[bank - 1][port] = byte
-            self._advance()
-
-    @abstractmethod
-    def _command(self, byte: int) -> None:
-        """Process the byte of a message that selects the register to write or read."""
+    def _store(self, byte: int) -> None:
+        bank, port = divmod(self._pointer, self._stride)
+        if bank and port < self._ports:
+            (self._outputs, self._polarities, self._inputs)[bank - 1][port] = byte
 
     def _advance(self) -> None:
         if self._moves:
@@ -67,7 +49,7 @@ class Pca9555Model(BankedModel):
 
     pins, _ports, _stride = 16, 2, 2
 
-    def _command(self, byte: int) -> None:
+    def _point(self, byte: int) -> None:
         self._pointer = byte & 7
 
 

@@ -29,10 +29,6 @@ class LatchedModel(Device):
         ports = (number % len(self._latches) for number in range(length))
         return bytes(self._latches[port] & self.port(port) for port in ports)
 
-    def poke(self, register: int, value: int) -> None:
-        """Set a register to `value` without a bus write."""
-        self._latches[register % len(self._latches)] = value
-
 
 class Pcf8574Model(LatchedModel):
     """One latch."""

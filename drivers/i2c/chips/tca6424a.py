@@ -15,7 +15,7 @@ class Tca6424aModel(BankedModel):
 
     pins, _ports, _stride = 24, 3, 4
 
-    def _command(self, byte: int) -> None:
+    def _point(self, byte: int) -> None:
         self._pointer, self._moves = byte & 0xF, bool(byte & 0x80)
 
 

@@ -53,14 +53,16 @@ def test_what_is_done_to_the_glove_shows_in_its_records(line: PtyLine, client: S
     decoder = RecordDecoder(22, status=True)
     with EmulatedCyberGlove(line, sensors=22) as glove:
         Dialogue(client).ask(setting("U", b"\1"))
+        Dialogue(client).ask(setting("T", b"\xff\xff\0\1"))  # half a second, long enough for one record at a time
         for number in range(5):
             values = bytes([100 + number] * 22)
             glove.set(values)
             glove.box.plugged = number != 3
-            client.write(b"G")
+            client.write(b"S")
             fault: RecordFault | None = "unplugged" if number == 3 else None
             status = 0x80 | (number != 3)
-            assert records(client, 1, decoder) == [Record(values, streamed=False, fault=fault, status=status)]
+            assert records(client, 1, decoder) == [Record(values, fault=fault, status=status)]
+            Dialogue(client).stop_stream()
         assert glove.records == 5
 
 

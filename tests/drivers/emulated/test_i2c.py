@@ -26,6 +26,14 @@ with SMBus("/dev/i2c-3") as bus:
     print(monotonic() - start)
 """
 
+TWO_READS = """
+from smbus2 import SMBus, i2c_msg
+for device in ("/dev/i2c-3", "/dev/i2c-5"):
+    byte = i2c_msg.read(0x20, 1)
+    SMBus(device).i2c_rdwr(byte)
+    print(*byte)
+"""
+
 
 @pytest.fixture
 def umockdev() -> None:
@@ -55,18 +63,17 @@ def test_several_buses_are_served_at_a_time_each_with_its_own_chips() -> None:
         EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,), paced=False),
         EmulatedBus("/dev/i2c-5", 100_000, "i2c-gpio", (EmulatedChip("pcf8574", 0x20),), paced=False),
     ]
-    read = "from smbus2 import SMBus; print(SMBus('/dev/i2c-3').read_byte(0x20), SMBus('/dev/i2c-5').read_byte(0x20))"
     with EmulatedI2c(buses) as emulated:
         emulated.set_all([[0x0000], [0x5A]])
-        assert client(emulated, sys.executable, "-c", read).split() == ["255", str(0x5A)]  # IODIRA, and the pins
+        assert client(emulated, sys.executable, "-c", TWO_READS).split() == ["255", str(0x5A)]  # IODIRA, and the pins
         assert [emulated.counters(bus).total_bytes for bus in range(2)] == [2, 2]
 
 
 @pytest.mark.usefixtures("umockdev")
 def test_programs_that_know_nothing_of_thenar_meet_the_chips_too() -> None:
-    program = tool("i2cget")
+    program = tool("i2ctransfer")
     with EmulatedI2c([EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,), paced=False)]) as emulated:
-        assert client(emulated, program, "-y", "3", "0x20", "0x00").strip() == "0xff"
+        assert client(emulated, program, "-y", "3", "w1@0x20", "0x00", "r1").strip() == "0xff"
 
 
 @pytest.mark.usefixtures("umockdev")
@@ -84,7 +91,7 @@ def test_several_threads_may_speak_to_it_at_a_time() -> None:
     buses = [EmulatedBus(f"/dev/i2c-{n}", 400_000, "any", (MCP,), paced=False) for n in range(3, 6)]
     with EmulatedI2c(buses) as emulated, ThreadPoolExecutor(4) as pool:
         for seen in pool.map(emulated.counters, list(range(3)) * 50):
-            assert (seen.calls, seen.traffic) == (0, ())
+            assert (seen.calls, seen.traffic) == (0, {})
 
 
 HOST = """
@@ -127,7 +134,7 @@ def test_nothing_stays_behind_of_a_server_that_was_killed() -> None:
 def test_a_server_that_ended_says_why() -> None:
     emulated = EmulatedI2c([EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,))])
     with pytest.raises(DeviceError, match=r"the emulated I2C buses have ended.*IndexError"):
-        emulated.reset(0, 7)
+        emulated.fault(0, "reset", 7)
     emulated.close()
 
 

@@ -6,16 +6,10 @@ from hypothesis import strategies as st
 
 from thenar.drivers.emulated.i2c_wire import (
     ADAPTERS,
-    BYTE,
-    BYTE_DATA,
-    I2C_BLOCK,
-    QUICK,
-    WORD_DATA,
     Adapter,
     Message,
     NakError,
     Station,
-    TransferFault,
     Wire,
 )
 from thenar.drivers.i2c.chips import CHIPS
@@ -164,27 +158,13 @@ def test_an_adapter_lets_through_what_its_driver_does(kind: str, messages: list[
 def test_each_adapter_has_its_own_errno_for_a_nak(kind: str) -> None:
     adapter = Adapter(Wire([], 100_000), kind)
     with pytest.raises(OSError) as refused:
-        adapter.smbus(0x20, True, 0, BYTE, b"")
+        adapter.rdwr([read(0x20, 1)])
     assert refused.value.errno == (errno.ENXIO if kind == "i2c-gpio" else errno.EREMOTEIO)
-
-
-def test_smbus_transfers_are_made_of_the_same_messages() -> None:
-    adapter = Adapter(Wire([mcp(0x1234)], 100_000), "any")
-    assert adapter.smbus(0x20, True, 0x12, BYTE_DATA, b"") == b"\x34"
-    assert adapter.smbus(0x20, True, 0x12, WORD_DATA, b"") == bytes.fromhex("3412")
-    assert adapter.smbus(0x20, True, 0x12, I2C_BLOCK, bytes(3)) == bytes.fromhex("341200")
-    adapter.smbus(0x20, False, 0x14, WORD_DATA, b"\xaa\x55")
-    assert adapter.smbus(0x20, True, 0x14, WORD_DATA, b"") == b"\xaa\x55"
-    adapter.smbus(0x20, False, 0x13, BYTE, b"")
-    assert adapter.smbus(0x20, True, 0, BYTE, b"") == b"\x12"
-    assert adapter.smbus(0x20, False, 0, QUICK, b"") == b""
-    with pytest.raises(OSError):
-        adapter.smbus(0x20, True, 0, 4, b"")
 
 
 def test_a_fault_lasts_as_many_transfers_as_it_is_told() -> None:
     adapter = Adapter(Wire([mcp()], 100_000), "any")
-    adapter.faults.append(TransferFault(errno.EIO, address=0x20, times=2))
+    adapter.fail(errno.EIO, address=0x20, times=2)
     for _ in range(2):
         with pytest.raises(OSError):
             adapter.rdwr(PAIR)

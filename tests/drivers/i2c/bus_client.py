@@ -10,8 +10,9 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
+from thenar.drivers.i2c.bus import I2cBus, PlacedPort
 from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.supervisor import PlacedChip, Route
 
 if TYPE_CHECKING:
     from thenar.drivers.i2c.bus import Scan
@@ -30,7 +31,9 @@ class Client:
         self._bus.close()
 
     def prepare(self, ports: list[tuple[int, str]]) -> None:
-        self._scan = self._bus.prepare([PortRead(chip, self._reading(chip, name)) for chip, name in ports])
+        self._scan = self._bus.prepare(
+            [[PlacedPort(self._members[chip], self._reading(chip, name)) for chip, name in ports]]
+        )
 
     def read(self) -> list[int | None]:
         assert self._scan is not None
@@ -62,10 +65,10 @@ class Client:
         return next(reading for reading in self._members[chip].chip.readings if reading.name == name)
 
 
-def _chip(kind: str, address: int, mux: int | None = None, channel: int | None = None) -> ChipAt:
+def _chip(kind: str, address: int, mux: int | None = None, channel: int | None = None) -> PlacedChip:
     chip = CHIPS[kind]
     used = frozenset(pin for pin, name in enumerate(chip.pins) if name not in chip.not_inputs)
-    return ChipAt(chip, address, used, mux, channel)
+    return PlacedChip(chip, address, used, None if mux is None or channel is None else Route(mux, channel))
 
 
 def main() -> None:

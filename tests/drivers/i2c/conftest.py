@@ -3,7 +3,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
+from thenar.drivers.emulated.i2c_wire import Place
 
 DEVICE = "/dev/i2c-7"
 CLIENT = Path(__file__).with_name("bus_client.py")
@@ -81,10 +82,9 @@ class Rig:
         self._stack.callback(client.close)
         return client
 
-    def traffic(self) -> dict[tuple[int, int | None, int | None, int | None], int]:
+    def traffic(self) -> Mapping[Place, int]:
         """Bytes so far by address, mux, channel and register."""
-        seen = self.emulated.counters(0).traffic
-        return {(place.address, place.mux, place.channel, place.register): place.count for place in seen}
+        return self.emulated.counters(0).traffic
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, PlacedPort, PortRead, cut
+from thenar.drivers.i2c.bus import I2cBus, PlacedPort, cut
 from thenar.drivers.i2c.chips import CHIPS, Reading
-from thenar.drivers.i2c.node import MOST_MESSAGES, BatchMode, Query
+from thenar.drivers.i2c.node import MOST_MESSAGES, BatchMode
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
 
 MakeRig = Callable[..., Any]
@@ -132,15 +132,15 @@ def test_more_ports_than_the_kernel_takes_messages_are_read_in_two_transfers(rig
 
 
 def test_two_chips_that_would_answer_at_one_address_are_refused() -> None:
-    def at(mux: int | None = None, channel: int | None = None) -> ChipAt:
-        return ChipAt(CHIPS["mcp23017"], 0x20, frozenset({0}), mux, channel)
+    def at(route: Route | None = None) -> PlacedChip:
+        return PlacedChip(CHIPS["mcp23017"], 0x20, frozenset({0}), route)
 
-    for chips in ([at(), at()], [at(), at(0x70, 1)], [at(0x70, 1), at(0x70, 1)]):
+    for chips in ([at(), at()], [at(), at(Route(0x70, 1))], [at(Route(0x70, 1)), at(Route(0x70, 1))]):
         with pytest.raises(SettingError, match="two chips would respond at 0x20"):
             I2cBus("/dev/i2c-7", chips)
-    for place in ((0x60, 1), (0x70, 8), (0x70, None), (None, 1)):
+    for route in (Route(0x60, 1), Route(0x70, 8)):
         with pytest.raises(SettingError, match="a tca9548a is at 0x70 to 0x77"):
-            I2cBus("/dev/i2c-7", [at(*place)])
+            I2cBus("/dev/i2c-7", [at(route)])
 
 
 def test_a_missing_or_wrong_bus_says_what_to_check(tmp_path: Any) -> None:
@@ -163,8 +163,8 @@ def test_a_file_is_no_bus_and_is_not_even_opened(tmp_path: Path) -> None:
 
 
 def test_a_bus_that_was_not_opened_or_was_closed_says_so(rig: MakeRig) -> None:
-    chip = CHIPS["mcp23017"]
-    scan = I2cBus("/dev/i2c-7", [ChipAt(chip, 0x20, frozenset())]).prepare([PortRead(0, chip.readings[0])])
+    chip = PlacedChip(CHIPS["mcp23017"], 0x20, frozenset())
+    scan = I2cBus("/dev/i2c-7", [chip]).prepare([[PlacedPort(chip, chip.chip.readings[0])]])
     with pytest.raises(DeviceError, match="is not open"):
         scan.read()
     glove = rig(("mcp23017", 0x20))
@@ -176,12 +176,12 @@ def test_a_bus_that_was_not_opened_or_was_closed_says_so(rig: MakeRig) -> None:
 
 
 MEMBERS = [
-    PlacedChip("/dev/i2c-7", CHIPS["mcp23017"], 0x20 + n % 4, frozenset(), route, present=n != 3)
+    PlacedChip(CHIPS["mcp23017"], 0x20 + n % 4, frozenset(), route, present=n != 3)
     for n, route in enumerate([None, None, None, None, Route(0x70, 1), Route(0x70, 1), Route(0x70, 2)])
 ]
 ports = st.lists(
     st.builds(
-        lambda member, command: PlacedPort(member, Query(member.address, command, 1), Reading("", command, ())),
+        lambda member, command: PlacedPort(member, Reading("", command, (-1,) * 8)),
         st.sampled_from(MEMBERS),
         st.sampled_from([b"", b"\x12"]),
     ),

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from thenar.drivers.emulated.i2c_wire import Adapter, Message, Station, Wire
 from thenar.drivers.i2c import bus as module
 from thenar.drivers.i2c import supervisor
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
+from thenar.drivers.i2c.bus import I2cBus, PlacedPort
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.i2c.node import DeviceNode, Query, Run
+from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.scanmap import Port
@@ -80,8 +81,16 @@ def opened(monkeypatch: pytest.MonkeyPatch, world: World, places: Sequence[Place
     for each in (module, supervisor):
         monkeypatch.setattr(each, "monotonic", world.clock)
     monkeypatch.setattr(module, "sleep", world.sleep)
-    chips = [ChipAt(CHIPS[kind], address, frozenset(range(4)), mux, channel) for kind, address, mux, channel in places]
-    bus = I2cBus("/dev/i2c-7", chips, clock_hz=CLOCK_HZ, check_every_s=1e9)
+    chips = [
+        PlacedChip(
+            CHIPS[kind],
+            address,
+            frozenset(range(4)),
+            None if mux is None or channel is None else Route(mux, channel),
+        )
+        for kind, address, mux, channel in places
+    ]
+    bus = I2cBus("/dev/i2c-7", chips, check_every_s=1e9)
     bus.open()
     return bus
 
@@ -96,8 +105,8 @@ def harness_of(places: Sequence[Place]) -> Harness:
     return Harness(name="x", buses=(bus,))
 
 
-def groups_of(ports: Sequence[Port], harness: Harness) -> list[list[PortRead]]:
-    return [[PortRead(port.chip, reading_of(port, harness))] for port in ports]
+def groups_of(bus: I2cBus, ports: Sequence[Port], harness: Harness) -> list[list[PlacedPort]]:
+    return [[PlacedPort(bus.chips[port.chip], reading_of(port, harness))] for port in ports]
 
 
 PLACES: dict[str, list[Place]] = {
@@ -135,7 +144,7 @@ def test_a_scan_takes_the_planned_time_and_gives_every_code(
             for station, four, (kind, *_) in zip(world.stations, codes, places, strict=True):
                 if kind.startswith("ads"):
                     station.device.levels = sum(code << 16 * channel for channel, code in enumerate(four))
-            reads = bus.interleaved(groups_of(ports, harness))
+            reads = bus.prepare(groups_of(bus, ports, harness))
             reads.read()
             before, found = world.now, reads.read()
         assert (world.now - before) * 1e6 == pytest.approx(overlapped_us(ports, harness), abs=0.01)
@@ -152,7 +161,7 @@ def test_a_scan_that_ended_early_leaves_no_old_codes_behind(monkeypatch: pytest.
     world, harness = World(*places), harness_of(places)
     bus = opened(monkeypatch, world, places)
     scan = whole_scan(harness, [f"{name}>1" for name in harness.taxel_names])
-    reads = bus.interleaved(groups_of(scan.ports, harness))
+    reads = bus.prepare(groups_of(bus, scan.ports, harness))
     device = world.stations[0].device
     for code in (100, 200, 300):
         device.levels = sum(code + channel << 16 * channel for channel in range(4))
@@ -171,7 +180,7 @@ def test_a_converter_that_is_gone_is_no_answer_and_holds_nobody_up(monkeypatch: 
     scan = whole_scan(harness, [*harness.switches, *(f"{name}>1" for name in harness.taxel_names)])
     for station, (kind, *_) in zip(world.stations, places, strict=True):
         station.device.levels = 0x0004_0003_0002_0001 if kind.startswith("ads") else 0xFFFF
-    reads = bus.interleaved(groups_of(scan.ports, harness))
+    reads = bus.prepare(groups_of(bus, scan.ports, harness))
     whole = reads.read()
     assert [answer for port, answer in zip(scan.ports, whole, strict=True) if port.chip == 2] == [1, 2, 3, 4]
     world.stations[2].absent = True
@@ -191,7 +200,7 @@ def test_channels_at_rest_are_looked_into_once_a_check(monkeypatch: pytest.Monke
     world, harness = World(*places), harness_of(places)
     bus = opened(monkeypatch, world, places)
     scan = whole_scan(harness, [f"{name}>1" for name in harness.taxel_names])
-    reads = bus.interleaved(groups_of(scan.ports, harness))
+    reads = bus.prepare(groups_of(bus, scan.ports, harness))
     wire = world.adapter.wire
     bus.chips[0].checked += 1
     before = wire.transfers

@@ -37,13 +37,13 @@ def recovers(glove: Any, levels: list[int], *, by_way_of: list[list[int | None]]
 @pytest.mark.parametrize("adapter", ["any", "i2c-gpio", "designware", "bcm2835"])
 def test_a_chip_that_stops_acknowledging_is_lost_alone_and_comes_back(rig: MakeRig, adapter: str) -> None:
     glove = running(rig, adapter=adapter)
-    glove.emulated.remove(0, 0)
+    glove.emulated.fault(0, "remove", 0)
     assert glove.client.ask("read") == [None, LEVELS[1]]
     gone, other = glove.client.state().chips
     assert (gone.present, other.present) == (False, True)
     assert "/dev/i2c-7: the mcp23017 at 0x20 does not reply: check its supply, its wires" in gone.last_error
     assert not other.errors
-    glove.emulated.heal(0)
+    glove.emulated.fault(0, "heal")
     recovers(glove, LEVELS, by_way_of=[[None, LEVELS[1]]])
 
 
@@ -52,7 +52,7 @@ def test_a_nak_is_known_by_every_errno_that_adapters_give_it(rig: MakeRig) -> No
     glove = rig(*(("mcp23017", 0x20 + n) for n in range(4)))
     glove.client.ask("prepare", [(n, "A") for n in range(4)])
     for number, code in enumerate(codes):
-        glove.emulated.fail(0, code, address=0x20 + number)
+        glove.emulated.fault(0, "fail", code, address=0x20 + number)
     assert glove.client.ask("read") == [None, None, None, 0xFF]
     for code, chip in zip(codes, glove.client.state().chips, strict=False):
         assert f"does not reply: check its supply, its wires and its address pins (errno {code})" in chip.last_error
@@ -61,7 +61,7 @@ def test_a_nak_is_known_by_every_errno_that_adapters_give_it(rig: MakeRig) -> No
 @pytest.mark.parametrize("code", [errno.EIO, errno.ETIMEDOUT, errno.EAGAIN, errno.EREMOTEIO, errno.EBUSY])
 def test_a_transfer_that_fails_twice_is_retried_within_the_scan(rig: MakeRig, code: int) -> None:
     glove = running(rig)
-    glove.emulated.fail(0, code, address=0x21, times=3)  # the batch, and twice alone
+    glove.emulated.fault(0, "fail", code, address=0x21, times=3)  # the batch, and twice alone
     assert glove.client.ask("read") == LEVELS
     assert [chip.errors for chip in glove.client.state().chips] == [0, 2]
 
@@ -69,7 +69,7 @@ def test_a_transfer_that_fails_twice_is_retried_within_the_scan(rig: MakeRig, co
 @pytest.mark.parametrize("code", [errno.EIO, errno.ETIMEDOUT, errno.EAGAIN, errno.EBUSY])
 def test_a_failing_chip_is_given_up_and_tried_once_a_second(rig: MakeRig, code: int) -> None:
     glove = running(rig, check_every_s=3600.0)
-    glove.emulated.fail(0, code, address=0x20)
+    glove.emulated.fault(0, "fail", code, address=0x20)
     before = glove.client.state()
     assert glove.client.ask("read") == [None, LEVELS[1]]
     state = glove.client.state()
@@ -77,7 +77,7 @@ def test_a_failing_chip_is_given_up_and_tried_once_a_second(rig: MakeRig, code: 
     assert f"(errno {code})" in state.chips[0].last_error
     assert glove.client.ask("read_until", [], 2.5) == [[None, LEVELS[1]]]
     assert glove.client.state().chips[0].errors - state.chips[0].errors in (1, 2)
-    glove.emulated.heal(0)
+    glove.emulated.fault(0, "heal")
     recovers(glove, LEVELS, by_way_of=[[None, LEVELS[1]]])
 
 
@@ -85,7 +85,7 @@ def test_a_failing_chip_is_given_up_and_tried_once_a_second(rig: MakeRig, code: 
 def test_an_adapter_that_refuses_batches_while_running_is_asked_for_less(rig: MakeRig, code: int) -> None:
     glove = running(rig)
     assert glove.client.state().way.startswith("all ports between")
-    glove.emulated.fail(0, code, batches=True)
+    glove.emulated.fault(0, "fail", code, batches=True)
     assert [glove.client.ask("read") for _ in range(3)] == [LEVELS] * 3
     state = glove.client.state()
     assert state.way == "all ports of a chip in one transfer"
@@ -95,13 +95,13 @@ def test_an_adapter_that_refuses_batches_while_running_is_asked_for_less(rig: Ma
 def test_an_address_claimed_by_a_kernel_driver_is_left_alone(rig: MakeRig) -> None:
     glove = rig(*TWO, opened=False)
     glove.emulated.set_all([LEVELS])
-    glove.emulated.claim(0, 0x20)
+    glove.emulated.fault(0, "claim", 0x20)
     glove.client.ask("open")
     glove.client.ask("prepare", BOTH)
     assert glove.client.ask("read") == [None, LEVELS[1]]
     assert "a kernel driver has the address" in glove.client.state().chips[0].last_error
     assert not any(place[0] == 0x20 for place in glove.traffic())
-    glove.emulated.heal(0)
+    glove.emulated.fault(0, "heal")
     recovers(glove, LEVELS, by_way_of=[[None, LEVELS[1]]])
 
 
@@ -109,14 +109,14 @@ def test_an_address_claimed_by_a_kernel_driver_is_left_alone(rig: MakeRig) -> No
 def test_a_line_held_low_gives_no_answers_advice_and_recovers(rig: MakeRig, adapter: str) -> None:
     """i2c-gpio notices nothing: there every byte reads 0, as if every switch were closed."""
     glove = running(rig, adapter=adapter)
-    glove.emulated.hold_sda(0)
+    glove.emulated.fault(0, "hold_sda")
     assert glove.client.ask("read") == [None, None]
     assert "/dev/i2c-7 is stuck" in glove.client.state().fault_message
     assert "clock SCL nine times" in glove.client.state().fault_message
     before = glove.client.state().transfers
     assert glove.client.ask("read_until", [], 2.5) == [[None, None]]
     assert glove.client.state().transfers - before <= 4  # tried once a second, not in every scan
-    glove.emulated.heal(0)
+    glove.emulated.fault(0, "heal")
     recovers(glove, LEVELS, by_way_of=[[None, None], [LEVELS[0], None], [None, LEVELS[1]]])
     assert glove.client.state().fault_message == ""
 
@@ -127,14 +127,14 @@ def test_zeros_from_a_line_held_low_are_no_closed_switches(rig: MakeRig) -> None
     glove = rig(*chips, adapter="i2c-gpio", check_every_s=3600.0)
     glove.client.ask("prepare", [(0, "0"), (1, "01")])
     assert glove.client.ask("read") == [0xFF, 0xFFFF]
-    glove.emulated.hold_sda(0)
+    glove.emulated.fault(0, "hold_sda")
     assert glove.client.ask("read") == [None, None]
 
 
 @pytest.mark.parametrize("adapter", ["bcm2835", "i2c-gpio"])
 def test_a_chip_that_waits_amid_a_byte_is_clocked_free(rig: MakeRig, adapter: str) -> None:
     glove = running(rig, adapter=adapter)
-    glove.emulated.hold_sda(0, transfers=4)
+    glove.emulated.fault(0, "hold_sda", transfers=4)
     recovers(glove, LEVELS, by_way_of=[[None, None], [LEVELS[0], None], [None, LEVELS[1]]])
 
 
@@ -142,12 +142,12 @@ def test_a_chip_that_waits_amid_a_byte_is_clocked_free(rig: MakeRig, adapter: st
 def test_a_line_held_low_at_open_is_reported_without_error(rig: MakeRig, adapter: str) -> None:
     glove = rig(*TWO, adapter=adapter, opened=False)
     glove.emulated.set_all([LEVELS])
-    glove.emulated.hold_sda(0)
+    glove.emulated.fault(0, "hold_sda")
     glove.client.ask("open")
     glove.client.ask("prepare", BOTH)
     assert glove.client.ask("read") == [None, None]
     assert "is stuck" in glove.client.state().fault_message
-    glove.emulated.heal(0)
+    glove.emulated.fault(0, "heal")
     recovers(glove, LEVELS, by_way_of=[[None, None], [LEVELS[0], None], [None, LEVELS[1]]])
 
 
@@ -199,7 +199,7 @@ def test_what_seemed_another_chip_once_is_soon_tried_again(rig: MakeRig) -> None
 
 def test_a_mux_that_was_reset_is_selected_again_within_the_scan(rig: MakeRig) -> None:
     glove = running(rig, [MUXED[0]], MUXED_LEVELS[:1], check_every_s=3600.0)
-    glove.emulated.poke_mux(0, 0x70, 0)
+    glove.emulated.fault(0, "poke_mux", 0x70, 0)
     assert glove.client.ask("read") == MUXED_LEVELS[:1]
     assert not glove.client.state().chips[0].errors
 
@@ -207,22 +207,22 @@ def test_a_mux_that_was_reset_is_selected_again_within_the_scan(rig: MakeRig) ->
 def test_a_mux_that_is_reset_between_its_channels_loses_nothing(rig: MakeRig) -> None:
     glove = running(rig, MUXED, MUXED_LEVELS)
     for _ in range(10):
-        glove.emulated.poke_mux(0, 0x70, 0)
+        glove.emulated.fault(0, "poke_mux", 0x70, 0)
         assert glove.client.ask("read") == MUXED_LEVELS
 
 
 def test_a_mux_reset_during_absence_is_selected_for_the_return(rig: MakeRig) -> None:
     glove = running(rig, [MUXED[0]], MUXED_LEVELS[:1])
-    glove.emulated.remove(0, 0)
+    glove.emulated.fault(0, "remove", 0)
     assert glove.client.ask("read") == [None]
-    glove.emulated.poke_mux(0, 0x70, 0)
-    glove.emulated.bring_back(0, 0)
+    glove.emulated.fault(0, "poke_mux", 0x70, 0)
+    glove.emulated.fault(0, "heal")
     recovers(glove, MUXED_LEVELS[:1], by_way_of=[[None]])
 
 
 def test_a_mux_that_another_program_switched_is_noticed_by_its_register(rig: MakeRig) -> None:
     glove = running(rig, [MUXED[0], ("mcp23017", 0x21, 0x70, 2)], MUXED_LEVELS, check_every_s=0.05)
-    glove.emulated.poke_mux(0, 0x70, 0x04 | 0x80)
+    glove.emulated.fault(0, "poke_mux", 0x70, 0x04 | 0x80)
     recovers(glove, MUXED_LEVELS, by_way_of=[])
     glove.client.ask("read_until", [], 0.3)
     assert any("tca9548a at 0x70 had lost its channel" in chip.last_error for chip in glove.client.state().chips)
@@ -230,10 +230,10 @@ def test_a_mux_that_another_program_switched_is_noticed_by_its_register(rig: Mak
 
 def test_a_mux_that_is_gone_is_named_and_comes_back(rig: MakeRig) -> None:
     glove = running(rig, [*MUXED, ("mcp23017", 0x21)], [*MUXED_LEVELS, 0xFFF0])
-    glove.emulated.remove_mux(0, 0x70)
+    glove.emulated.fault(0, "remove_mux", 0x70)
     assert glove.client.ask("read") == [None, None, 0xFFF0]
     assert "the tca9548a at 0x70 does not reply" in glove.client.state().chips[0].last_error
-    glove.emulated.heal(0)
+    glove.emulated.fault(0, "heal")
     recovers(
         glove,
         [*MUXED_LEVELS, 0xFFF0],
@@ -251,7 +251,7 @@ def test_a_mux_that_stays_connected_is_asked_again_before_another(rig: MakeRig, 
     glove.client.ask("prepare", [(0, "AB")])
     assert glove.client.ask("read") == THEIR_LEVELS[:1]
     glove.client.ask("prepare", [(1, "AB")])
-    glove.emulated.fail(0, code, address=0x70, times=1)
+    glove.emulated.fault(0, "fail", code, address=0x70, times=1)
     assert glove.client.ask("read") == THEIR_LEVELS[1:]
 
 
@@ -260,27 +260,27 @@ def test_a_mux_that_stays_connected_blocks_others_and_is_named(rig: MakeRig) -> 
     glove.client.ask("prepare", [(0, "AB")])
     assert glove.client.ask("read") == THEIR_LEVELS[:1]
     glove.client.ask("prepare", [(1, "AB")])
-    glove.emulated.fail(0, errno.EIO, address=0x70)
+    glove.emulated.fault(0, "fail", errno.EIO, address=0x70)
     assert glove.client.ask("read") == [None]
     assert "the tca9548a at 0x70 does not work" in glove.client.state().chips[1].last_error
-    glove.emulated.heal(0)
+    glove.emulated.fault(0, "heal")
     recovers(glove, THEIR_LEVELS[1:], by_way_of=[[None]])
 
 
 def test_a_mux_that_is_gone_keeps_no_other_from_being_read(rig: MakeRig) -> None:
     glove = running(rig, TWO_MUXES, THEIR_LEVELS, check_every_s=3600.0)
-    glove.emulated.remove_mux(0, 0x70)
+    glove.emulated.fault(0, "remove_mux", 0x70)
     assert glove.client.ask("read") == [None, THEIR_LEVELS[1]]
 
 
 def test_an_unusual_errno_for_a_nak_is_no_stuck_bus(rig: MakeRig) -> None:
     glove = rig(*TWO, opened=False, check_every_s=3600.0)
     glove.emulated.set_all([LEVELS])
-    glove.emulated.fail(0, errno.EIO, address=0x7F)
+    glove.emulated.fault(0, "fail", errno.EIO, address=0x7F)
     glove.client.ask("open")
     assert glove.client.state().fault_message == ""
     glove.client.ask("prepare", BOTH)
-    glove.emulated.fail(0, errno.EIO, address=0x20)
+    glove.emulated.fault(0, "fail", errno.EIO, address=0x20)
     assert glove.client.ask("read") == [None, LEVELS[1]]
     assert glove.client.state().fault_message == ""
 
@@ -289,7 +289,7 @@ def test_an_unusual_errno_for_a_nak_is_no_stuck_bus(rig: MakeRig) -> None:
 def test_a_chip_that_a_crash_left_in_another_bank_is_read_rightly(rig: MakeRig, leftover: int) -> None:
     glove = rig(*TWO, opened=False)
     glove.emulated.set_all([LEVELS])
-    glove.emulated.poke(0, 0, 0x0A, leftover)
+    glove.emulated.fault(0, "poke", 0, 0x0A, leftover)
     glove.client.ask("open")
     glove.client.ask("prepare", BOTH)
     assert glove.client.ask("read") == LEVELS
@@ -298,17 +298,17 @@ def test_a_chip_that_a_crash_left_in_another_bank_is_read_rightly(rig: MakeRig, 
 def test_a_chip_absent_at_open_is_used_once_it_comes(rig: MakeRig) -> None:
     glove = rig(*TWO, opened=False)
     glove.emulated.set_all([LEVELS])
-    glove.emulated.remove(0, 0)
+    glove.emulated.fault(0, "remove", 0)
     glove.client.ask("open")
     glove.client.ask("prepare", BOTH)
     assert glove.client.ask("read") == [None, LEVELS[1]]
-    glove.emulated.bring_back(0, 0)
+    glove.emulated.fault(0, "heal")
     recovers(glove, LEVELS, by_way_of=[[None, LEVELS[1]]])
 
 
 def test_a_chip_without_pull_ups_is_set_up_before_false_reads(rig: MakeRig) -> None:
     glove = running(rig, check_every_s=3600.0)
-    glove.emulated.reset(0, 0)  # its open inputs float now, and read 0
+    glove.emulated.fault(0, "reset", 0)  # its open inputs float now, and read 0
     assert glove.client.ask("read") == LEVELS
     assert "had lost its registers" in glove.client.state().chips[0].last_error
 
@@ -316,13 +316,13 @@ def test_a_chip_without_pull_ups_is_set_up_before_false_reads(rig: MakeRig) -> N
 def test_half_lost_pull_ups_show_at_the_unused_pin(rig: MakeRig) -> None:
     glove = running(rig, check_every_s=3600.0)
     glove.emulated.set_levels(0, 0, 0xFFFF)
-    glove.emulated.poke(0, 0, 0x0C, 0x0F)
+    glove.emulated.fault(0, "poke", 0, 0x0C, 0x0F)
     assert glove.client.ask("read") == [0xFFFF, LEVELS[1]]
 
 
 def test_a_reset_that_shows_in_no_port_is_noticed_within_a_check(rig: MakeRig) -> None:
     glove = running(rig, check_every_s=0.05)
-    glove.emulated.reset(0, 1)
+    glove.emulated.fault(0, "reset", 1)
     assert glove.client.ask("read_until", [], 0.5) == [LEVELS]
     assert "had lost its registers" in glove.client.state().chips[1].last_error
 

@@ -36,7 +36,7 @@ class DeadNode(DeviceNode):
 @pytest.mark.parametrize("code", [errno.EREMOTEIO, errno.ENXIO, errno.EIO, errno.ETIMEDOUT])
 def test_a_gone_adapter_is_noticed_whatever_its_errno(code: int) -> None:
     node = DeadNode(code)
-    chips = [PlacedChip(node.device, CHIPS["mcp23017"], address, frozenset(), None) for address in (0x20, 0x21)]
+    chips = [PlacedChip(CHIPS["mcp23017"], address, frozenset()) for address in (0x20, 0x21)]
     keeper = ChipSupervisor(node, chips, check_every_s=1.0)
     keeper.begin()
     assert not any(chip.present for chip in chips)

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.emulated.i2c import EmulatedI2c, EmulatedSpi
+from thenar.drivers.emulated.i2c import EmulatedI2c
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.drivers.spi.device import SpiDevice
@@ -112,7 +112,7 @@ def rig() -> Iterator[Rig]:
         message = "program umockdev-wrapper is missing"
         (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
     kinds = ("mcp3208", "mcp3008", None)
-    with EmulatedI2c([], [EmulatedSpi(*pair) for pair in zip(DEVICES, kinds, strict=True)]) as emulated:
+    with EmulatedI2c([], dict(zip(DEVICES, kinds, strict=True))) as emulated:
         made = Rig(emulated)
         yield made
         made.close()

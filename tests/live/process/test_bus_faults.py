@@ -32,15 +32,15 @@ def assert_no_chip_was_given_up(running: Any, begun_us: int) -> None:
 
 
 LASTING: dict[str, tuple[Do, tuple[int, ...]]] = {
-    "a chip answers nobody": (lambda i2c: i2c.remove(0, STRAIGHT), (1,)),
-    "a chip behind the mux answers nobody": (lambda i2c: i2c.remove(0, BEHIND), (2,)),
-    "the mux answers nobody": (lambda i2c: i2c.remove_mux(0, MUX), (2, 3)),
-    "EIO at a chip": (lambda i2c: i2c.fail(0, errno.EIO, address=PCA9555), (1,)),
-    "EREMOTEIO at a chip behind the mux": (lambda i2c: i2c.fail(0, errno.EREMOTEIO, address=MCP23008), (2,)),
-    "ETIMEDOUT at a chip": (lambda i2c: i2c.fail(0, errno.ETIMEDOUT, address=PCA9555), (1,)),
-    "EIO everywhere": (lambda i2c: i2c.fail(0, errno.EIO), (0, 1, 2, 3)),
-    "ETIMEDOUT everywhere": (lambda i2c: i2c.fail(0, errno.ETIMEDOUT), (0, 1, 2, 3)),
-    "SDA held low": (lambda i2c: i2c.hold_sda(0), (0, 1, 2, 3)),
+    "a chip answers nobody": (lambda i2c: i2c.fault(0, "remove", STRAIGHT), (1,)),
+    "a chip behind the mux answers nobody": (lambda i2c: i2c.fault(0, "remove", BEHIND), (2,)),
+    "the mux answers nobody": (lambda i2c: i2c.fault(0, "remove_mux", MUX), (2, 3)),
+    "EIO at a chip": (lambda i2c: i2c.fault(0, "fail", errno.EIO, address=PCA9555), (1,)),
+    "EREMOTEIO at a chip behind the mux": (lambda i2c: i2c.fault(0, "fail", errno.EREMOTEIO, address=MCP23008), (2,)),
+    "ETIMEDOUT at a chip": (lambda i2c: i2c.fault(0, "fail", errno.ETIMEDOUT, address=PCA9555), (1,)),
+    "EIO everywhere": (lambda i2c: i2c.fault(0, "fail", errno.EIO), (0, 1, 2, 3)),
+    "ETIMEDOUT everywhere": (lambda i2c: i2c.fault(0, "fail", errno.ETIMEDOUT), (0, 1, 2, 3)),
+    "SDA held low": (lambda i2c: i2c.fault(0, "hold_sda"), (0, 1, 2, 3)),
 }
 
 
@@ -52,8 +52,8 @@ def test_what_cannot_be_read_is_missed_and_comes_back(run: MakeRun, outage: Outa
     scene.settled(0)
     held = client.held
     lost = running.bus_names(*chips)
-    outage(scene, lambda: do(i2c), lambda: i2c.heal(0), lost=lost, period_us=PERIOD_US)
-    outage(scene, lambda: do(i2c), lambda: i2c.heal(0), lost=lost, period_us=PERIOD_US)
+    outage(scene, lambda: do(i2c), lambda: i2c.fault(0, "heal"), lost=lost, period_us=PERIOD_US)
+    outage(scene, lambda: do(i2c), lambda: i2c.fault(0, "heal"), lost=lost, period_us=PERIOD_US)
     assert client.held == held
     assert client.count("i2c", "failures") > 0
     assert client.end() == 0
@@ -66,15 +66,15 @@ def test_a_chip_back_right_after_a_search_is_found(run: MakeRun, address: int) -
     scene, client, i2c = running.scene, running.start(), running.bench.i2c
     scene.settled(0)
     chip = {PCA9555: STRAIGHT, MCP23008: BEHIND}[address]
-    i2c.remove(0, chip)
+    i2c.fault(0, "remove", chip)
     scene.grasps.wait(lambda grasp: set(grasp.lost) == running.bus_names(chip), running.now_us())
 
     def looked() -> int:
-        return sum(place.count for place in running.wire().traffic if place.address == address)
+        return sum(count for place, count in running.wire().traffic.items() if place.address == address)
 
     before = looked()
     running.eventually(lambda: looked() > before)
-    i2c.bring_back(0, chip)
+    i2c.fault(0, "heal")
     back_us = running.now_us()
     took_us = scene.well(back_us).time_us - back_us
     print(f"well {took_us / 1000:.1f} ms after")
@@ -90,7 +90,7 @@ def test_every_adapter_gives_the_same_answers_and_none_with_sda_low(run: MakeRun
         scene.show(row)
         scene.settled(row)
     lost = everything_on_the_bus(running)
-    outage(scene, lambda: i2c.hold_sda(0), lambda: i2c.heal(0), lost=lost, period_us=PERIOD_US)
+    outage(scene, lambda: i2c.fault(0, "hold_sda"), lambda: i2c.fault(0, "heal"), lost=lost, period_us=PERIOD_US)
     assert client.end() == 0
 
 
@@ -98,7 +98,7 @@ def test_sda_that_a_few_transfers_clock_free_heals_by_itself(run: MakeRun) -> No
     running = run("both", "glove", "bus")
     scene, client = running.scene, running.start()
     scene.settled(0)
-    running.bench.i2c.hold_sda(0, 5)
+    running.bench.i2c.fault(0, "hold_sda", 5)
     scene.show(7)
     scene.settled(7)
     assert client.end() == 0
@@ -141,7 +141,7 @@ def test_what_fails_once_or_twice_is_tried_again_and_never_missed(run: MakeRun, 
     begun_us = running.now_us()
     for code, times in product((errno.EREMOTEIO, errno.EIO, errno.ETIMEDOUT, errno.EAGAIN), (1, 2, 1)):
         print(errno.errorcode[code], times)
-        i2c.fail(0, code, address=address, times=times)
+        i2c.fault(0, "fail", code, address=address, times=times)
         scene.show(3 * times)
         scene.settled(3 * times)
     assert_no_chip_was_given_up(running, begun_us)
@@ -156,7 +156,7 @@ def test_a_refused_batch_is_read_otherwise_and_nothing_is_missed(run: MakeRun, c
     scene.settled(0)
     begun_us = running.now_us()
     before = running.wire()
-    i2c.fail(0, code, batches=True)
+    i2c.fault(0, "fail", code, batches=True)
     for row in (5, 11, 17):
         scene.show(row)
         scene.settled(row)
@@ -175,11 +175,11 @@ def test_a_wrong_chip_is_not_believed_the_right_one_is(run: MakeRun, chip: int, 
     scene.settled(0)
     scene.show(5)
     scene.settled(5)
-    i2c.remove(0, chip)
+    i2c.fault(0, "remove", chip)
     lost = running.bus_names(chip)
     scene.grasps.wait(lambda grasp: set(grasp.lost) == lost, running.now_us())
     i2c.replace(0, chip, other)
-    i2c.bring_back(0, chip)
+    i2c.fault(0, "heal")
     begun_us = running.now_us()
     scene.grasps.wait(lambda grasp: grasp.time_us > begun_us + 1_500_000, begun_us)
     assert all(grasp.health != "ok" for grasp in scene.grasps.since(begun_us))
@@ -197,7 +197,7 @@ def test_a_mux_that_forgets_its_channel_gives_no_wrong_answer(run: MakeRun) -> N
     for control, row in product((0, 1 << 1, 1 << 4, 1 << 6, 0xFF), (4, 12)):
         print(control, row)
         for _ in range(3):
-            i2c.poke_mux(0, MUX, control)
+            i2c.fault(0, "poke_mux", MUX, control)
         scene.show(row)
         scene.settled(row)
     assert client.end() == 0
@@ -211,7 +211,7 @@ def test_a_brief_loss_of_supply_gives_no_wrong_answer(run: MakeRun) -> None:
     scene.settled(0)
     for chip, row in product((0, STRAIGHT, BEHIND, FIFTH), (4, 12)):
         print(chip, row)
-        i2c.reset(0, chip)
+        i2c.fault(0, "reset", chip)
         scene.show(row)
         scene.settled(row)
     assert client.end() == 0

@@ -76,7 +76,7 @@ def test_chips_and_ports_without_a_kept_switch_are_never_touched(run: MakeRun) -
     # Nobody has address 0x7F: reading there is how a stuck bus would be noticed.
     assert touched - {(0x7F, None, None)} == used | {(0x70, None, None)}
     # Port B of the first chip holds a switch that is not kept: only port A's GPIO register is read, a byte each time.
-    first = {place.register: place.count for place in seen if place.address == chips[0].address}
+    first = {place.register: count for place, count in seen.items() if place.address == chips[0].address}
     assert first.get(GPIOB_23017, 0) == 0
     assert first.get(GPIOA_23017, 0) % 4 == 0  # address and register, address and the one byte
     assert first.get(GPIOA_23017, 0) >= 100

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from thenar.drivers.cyberglove_protocol import SENSORS_18
-from thenar.drivers.emulated.cyberglove import Doubts, EmulatedCyberGlove
+from thenar.drivers.emulated.cyberglove import CyberGloveBox, Doubts, EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime import Build, Glove
 from thenar.runtime.frames import GloveFrame
@@ -44,7 +44,7 @@ def test_a_frame_has_every_sensor_unrequested_ones_zero(line: PtyLine) -> None:
 
 
 def test_a_box_without_a_mask_delivers_all_and_is_in_trouble(line: PtyLine) -> None:
-    with EmulatedCyberGlove(line, doubts=Doubts(mask="ignored")) as emulated:
+    with EmulatedCyberGlove(line, CyberGloveBox(doubts=Doubts(mask="ignored"))) as emulated:
         emulated.set(VALUES)
         device = opened(line)
         assert first(device).sensors == VALUES

@@ -45,7 +45,7 @@ class Bus:
     def open(self) -> None:
         pass
 
-    def interleaved(self, _groups: Sequence[Sequence[object]]) -> Bench:
+    def prepare(self, _groups: Sequence[Sequence[object]]) -> Bench:
         return self.bench
 
 

@@ -18,7 +18,8 @@ from msgspec.structs import replace
 from thenar.compiler.frontier.wirings import BOARD, wirings
 from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c, WireCounters
 from thenar.drivers.errors import DeviceError
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead, Scan
+from thenar.drivers.i2c.bus import I2cBus, PlacedPort, Scan
+from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_board
@@ -119,11 +120,21 @@ def main() -> None:
 
 def _scan_of(harness: Harness, number: int, stack: ExitStack) -> Scan:
     wiring = harness.buses[number]
-    chips = [ChipAt(chip.chip, chip.address, frozenset(chip.numbered_pins), *_behind(chip)) for chip in wiring.chips]
-    bus = stack.enter_context(I2cBus(wiring.device, chips, clock_hz=wiring.clock_hz, check_every_s=_NEVER_S))
+    chips = [
+        PlacedChip(
+            chip.chip,
+            chip.address,
+            frozenset(chip.numbered_pins),
+            Route(chip.mux.address, chip.mux.channel) if chip.mux else None,
+        )
+        for chip in wiring.chips
+    ]
+    bus = stack.enter_context(I2cBus(wiring.device, chips, check_every_s=_NEVER_S))
     bus.open()
     ports = whole_scan(harness, harness.switches).ports
-    return bus.prepare([PortRead(port.chip, reading_of(port, harness)) for port in ports if port.bus == number])
+    return bus.prepare(
+        [[PlacedPort(chips[port.chip], reading_of(port, harness)) for port in ports if port.bus == number]]
+    )
 
 
 def _behind(chip: ChipWiring) -> tuple[int, int] | tuple[None, None]:
