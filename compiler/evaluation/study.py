@@ -215,7 +215,7 @@ def evaluate(
     ------
     EvaluationError
         If the set cannot be split as requested, or its rows look like frames of fewer trials than it has.
-    MemberError, TrainerError
+    MemberError, TrainingError
         For an unknown baseline, or an unknown trainer or setting.
 
     Examples

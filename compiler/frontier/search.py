@@ -79,7 +79,7 @@ class Search:
     ------
     MemberError
         For an unknown method or trainer.
-    TrainerError
+    TrainingError
         For a setting that the trainer does not take.
     FrontierError
         If the search would be empty.

@@ -18,11 +18,7 @@ class RecordingError(ThenarError, ValueError):
 
 
 class TableError(ThenarError, ValueError):
-    """A table cannot be read, or holds something that its columns.toml does not allow."""
-
-
-class ColumnsError(ThenarError, ValueError):
-    """A columns.toml cannot be read, or does not fit its table."""
+    """A table or its columns.toml cannot be read, or one does not fit the other."""
 
 
 LARGEST = 1_000_000_000  # bytes of a table, also when it is unpacked

@@ -15,7 +15,7 @@ from thenar.runtime.names import SHOWN, list_names, shortened
 from thenar.runtime.published import NONE
 
 from ..arrays import groups, otsu
-from . import ColumnsError, RecordingError, TableError, check_room, list_rows
+from . import RecordingError, TableError, check_room, list_rows
 from .cells import Parsed, Value, bits, codes, integers, names, natural_key, numbers, times, unit_of_time
 from .columns import KEYS, ColumnRoles, Selection
 from .summary import Oddity
@@ -86,7 +86,7 @@ def read_cells(
     independent = columns.frames == "independent"
     trial_ids = np.arange(len(readings.rows)) if independent else readings.trial_ids()
     if untold and (shared := int((np.bincount(trial_ids)[trial_ids] > 1).sum())):
-        raise ColumnsError(
+        raise TableError(
             f"{table.what}: {shared} rows share subject, grasp type, object and session with others, and nothing says "
             "which of them are frames of one trial: name the column that does (`trial = ...`, or a list of them), or "
             'state that each row is a separate trial (`frames = "independent"`)'

@@ -137,8 +137,7 @@ def simulate(
     block     approximate number of repetitions simulated at a time, fewer if each has many frames
     keep_unsettled  keep repetitions that did not settle; the report names them in any case
 
-    Raises SceneError if the scene cannot be simulated, or if none of it settles; PlanError if a hand cannot hold an
-    object.
+    Raises SceneError if the scene cannot be simulated, if none of it settles, or if a hand cannot hold an object.
     """
     start = perf_counter()
     # Errors of the scene are raised here and not in a worker.
