@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.names import list_names, nearest, shortened
 from thenar.runtime.published import NONE
+from thenar.runtime.recording.reader import Oddity
 
 from ..arrays import groups
 from . import TYPES, RecordingError, TableError, check_names, check_room, list_rows
@@ -19,7 +20,7 @@ from .columns import ColumnRoles, JointColumns, TaxelColumns, read_columns, sele
 from .graspset import CODES, GraspSet, Joint
 from .inputs import WORDS, Course, possible_clocks, words_of
 from .readings import Readings, nothing_held, read_cells
-from .summary import Oddity, check_trials, find_oddities, looks_like_frames
+from .summary import check_trials, find_oddities, looks_like_frames
 from .table import Table, read_table
 from .taxonomy import Taxonomy, own, plain, published
 from .trial_files import Report, find_files, is_pattern, read_files

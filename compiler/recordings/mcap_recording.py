@@ -26,7 +26,7 @@ from thenar.runtime.names import SHOWN, shortened
 from thenar.runtime.published import NONE
 from thenar.runtime.recording.guide import FRESH_US
 from thenar.runtime.recording.layout import switch_matrix
-from thenar.runtime.recording.reader import Reader, check_made
+from thenar.runtime.recording.reader import Oddity, Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.taxels import TaxelLine, Taxels
 
@@ -34,7 +34,7 @@ from . import TableError, list_rows
 from .columns import CalibrationPoints, JointColumns
 from .graspset import CODES, GraspSet, Joint
 from .importer import CodingCost, ImportReport, code_joint, import_file, report_of
-from .summary import Oddity, find_oddities
+from .summary import find_oddities
 from .taxonomy import Taxonomy
 from .trial_files import Report
 
@@ -123,7 +123,7 @@ def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[Gras
     for path in paths:
         reader = Reader(path)
         parts += _parts(reader, stream)
-        findings += [Oddity(fault.kind, fault.count, fault.message) for fault in reader.faults()]
+        findings += reader.faults()
         size += reader.end.size if reader.end is not None else 0
     what = ", ".join(path.name for path in paths)
     _check_alike(parts)

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from thenar.runtime.names import SHOWN, list_names, shortened
 from thenar.runtime.published import NONE
+from thenar.runtime.recording.reader import Oddity
 
 from ..arrays import groups, otsu
 from . import RecordingError, TableError, check_room, list_rows
 from .cells import Parsed, Value, bits, codes, integers, names, natural_key, numbers, times, unit_of_time
 from .columns import KEYS, ColumnRoles, Selection
-from .summary import Oddity
 from .table import Table
 from .taxonomy import plain
 

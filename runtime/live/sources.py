@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from threading import Condition, Event, Thread
 from types import TracebackType
-from typing import Generic, Protocol, Self, TypeVar
+from typing import Self
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -36,21 +36,6 @@ _LONGEST_WAIT_US = 250_000
 _MOST_FAULTS = 20
 
 _log = logging.getLogger("thenar")
-T_co = TypeVar("T_co", covariant=True)
-T = TypeVar("T")
-
-
-class Readable(Protocol[T_co]):
-    """An object that can be kept open: usually a `Source`."""
-
-    def open(self) -> object:
-        """Open it; raises DeviceError if it is not there, SettingError if no retry helps."""
-
-    def read(self, timeout_s: float) -> T_co | None:
-        """Return the next sample, or None if none arrives in time; raises as `open` does."""
-
-    def close(self) -> None:
-        """Close it, in whatever state it is."""
 
 
 class DeviceState(Struct, frozen=True):
@@ -65,14 +50,18 @@ class DeviceState(Struct, frozen=True):
     faults: int = 0
 
 
-class DeviceThread(Generic[T]):
-    """Keeps `device` open and passes every sample to `take`, in a separate thread, until it is closed.
+class DeviceThread:
+    """Keeps a source open and passes every frame to `take`, in a separate thread, until it is closed.
 
     A SettingError ends it unless the device was open before: `failure` then holds it, for callers that wait.
     """
 
     def __init__(
-        self, name: str, device: Readable[T], take: Callable[[T], None], changed: Callable[[], None] = lambda: None
+        self,
+        name: str,
+        device: Source,
+        take: Callable[[SwitchFrame | GloveFrame], None],
+        changed: Callable[[], None] = lambda: None,
     ) -> None:
         """changed() is called whenever the state changes."""
         self.state = DeviceState(name, connected=False, error=NOT_YET, opened=0)
@@ -126,9 +115,9 @@ class DeviceThread(Generic[T]):
 
     def _read(self) -> None:
         while not self._stop.is_set():
-            sample = self._device.read(READ_S)
-            if sample is not None:
-                self._take(sample)
+            frame = self._device.read(READ_S)
+            if frame is not None:
+                self._take(frame)
 
     def _blame(self, fault: str) -> None:
         """Count an exception, and log it with its trace, once: a device that opens and then fails does so for hours."""
@@ -304,8 +293,7 @@ class Sources:
         self.take: Callable[..., Snapshot] = partial(self._arrivals.take, self._patience_us)
         self.changed = True
         self._keepers = [
-            DeviceThread[SwitchFrame | GloveFrame](source.name, source, self._taking(source), self._change)
-            for source in self._devices
+            DeviceThread(source.name, source, self._taking(source), self._change) for source in self._devices
         ]
 
     def _change(self) -> None:

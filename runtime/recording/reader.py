@@ -7,7 +7,6 @@ anywhere, it is scanned once (`Index`), most of its messages undecoded.
 from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from struct import Struct, pack
 from typing import Any
@@ -205,13 +204,16 @@ _CHECKED_FOOTER = 16
 _LARGEST_MADE = 20_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """A fault of a file that could still be read: its kind, how often it occurs, a sentence for people."""
+class Oddity(msgspec.Struct, frozen=True):
+    """One kind of oddity of a file that could still be read: its count, and a sentence; of a table also the first rows,
+    as the user counts them, and the columns.
+    """
 
     kind: str
     count: int
     message: str
+    rows: tuple[int, ...] = ()
+    columns: tuple[str, ...] = ()
 
 
 class Reader:
@@ -260,16 +262,16 @@ class Reader:
                 self.session = entry
             yield entry
 
-    def faults(self) -> Iterator[Fault]:
+    def faults(self) -> Iterator[Oddity]:
         """Yield the faults of the file, once its end is reached."""
         name, end, skipped = self.path.name, self.end, self._decoder.skipped
         if end is not None and (end.whole < end.size or not (end.closed or self._in_data)):
-            yield Fault("cut recordings", 1, _cut_message(name, end))
+            yield Oddity("cut recordings", 1, _cut_message(name, end))
         if self._wrong:
-            yield Fault("altered recordings", 1, f"{name} is altered: {'; '.join(self._wrong)}")
+            yield Oddity("altered recordings", 1, f"{name} is altered: {'; '.join(self._wrong)}")
         if skipped:
             message = f"{name} holds records that thenar skips: {list_names(self._decoder.first_skipped, skipped)}"
-            yield Fault("records passed over", skipped, message)
+            yield Oddity("records passed over", skipped, message)
 
     def _read(self) -> Iterator[Entry]:
         for record in self._records:

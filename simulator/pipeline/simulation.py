@@ -1,5 +1,6 @@
 """`simulate`: a scene in, a set of grasps and a report out."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
@@ -19,7 +20,7 @@ from ..errors import SceneError
 from ..planning.plan import Progress, postures_of
 from ..planning.postures import Postures
 from ..scenes.scene import Scene, Subject
-from ..streams import Draw, DrawCounts
+from ..streams import Draw
 from .batch import Batch, Integers
 from .effect import at_a_time
 from .glove import TAXEL_ADC, TaxelConverter
@@ -85,7 +86,7 @@ def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> SubjectSessio
     numbers = [share for _, share in scene.shares() if share]
     sites = [condition.site(np.array(share)) for condition, share in zip(conditions, numbers, strict=True)]
     # Repetitions are sorted by one random word each, which does not depend on other repetitions, types or objects.
-    words = [Draw(scene.seed, ORDER, site, DrawCounts()).per_repetition().words for site in sites]
+    words = [Draw(scene.seed, ORDER, site, Counter()).per_repetition().words for site in sites]
     counts = list(map(len, words))
     owner = np.repeat(np.arange(len(conditions)), counts)
     order = np.argsort(np.concatenate(words), kind="stable")

@@ -15,7 +15,6 @@ from thenar.stability.weka import (
     DIVERGED,
     EXP_IN_JAVA,
     EXP_OF_THE_PROCESSOR,
-    NotRun,
     WekaComparison,
     WekaError,
     compare_with_weka,
@@ -63,7 +62,7 @@ def test_a_model_that_lacks_a_branch_is_refused(left_out: str) -> None:
 
 def test_without_java_it_is_not_run_and_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert compare_with_weka() == NotRun("java or Weka is not installed")
+    assert compare_with_weka() == "java or Weka is not installed"
 
 
 def test_a_jvm_that_refuses_is_quoted(weka: Callable[..., str]) -> None:

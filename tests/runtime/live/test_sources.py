@@ -16,6 +16,7 @@ from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.live.sources import DeviceThread, FrameBuffer
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import LiveGrasp
+from thenar.runtime.sources.base import Source
 
 MakeBuild = Callable[..., Build]
 PERIOD_US = 10_000_000
@@ -210,11 +211,11 @@ def test_a_part_that_has_not_come_yet_is_lost(joined: Joined) -> None:
 LONG_S = 10.0
 
 
-class Device:
+class Device(Source):
     """Hands out what the test puts in, one thing a reading; an exception is raised."""
 
     def __init__(self) -> None:
-        self.samples: Queue[int | Exception] = Queue()
+        self.samples: Queue[SwitchFrame | Exception] = Queue()
         self.openings: Queue[Exception | None] = Queue()
         self.closed = Event()
 
@@ -223,7 +224,7 @@ class Device:
         if wrong is not None:
             raise wrong
 
-    def read(self, timeout_s: float) -> int | None:
+    def read(self, timeout_s: float) -> SwitchFrame | None:
         if self.samples.empty():
             self.closed.wait(0.001)
             return None
@@ -239,7 +240,7 @@ class Device:
 class Kept:
     def __init__(self) -> None:
         self.device = Device()
-        self.taken: Queue[int] = Queue()
+        self.taken: Queue[SwitchFrame | GloveFrame] = Queue()
         self.changes: Queue[tuple[bool, str]] = Queue()
         self.keeper = DeviceThread("thing", self.device, self.taken.put, self._changed)
         self.keeper.start()
@@ -262,8 +263,8 @@ def kept() -> Iterator[Kept]:
 def test_every_sample_is_taken_in_order(kept: Kept) -> None:
     kept.device.openings.put(None)
     for number in range(100):
-        kept.device.samples.put(number)
-    assert [kept.taken.get(timeout=LONG_S) for _ in range(100)] == list(range(100))
+        kept.device.samples.put(SwitchFrame(number, 0))
+    assert [kept.taken.get(timeout=LONG_S) for _ in range(100)] == [SwitchFrame(number, 0) for number in range(100)]
     assert kept.next_change() == (True, "")
 
 
@@ -275,8 +276,8 @@ def test_a_lost_device_is_closed_and_reopened_and_reported(kept: Kept) -> None:
     assert kept.device.closed.wait(LONG_S)
     kept.device.openings.put(None)
     assert kept.next_change() == (True, "")
-    kept.device.samples.put(7)
-    assert kept.taken.get(timeout=LONG_S) == 7
+    kept.device.samples.put(SwitchFrame(7, 0))
+    assert kept.taken.get(timeout=LONG_S) == SwitchFrame(7, 0)
     assert kept.keeper.state.opened == 2
 
 
