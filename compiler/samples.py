@@ -25,7 +25,7 @@ FRAMES = 32
 
 
 class TrainingError(ThenarError, ValueError):
-    """Rows that cannot be trained on, or an unknown or invalid setting of a trainer."""
+    """Rows that cannot be learnt from, or choices by which nothing can be: settings, limits of a placement."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -128,7 +128,7 @@ class Glove:
         whole = recordable or record is not None
         devices = system.sources(all_sensors=whole)
         self._recognizer, self.sources = system.recognizer(), devices
-        self._feed = feed
+        self.feed = feed
         self._selector = None
         if preshapes is not None:
             from .preshape import preshape_selector
@@ -160,7 +160,7 @@ class Glove:
             self._fanout.begin(self.system.build)
             if self._record is not None:
                 self.recorder = opening.enter_context(self.new_recording(Path(self._record)))
-            if self._feed is None:
+            if self.feed is None:
                 opening.enter_context(self.sources)
             self._open = opening.pop_all()
         return self
@@ -177,7 +177,7 @@ class Glove:
         """
         if self.stop.is_set():
             raise StopIteration
-        taken = self.sources.take() if self._feed is None else self._feed()
+        taken = self.sources.take() if self.feed is None else self.feed()
         now = taken.time_us
         moment = self._recognizer.step(now, time_ns() // 1000, taken.switches, taken.glove)
         grasp = moment.grasp
@@ -187,7 +187,7 @@ class Glove:
             moment.preshape = self._selector.update(grasp)
         moment.angles = self._angles_of(taken.measured)
         # Only this process may have been stopped in between.
-        if self._feed is not None or now_us() - now <= LATE_US:
+        if self.feed is not None or now_us() - now <= LATE_US:
             self._fanout.publish(grasp, moment.preshape, moment.angles, moment)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None)
         if self._recognizer.quarantine.found != self._quarantined:

@@ -77,7 +77,7 @@ class Search:
 
     Raises
     ------
-    MemberError
+    SettingError
         For an unknown method or trainer.
     TrainingError
         For a setting that the trainer does not take.

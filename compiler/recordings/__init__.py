@@ -14,7 +14,7 @@ from thenar.runtime.names import SHOWN, fault, list_names, shortened
 
 
 class RecordingError(ThenarError, ValueError):
-    """A set of grasps is inconsistent, or a label is not in its taxonomy."""
+    """A set of grasps is inconsistent, has a label that is not in its taxonomy, or lacks movements where they count."""
 
 
 class TableError(ThenarError, ValueError):

@@ -93,7 +93,7 @@ def import_files(
 
     A path with fields in braces, such as data/{label}_{trial}.csv, is a table in many files; `progress` takes how many
     of how many were read. Recordings are imported as a `stream` or trial by trial. Raises TableError, RecordingError or
-    McapError naming file, rows and columns, and OSError.
+    FormatError naming file, rows and columns, and OSError.
     """
     if all(path.suffix.lower() == ".mcap" for path in paths):
         if columns is not None:
@@ -114,8 +114,8 @@ def import_files(
 def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[GraspSet, ImportReport]:
     """Import the accepted trials of recordings of one glove and one taxonomy; subjects may differ.
 
-    As a `stream` they have a row every 10 ms, and every restart is a separate session. Raises McapError, TableError or
-    RecordingError naming the file, and OSError.
+    As a `stream` they have a row every 10 ms, and every restart is a separate session. Raises FormatError, TableError
+    or RecordingError naming the file, and OSError.
     """
     parts: list[_Part] = []
     findings: list[Oddity] = []

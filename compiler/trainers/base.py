@@ -183,7 +183,7 @@ class Training:
     def of(cls, options: Recipe) -> "Training":
         """Return the training that `options` define, with defaults for what is not given.
 
-        If no trainer is given, the defaults are the paper's, of LogitBoost. Raises MemberError or TrainingError for
+        If no trainer is given, the defaults are the paper's, of LogitBoost. Raises SettingError or TrainingError for
         invalid options.
         """
         trainer, given = _asked(options)[0]
@@ -197,7 +197,7 @@ class Training:
     def candidates(cls, options: Recipe) -> "tuple[Training, ...]":
         """Return every training that `options` allow, to be compared: a single one if nothing is left open.
 
-        Raises MemberError or TrainingError for invalid options.
+        Raises SettingError or TrainingError for invalid options.
         """
         asked = _asked(options)
         if options.trainer == AUTO and len(asked) > 1:

@@ -13,7 +13,6 @@ from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.study import Study, StudyDesign, evaluate
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.placement import place
 from thenar.compiler.recogniser import check_inputs
@@ -38,7 +37,7 @@ def many_types() -> GraspSet:
         (lambda grasps, folder: compile_build(grasps, folder / "build"), TrainingError),
         (lambda grasps, _: find_frontier(grasps), FrontierError),
         (lambda grasps, _: evaluate(grasps), EvaluationError),
-        (lambda grasps, _: place(grasps), PlacementError),
+        (lambda grasps, _: place(grasps), TrainingError),
         (lambda grasps, _: Samples.of(grasps), TrainingError),
     ],
     ids=["compile", "frontier", "evaluate", "place", "place --method"],

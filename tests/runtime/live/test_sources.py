@@ -278,7 +278,7 @@ def test_a_lost_device_is_closed_and_reopened_and_reported(kept: Kept) -> None:
     assert kept.next_change() == (True, "")
     kept.device.samples.put(SwitchFrame(7, 0))
     assert kept.taken.get(timeout=LONG_S) == SwitchFrame(7, 0)
-    assert kept.keeper.state.opened == 2
+    assert kept.keeper.opened == 2
 
 
 def test_failing_again_in_the_same_way_is_no_news(kept: Kept) -> None:
@@ -317,7 +317,7 @@ def test_a_program_fault_is_traced_counted_and_survived(kept: Kept, caplog: pyte
     assert kept.next_change() == (False, "ZeroDivisionError: oops")
     kept.device.openings.put(None)
     assert kept.next_change() == (True, "")
-    assert kept.keeper.state.faults >= 3
+    assert kept.keeper.faults >= 3
     traces = [record for record in caplog.records if record.name == "thenar" and record.exc_info]
     assert "thing" in traces[0].getMessage()
     assert "ZeroDivisionError: oops" in caplog.text
@@ -330,5 +330,5 @@ def test_a_fault_after_each_opening_is_logged_once(kept: Kept, caplog: pytest.Lo
         assert kept.next_change() == (True, "")
         kept.device.samples.put(ZeroDivisionError("oops"))
         assert kept.next_change() == (False, "ZeroDivisionError: oops")
-    assert kept.keeper.state.faults == 3
+    assert kept.keeper.faults == 3
     assert len([record for record in caplog.records if record.exc_info]) == 1
