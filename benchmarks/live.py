@@ -114,7 +114,7 @@ def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[C
         sinks=sinks,
         record=record,
         status=stage >= 3,
-        feed=feed,
+        feed=feed.take,
     )
     stack.enter_context(run)
     if stage >= 4:

@@ -88,7 +88,7 @@ def rate(build: str, glove: str, seconds: float) -> Rate:
         )
         with run, read_along(folder / "socket"):
             feed = Counted(run.sources)
-            run.feed = feed
+            run.feed = feed.take
             _run(run, _START_S, until_well=True)
             return _over(run, feed, seconds)
 

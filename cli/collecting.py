@@ -28,9 +28,9 @@ from thenar.runtime.calibration import load_calibration
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import SwitchFrame, now_us, old_after_us
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources
+from thenar.runtime.live.sources import NOT_YET, Sources
 from thenar.runtime.names import list_names
-from thenar.runtime.published import NONE
+from thenar.runtime.published import NONE, DeviceHealth
 from thenar.runtime.recording.guide import KEYS, CollectionGuide, Journal, Key, Trial
 from thenar.runtime.recording.session import Collection, Session
 from thenar.runtime.recording.writer import Recorder
@@ -198,7 +198,7 @@ class Terminal(Closing):
         *lines, self._rest = self._rest.split("\n")
         return [line.strip().lower() for line in lines]
 
-    def show(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> None:
+    def show(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> None:
         """Show the guide's state, if it changed or the next refresh is due."""
         if not self._console.is_terminal:
             self._say(guide, devices)
@@ -206,7 +206,7 @@ class Terminal(Closing):
             self._due_us, self._shown = now_us + _REDRAW_US, guide.step
             self._live.update(self._drawn(now_us, guide, devices), refresh=True)
 
-    def _say(self, guide: CollectionGuide, devices: Sequence[DeviceState]) -> None:
+    def _say(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> None:
         errors = "; ".join(device.error for device in devices if not device.connected)
         why = f" ({errors})" if errors else ""
         problem = f"not captured: {guide.problem}{why}; " if guide.problem else ""
@@ -216,7 +216,7 @@ class Terminal(Closing):
             self._said = line
             self._console.print(line, soft_wrap=True)
 
-    def _drawn(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> RenderableType:
+    def _drawn(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> RenderableType:
         table = Table.grid(padding=(0, 2))
         skipped = f", {guide.skipped} skipped" if guide.skipped else ""
         bar = ProgressBar(guide.total, guide.done, width=40)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.text import Text
 
-from thenar.compiler.text import DASH, counted, interval
+from thenar.compiler.text import DASH, counted
 
 from .options import (
     CHOOSING,
@@ -269,11 +269,12 @@ def _print_grid(title: str, grid: "Grid", note: str = "") -> None:
 def _print(study: "Study", *, confusion: bool) -> None:
     """Print all tables, laid out as in the paper, and the confusion matrices if requested."""
     from thenar.compiler.evaluation.folds import PROTOCOLS
+    from thenar.compiler.evaluation.rates import interval
 
     console = out()
-    for protocol in PROTOCOLS:
-        if protocol.name in study.options.protocols:
-            console.print(f"Protocol {protocol.name}: {protocol.meaning}")
+    for protocol, meaning in PROTOCOLS.items():
+        if protocol in study.options.protocols:
+            console.print(f"Protocol {protocol}: {meaning}")
     for rated in study.tables:
         _print_grid(rated.title, _rates(rated), rated.note)
     console.print()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.text import Text
 
-from thenar.compiler.text import duration, interval
+from thenar.compiler.text import duration
 from thenar.drivers.names import printable
 from thenar.runtime.recipe import AUTO
 
@@ -161,6 +161,7 @@ def _print(found: "Frontier", output: Path) -> None:
 
 def print_frontier(frontier: "Frontier") -> None:
     """Print the points, the picked one bold; then the omissions, and the caption of the picture."""
+    from thenar.compiler.evaluation.rates import interval
     from thenar.compiler.frontier import words
 
     rates, elements = words.rates_of(frontier), words.elements_of(frontier)

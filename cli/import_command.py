@@ -87,7 +87,7 @@ def _pattern(folder: Path) -> Path:
 
 def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport]":
     """Import the table in `path` with the detected columns, if the user agrees."""
-    from thenar.compiler.recordings import ColumnsError
+    from thenar.compiler.recordings import TableError
     from thenar.compiler.recordings.importer import import_table
     from thenar.compiler.recordings.propose import propose_file
 
@@ -103,24 +103,24 @@ def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport
     replacing = ["--overwrite"] if output.exists() else []
     again = shlex.join(["thenar", "import", str(path), "-o", str(output), *replacing, "--columns", str(written)])
     if proposal.lacks:
-        raise ColumnsError(f"{proposal.lacks}: do so in {written}, then run: {again}")
+        raise TableError(f"{proposal.lacks}: do so in {written}, then run: {again}")
     if asked and not click.confirm("Import with these columns?"):
-        raise ColumnsError(f"nothing was imported: correct {written}, then run: {again}")
+        raise TableError(f"nothing was imported: correct {written}, then run: {again}")
     if not yes and not asked:
-        raise ColumnsError(f"nobody confirmed the columns on a terminal: review {written}, then run: {again}")
+        raise TableError(f"nobody confirmed the columns on a terminal: review {written}, then run: {again}")
     with progress(f"importing {path.name}"):
         return import_table(read, proposal.columns)
 
 
 def _write(text: str, path: Path, asked: bool) -> Path:
     """Write the detected columns to `path`; replace others there only if the user agrees. Return the path."""
-    from thenar.compiler.recordings import ColumnsError
+    from thenar.compiler.recordings import TableError
     from thenar.runtime.files import write_atomically
 
     kept = os.path.lexists(path) and not (path.is_file() and path.read_bytes() == text.encode())
     replace = overwrites(click.get_current_context()) or (asked and kept and click.confirm(f"Replace {path}?"))
     if kept and not replace:
-        raise ColumnsError(f"{path} holds other columns than those detected: add --columns {path} or --overwrite")
+        raise TableError(f"{path} holds other columns than those detected: add --columns {path} or --overwrite")
     write_atomically(path, text.encode())
     return path
 

@@ -85,7 +85,9 @@ def command(
 
     _check_modes(scene, (output, explain, listing), keep_unsettled=keep_unsettled)
     if scene is None:
-        show(scenes := shipped_scenes(), lambda _: echo("\n".join(f"{each.name:<16}{each.what}" for each in scenes)))
+        scenes = shipped_scenes()
+        listed = [{"name": name, "what": what} for name, what in scenes.items()]
+        show(listed, lambda _: echo("\n".join(f"{name:<16}{what}" for name, what in scenes.items())))
         return
     loaded = load_scene(scene).varied(repetitions, seed, names, more, rest, subjects)
     try:

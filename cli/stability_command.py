@@ -103,11 +103,11 @@ def _print_case(console: Console, case: "CaseReport") -> None:
         console.print(Text(f"What could go wrong: {case.about.danger}", "dim"))
     checks = table(_HEADS, _NUMBERS)
     checks.box, checks.padding, checks.pad_edge = None, (0, 2, 0, 0), False
-    for check in case.checks:
-        finding, style = check.finding, "green" if check.holds else "bold red"
+    for finding in case.findings:
+        style = "green" if finding.holds else "bold red"
         error = (f"{finding.tried:,}", figure(finding.error), f"{figure(finding.bound)} {finding.unit}")
-        checks.add_row(finding.check, finding.reference, *error, Text(verdict(check), style))
-    if case.checks:
+        checks.add_row(finding.check, finding.reference, *error, Text(verdict(finding), style))
+    if case.findings:
         console.print(checks)
     if case.failure is not None:
         console.print(Text(f"FAILED: {case.failure}", "red"))

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from .recordings.export import from_dataframe, to_dataframe
     from .recordings.graspset import GraspSet, Joint
     from .recordings.merging import merge, split
-    from .samples import Samples
-    from .trainers.base import TRAINERS, BoostingError, Setting, Trainer
+    from .samples import Samples, TrainingError
+    from .trainers.base import TRAINERS, Setting, Trainer
 
 _HOMES = {
     "thenar.drivers.errors": ("ThenarError",),
@@ -72,8 +72,8 @@ _HOMES = {
     ".recordings.export": ("from_dataframe", "to_dataframe"),
     ".recordings.graspset": ("GraspSet", "Joint"),
     ".recordings.merging": ("merge", "split"),
-    ".samples": ("Samples",),
-    ".trainers.base": ("TRAINERS", "BoostingError", "Setting", "Trainer"),
+    ".samples": ("Samples", "TrainingError"),
+    ".trainers.base": ("TRAINERS", "Setting", "Trainer"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -84,7 +84,6 @@ __all__ = [
     "AdditiveLogitClassifier",
     "Bins",
     "Bit",
-    "BoostingError",
     "Build",
     "BuildReport",
     "ColumnRoles",
@@ -110,6 +109,7 @@ __all__ = [
     "Term",
     "ThenarError",
     "Trainer",
+    "TrainingError",
     "Verification",
     "compile",
     "compile_build",

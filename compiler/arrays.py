@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from thenar.runtime.errors import SealError
+from thenar.runtime.errors import FormatError
 
 AnyArray = NDArray[np.generic]
 
@@ -53,39 +53,39 @@ def pack(header: bytes, arrays: Mapping[str, AnyArray]) -> bytes:
 def unpack(payload: bytes, what: str = "payload") -> tuple[bytes, dict[str, AnyArray]]:
     """Return (header, arrays) of `pack`; the arrays are read-only views of what was read.
 
-    Raises SealError, calling the payload `what`, unless it is exactly such an npz: no compression, no objects, no
+    Raises FormatError, calling the payload `what`, unless it is exactly such an npz: no compression, no objects, no
     member longer or shorter than it says.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(payload)) as members:
             infos = members.infolist()
             if packed := [info.filename for info in infos if info.compress_type != zipfile.ZIP_STORED]:
-                raise SealError(f"array {packed[0]} is compressed")
+                raise FormatError(f"array {packed[0]} is compressed")
             # Entries of a zip may share bytes: read separately, they could take any multiple of the file's size.
             if sum(info.file_size for info in infos) > len(payload):
-                raise SealError(f"{what} holds arrays that overlap")
+                raise FormatError(f"{what} holds arrays that overlap")
             arrays = {info.filename.removesuffix(".npy"): _array(info.filename, members.read(info)) for info in infos}
             if len(arrays) != len(infos):
-                raise SealError(f"{what} holds an array twice")
+                raise FormatError(f"{what} holds an array twice")
     except _UNREADABLE as reason:
-        raise SealError(f"{what} holds no readable arrays: {reason}") from reason
+        raise FormatError(f"{what} holds no readable arrays: {reason}") from reason
     header = arrays.pop(_HEADER, None)
     if header is None or header.dtype != np.uint8:
-        raise SealError(f"{what} holds no header")
+        raise FormatError(f"{what} holds no header")
     return header.tobytes(), arrays
 
 
 def _array(name: str, data: bytes) -> AnyArray:
     """Return the array in a member. Nothing is allocated for it: it is a view of `data`."""
     if data[:8] != b"\x93NUMPY\1\0":
-        raise SealError(f"array {name} is of another npy format")
+        raise FormatError(f"array {name} is of another npy format")
     start = 10 + int.from_bytes(data[8:10], "little")
     head = _HEAD.fullmatch(data[10:start])
     if head is None:
-        raise SealError(f"array {name} is not plain numbers: its head is not as it is written here")
+        raise FormatError(f"array {name} is not plain numbers: its head is not as it is written here")
     dtype, shape = np.dtype(head[1].decode()), tuple(map(int, re.findall(rb"[0-9]+", head[2])))
     if start + dtype.itemsize * math.prod(shape) != len(data):
-        raise SealError(f"array {name} is not plain numbers of its shape {shape}")
+        raise FormatError(f"array {name} is not plain numbers of its shape {shape}")
     flat: AnyArray = np.frombuffer(data, dtype, offset=start)
     return flat.reshape(shape)
 

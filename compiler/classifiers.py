@@ -11,7 +11,8 @@ from thenar.drivers.extras import optional
 from thenar.runtime.model.tables import TIE, winners
 
 from .elementary import Floats, softmax
-from .trainers.base import BoostingError, check_weights
+from .samples import TrainingError
+from .trainers.base import check_weights
 from .trainers.logit import BINS, PENALTY, SMOOTHNESS, fit_logit
 from .trainers.logitboost import boost
 from .trainers.newton import TOLERANCE
@@ -55,7 +56,7 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
 
         Raises
         ------
-        BoostingError
+        TrainingError
             A ValueError, if a parameter, a weight or a label is invalid.
         ValueError
             If X holds NaN or an infinity, here and wherever X is given.
@@ -125,7 +126,7 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
         matches = targets[:, np.newaxis] == self.classes_
         if not matches.any(axis=1).all():
             strange = targets[~matches.any(axis=1)][0]
-            raise BoostingError(
+            raise TrainingError(
                 f"label {str(strange)!r} of y is not among the declared classes {self.classes_.tolist()}"
             )
         found: NDArray[np.intp] = matches.argmax(axis=1)

@@ -24,8 +24,8 @@ MASKED = 4
 FRAMES = 32
 
 
-class SamplesError(ThenarError, ValueError):
-    """Rows that cannot be trained on."""
+class TrainingError(ThenarError, ValueError):
+    """Rows that cannot be learnt from, or choices by which nothing can be: settings, limits of a placement."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +59,7 @@ class Samples:
 
     Raises
     ------
-    SamplesError
+    TrainingError
         If the arrays do not fit together, or there are no rows.
 
     Examples
@@ -94,12 +94,12 @@ class Samples:
         rows = set(map(len, parts.values()))
         if len(rows) != 1 or any(parts[name].ndim != 1 + shape.count(" ") for name, shape in shapes.items()):
             sizes = ", ".join(f"{name} {part.shape}" for name, part in parts.items())
-            raise SamplesError(f"{sizes} must be {', '.join(shapes.values())} of the same n rows")
+            raise TrainingError(f"{sizes} must be {', '.join(shapes.values())} of the same n rows")
         if not rows.pop():
-            raise SamplesError("there are no rows to train on: take a set with rows")
+            raise TrainingError("there are no rows to train on: take a set with rows")
         if self.labels.min() < 0 or self.labels.max() >= self.n_classes:
-            raise SamplesError(f"labels must be class numbers 0 to {self.n_classes - 1}")
-        check_types(self.n_classes, SamplesError)
+            raise TrainingError(f"labels must be class numbers 0 to {self.n_classes - 1}")
+        check_types(self.n_classes, TrainingError)
 
     @classmethod
     def of(cls, grasp_set: GraspSet, inputs: Inputs = "both") -> "Samples":
@@ -218,7 +218,7 @@ class Samples:
     def inputs(self) -> NDArray[np.uint16]:
         """The inputs as one matrix (n, s + j): the switches' bits, then the joints' codes. There must be no taxels."""
         if self.taxels.shape[1]:
-            raise SamplesError("taxels are no inputs: turn them into bits by thresholds first")
+            raise TrainingError("taxels are no inputs: turn them into bits by thresholds first")
         return np.hstack([self.switches, self.codes], dtype=np.uint16)
 
     @property

@@ -2,36 +2,14 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import Protocol
 
 DASH = "–"
 NBSP = "\N{NO-BREAK SPACE}"
 
 
-class Interval(Protocol):
-    """A rate in 0..1 with its 95 % interval."""
-
-    @property
-    def mean(self) -> float:
-        """The rate."""
-
-    @property
-    def low(self) -> float:
-        """Lower end."""
-
-    @property
-    def high(self) -> float:
-        """Upper end."""
-
-
 def percent(share: float, space: str = " ") -> str:
     """Return "96.3 %" for 0.963."""
     return f"{100 * share:.1f}{space}%"
-
-
-def interval(rate: Interval | None) -> str:
-    """Return "96.3 [95.1, 97.2]", in percent; a dash for no rate."""
-    return DASH if rate is None else f"{100 * rate.mean:.1f} [{100 * rate.low:.1f}, {100 * rate.high:.1f}]"
 
 
 def microseconds(us: float) -> str:

@@ -22,4 +22,4 @@ class DeviceError(ThenarError, OSError):
 
 
 class SettingError(ThenarError, ValueError):
-    """A request that the device cannot fulfil: retrying does not help."""
+    """An unknown name, or a request that the device cannot fulfil: retrying does not help."""

@@ -6,15 +6,11 @@ from collections.abc import Container, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
-from .errors import ThenarError
+from .errors import SettingError
 from .names import shortened
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
-
-
-class MemberError(ThenarError, ValueError):
-    """A member of a registry that does not exist or cannot be loaded."""
 
 
 class Named(Protocol):
@@ -53,7 +49,7 @@ class Members(Mapping[str, M], Generic[M]):
 
     Raises
     ------
-    MemberError
+    SettingError
         On use, if a member of another package cannot be imported, is not a `shape`, or has a name that is taken.
     """
 
@@ -83,7 +79,7 @@ class Members(Mapping[str, M], Generic[M]):
 
     def _check_free(self, name: str, taken: Container[str]) -> None:
         if name in taken:
-            raise MemberError(f"two packages define the {self.kind} {shortened(name)!r}: uninstall one of them")
+            raise SettingError(f"two packages define the {self.kind} {shortened(name)!r}: uninstall one of them")
 
     def _where(self, point: "EntryPoint") -> str:
         return f"the {self.kind} {shortened(point.name)!r} ({shortened(point.value)}) of another package"
@@ -97,9 +93,9 @@ class Members(Mapping[str, M], Generic[M]):
             # str() of a SystemExit is only its number.
             what = str(error) if isinstance(error, Exception) else repr(error)
             said = f"cannot be loaded: {shortened(what)}; fix or uninstall it"
-            raise MemberError(f"{self._where(point)} {said}") from error
+            raise SettingError(f"{self._where(point)} {said}") from error
         if reason := self.unfit(member):
-            raise MemberError(f"{self._where(point)} {reason}: docs/how-to/extend.md says what to define")
+            raise SettingError(f"{self._where(point)} {reason}: docs/how-to/extend.md says what to define")
         return member
 
     def unfit(self, member: object) -> str:
@@ -116,9 +112,9 @@ class Members(Mapping[str, M], Generic[M]):
         return len(self._members)
 
     def named(self, name: str) -> M:
-        """Return a member. Raises MemberError, which lists all names, if there is none of that name."""
+        """Return a member. Raises SettingError, which lists all names, if there is none of that name."""
         if name not in self:
-            raise MemberError(f"there is no {self.kind} {shortened(name)!r}: choose one of {', '.join(self)}")
+            raise SettingError(f"there is no {self.kind} {shortened(name)!r}: choose one of {', '.join(self)}")
         return self[name]
 
 
@@ -130,7 +126,7 @@ class MembersByName(Members[M]):
 
     Raises
     ------
-    MemberError
+    SettingError
         On use, if a name is taken. On access to a member of another package, if it cannot be imported, is not a
         `shape`, or has a different name from its entry point.
     """
@@ -154,7 +150,7 @@ class MembersByName(Members[M]):
         member = self._loaded(point)
         if member.name != name:
             said = f"has a different name, {shortened(member.name)!r}: give its entry point that name"
-            raise MemberError(f"{self._where(point)} {said}")
+            raise SettingError(f"{self._where(point)} {said}")
         return member
 
     def __contains__(self, name: object) -> bool:

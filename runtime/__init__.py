@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .build import Build, Recognition
-    from .errors import BuildError, FrameError, SealError, ThenarError
+    from .errors import BuildError, FormatError, FrameError, ThenarError
     from .glove import Glove
 
 # Names are imported on first use: devices take as long to import as everything else, and --help needs none of them.
@@ -15,11 +15,11 @@ _HOMES = {
     "FrameError": ".errors",
     "Glove": ".glove",
     "Recognition": ".build",
-    "SealError": ".errors",
+    "FormatError": ".errors",
     "ThenarError": ".errors",
 }
 
-__all__ = ["Build", "BuildError", "FrameError", "Glove", "Recognition", "SealError", "ThenarError"]
+__all__ = ["Build", "BuildError", "FormatError", "FrameError", "Glove", "Recognition", "ThenarError"]
 
 
 def __getattr__(name: str) -> object:

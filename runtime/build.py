@@ -92,8 +92,8 @@ class Build:
     def load(cls, folder: str | PathLike[str]) -> Self:
         """Return the build in `folder`.
 
-        Raises BuildError or SealError, naming the file, if one is missing, damaged, truncated, oversized, from another
-        build, or newer than this thenar.
+        Raises BuildError or FormatError, naming the file, if one is missing, damaged, truncated, oversized, from
+        another build, or newer than this thenar.
         """
         where = Path(folder)
         manifest = load_manifest(where)

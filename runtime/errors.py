@@ -2,11 +2,14 @@
 
 from thenar.drivers.errors import ThenarError
 
-__all__ = ["BuildError", "FrameError", "HarnessError", "McapError", "SealError", "ThenarError"]
+__all__ = ["BuildError", "FormatError", "FrameError", "HarnessError", "ThenarError"]
 
 
-class SealError(ThenarError, ValueError):
-    """A sealed file is not valid: foreign, truncated, altered, oversized or of a newer format."""
+class FormatError(ThenarError, ValueError):
+    """A file is foreign, truncated, altered, oversized or of a newer format.
+
+    The message names the file, and of a recording also the byte.
+    """
 
 
 class BuildError(ThenarError, ValueError):
@@ -19,7 +22,3 @@ class FrameError(ThenarError, ValueError):
 
 class HarnessError(ThenarError, ValueError):
     """A harness is invalid or does not fit the build; the message names file, line and key."""
-
-
-class McapError(ThenarError, ValueError):
-    """A recording cannot be read: not MCAP, not from thenar, or altered. The message names the file and the byte."""

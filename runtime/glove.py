@@ -1,13 +1,13 @@
 """`Glove`: a glove that recognises grasps, as an iterator of published moments."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
 from threading import Event
 from time import time_ns
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, Self
 
 from .build import Build
 from .calibration import AngleReader
@@ -27,13 +27,6 @@ if TYPE_CHECKING:
     from .recording.writer import LiveRecorder
 
 _REPORT_US = 1_000_000
-
-
-class Feed(Protocol):
-    """The origin of frames: usually the devices of the harness."""
-
-    def take(self) -> Snapshot:
-        """Return the newest frames, and all that arrived since the last call, after waiting for something new."""
 
 
 class Glove:
@@ -66,8 +59,9 @@ class Glove:
         Whether sinks get a report of the glove's health once a second, and whenever a device comes or goes.
     stop : threading.Event, optional
         Ends the iteration when it is set.
-    feed : Feed, optional
-        The origin of frames instead of the harness's devices, which are then not opened.
+    feed : callable, optional
+        Returns the newest frames, and all that arrived since the last call, instead of the harness's devices, which are
+        then not opened.
 
     Attributes
     ----------
@@ -118,7 +112,7 @@ class Glove:
         recordable: bool = False,
         status: bool = False,
         stop: Event | None = None,
-        feed: Feed | None = None,
+        feed: Callable[[], Snapshot] | None = None,
     ) -> None:
         loaded = build if isinstance(build, Build) else Build.load(build)
         if not isinstance(harness, Harness):
@@ -134,7 +128,7 @@ class Glove:
         whole = recordable or record is not None
         devices = system.sources(all_sensors=whole)
         self._recognizer, self.sources = system.recognizer(), devices
-        self.feed: Feed = self.sources if feed is None else feed
+        self.feed = feed
         self._selector = None
         if preshapes is not None:
             from .preshape import preshape_selector
@@ -166,7 +160,7 @@ class Glove:
             self._fanout.begin(self.system.build)
             if self._record is not None:
                 self.recorder = opening.enter_context(self.new_recording(Path(self._record)))
-            if self.feed is self.sources:
+            if self.feed is None:
                 opening.enter_context(self.sources)
             self._open = opening.pop_all()
         return self
@@ -183,7 +177,7 @@ class Glove:
         """
         if self.stop.is_set():
             raise StopIteration
-        taken = self.feed.take()
+        taken = self.sources.take() if self.feed is None else self.feed()
         now = taken.time_us
         moment = self._recognizer.step(now, time_ns() // 1000, taken.switches, taken.glove)
         grasp = moment.grasp
@@ -193,7 +187,7 @@ class Glove:
             moment.preshape = self._selector.update(grasp)
         moment.angles = self._angles_of(taken.measured)
         # Only this process may have been stopped in between.
-        if self.feed is not self.sources or now_us() - now <= LATE_US:
+        if self.feed is not None or now_us() - now <= LATE_US:
             self._fanout.publish(grasp, moment.preshape, moment.angles, moment)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None)
         if self._recognizer.quarantine.found != self._quarantined:

@@ -14,7 +14,7 @@ The payload is not read before kind, version, length and checksum have been chec
 import hashlib
 import struct
 
-from .errors import SealError
+from .errors import FormatError
 
 HEADER = struct.Struct("<8sH6xQ32s")
 _UNSIGNED = struct.Struct("<8sH6xQ")
@@ -30,19 +30,19 @@ def unseal(data: bytes, kind: bytes, newest: int, what: str) -> tuple[int, bytes
     """Return (format version, payload) of a sealed file.
 
     `newest` is the highest format version that the caller reads, `what` the file's name in messages, e.g. "set.grasps".
-    Raises SealError saying which of kind, version, length or checksum is wrong.
+    Raises FormatError saying which of kind, version, length or checksum is wrong.
     """
     if data[:8] != kind[: len(data)] or not data:
-        raise SealError(f"{what} is not a thenar {kind.decode()} file: it starts with {data[:8]!r}")
+        raise FormatError(f"{what} is not a thenar {kind.decode()} file: it starts with {data[:8]!r}")
     if len(data) < HEADER.size:
-        raise SealError(f"{what} is truncated: {len(data)} bytes, the header alone has {HEADER.size}")
+        raise FormatError(f"{what} is truncated: {len(data)} bytes, the header alone has {HEADER.size}")
     _, version, length, digest = HEADER.unpack_from(data)
     if version > newest:
-        raise SealError(f"{what} has format {version}, this thenar reads up to {newest}: update thenar")
+        raise FormatError(f"{what} has format {version}, this thenar reads up to {newest}: update thenar")
     if len(data) - HEADER.size < length:
-        raise SealError(f"{what} is truncated: {len(data) - HEADER.size} of {length} payload bytes")
+        raise FormatError(f"{what} is truncated: {len(data) - HEADER.size} of {length} payload bytes")
     if len(data) - HEADER.size > length:
-        raise SealError(f"{what} is altered: {len(data) - HEADER.size - length} bytes too many")
+        raise FormatError(f"{what} is altered: {len(data) - HEADER.size - length} bytes too many")
     if hashlib.sha256(data[: _UNSIGNED.size] + data[HEADER.size :]).digest() != digest:
-        raise SealError(f"{what} is altered: its checksum does not match; copy it again from its source")
+        raise FormatError(f"{what} is altered: its checksum does not match; copy it again from its source")
     return version, data[HEADER.size :]

@@ -2,12 +2,11 @@
 
 from thenar.drivers.errors import ThenarError
 
-__all__ = ["PlanError", "SceneError", "ThenarError"]
+__all__ = ["SceneError", "ThenarError"]
 
 
 class SceneError(ThenarError, ValueError):
-    """A scene cannot be simulated: the message names the file, the location in it, and the remedy."""
+    """A scene cannot be simulated, or no posture of a hand holds an object with a grasp type.
 
-
-class PlanError(ThenarError, ValueError):
-    """No posture of a hand can hold an object with a grasp type."""
+    The message says where, and what to do.
+    """

@@ -9,7 +9,7 @@ Only Philox' raw 64-bit words come from numpy, which guarantees them; deviates.p
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from hashlib import blake2b
 
 import numpy as np
@@ -126,26 +126,19 @@ class Site:
     repetitions: NDArray[np.int64]
 
 
-@dataclass(slots=True)
-class DrawCounts:
-    """The number of random numbers that each effect has drawn."""
-
-    counts: Counter[str] = field(default_factory=Counter)
-
-
 @dataclass(frozen=True, slots=True)
 class Draw:
     """The random numbers of one effect for one batch of n repetitions.
 
     `per_repetition` draws differ by repetition; `per_subject` draws are constant over all repetitions of a subject,
     `per_type` draws over those of a grasp type; `per_glove` draws are the same for all subjects.
-    The same call returns the same numbers again.
+    The same call returns the same numbers again. `draws` counts them, by the name of the effect.
     """
 
     seed: int
     effect: str
     site: Site
-    draws: DrawCounts
+    draws: Counter[str]
 
     def at_rest(self, numbers: NDArray[np.int64]) -> "Draw":
         """Return the draws for the same subject's rests (n,): the rest before trial t has the number t."""
@@ -174,12 +167,12 @@ class Draw:
 
     def count(self, what: str, number: int) -> None:
         """Count something of this effect, such as solver steps, for its entry in the ledger."""
-        self.draws.counts[what] += number
+        self.draws[what] += number
 
     def _words(self, repetitions: Sequence[int], condition: int, subject: int, size: int) -> Words:
         """Return `size` words for each of the repetitions."""
         words = np.empty((len(repetitions), size), dtype=np.uint64)
-        self.draws.counts[self.effect] += words.size
+        self.draws[self.effect] += words.size
         counter = np.array([0, 0, condition, subject], dtype=np.uint64)
         source, at = np.random.Philox(key=_key(self.seed, self.effect), counter=counter), 0
         for row, repetition in zip(words, repetitions, strict=True):

@@ -26,6 +26,7 @@ class Finding(msgspec.Struct):
     tried      number of hard inputs
     worst      a description of the input with the worst error; "" if irrelevant
     beyond     number of errors beyond the bound; 0 if not counted
+    holds      whether at least one input was tried, and the error is a number within its bound
     """
 
     check: str
@@ -36,6 +37,10 @@ class Finding(msgspec.Struct):
     tried: int
     worst: str = ""
     beyond: int = 0
+    holds: bool = False
+
+    def __post_init__(self) -> None:
+        self.holds = self.tried > 0 and math.isfinite(self.error) and self.error <= self.bound
 
     @classmethod
     def of(cls, check: str, reference: str, bound: float, unit: str) -> "Finding":
@@ -49,8 +54,4 @@ class Finding(msgspec.Struct):
         self.beyond += int(not error <= self.bound)
         if not error <= self.error:
             self.error, self.worst = (math.inf if math.isnan(error) else float(error)), at
-
-    @property
-    def holds(self) -> bool:
-        """Whether at least one input was tried, and the error is a number within its bound."""
-        return self.tried > 0 and math.isfinite(self.error) and self.error <= self.bound
+        self.__post_init__()

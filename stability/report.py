@@ -16,7 +16,7 @@ from thenar.compiler.text import counted
 from thenar.compiler.workers import in_workers
 
 from .finding import Case, Finding
-from .weka import Differences, NotRun, WekaComparison
+from .weka import Differences, WekaComparison
 
 Progress = Callable[[int, int], None]
 
@@ -93,29 +93,24 @@ def load(name: str) -> ModuleType:
     return import_module(f".cases.{name}", __package__)
 
 
-class Check(msgspec.Struct, frozen=True):
-    """A finding and its verdict."""
-
-    finding: Finding
-    holds: bool
-
-
 class CaseReport(msgspec.Struct, frozen=True):
     """The findings of a case. `failure` describes an exception and its location; earlier findings are kept."""
 
     name: str
     about: Case
-    checks: tuple[Check, ...]
+    findings: tuple[Finding, ...]
     failure: str | None
     holds: bool
 
 
 class Report(msgspec.Struct, frozen=True):
-    """The results of the catalogue; `weka` is the comparison with Weka on a separable set, None if not requested."""
+    """The results of the catalogue; `weka` is the comparison with Weka on a separable set, or the reason why
+    there is none; None if not requested.
+    """
 
     full: bool
     cases: tuple[CaseReport, ...]
-    weka: WekaComparison | NotRun | None
+    weka: WekaComparison | str | None
     holds: bool
 
 
@@ -156,9 +151,8 @@ def run_case(name: str, *, full: bool) -> CaseReport:
 
 
 def _reported(name: str, findings: Sequence[Finding], failure: str | None) -> CaseReport:
-    checks = tuple(Check(finding, finding.holds) for finding in findings)
-    holds = failure is None and bool(checks) and all(check.holds for check in checks)
-    return CaseReport(name, CASES[name], checks, failure, holds)
+    holds = failure is None and bool(findings) and all(finding.holds for finding in findings)
+    return CaseReport(name, CASES[name], tuple(findings), failure, holds)
 
 
 # The meanings of units, in the order of the legend. Other units count violations, or are self-explanatory.
@@ -177,19 +171,19 @@ def figure(number: float) -> str:
     return f"{round(number):,}" if whole else f"{number:.3g}"
 
 
-def verdict(check: Check) -> str:
+def verdict(finding: Finding) -> str:
     """Return the verdict in one or two words."""
-    if check.holds:
+    if finding.holds:
         return "holds"
-    return "FAILS" if check.finding.tried else "NOT TRIED"
+    return "FAILS" if finding.tried else "NOT TRIED"
 
 
 def summary(report: Report) -> str:
     """Return a one-line summary."""
-    checks = [check for case in report.cases for check in case.checks]
-    tried = sum(check.finding.tried for check in checks)
+    findings = [finding for case in report.cases for finding in case.findings]
+    tried = sum(finding.tried for finding in findings)
     looked = f"{counted(len(report.cases), 'case')} {'in full' if report.full else 'quickly'}, "
-    looked += f"{counted(len(checks), 'check')} on {counted(tried, 'input')}"
+    looked += f"{counted(len(findings), 'check')} on {counted(tried, 'input')}"
     if report.holds:
         return f"{looked}: all hold"
     bad = ", ".join(case.name for case in report.cases if not case.holds)
@@ -200,8 +194,8 @@ def failures(report: Report) -> tuple[str, ...]:
     """Return a sentence per failure: the case, the check, the size of the error, and the worst input."""
     found = []
     for case in report.cases:
-        faults = [_fault(check.finding) for check in case.checks if not check.holds]
-        if case.failure is not None or not case.checks:
+        faults = [_fault(finding) for finding in case.findings if not finding.holds]
+        if case.failure is not None or not case.findings:
             faults.append(case.failure or "it has no findings")
         found += [f"{case.name}: {fault}" for fault in faults]
     return tuple(found)
@@ -218,7 +212,7 @@ def _fault(finding: Finding) -> str:
 
 def legend(report: Report) -> tuple[tuple[str, str], ...]:
     """Return the units in use that need an explanation, each with its meaning."""
-    units = {check.finding.unit for case in report.cases for check in case.checks}
+    units = {finding.unit for case in report.cases for finding in case.findings}
     return tuple(
         (unit, meaning)
         for unit, meaning in _MEANINGS
@@ -226,10 +220,10 @@ def legend(report: Report) -> tuple[tuple[str, str], ...]:
     )
 
 
-def weka_lines(weka: WekaComparison | NotRun) -> tuple[str, ...]:
+def weka_lines(weka: WekaComparison | str) -> tuple[str, ...]:
     """Return the results of the comparison with Weka, one sentence per line."""
-    if isinstance(weka, NotRun):
-        return (f"not run: {weka.why}",)
+    if isinstance(weka, str):
+        return (f"not run: {weka}",)
     changed = f"after the last round {counted(weka.weka_changed, 'row')} of {weka.held_out} change class"
     return (
         f"Weka {weka.weka} and thenar, {weka.rounds} rounds on {weka.rows} rows of {weka.classes} classes that "

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from thenar.compiler.elementary import Floats, softmax
 from thenar.compiler.trainers.logitboost import boost
 from thenar.compiler.trainers.stumps import Stumps
-from thenar.drivers.errors import ThenarError
 from thenar.runtime.model.tables import winners
 
 JAR = Path("/usr/share/java/weka.jar")  # where Debian's package puts it
@@ -37,23 +36,19 @@ _SEED = 6
 _FLIPPED = 0.12  # of the switches
 
 
-class WekaError(ThenarError, RuntimeError):
-    """Weka could not be run, or its output is not the expected model."""
-
-
 def run_weka(*arguments: str, options: tuple[str, ...] = ()) -> str:
-    """Return the output of a Weka class under JVM `options`. Raises WekaError if Weka is missing or fails."""
+    """Return the output of a Weka class under JVM `options`. Raises RuntimeError if Weka is missing or fails."""
     java = shutil.which("java")
     if java is None or not JAR.is_file():
-        raise WekaError("java or Weka is not installed")
+        raise RuntimeError("java or Weka is not installed")
     command = [java, *options, "-cp", str(JAR), *arguments]
     try:
         return subprocess.run(command, check=True, capture_output=True, text=True, timeout=_LONGEST_S).stdout
     except subprocess.CalledProcessError as reason:
         said = (reason.stderr or reason.stdout).strip().partition("\n")[0]
-        raise WekaError(f"java ended with code {reason.returncode}: {said}") from reason
+        raise RuntimeError(f"java ended with code {reason.returncode}: {said}") from reason
     except subprocess.TimeoutExpired as reason:
-        raise WekaError(f"Weka was not finished after {_LONGEST_S:g} s") from reason
+        raise RuntimeError(f"Weka was not finished after {_LONGEST_S:g} s") from reason
 
 
 def weka_stumps(
@@ -61,7 +56,7 @@ def weka_stumps(
 ) -> Stumps:
     """Train Weka's LogitBoost on X (n, d) of integers and labels (n,) under JVM `options`; return its stumps.
 
-    They have full precision: Java prints a double so that it reads back unchanged. Raises WekaError.
+    They have full precision: Java prints a double so that it reads back unchanged. Raises RuntimeError.
     """
     with TemporaryDirectory(prefix="thenar-weka-") as folder:
         table = Path(folder) / "set.arff"
@@ -72,14 +67,14 @@ def weka_stumps(
 
 
 def read_stumps(printed: str, rounds: int, n_classes: int, n_inputs: int) -> Stumps:
-    """Parse the stumps of a model in Weka's output, with columns x0, x1, ... Raises WekaError if they do not match."""
+    """Parse the stumps of a model in Weka's output, with columns x0, x1, ... Raises RuntimeError for another model."""
     left, right, missing = (pattern.findall(printed) for pattern in _BRANCHES)
     if not len(left) == len(right) == len(missing) == rounds * n_classes:
-        raise WekaError(f"Weka printed {len(left)} stumps, not {rounds} rounds of {n_classes}")
+        raise RuntimeError(f"Weka printed {len(left)} stumps, not {rounds} rounds of {n_classes}")
     shape = rounds, n_classes
     columns = np.array([int(column) for column, _, _ in left], dtype=np.int32).reshape(shape)
     if columns.max() >= n_inputs:
-        raise WekaError(f"Weka split column {columns.max()} of {n_inputs}")
+        raise RuntimeError(f"Weka split column {columns.max()} of {n_inputs}")
     values = np.array([[float(line[-1]) for line in lines] for lines in (left, right, missing)])
     thresholds = np.array([float(threshold) for _, threshold, _ in left]).reshape(shape)
     return Stumps(n_inputs, columns, thresholds, values.T.reshape(*shape, 3), shrinkage=1.0)
@@ -100,7 +95,7 @@ class Differences(msgspec.Struct, frozen=True):
     parts: int | None
 
 
-class WekaComparison(msgspec.Struct, frozen=True, tag="run"):
+class WekaComparison(msgspec.Struct, frozen=True):
     """The comparison of Weka and thenar."""
 
     weka: str  # its version
@@ -114,13 +109,7 @@ class WekaComparison(msgspec.Struct, frozen=True, tag="run"):
     weka_changed: int  # held-out rows whose class in Weka depends on the choice of exp()
 
 
-class NotRun(msgspec.Struct, frozen=True, tag="not run"):
-    """The reason why there is no comparison."""
-
-    why: str
-
-
-def compare_with_weka() -> WekaComparison | NotRun:
+def compare_with_weka() -> WekaComparison | str:
     """Run the comparison, or return the reason why it cannot run."""
     X, labels = separable_set()
     half = len(labels) // 2
@@ -130,8 +119,8 @@ def compare_with_weka() -> WekaComparison | NotRun:
             weka_stumps(*training, CLASSES, ROUNDS, options) for options in (EXP_OF_THE_PROCESSOR, EXP_IN_JAVA)
         )
         version = run_weka("weka.core.Version").partition("\n")[0].strip()
-    except WekaError as reason:
-        return NotRun(str(reason))
+    except RuntimeError as reason:
+        return str(reason)
     ours, _ = boost(*training, CLASSES, rounds=ROUNDS)
     # The distributions (M, K, n) after each round.
     by_processor, by_java, by_us = (

@@ -142,7 +142,7 @@ def test_the_surveys_are_those_of_the_page() -> None:
     rows = {row["mm, mean ± standard deviation"].strip("`"): list(row.values())[1:] for row in table("mm, mean")}
     assert rows.keys() == SURVEYS.keys()
     for survey, (men, women) in SURVEYS.items():
-        spreads = (men.length, women.length, men.breadth, women.breadth)
+        spreads = (men[0], women[0], men[1], women[1])
         cells = [cell.removesuffix(" (ours)") for cell in rows[survey]]
         assert cells == [f"{spread.mean:.1f} ± {spread.sd:g}" for spread in spreads]
 

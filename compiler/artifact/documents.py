@@ -165,12 +165,12 @@ class Documents:
 
 def _transitions(grasp_set: GraspSet) -> "Transitions | None":
     """Return which type follows which, where the rows are whole movements, else None."""
-    from ..movements.streams import MovementError
     from ..movements.transitions import Transitions
+    from ..recordings import RecordingError
 
     try:
         return Transitions.of_set(grasp_set) if grasp_set.is_none.any() else None
-    except MovementError:
+    except RecordingError:
         return None
 
 

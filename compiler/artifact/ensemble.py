@@ -97,7 +97,7 @@ def ensemble_to_bytes(model: Model) -> bytes:
 def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
     """Return the model of an `ensemble.bin`; error messages call the file `what`.
 
-    Raises SealError for a file that is foreign, truncated, altered or newer, and BuildError for an inconsistent one.
+    Raises FormatError for a file that is foreign, truncated, altered or newer, and BuildError for an inconsistent one.
     """
     version, payload = unseal(data, KIND, OTHERS, what)
     header_bytes, arrays = unpack(payload, what)
@@ -238,7 +238,7 @@ def _grids(arrays: Mapping[str, AnyArray], what: str) -> tuple[Grid, ...]:
 
 
 def _others(arrays: Mapping[str, AnyArray], kinds: Sequence[str], what: str) -> Iterator[Term]:
-    """Yield the further terms of these kinds. Raises MemberError for a kind that no installed package defines."""
+    """Yield the further terms of these kinds. Raises SettingError for a kind that no installed package defines."""
     for number, name in enumerate(kinds):
         prefix = f"term_{number}_"
         fields = {key.removeprefix(prefix): array for key, array in arrays.items() if key.startswith(prefix)}

@@ -72,7 +72,7 @@ def export_c(
 
     Raises
     ------
-    MemberError
+    SettingError
         If there is no such target.
     FirmwareError
         If the build does not fit the target.

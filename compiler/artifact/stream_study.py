@@ -35,8 +35,9 @@ from ..movements.segments import (
     score_streams,
     segments_of,
 )
-from ..movements.streams import TICK_US, MovementError, movements_of, streams_of
+from ..movements.streams import TICK_US, movements_of, streams_of
 from ..recogniser import Recogniser
+from ..recordings import RecordingError
 from ..recordings.graspset import GraspSet
 from ..samples import FRAMES, Samples
 from ..trainers.base import SHARED, Report
@@ -114,18 +115,18 @@ def study_streams(grasp_set: GraspSet, options: Recipe, jobs: int = -1, progress
 
     Raises
     ------
-    MovementError
+    RecordingError
         If the set holds no whole movements, no rows in which nothing is held, or only one subject.
     """
     streams = streams_of(grasp_set)
     if not grasp_set.is_none.any():
-        raise MovementError(
+        raise RecordingError(
             "the set has no rows in which nothing is held: record them (thenar record), or simulate a scene that keeps "
             'every frame (rows = "all")'
         )
     subjects = tuple(sorted({stream.subject for stream in streams}))
     if len(subjects) < 2:
-        raise MovementError(f"the set holds streams of {subjects[0]} only: leaving a subject out takes two")
+        raise RecordingError(f"the set holds streams of {subjects[0]} only: leaving a subject out takes two")
     given: dict[Inputs, bool] = {"switches": bool(grasp_set.element_names), "joints": bool(grasp_set.joints)}
     kinds = [kind for kind, some in {"both": all(given.values()), **given}.items() if some]
     report, total = progress or (lambda _done, _total: None), len(subjects) * (1 + len(kinds))

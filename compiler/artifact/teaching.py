@@ -26,8 +26,9 @@ from thenar.runtime.preshape import PreshapeTable
 from thenar.runtime.task import Task, TaskStep
 
 from ..movements.segments import levenshtein, segments_of
-from ..movements.streams import MovementError, streams_of
+from ..movements.streams import streams_of
 from ..movements.transitions import Transitions
+from ..recordings import RecordingError
 from ..recordings.graspset import GraspSet
 from ..samples import select_inputs
 from .timeline import MCAP, Timeline, segment
@@ -137,13 +138,13 @@ def taught(
 
     Raises
     ------
-    MovementError
+    RecordingError
         If no grasp occurs in most of them.
     """
     columns = aligned([one.types for one in shown])
     steps = [step for column in columns if (step := _majority(shown, column)) is not None]
     if not steps:
-        raise MovementError(
+        raise RecordingError(
             f"the {len(shown)} demonstrations have no grasp that occurs in most of them: "
             f"{'; '.join(f'{one.name}: ' + ' '.join(one.types[:8]) for one in shown[:4])}"
         )
@@ -238,7 +239,7 @@ def behaviour_tree(task: Task) -> bytes:
 def demonstrations(folder: Path, recordings: Sequence[Path]) -> Iterator[Demonstration]:
     """Yield a demonstration for each recording (.mcap) of the build's inputs and for each stream of whole movements.
 
-    Whole movements come from sets (.grasps). Raises MovementError where a demonstration shows no grasp, and whatever
+    Whole movements come from sets (.grasps). Raises RecordingError where a demonstration shows no grasp, and whatever
     `segment` raises.
     """
     build = Build.load(folder)
@@ -271,7 +272,7 @@ def _shown(build: Build, name: str, timelines: Sequence[Timeline], read: Sequenc
             own = codes[(times >= start) & (times < end)]
             grasps.append(DemonstratedGrasp(timeline.types[one.state], (end - start) / 1e6, _values(build, own)))
     if not grasps:
-        raise MovementError(f"{name} shows no grasp: look at it with thenar segment, or leave it out")
+        raise RecordingError(f"{name} shows no grasp: look at it with thenar segment, or leave it out")
     return Demonstration(name, tuple(grasps))
 
 

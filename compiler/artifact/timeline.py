@@ -26,8 +26,9 @@ from thenar.runtime.scores import refused
 from thenar.runtime.segmenting.decoder import decode, emissions
 
 from ..movements.segments import OVERLAPS, Span, live_states, score_streams, segments_of
-from ..movements.streams import MovementError, newest, streams_of
+from ..movements.streams import newest, streams_of
 from ..pictures import on_paper, painting, rendered
+from ..recordings import RecordingError
 from ..recordings.graspset import GraspSet
 from ..samples import select_inputs
 from ..text import cell
@@ -162,11 +163,11 @@ def segment(
 
     Raises
     ------
-    MovementError
+    RecordingError
         If the recordings are not whole movements, or are empty.
     SettingError
         If the lag is out of range, or a recording lacks an input of the build.
-    BuildError, SealError, McapError, CompileError
+    BuildError, FormatError, CompileError
         If a file is damaged, or the recordings lack inputs of the build.
 
     Examples
@@ -189,7 +190,7 @@ def _of_movements(
 ) -> tuple[Timeline, ...]:
     """Return the timelines of whole movements, with their recorded types as the truth."""
     if not len(grasp_set):
-        raise MovementError("the set has no rows to find segments in")
+        raise RecordingError("the set has no rows to find segments in")
     bits, codes = select_inputs(grasp_set, build.manifest)
     streams = streams_of(grasp_set, build.manifest.segmenting.tick_us)
     types = build.grasps[: build.manifest.segmenting.n_types]
@@ -241,7 +242,7 @@ def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], 
         if moment.scores is not None:
             read.append((moment.grasp.unix_us, moment.scores, moment.refused))
     if not read:
-        raise MovementError(f"{path.name} holds no moment with enough readings for the build")
+        raise RecordingError(f"{path.name} holds no moment with enough readings for the build")
     times_us, biased_scores, rejected = (np.array(each) for each in zip(*read, strict=True))
     timelines = []
     for number, (start_us, rows) in enumerate(newest(times_us, tick_us), 1):
@@ -340,11 +341,11 @@ WRITERS: Mapping[str, Callable[[Sequence[Timeline]], bytes]] = {".csv": as_csv, 
 def draw(timelines: Sequence[Timeline], kind: str) -> bytes:
     """Return the picture as the bytes of a "png" or "svg"; the same timelines give the same bytes.
 
-    Raises MovementError where there is nothing to draw, PictureError if matplotlib is not installed.
+    Raises RecordingError where there is nothing to draw, PictureError if matplotlib is not installed.
     """
     length = [len(timeline.states) * timeline.tick_us / 1e6 for timeline in timelines]
     if not any(length):
-        raise MovementError("the recordings have no frames to draw")
+        raise RecordingError("the recordings have no frames to draw")
     # Long recordings get more seconds per line, and very long ones no names.
     seconds = _SECONDS * max(1.0, sum(length) / (_SECONDS * _MOST_LINES))
     lines = [

@@ -18,10 +18,11 @@ from thenar.runtime.segmenting.model import SegmentModel
 from ..evaluation.folds import OF, Fold, groups_of, leave_groups_out, leave_one_out, trial_folds
 from ..evaluation.rates import UNITS, rated
 from ..movements.segments import learnt
-from ..movements.streams import TICK_US, MovementError, streams_of
+from ..movements.streams import TICK_US, streams_of
 from ..placement.constraints import Limits
 from ..placement.ports import PortCosts
 from ..recogniser import Classes, Groups, Recogniser, Scores, check_inputs
+from ..recordings import RecordingError
 from ..recordings.graspset import GraspSet
 from ..recordings.summary import check_trials
 from ..samples import Samples
@@ -208,7 +209,7 @@ def segments_for(grasp_set: GraspSet, samples: Samples, scores: Scores | None, s
         return None
     try:
         streams = streams_of(grasp_set)
-    except MovementError:
+    except RecordingError:
         return None
     return learnt(streams, samples.labels, scores, samples.n_types, scale, TICK_US)
 

@@ -121,7 +121,7 @@ def verify(
 
     Raises
     ------
-    BuildError, SealError
+    BuildError, FormatError
         If the folder is not a valid build.
     CompileError
         If the recordings lack inputs of the build, or have no rows.
@@ -223,7 +223,7 @@ def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Report | No
 
     Raises
     ------
-    BuildError, SealError
+    BuildError, FormatError
         If the folder is not a valid build.
     CompileError
         If the recordings lack inputs of the build, or have no rows.

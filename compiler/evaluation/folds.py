@@ -273,31 +273,23 @@ def groups_of(grasp_set: GraspSet, by: Scheme) -> NDArray[np.str_] | None:
 ProtocolName = Literal["paper", "nested"]
 
 
-@dataclass(frozen=True, slots=True)
-class Protocol:
-    """A protocol's name, and one sentence on its meaning."""
-
-    name: ProtocolName
-    meaning: str
-
-    def may_choose(self, population: Population, fold: Fold) -> Rows:
-        """Return the rows from which the placement for this fold may be chosen."""
-        return population.rows if self.name == "paper" else fold.train
-
-    def may_choose_pooled(self, everyone: Rows, fold: Fold) -> Rows:
-        """Return the rows from which a placement common to all subjects may be chosen for this fold."""
-        return everyone if self.name == "paper" else np.setdiff1d(everyone, fold.test)
+# Each with its meaning, in a sentence.
+PROTOCOLS: dict[ProtocolName, str] = {
+    "paper": "The placement is chosen once, from all rows, test rows included, as the paper did: optimistic.",
+    "nested": (
+        "The placement is chosen anew inside each training fold, without the test rows: the accuracy on new grasps."
+    ),
+}
 
 
-PAPER = Protocol(
-    "paper",
-    "The placement is chosen once, from all rows, test rows included, as the paper did: optimistic.",
-)
-NESTED = Protocol(
-    "nested",
-    "The placement is chosen anew inside each training fold, without the test rows: the accuracy on new grasps.",
-)
-PROTOCOLS = (PAPER, NESTED)
+def may_choose(protocol: ProtocolName, population: Population, fold: Fold) -> Rows:
+    """Return the rows from which the placement for this fold may be chosen."""
+    return population.rows if protocol == "paper" else fold.train
+
+
+def may_choose_pooled(protocol: ProtocolName, everyone: Rows, fold: Fold) -> Rows:
+    """Return the rows from which a placement common to all subjects may be chosen for this fold."""
+    return everyone if protocol == "paper" else np.setdiff1d(everyone, fold.test)
 
 
 def concerns(grasp_set: GraspSet, populations: tuple[Population, ...], scheme: Scheme, n_folds: int) -> tuple[str, ...]:

@@ -19,25 +19,15 @@ from thenar.runtime.manifest import Of
 
 from ..pictures import on_paper, rendered
 from ..samples import Samples
-from .folds import NESTED, EvaluationError, Fold, Population, Rows, Scheme, leave_groups_out, trial_folds
+from .folds import EvaluationError, Fold, Population, Rows, Scheme, leave_groups_out, trial_folds
 from .plan import CellPlan, Planner, learners
-from .rates import Draws, Floats, Rate, RecipeWords
+from .rates import Draws, ExpectedAccuracy, Floats, Rate, RecipeWords
 from .tables import RateReader
 
 FURTHER, LEAST = (2, 4), 4
 _EXPONENTS = np.arange(1, 61) / 30  # of n, from 1/30 to 2
 # Curves are not inputs, so they get other colours.
 _COLOURS, _MARKERS = ("ink", "picked", "link", "baseline-1", "baseline-2", "baseline-3"), "os^Dv"
-
-
-@dataclass(frozen=True, slots=True)
-class ExpectedAccuracy:
-    """The accuracy expected after `repetitions` repetitions, from a fitted law, with its 95 % interval."""
-
-    repetitions: int
-    mean: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +169,7 @@ def plan_learning(planner: Planner, subjects: NDArray[np.str_], scheme: Scheme, 
     populations = [
         Population("all", everyone, grasps, tuple(map(tuple, folds))) for folds in (*map(limited, sizes), runs)
     ]
-    kind, chosen = planner.kinds[0], partial(planner.placement, NESTED)
+    kind, chosen = planner.kinds[0], partial(planner.placement, "nested")
     cells = {
         name: tuple(planner.cell(population, kind, chosen, name) for population in populations) for name in learners()
     }

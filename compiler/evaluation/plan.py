@@ -19,7 +19,7 @@ from ..samples import Columns, Samples
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
 from .choosing import InputChoices, choose_training
-from .folds import Fold, Population, Protocol, Rows
+from .folds import Fold, Population, ProtocolName, Rows, may_choose, may_choose_pooled
 
 Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
@@ -221,9 +221,9 @@ class Planner:
         """All rows."""
         return self.choices.samples
 
-    def table(self, name: TableName, protocol: Protocol) -> list[RowPlan]:
+    def table(self, name: TableName, protocol: ProtocolName) -> list[RowPlan]:
         """Return the rows of a table under a protocol."""
-        rows: dict[TableName, Callable[[Protocol], list[RowPlan]]] = {
+        rows: dict[TableName, Callable[[ProtocolName], list[RowPlan]]] = {
             "generality": self._generality,
             "pruning": self._pruning,
             "baselines": self._baselines,
@@ -237,35 +237,35 @@ class Planner:
         kinds = available(self._n_switches, self.choices.n_joints)
         return [self._row(kind.name, kind.what, kind, partial(self.placement, protocol)) for kind in kinds]
 
-    def _generality(self, protocol: Protocol) -> list[RowPlan]:
+    def _generality(self, protocol: ProtocolName) -> list[RowPlan]:
         def chosen_by(giver: Population, population: Population, fold: Fold) -> Elements:
             # Another subject's placement has never seen this subject's rows: both protocols allow it.
-            return self.chosen(protocol.may_choose(population, fold) if population is giver else giver.rows)
+            return self.chosen(may_choose(protocol, population, fold) if population is giver else giver.rows)
 
         return [
             self._row(giver.name, f"placement of subject {giver.name}", SELECTED, partial(chosen_by, giver))
             for giver in self.populations
         ]
 
-    def _pruning(self, protocol: Protocol) -> list[RowPlan]:
+    def _pruning(self, protocol: ProtocolName) -> list[RowPlan]:
         everyone = np.unique(np.concatenate([population.rows for population in self.populations]))
 
         def pooled(least: int, population: Population, fold: Fold) -> Elements:
-            return self.chosen(protocol.may_choose_pooled(everyone, fold), prune=least)
+            return self.chosen(may_choose_pooled(protocol, everyone, fold), prune=least)
 
         # One tree of some rows serves every S.
         recipes = [changed(self.recipe, {"prune": least}) for least in self.prune_list]
         folds = [fold for population in self.populations for fold in population.folds]
-        several = {rows.tobytes(): rows for rows in (protocol.may_choose_pooled(everyone, fold) for fold in folds)}
+        several = {rows.tobytes(): rows for rows in (may_choose_pooled(protocol, everyone, fold) for fold in folds)}
         self.choices.choose(recipes, list(several.values()))
         everything = self._row("all", "all switches", ALL_SWITCHES, lambda population, fold: ())
         pruned = [self._row(str(s), f"S = {s}", SELECTED, partial(pooled, s)) for s in self.prune_list]
         return [everything, *pruned]
 
-    def _baselines(self, protocol: Protocol) -> list[RowPlan]:
+    def _baselines(self, protocol: ProtocolName) -> list[RowPlan]:
         def baseline(name: str, population: Population, fold: Fold) -> Elements:
             number = len(self.placement(protocol, population, fold))
-            return self.chosen(protocol.may_choose(population, fold), placement=name, keep=number or None, prune=0)
+            return self.chosen(may_choose(protocol, population, fold), placement=name, keep=number or None, prune=0)
 
         def drawn(draw: int, population: Population, fold: Fold) -> Elements:
             elements, number = self.elements(fold.train), len(self.placement(protocol, population, fold))
@@ -284,7 +284,7 @@ class Planner:
             RowPlan("random", f"mean of {DRAWS} draws", tuple(map(random, self.populations))),
         ]
 
-    def _trainers(self, protocol: Protocol) -> list[RowPlan]:
+    def _trainers(self, protocol: ProtocolName) -> list[RowPlan]:
         chosen = partial(self.placement, protocol)
         # Choosing settings takes as long as many fits: a single repeat is run.
         once = replace(
@@ -303,9 +303,9 @@ class Planner:
     def _n_switches(self) -> int:
         return self.samples.n_switches + int(self.samples.taxels.shape[1])
 
-    def placement(self, protocol: Protocol, population: Population, fold: Fold) -> Elements:
+    def placement(self, protocol: ProtocolName, population: Population, fold: Fold) -> Elements:
         """Return the recipe's placement for a fold, chosen from the population's rows as the protocol allows."""
-        return self.chosen(protocol.may_choose(population, fold))
+        return self.chosen(may_choose(protocol, population, fold))
 
     def elements(self, rows: Rows) -> Elements:
         """Return the elements available in these rows."""

@@ -16,7 +16,7 @@ from thenar.runtime.names import list_names
 from thenar.runtime.recipe import AUTO, Recipe
 
 from ..samples import decided
-from ..text import counted, interval
+from ..text import DASH, counted
 from ..trainers.base import Training
 
 UNITS: tuple[Unit, ...] = ("trials", "frames")
@@ -190,6 +190,21 @@ class Rate:
     def __str__(self) -> str:
         """Return "73.1 [55.2, 86.0] % new subject, trials"."""
         return f"{interval(self)} % {self.what}"
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedAccuracy:
+    """The accuracy expected after `repetitions` repetitions, from a fitted law, with its 95 % interval."""
+
+    repetitions: int
+    mean: float
+    low: float
+    high: float
+
+
+def interval(rate: Rate | ExpectedAccuracy | None) -> str:
+    """Return "96.3 [95.1, 97.2]", in percent; a dash for no rate."""
+    return DASH if rate is None else f"{100 * rate.mean:.1f} [{100 * rate.low:.1f}, {100 * rate.high:.1f}]"
 
 
 def placement_words(options: Recipe) -> str:

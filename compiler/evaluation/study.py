@@ -23,7 +23,6 @@ from ..text import counted
 from ..workers import check_memory, in_workers
 from .choosing import InputChoices
 from .folds import (
-    NESTED,
     OF,
     PROTOCOLS,
     EvaluationError,
@@ -215,7 +214,7 @@ def evaluate(
     ------
     EvaluationError
         If the set cannot be split as requested, or its rows look like frames of fewer trials than it has.
-    MemberError, TrainerError
+    SettingError, TrainingError
         For an unknown baseline, or an unknown trainer or setting.
 
     Examples
@@ -236,11 +235,11 @@ def evaluate(
     samples = Samples.of(chosen)
     planner = Planner(populations, InputChoices(samples, ports, limits), recipe, design.prune_list, design.baselines)
     plans = {
-        (name, protocol.name): planner.table(name, protocol)
+        (name, protocol): planner.table(name, protocol)
         for name, reason in reasons.items()
         if reason is None
         for protocol in PROTOCOLS
-        if protocol.name in design.protocols and (protocol is NESTED or name not in _NESTED)
+        if protocol in design.protocols and (protocol == "nested" or name not in _NESTED)
     }
     curves = plan_learning(planner, chosen.subjects, scheme, design.repeats) if design.learning else None
     cells = [cell for rows in plans.values() for row in rows for cell in row.cells]
@@ -337,7 +336,7 @@ def _recognised(task: tuple[GraspSet, Planner, Scheme, int]) -> tuple[int, int]:
         populations = populations_of(grasp_set, scheme, recipe.folds, 1, recipe.seed)
     planner = replace(planner, populations=populations, choices=replace(planner.choices, samples=samples))
     plans = [
-        planner.cell(population, planner.kinds[0], partial(planner.placement, NESTED)) for population in populations
+        planner.cell(population, planner.kinds[0], partial(planner.placement, "nested")) for population in populations
     ]
     plans = [replace(plan, runs=plan.runs[:1]) for plan in plans]
     candidates = candidates_of(recipe)

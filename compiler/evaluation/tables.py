@@ -14,10 +14,9 @@ from thenar.runtime.manifest import Of
 
 from ..pictures import rendered
 from ..samples import Samples, decided
-from ..text import interval
 from .folds import ProtocolName, Rows
 from .plan import REFERENCE, CellPlan, FoldFit, Labels, RowPlan, TableName
-from .rates import Paired, Rate, RecipeWords, rated
+from .rates import Paired, Rate, RecipeWords, interval, rated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

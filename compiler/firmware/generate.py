@@ -29,7 +29,7 @@ def firmware_files(
     name    of its files and functions: lower-case letters, digits and _, at most 32
     flash   how many bytes of flash the classifier may take; None: three quarters of the part's
 
-    Raises FirmwareError if the name cannot be used in C, or the build does not fit; MemberError if there is no such
+    Raises FirmwareError if the name cannot be used in C, or the build does not fit; SettingError if there is no such
     target.
     """
     member = TARGETS.named(target)

@@ -23,8 +23,9 @@ from thenar.runtime.segmenting.model import SegmentModel
 
 from ..evaluation.folds import Rows, leave_groups_out, trial_folds
 from ..movements.segments import learnt
-from ..movements.streams import TICK_US, MovementError, Stream, Times, streams_of
+from ..movements.streams import TICK_US, Stream, Times, streams_of
 from ..placement.placement import InputSelection
+from ..recordings import RecordingError
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..trainers.base import Training
@@ -94,7 +95,7 @@ def movements_of(grasp_set: GraspSet, rows: Rows) -> Movements | None:
     none = grasp_set.is_none
     try:
         recorded = streams_of(grasp_set) if none.any() else ()
-    except MovementError:
+    except RecordingError:
         return None
     movements = grasp_set.movement_ids
     inside = np.isin(movements, movements[np.flatnonzero(~none)[rows]])

@@ -77,9 +77,9 @@ class Search:
 
     Raises
     ------
-    MemberError
+    SettingError
         For an unknown method or trainer.
-    TrainerError
+    TrainingError
         For a setting that the trainer does not take.
     FrontierError
         If the search would be empty.

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable
 from thenar.runtime.names import printable, taxel_and_code
 from thenar.runtime.recipe import PAPERS_TRAINER
 
-from ..evaluation.rates import Rate
+from ..evaluation.rates import Rate, interval
 from ..facts import SensorCount
-from ..text import cells, counted, duration, interval, listed, percent
+from ..text import cells, counted, duration, listed, percent
 from .points import Frontier, FrontierPoint, PointSetting, PointTime, ReferencePoint
 
 _LONGEST = 40  # letters of a name on a picture

@@ -9,6 +9,7 @@ from textwrap import fill
 
 import msgspec
 
+from thenar.runtime.errors import BuildError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.manifest import Manifest
@@ -20,7 +21,7 @@ from ..text import cells, sentence
 from .circuit import BillLine, Circuit, Component, ComponentKind
 from .layout import CONTACT_MM, counted_sensors
 from .pattern import dxf_of, svg_of
-from .spec import GloveSpec, SpecError, SpecSummary, glove_spec
+from .spec import GloveSpec, SpecSummary, glove_spec
 
 Row = Sequence[object]
 _WIDTH = 100
@@ -269,18 +270,18 @@ def files_of(spec: GloveSpec) -> Mapping[str, bytes]:
 
 
 def check_output(folder: Path) -> None:
-    """Raise SpecError unless a spec may be written there: a new or empty folder, or one that holds a spec."""
+    """Raise BuildError unless a spec may be written there: a new or empty folder, or one that holds a spec."""
     folder.parent.mkdir(parents=True, exist_ok=True)
-    check_folder(folder, users_files, SpecError)
+    check_folder(folder, users_files, BuildError)
 
 
 def write_spec(files: Mapping[str, bytes], folder: Path) -> None:
-    """Write the files of a spec as `folder`, replacing an older spec. Raises SpecError as `check_output` does."""
-    publish_folder(files, folder, users_files, SpecError)
+    """Write the files of a spec as `folder`, replacing an older spec. Raises BuildError as `check_output` does."""
+    publish_folder(files, folder, users_files, BuildError)
 
 
 def users_files(folder: Path) -> list[str]:
-    """Return the user's entries in the folder of a spec. Raises SpecError if it holds no spec."""
+    """Return the user's entries in the folder of a spec. Raises BuildError if it holds no spec."""
     if any(folder.iterdir()) and not (folder / _MARK).is_file():
-        raise SpecError(f"{folder} exists already and is not a spec: name another folder")
+        raise BuildError(f"{folder} exists already and is not a spec: name another folder")
     return [path for path in entries(folder) if path not in NAMES]

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from msgspec import Struct
 from msgspec.structs import replace
 
-from thenar.drivers.errors import ThenarError
-from thenar.runtime.errors import HarnessError
+from thenar.runtime.errors import BuildError, HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Detected, Faults, Manifest, Recognised, Switch
 from thenar.runtime.names import list_names
@@ -33,10 +32,6 @@ from .layout import (
     wires_of,
 )
 from .pattern import Pattern, pattern_of
-
-
-class SpecError(ThenarError, ValueError):
-    """There is no glove to describe, or it does not match the wiring."""
 
 
 class ExpectedPerformance(Struct, frozen=True):
@@ -133,12 +128,12 @@ def glove_spec(
 ) -> GloveSpec:
     """Return the spec of a build's glove, wired with `harness`; without one, a wiring is proposed.
 
-    scan is the build's scan map, if it has one; hand, the hand that has positions for its switches. Raises SpecError
+    scan is the build's scan map, if it has one; hand, the hand that has positions for its switches. Raises BuildError
     if the build keeps no switch, or has a scan map but no harness is given; HarnessError if the harness lacks a kept
     switch, or does not match the scan map.
     """
     if not manifest.switches:
-        raise SpecError("the build keeps no switch, so there is no glove to build: compile it with ``inputs`` both")
+        raise BuildError("the build keeps no switch, so there is no glove to build: compile it with ``inputs`` both")
     wired = _harness(manifest, scan, harness)
     kept_names = [switch.name for switch in manifest.switches]
     read = whole_scan(wired, kept_names) if scan is None else scan
@@ -176,7 +171,7 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) 
     names = [switch.name for switch in manifest.switches]
     if harness is None:
         if scan is not None:
-            raise SpecError("the build was compiled for a specific wiring: name its glove.toml with ``glove``")
+            raise BuildError("the build was compiled for a specific wiring: name its glove.toml with ``glove``")
         return propose_harness(names, cyberglove=propose_cyberglove([joint.name for joint in manifest.joints]))
     if scan is not None:
         check_harness(scan, harness, names)

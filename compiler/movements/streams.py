@@ -10,10 +10,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.drivers.errors import ThenarError
-
 from ..arrays import groups
 from ..placement.elements import above, elements_of
+from ..recordings import RecordingError
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 
@@ -33,10 +32,6 @@ LEAST_FRAMES = 10
 _ALIKE = 0.5
 # A hold continues if a contact's bounce interrupts it for at most these frames.
 _BRIDGED = 2
-
-
-class MovementError(ThenarError, ValueError):
-    """Recordings in which no movements or segments are, or from which none can be learned."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -202,11 +197,11 @@ def streams_of(grasp_set: GraspSet, tick_us: int = TICK_US) -> tuple[Stream, ...
     """Return the streams of a set, each of one subject in one session, in the order of their first rows.
 
     A state lasts a tick and shows the newest row. A stream ends before a pause, and where the clock starts again. Rows
-    outside of movements, such as static grasps, belong to no stream. Raises MovementError if all rows do.
+    outside of movements, such as static grasps, belong to no stream. Raises RecordingError if all rows do.
     """
     inside = movements_of(grasp_set).inside
     if not inside.any():
-        raise MovementError(
+        raise RecordingError(
             "each row of the set is a separate trial: segments need whole movements, as `thenar record` or "
             'scenes with rows = "all" make them'
         )

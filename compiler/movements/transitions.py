@@ -13,11 +13,12 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from thenar.runtime.errors import FormatError
 from thenar.runtime.files import read_file
 
 from ..recordings.graspset import GraspSet
 from .segments import segments_of
-from .streams import MovementError, streams_of
+from .streams import streams_of
 
 # Rarer transitions are not admissible.
 FREQUENT = 0.1
@@ -53,7 +54,7 @@ class Transitions:
 
     @classmethod
     def of_set(cls, grasp_set: GraspSet) -> "Transitions":
-        """Count the changes in the true segments of a set. Raises MovementError if rows are not movements."""
+        """Count the changes in the true segments of a set. Raises RecordingError if rows are not movements."""
         names, labels = grasp_set.taxonomy.types, grasp_set.labels
         types = sorted(set(labels[~grasp_set.is_none].tolist()))
         streams = [segments_of(labels[stream.rows], len(names)) for stream in streams_of(grasp_set)]
@@ -61,12 +62,12 @@ class Transitions:
 
     @classmethod
     def load(cls, path: Path) -> "Transitions":
-        """Load a file written by `save`. Raises MovementError that names the file, OSError."""
+        """Load a file written by `save`. Raises FormatError that names the file, OSError."""
         try:
-            file = msgspec.json.decode(read_file(path, _LARGEST, MovementError), type=TransitionFile)
+            file = msgspec.json.decode(read_file(path, _LARGEST, FormatError), type=TransitionFile)
             counts = np.array(file.counts, np.intp).reshape(len(file.types), len(file.types))
         except (msgspec.DecodeError, UnicodeDecodeError, ValueError, OverflowError) as wrong:
-            raise MovementError(f"{path} is not a transitions file: {wrong}") from None
+            raise FormatError(f"{path} is not a transitions file: {wrong}") from None
         return cls(file.types, counts)
 
     @property

@@ -17,8 +17,7 @@ from thenar.runtime.names import list_names, nearest
 from thenar.runtime.recipe import Recipe
 
 from ..recordings.graspset import GraspSet
-from ..samples import Columns, Samples
-from . import PlacementError
+from ..samples import Columns, Samples, TrainingError
 from .elements import Elements
 from .ports import PortCosts, record_times_us
 
@@ -39,7 +38,7 @@ class Limits:
     joints       names of the joints
     places       known positions of switches and taxels on the hand
 
-    Raises PlacementError for an unknown name, and for constraints that contradict each other.
+    Raises TrainingError for an unknown name, and for constraints that contradict each other.
     """
 
     names: tuple[str, ...]
@@ -56,19 +55,19 @@ class Limits:
     def __post_init__(self) -> None:
         for name in (*self.keep, *self.never):
             if name not in (every := (*self.names, *self.joints)):
-                raise PlacementError(f"there is no input {name!r} to keep or to leave out{nearest(name, every)}")
+                raise TrainingError(f"there is no input {name!r} to keep or to leave out{nearest(name, every)}")
         if self.apart_mm and (lost := [name for name in self.names if name not in self.places]):
-            raise PlacementError(
+            raise TrainingError(
                 f"``apart_mm``: the position of {list_names(lost)} is unknown: give ``layout`` your glove"
             )
         if both := [name for name in self.keep if name in self.never]:
-            raise PlacementError(
+            raise TrainingError(
                 f"``keep_these`` and ``never`` both name {list_names(both)}: take it out of one of them"
             )
         for at, name in enumerate(self.keep):
             for other in self.keep[:at] if self.apart_mm and name in self.names else ():
                 if other in self.names and self._apart(name, other) < self.apart_mm:
-                    raise PlacementError(
+                    raise TrainingError(
                         f"``keep_these`` {other},{name} are {self._apart(name, other):.1f} mm apart, ``apart_mm`` "
                         f"requires {self.apart_mm:g}: drop one of them, or allow less"
                     )
@@ -97,13 +96,13 @@ class Limits:
     def on(self, elements: Elements, ports: PortCosts | None) -> "Bound":
         """Return the constraints on these elements; `ports` holds the costs of reading them.
 
-        Raises PlacementError if they cannot be met.
+        Raises TrainingError if they cannot be met.
         """
         if self.budget_us is not None and ports is None and elements:
-            raise PlacementError("``budget_us`` needs the cost of reading the glove: name its ``glove``")
+            raise TrainingError("``budget_us`` needs the cost of reading the glove: name its ``glove``")
         own = [self.names[element.column] for element in elements]
         if lost := [name for name in self.keep if name in self.names and name not in own]:
-            raise PlacementError(f"``keep_these`` names {list_names(lost)}, and ``inputs`` leaves that out")
+            raise TrainingError(f"``keep_these`` names {list_names(lost)}, and ``inputs`` leaves that out")
         bound = Bound(
             self,
             groups=tuple(
@@ -120,18 +119,18 @@ class Limits:
     def on_joints(self, most: int | None) -> tuple[Columns, Columns, int]:
         """Return the joints to keep in any case, those not to keep, and how many to keep at most.
 
-        Raises PlacementError if more joints must be kept than `most`, or than the budget allows.
+        Raises TrainingError if more joints must be kept than `most`, or than the budget allows.
         """
         keep, never = (
             tuple(joint for joint, name in enumerate(self.joints) if name in asked) for asked in (self.keep, self.never)
         )
         if most is not None and len(keep) > most:
-            raise PlacementError(f"``keep_these`` names {len(keep)} joints, ``keep_joints`` allows {most}: name fewer")
+            raise TrainingError(f"``keep_these`` names {len(keep)} joints, ``keep_joints`` allows {most}: name fewer")
         fit = len(self.joints)
         if self.budget_us is not None and self.records_us:
             fit = sum(us <= self.budget_us for us in self.records_us)
         if len(keep) > fit:
-            raise PlacementError(
+            raise TrainingError(
                 f"``keep_these`` names {len(keep)} joints, whose record takes {self.records_us[len(keep) - 1]:.1f} us, "
                 f"``budget_us`` allows {self.budget_us:g}: name fewer, or allow more"
             )
@@ -187,22 +186,22 @@ class Bound:
         return [_ns(us) for us in self.ports.us] if self.ports is not None else []
 
     def check(self) -> None:
-        """Raise PlacementError if the elements that must be kept break a constraint."""
+        """Raise TrainingError if the elements that must be kept break a constraint."""
         limits, kept = self.limits, self.required(())
         if limits.taxels is not None and len(set(self.taxel[kept].tolist()) - {-1}) > limits.taxels:
-            raise PlacementError(
+            raise TrainingError(
                 f"``keep_these`` names more taxels than ``at_most`` {limits.taxels} taxels allows: name fewer, or "
                 "allow more"
             )
         if limits.budget_us is not None and self.ports is not None:
             taken = sum(self._times[port] for port in {self.ports.port_of[one] for one in kept})
             if taken > _ns(limits.budget_us):
-                raise PlacementError(
+                raise TrainingError(
                     f"``keep_these`` takes {taken / 1000:.1f} us to read, ``budget_us`` allows {limits.budget_us:g}: "
                     "name fewer, or allow more"
                 )
         if self.never.size and not kept and not self.addable(()).any():
-            raise PlacementError("``never`` and ``budget_us`` leave nothing to choose: allow more")
+            raise TrainingError("``never`` and ``budget_us`` leave nothing to choose: allow more")
 
     def required(self, order: Sequence[int]) -> list[int]:
         """Return one element of each group that must be kept, the first in `order`."""
@@ -213,9 +212,7 @@ class Bound:
         """Return at most `most` of `order`, required elements first, skipping each that would break a constraint."""
         kept = self.required(order)
         if len(kept) > most:
-            raise PlacementError(
-                f"``keep_these`` names {len(kept)}, ``keep`` allows {most:g}: name fewer, or keep more"
-            )
+            raise TrainingError(f"``keep_these`` names {len(kept)}, ``keep`` allows {most:g}: name fewer, or keep more")
         for column in order:
             if len(kept) < most and column not in kept and self.addable(kept)[column]:
                 kept.append(column)

@@ -12,7 +12,7 @@ from thenar.runtime.names import fault, shortened
 from thenar.runtime.nesting import check_json
 
 from ..pictures import on_paper, painting, rendered
-from . import PlacementError
+from ..samples import TrainingError
 from .placement import Placement
 from .tree import Node, Tree, edge_label, names_for, sizes_of
 
@@ -28,9 +28,9 @@ _WANTED = "name a build folder, a file of `thenar place -o`, or a text file with
 
 
 def draw_placement(placement: Placement, path: Path) -> None:
-    """Draw the tree of a placement by ID3 with `draw_tree`. Raises PlacementError for a placement without a tree."""
+    """Draw the tree of a placement by ID3 with `draw_tree`. Raises TrainingError for a placement without a tree."""
     if placement.tree is None:
-        raise PlacementError(f"a placement by {placement.method} has no tree to draw")
+        raise TrainingError(f"a placement by {placement.method} has no tree to draw")
     draw_tree(placement.tree, path, placement.all_names, placement.grasps)
 
 
@@ -85,22 +85,22 @@ def kept_names(path: Path) -> tuple[str, ...]:
     """Return the names of the kept switches, in the order in which they were chosen.
 
     path is a build's folder, a JSON file (a placement's document, or an array of names), or a text file with one name
-    per line. Raises PlacementError if it is none of these or names no switch, BuildError if it is a damaged build.
+    per line. Raises TrainingError if it is none of these or names no switch, BuildError if it is a damaged build.
     """
     names = tuple(kept.name for kept in load_manifest(path).switches) if path.is_dir() else _of_file(path)
     for name in names:
         if reason := fault(name):
-            raise PlacementError(f"{path}: switch {shortened(repr(name))} {reason}")
+            raise TrainingError(f"{path}: switch {shortened(repr(name))} {reason}")
     if not names:
-        raise PlacementError(f"{path} keeps no switches: there is nothing to draw")
+        raise TrainingError(f"{path} keeps no switches: there is nothing to draw")
     return names
 
 
 def _of_file(path: Path) -> tuple[str, ...]:
     try:
-        text = read_file(path, _LARGEST_LIST, PlacementError).decode()
+        text = read_file(path, _LARGEST_LIST, TrainingError).decode()
     except UnicodeDecodeError:
-        raise PlacementError(f"{path} is not a text file: {_WANTED}") from None
+        raise TrainingError(f"{path} is not a text file: {_WANTED}") from None
     if text.lstrip()[:1] not in ("{", "["):
         return tuple(filter(None, map(str.strip, text.splitlines())))
     try:
@@ -112,4 +112,4 @@ def _of_file(path: Path) -> tuple[str, ...]:
         return msgspec.convert(found, tuple[str, ...])
     except ValueError as reason:
         why = shortened(str(reason))
-        raise PlacementError(f"{path} is not a list of switches ({why}): {_WANTED}") from None
+        raise TrainingError(f"{path} is not a list of switches ({why}): {_WANTED}") from None

@@ -67,11 +67,11 @@ def taxel_levels(codes: NDArray[np.uint16], labels: NDArray[np.intp], n_classes:
     np.add.at(counts, (labels, place), 1)
     splits, found = [_split(counts, 0, len(values))], list[int]()
     while splits and len(found) < most:
-        best = splits.pop(first_of_most_gain(np.array([split.table for split in splits])))
-        if found and not gain_bits(best.table):
+        start, at, stop, table = splits.pop(first_of_most_gain(np.array([table for *_, table in splits])))
+        if found and not gain_bits(table):
             break
-        found.append((int(values[best.at - 1]) + int(values[best.at])) // 2)
-        parts = ((best.start, best.at), (best.at, best.stop))
+        found.append((int(values[at - 1]) + int(values[at])) // 2)
+        parts = ((start, at), (at, stop))
         splits = sorted([*splits, *(_split(counts, *part) for part in parts if part[1] - part[0] > 1)])
     return tuple(sorted(found))
 
@@ -96,24 +96,16 @@ def _fence(ascending: NDArray[np.int64]) -> int:
     return median + _QUARTILES * (median - low if low > ascending[0] else high - median)
 
 
-class _Split(NamedTuple):
-    """The best threshold of an interval: it splits the values `start` to `stop` - 1 before value `at`, with the
-    resulting counts `table` (K, 2).
+def _split(counts: Counts, start: int, stop: int) -> tuple[int, int, int, Counts]:
+    """Return `start`, the value before which the best threshold splits the values `start` to `stop` - 1, `stop`, and
+    the resulting counts (K, 2).
     """
-
-    start: int
-    stop: int
-    at: int
-    table: Counts
-
-
-def _split(counts: Counts, start: int, stop: int) -> _Split:
     inside = counts[:, start:stop]
     totals = inside.sum(axis=1)
     above = totals[:, np.newaxis] - np.cumsum(inside, axis=1)[:, :-1]
     places = np.arange(stop - start - 1)
     best = best_position(NodeCounts(totals, above, places), places) or 0
-    return _Split(start, stop, start + best + 1, np.column_stack([totals - above[:, best], above[:, best]]))
+    return start, start + best + 1, stop, np.column_stack([totals - above[:, best], above[:, best]])
 
 
 def bits_of(samples: Samples, elements: Elements) -> Samples:

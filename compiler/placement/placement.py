@@ -18,9 +18,8 @@ from ..elementary import LN_2
 from ..facts import SensorCount
 from ..model.faults import count_faults
 from ..recordings.graspset import GraspSet
-from ..samples import Columns, Samples, check_types
+from ..samples import Columns, Samples, TrainingError, check_types
 from ..trainers.logit import fit_logit
-from . import PlacementError
 from .constraints import Bound, Limits
 from .elements import Elements, bits_of, elements_of, names_of, ports_of
 from .gain import Cooccurrence, entropy_bits
@@ -86,9 +85,9 @@ def select(
 
     Raises
     ------
-    MemberError
+    SettingError
         If there is no such method.
-    PlacementError
+    TrainingError
         If it cannot choose.
     """
     elements = elements_of(samples, recipe.levels)
@@ -117,7 +116,7 @@ def choose(
     Return their columns in the method's order, and their gains in bits: in the tree of the paper's ID3, which is
     returned too, or each column's alone for another method.
     `ports` are the costs for methods that use them, `limits` hold for all methods; `robust` looks for the placement
-    that loses least with its worst lost switch. Raises MemberError for an unknown method, PlacementError if it cannot
+    that loses least with its worst lost switch. Raises SettingError for an unknown method, TrainingError if it cannot
     choose.
     """
     tree, columns = None, Columns()
@@ -209,7 +208,7 @@ def information_alone(samples: Samples, columns: Columns) -> tuple[float, ...]:
 def kept_joints(samples: Samples, most: int | None, limits: Limits | None = None) -> Columns:
     """Return at most `most` joints to keep, ascending, given the switches of these rows; None: all that `limits` allow.
 
-    Raises PlacementError if the limits require more joints.
+    Raises TrainingError if the limits require more joints.
     """
     every: Columns = tuple(range(samples.codes.shape[1]))
     if not every:
@@ -355,9 +354,9 @@ def place(
 
     Raises
     ------
-    MemberError
+    SettingError
         If there is no such method.
-    PlacementError
+    TrainingError
         If the set has no switches, no rows, or more grasp types than a build can hold, or if the method lacks the
         number that it takes.
 
@@ -412,12 +411,12 @@ def _samples_of(grasp_set: GraspSet, recipe: Recipe) -> Samples:
     """Return the rows of a set to choose from, with the recipe's inputs."""
     if not grasp_set.element_names or recipe.inputs == "joints":
         why = "``inputs`` are the joints" if grasp_set.element_names else "the set holds joints only"
-        raise PlacementError(f"there are no switches to place: {why}")
+        raise TrainingError(f"there are no switches to place: {why}")
     if not len(grasp_set):
-        raise PlacementError("there are no rows: a placement needs at least one labelled grasp")
+        raise TrainingError("there are no rows: a placement needs at least one labelled grasp")
     if recipe.keep_joints is not None and (not grasp_set.joints or recipe.inputs == "switches"):
-        raise PlacementError("there are no joints to choose from: leave ``keep_joints`` out")
-    check_types(len(np.unique(grasp_set.labels)), PlacementError)
+        raise TrainingError("there are no joints to choose from: leave ``keep_joints`` out")
+    check_types(len(np.unique(grasp_set.labels)), TrainingError)
     return Samples.of(grasp_set, recipe.inputs)
 
 

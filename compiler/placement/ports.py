@@ -15,7 +15,7 @@ from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import glove_us
 
-from . import PlacementError
+from ..samples import TrainingError
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class PortCosts:
     port_of  (s,) the port of every switch, an index of `us`
     us       (ports,) microseconds, >= 0
 
-    Raises PlacementError if a switch is on an unknown port, or a time is negative or not finite.
+    Raises TrainingError if a switch is on an unknown port, or a time is negative or not finite.
     """
 
     port_of: tuple[int, ...]
@@ -33,9 +33,9 @@ class PortCosts:
 
     def __post_init__(self) -> None:
         if any(not 0 <= port < len(self.us) for port in self.port_of):
-            raise PlacementError(f"every switch must be on one of the {len(self.us)} ports with a given time")
+            raise TrainingError(f"every switch must be on one of the {len(self.us)} ports with a given time")
         if any(not 0 <= us < float("inf") for us in self.us):
-            raise PlacementError("the time that reading a port takes must be finite and at least 0 us")
+            raise TrainingError("the time that reading a port takes must be finite and at least 0 us")
 
     def shares(self, kept: Iterable[int]) -> NDArray[np.float64]:
         """Return each kept switch's share of its port's time, split evenly among the port's kept switches, as a

@@ -66,7 +66,7 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
     Raises
     ------
     ValueError
-        In `fit`, if X or y cannot be used; a MemberError for an unknown method, a PlacementError if it cannot choose
+        In `fit`, if X or y cannot be used; a SettingError for an unknown method, a TrainingError if it cannot choose
         here, or if a number is out of its range.
 
     References

@@ -13,8 +13,8 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..samples import TrainingError
 from ..text import counted
-from . import PlacementError
 from .gain import CellCounter, Counts, NodeCounts, best_position, gain_bits
 
 Label = bool | int | float | str
@@ -136,7 +136,7 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
         """Return the label (n,) of each row of X (n, n_inputs); an unseen value gets the node's majority."""
         matrix = check_matrix(X)
         if matrix.shape[1] != self.n_inputs:
-            raise PlacementError(f"X has {matrix.shape[1]} inputs, the tree was grown on {self.n_inputs}")
+            raise TrainingError(f"X has {matrix.shape[1]} inputs, the tree was grown on {self.n_inputs}")
         labels = np.zeros(len(matrix), dtype=np.intp)
         rows_of = {0: np.arange(len(matrix))}
         for number, node in enumerate(self.nodes):
@@ -154,7 +154,7 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
     def text(self, names: Sequence[str] = (), class_names: Sequence[str] = ()) -> str:
         """Return the tree as text, one line per node; names default to x0, x1 ... and `classes`.
 
-        Raises PlacementError if there are names, but not one for each.
+        Raises TrainingError if there are names, but not one for each.
         """
         names, class_names = names_for(self, names, class_names)
         lines = []
@@ -201,7 +201,7 @@ def grow_id3(X: ArrayLike, y: ArrayLike, min_samples: int = 0) -> Tree:
 
     Raises
     ------
-    PlacementError
+    TrainingError
         If X or y are not such data; the message names row and column.
 
     Examples
@@ -211,7 +211,7 @@ def grow_id3(X: ArrayLike, y: ArrayLike, min_samples: int = 0) -> Tree:
     (0,)
     """
     if min_samples < 0:
-        raise PlacementError(f"min_samples is {min_samples}, a number of rows >= 0 is needed")
+        raise TrainingError(f"min_samples is {min_samples}, a number of rows >= 0 is needed")
     matrix = check_matrix(X)
     classes, labels = check_labels(y, len(matrix))
     nodes = _nodes(CellCounter(matrix, labels, len(classes)), np.bincount(labels), min_samples)
@@ -278,7 +278,7 @@ def names_for(tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> t
     names = names or [f"x{number}" for number in range(tree.n_inputs)]
     class_names = class_names or [str(label) for label in tree.classes]
     if len(names) != tree.n_inputs or len(class_names) != len(tree.classes):
-        raise PlacementError(
+        raise TrainingError(
             f"{len(names)} input and {len(class_names)} class names were given, "
             f"the tree has {tree.n_inputs} inputs and {len(tree.classes)} classes"
         )
@@ -300,13 +300,13 @@ _WHOLE = "not a whole number >= 0"
 def check_matrix(X: ArrayLike) -> NDArray[Any]:
     """Return X (n, d) as an array of bool or int, all values >= 0; floats with integer values become ints.
 
-    Raises PlacementError that names row and column of the first other entry.
+    Raises TrainingError that names row and column of the first other entry.
     """
     matrix = np.asarray(X)
     if matrix.ndim != 2:
-        raise PlacementError(f"X has {matrix.ndim} dimensions, (rows, inputs) are needed")
+        raise TrainingError(f"X has {matrix.ndim} dimensions, (rows, inputs) are needed")
     if matrix.dtype.kind not in "biuf":
-        raise PlacementError(f"X holds {matrix.dtype}, bits or non-negative whole numbers are needed")
+        raise TrainingError(f"X holds {matrix.dtype}, bits or non-negative whole numbers are needed")
     if matrix.dtype.kind == "f":
         # Comparisons with NaN are false, so this finds NaN as well.
         _refuse(~((matrix >= 0) & (matrix < 2**62) & (matrix == np.floor(matrix))), matrix, _WHOLE)
@@ -319,11 +319,11 @@ def check_matrix(X: ArrayLike) -> NDArray[Any]:
 def _refuse(bad: NDArray[np.bool_], matrix: NDArray[Any], why: str) -> None:
     if bad.any():
         row, column = (int(index) for index in np.argwhere(bad)[0])
-        raise PlacementError(f"X holds {matrix[row, column]} in row {row}, column {column}: {why}")
+        raise TrainingError(f"X holds {matrix[row, column]} in row {row}, column {column}: {why}")
 
 
 def check_bits(X: ArrayLike) -> NDArray[np.bool_]:
-    """Return X (n, d) as bool; raise PlacementError that names the first entry that is neither 0 nor 1."""
+    """Return X (n, d) as bool; raise TrainingError that names the first entry that is neither 0 nor 1."""
     matrix = check_matrix(X)
     if matrix.size and matrix.dtype != np.bool_ and matrix.max() > 1:
         _refuse(matrix > 1, matrix, "neither 0 nor 1")
@@ -333,22 +333,22 @@ def check_bits(X: ArrayLike) -> NDArray[np.bool_]:
 def check_labels(y: ArrayLike, n_rows: int) -> tuple[NDArray[Any], NDArray[np.intp]]:
     """Return the sorted classes (K,) of y and the class number of each row (n,).
 
-    Raises PlacementError if y is empty, does not have one label for each row, holds NaN or infinity, or cannot be
+    Raises TrainingError if y is empty, does not have one label for each row, holds NaN or infinity, or cannot be
     sorted.
     """
     labels = np.asarray(y)
     if labels.shape != (n_rows,):
-        raise PlacementError(f"y has shape {labels.shape}, one label for each of the {n_rows} rows of X is needed")
+        raise TrainingError(f"y has shape {labels.shape}, one label for each of the {n_rows} rows of X is needed")
     if not n_rows:
-        raise PlacementError("there are no rows: a placement needs at least one labelled grasp")
+        raise TrainingError("there are no rows: a placement needs at least one labelled grasp")
     strange = ~np.isfinite(labels) if labels.dtype.kind == "f" else np.zeros(n_rows, np.bool_)
     if labels.dtype.kind == "O":
         strange = np.array([isinstance(label, float) and not math.isfinite(label) for label in labels.tolist()])
     if strange.any():
         row = int(strange.argmax())
-        raise PlacementError(f"y is {labels[row]} in row {row}: every row needs a label")
+        raise TrainingError(f"y is {labels[row]} in row {row}: every row needs a label")
     try:
         classes, numbers = np.unique(labels, return_inverse=True)
     except TypeError as mixed:
-        raise PlacementError(f"the labels in y cannot be sorted ({mixed}): use text or numbers, not both") from None
+        raise TrainingError(f"the labels in y cannot be sorted ({mixed}): use text or numbers, not both") from None
     return classes, numbers

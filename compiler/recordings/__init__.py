@@ -14,15 +14,11 @@ from thenar.runtime.names import SHOWN, fault, list_names, shortened
 
 
 class RecordingError(ThenarError, ValueError):
-    """A set of grasps is inconsistent, or a label is not in its taxonomy."""
+    """A set of grasps is inconsistent, has a label that is not in its taxonomy, or lacks movements where they count."""
 
 
 class TableError(ThenarError, ValueError):
-    """A table cannot be read, or holds something that its columns.toml does not allow."""
-
-
-class ColumnsError(ThenarError, ValueError):
-    """A columns.toml cannot be read, or does not fit its table."""
+    """A table or its columns.toml cannot be read, or one does not fit the other."""
 
 
 LARGEST = 1_000_000_000  # bytes of a table, also when it is unpacked

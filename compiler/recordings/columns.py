@@ -7,7 +7,6 @@ import re
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from fnmatch import translate
 from itertools import islice
 from pathlib import Path
@@ -22,7 +21,7 @@ from thenar.runtime.names import LONGEST_NAME, nearest, shortened
 from thenar.runtime.toml_source import read_source
 from thenar.runtime.toml_struct import convert
 
-from . import ColumnsError
+from . import TableError
 from .cells import TimeUnit
 from .graspset import CODES, LARGEST_VALUE
 
@@ -206,21 +205,15 @@ def _is_encoding(name: str) -> bool:
         return False
 
 
-@dataclass(frozen=True, slots=True)
-class Selection:
-    """The inputs in one table, by name, with the entries that say how to read them.
-
-    switches  the switches, without an entry, then the taxels with a threshold
-    coded     the columns that become codes: the joints, then the analog taxels
-    """
-
-    switches: tuple[tuple[str, TaxelColumns | None], ...]
-    coded: tuple[tuple[str, JointColumns], ...]
+# Inputs of a table, by name, with the entries that say how to read them: the switches, without an entry, and the taxels
+# with a threshold; and the columns that become codes, the joints and the analog taxels.
+SwitchInputs = tuple[tuple[str, TaxelColumns | None], ...]
+CodedInputs = tuple[tuple[str, JointColumns], ...]
 
 
 def read_columns(path: Path) -> ColumnRoles:
-    """Read a columns.toml; raises ColumnsError with file, line and key."""
-    source = read_source(path, ColumnsError)
+    """Read a columns.toml; raises TableError with file, line and key."""
+    source = read_source(path, TableError)
     return convert(source, (), source.tables(), ColumnRoles)
 
 
@@ -228,16 +221,16 @@ def read_columns(path: Path) -> ColumnRoles:
 KEYS = ("label", "subject", "object", "session", "trial", "time")
 
 
-def select(columns: ColumnRoles, names: Sequence[str]) -> Selection:
-    """Find the columns that `columns` refers to among a table's `names`.
+def select(columns: ColumnRoles, names: Sequence[str]) -> tuple[SwitchInputs, CodedInputs]:
+    """Find the inputs that `columns` refers to among a table's `names`.
 
-    Raises ColumnsError if a column is missing or used twice, a glob matches nothing, or there are no inputs.
+    Raises TableError if a column is missing or used twice, a glob matches nothing, or there are no inputs.
     """
     there = set(names)
     for key in KEYS:
         for column in columns.parts(key):
             if column not in there:
-                raise ColumnsError(f"{key}: the table has no column {shortened(repr(column))}{nearest(column, names)}")
+                raise TableError(f"{key}: the table has no column {shortened(repr(column))}{nearest(column, names)}")
     lists: list[tuple[str, JointColumns | None, tuple[str, ...]]] = [
         ("switches", None, columns.switches),
         *(("taxels", entry, entry.columns) for entry in columns.taxels),
@@ -254,29 +247,25 @@ def select(columns: ColumnRoles, names: Sequence[str]) -> Selection:
     found = list(islice(matched, len(names) + 1))
     used = Counter([*(name for key in KEYS for name in columns.parts(key)), *(name for name, _ in found)])
     if twice := [name for name, times in used.items() if times > 1]:
-        raise ColumnsError(f"column {twice[0]!r} is used {used[twice[0]]} times: name it once, or narrow the globs")
+        raise TableError(f"column {twice[0]!r} is used {used[twice[0]]} times: name it once, or narrow the globs")
     if not found:
-        raise ColumnsError("no column is an input: name some under `switches`, `[[taxels]]` or `[[joints]]`")
+        raise TableError("no column is an input: name some under `switches`, `[[taxels]]` or `[[joints]]`")
     taxels = [(name, entry) for name, entry in found if isinstance(entry, TaxelColumns)]
     joints = [(name, entry) for name, entry in found if entry is not None and not isinstance(entry, TaxelColumns)]
-    return Selection(
-        switches=(
-            *((name, None) for name, entry in found if entry is None),
-            *((name, entry) for name, entry in taxels if entry.threshold != "learnt"),
-        ),
-        coded=(*joints, *((name, entry) for name, entry in taxels if entry.threshold == "learnt")),
+    switches: SwitchInputs = (
+        *((name, None) for name, entry in found if entry is None),
+        *((name, entry) for name, entry in taxels if entry.threshold != "learnt"),
     )
+    return switches, (*joints, *((name, entry) for name, entry in taxels if entry.threshold == "learnt"))
 
 
 def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
-    """Raise ColumnsError if there are too many globs, or too long ones, to match in reasonable time."""
+    """Raise TableError if there are too many globs, or too long ones, to match in reasonable time."""
     longest = max(globs, key=len, default="")
     if len(longest) > LONGEST_GLOB:
-        raise ColumnsError(f"the glob {shortened(repr(longest))} has more than {LONGEST_GLOB} characters: shorten it")
+        raise TableError(f"the glob {shortened(repr(longest))} has more than {LONGEST_GLOB} characters: shorten it")
     if sum(map(_is_wild, globs)) * len(names) > COMPARISONS:
-        raise ColumnsError(
-            f"{len(globs)} globs are too many for {len(names)} columns: name columns, or use fewer globs"
-        )
+        raise TableError(f"{len(globs)} globs are too many for {len(names)} columns: name columns, or use fewer globs")
 
 
 def _matches(what: str, pattern: str, names: Sequence[str], there: set[str]) -> list[str]:
@@ -287,7 +276,7 @@ def _matches(what: str, pattern: str, names: Sequence[str], there: set[str]) -> 
     if not found:
         advice = f"; for the column of that name write {shortened(repr(glob.escape(pattern)), LONGEST_GLOB)}"
         advice = advice if pattern in there else nearest(pattern, names)
-        raise ColumnsError(f"{what}: {shortened(repr(pattern))} matches no column of the table{advice}")
+        raise TableError(f"{what}: {shortened(repr(pattern))} matches no column of the table{advice}")
     return found
 
 

@@ -23,7 +23,7 @@ from thenar.runtime.toml_struct import convert
 
 from ..pictures import painting, rendered
 from ..text import cell, cells
-from . import ColumnsError, RecordingError, TableError, check_names
+from . import RecordingError, TableError, check_names
 from .cells import Column, unlisted
 from .columns import KEYS, CalibrationPoints, ColumnRoles, JointColumns, TaxelColumns, read_columns
 from .graspset import GraspSet, Joint
@@ -255,7 +255,7 @@ def from_dataframe(frame: "pd.DataFrame", columns: ColumnRoles | str | Path | No
 
     Raises
     ------
-    TableError, ColumnsError, RecordingError
+    TableError, RecordingError
         As for an import of the same table; the message names rows, as counted by `iloc`, and columns.
 
     Examples
@@ -272,7 +272,7 @@ def from_dataframe(frame: "pd.DataFrame", columns: ColumnRoles | str | Path | No
         proposal = propose(table)
         if proposal.lacks:
             advice = "say so in `columns`: a ColumnRoles, or the path of a columns.toml"
-            raise ColumnsError(f"{_WHAT}: {proposal.lacks}; {advice}")
+            raise TableError(f"{_WHAT}: {proposal.lacks}; {advice}")
         roles = proposal.columns
     grasp_set, report = import_table(table, roles or read_columns(Path(columns)))  # type: ignore[arg-type]
     for finding in report.warnings:
@@ -286,7 +286,7 @@ def _said(frame: "pd.DataFrame") -> ColumnRoles | None:
     text = frame.attrs.get(COLUMNS_TOML)
     if not isinstance(text, str):
         return None
-    source = TomlText(f"attrs[{COLUMNS_TOML!r}] of {_WHAT}", text, ColumnsError)
+    source = TomlText(f"attrs[{COLUMNS_TOML!r}] of {_WHAT}", text, TableError)
     return convert(source, (), source.tables(), ColumnRoles)
 
 

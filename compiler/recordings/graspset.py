@@ -20,7 +20,7 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thenar.runtime.errors import SealError
+from thenar.runtime.errors import FormatError
 from thenar.runtime.files import read_file, write_atomically
 from thenar.runtime.names import LONGEST_NAME, fault, shortened
 from thenar.runtime.nesting import check_json
@@ -349,15 +349,15 @@ class GraspSet:
 
     @staticmethod
     def load(path: str | Path) -> "GraspSet":
-        """Read a `.grasps` file; raises SealError with the reason if it is foreign, truncated, altered, newer or
+        """Read a `.grasps` file; raises FormatError with the reason if it is foreign, truncated, altered, newer or
         invalid.
         """
         name = Path(path).name
-        _, payload = unseal(read_file(Path(path), LARGEST, SealError), KIND, VERSION, name)
+        _, payload = unseal(read_file(Path(path), LARGEST, FormatError), KIND, VERSION, name)
         try:
             return _unpack(len(payload), *unpack(payload, name))
         except (RecordingError, msgspec.DecodeError, ValueError) as reason:
-            raise SealError(f"{name} is inconsistent: {reason}") from reason
+            raise FormatError(f"{name} is inconsistent: {reason}") from reason
 
     def save(self, path: str | Path) -> None:
         """Write a `.grasps` file, completely or not at all; the same set gives the same bytes."""

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from thenar.runtime.names import list_names, nearest, shortened
 from thenar.runtime.published import NONE
+from thenar.runtime.recording.reader import Oddity
 
 from ..arrays import groups
-from . import TYPES, ColumnsError, RecordingError, TableError, check_names, check_room, list_rows
+from . import TYPES, RecordingError, TableError, check_names, check_room, list_rows
 from .columns import ColumnRoles, JointColumns, TaxelColumns, read_columns, select, sound_grid
 from .graspset import CODES, GraspSet, Joint
 from .inputs import WORDS, Course, possible_clocks, words_of
 from .readings import Readings, nothing_held, read_cells
-from .summary import Oddity, check_trials, find_oddities, looks_like_frames
+from .summary import check_trials, find_oddities, looks_like_frames
 from .table import Table, read_table
 from .taxonomy import Taxonomy, own, plain, published
 from .trial_files import Report, find_files, is_pattern, read_files
@@ -69,7 +70,7 @@ def import_file(
 ) -> tuple[GraspSet, ImportReport]:
     """Import the table in file `table`, or the files that it matches as a pattern, with the columns.toml `columns`.
 
-    Raises TableError, ColumnsError or RecordingError naming file, rows and columns, and OSError.
+    Raises TableError or RecordingError naming file, rows and columns, and OSError.
     """
     wanted = read_columns(columns)
     if not is_pattern(table):
@@ -78,26 +79,25 @@ def import_file(
 
 
 def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportReport]:
-    """Import `table` with `columns`; raises TableError, ColumnsError or RecordingError."""
+    """Import `table` with `columns`; raises TableError or RecordingError."""
     table = _renamed(table, columns.rename)
-    selection = select(columns, list(table.columns))
-    readings, times_us, warnings, notes = read_cells(table, columns, selection)
+    switches, coded = select(columns, list(table.columns))
+    readings, times_us, warnings, notes = read_cells(table, columns, switches, coded)
     table = replace(table, columns={})  # its cells were read: their memory is needed
     grasps, taxonomy, aliases = _labels(table, columns, readings)
-    coded = [
-        code_joint(name, entry, readings.joints[:, column], readings.rows)
-        for column, (name, entry) in enumerate(selection.coded)
+    made = [
+        code_joint(name, entry, readings.joints[:, column], readings.rows) for column, (name, entry) in enumerate(coded)
     ]
-    costs = tuple(cost for _, _, cost in coded)
-    count = sum(not isinstance(entry, TaxelColumns) for _, entry in selection.coded)
-    joints, taxels = coded[:count], coded[count:]
+    costs = tuple(cost for _, _, cost in made)
+    count = sum(not isinstance(entry, TaxelColumns) for _, entry in coded)
+    joints, taxels = made[:count], made[count:]
     empty = np.zeros((len(grasps), 0), np.uint16)
     # Read-only, so that the set uses them without copies.
     for name in readings.__slots__:
         getattr(readings, name).setflags(write=False)
     grasp_set = GraspSet(
         switches=readings.switches,
-        switch_names=tuple(name for name, _ in selection.switches),
+        switch_names=tuple(name for name, _ in switches),
         codes=np.stack([codes for codes, _, _ in joints], axis=1) if joints else empty,
         joints=tuple(joint for _, joint, _ in joints),
         taxels=np.stack([codes for codes, _, _ in taxels], axis=1) if taxels else empty,
@@ -115,13 +115,11 @@ def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportRe
     grasp_set, alike = _trials_by_name(grasp_set, columns)
     warnings += [
         *alike,
-        *check_trials(grasp_set, ColumnsError),
+        *check_trials(grasp_set, TableError),
         *aliases,
         *coarse(zip(costs, readings.joints.T, strict=True)),
         *find_oddities(grasp_set, readings.rows),
-        *possible_clocks(
-            zip((name for name, _ in selection.coded), readings.joints.T, strict=True), _course(readings, columns)
-        ),
+        *possible_clocks(zip((name for name, _ in coded), readings.joints.T, strict=True), _course(readings, columns)),
     ]
     if taxels:
         notes.append(
@@ -148,11 +146,11 @@ def _trials_by_name(grasp_set: GraspSet, columns: ColumnRoles) -> tuple[GraspSet
 
 
 def _renamed(table: Table, rename: dict[str, str]) -> Table:
-    """Return `table` with other names for some columns. Raises ColumnsError, or RecordingError for a name twice."""
+    """Return `table` with other names for some columns. Raises TableError, or RecordingError for a name twice."""
     names = list(table.columns)
     for name in rename:
         if name not in table.columns:
-            raise ColumnsError(f"rename: the table has no column {shortened(repr(name))}{nearest(name, names)}")
+            raise TableError(f"rename: the table has no column {shortened(repr(name))}{nearest(name, names)}")
     names = list((dict(zip(names, names, strict=True)) | rename).values())
     check_names("rename: column", names)
     return replace(table, columns=dict(zip(names, table.columns.values(), strict=True)))
@@ -254,7 +252,7 @@ def _taxonomy(columns: ColumnRoles, labels: list[str]) -> Taxonomy:
             return Taxonomy(name, types)
         return own(sorted(set(labels))) if columns.taxonomy == "own" else published(columns.taxonomy)
     except RecordingError as reason:
-        raise ColumnsError(f"taxonomy: {reason}") from reason
+        raise TableError(f"taxonomy: {reason}") from reason
 
 
 # The second point of a grid's straight line: so far out that its step equals the grid within a bit or two.

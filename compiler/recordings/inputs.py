@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.names import list_names
+from thenar.runtime.recording.reader import Oddity
 
 from .cells import UNITS, bits, names, numbers, times
 from .columns import sound_grid, stem_of
 from .graspset import CODES
-from .summary import Oddity
 from .table import Table
 
 Values = NDArray[np.float64]

@@ -26,15 +26,15 @@ from thenar.runtime.names import SHOWN, shortened
 from thenar.runtime.published import NONE
 from thenar.runtime.recording.guide import FRESH_US
 from thenar.runtime.recording.layout import switch_matrix
-from thenar.runtime.recording.reader import Reader, check_made
+from thenar.runtime.recording.reader import Oddity, Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.taxels import TaxelLine, Taxels
 
-from . import ColumnsError, TableError, list_rows
+from . import TableError, list_rows
 from .columns import CalibrationPoints, JointColumns
 from .graspset import CODES, GraspSet, Joint
 from .importer import CodingCost, ImportReport, code_joint, import_file, report_of
-from .summary import Oddity, find_oddities
+from .summary import find_oddities
 from .taxonomy import Taxonomy
 from .trial_files import Report
 
@@ -92,32 +92,30 @@ def import_files(
     """Import one table with the columns.toml in file `columns`, or self-describing recordings.
 
     A path with fields in braces, such as data/{label}_{trial}.csv, is a table in many files; `progress` takes how many
-    of how many were read. Recordings are imported as a `stream` or trial by trial. Raises TableError, ColumnsError,
-    RecordingError or McapError naming file, rows and columns, and OSError.
+    of how many were read. Recordings are imported as a `stream` or trial by trial. Raises TableError, RecordingError or
+    FormatError naming file, rows and columns, and OSError.
     """
     if all(path.suffix.lower() == ".mcap" for path in paths):
         if columns is not None:
-            raise ColumnsError(f"a recording describes its own columns: leave {columns.name} out")
+            raise TableError(f"a recording describes its own columns: leave {columns.name} out")
         return import_recordings(paths, stream)
     if stream:
-        raise ColumnsError(
-            "each row of a table is imported as it is: ``stream`` is for recordings (.mcap), leave it out"
-        )
+        raise TableError("each row of a table is imported as it is: ``stream`` is for recordings (.mcap), leave it out")
     if len(paths) > 1:
         raise TableError(
             "several recordings (.mcap) can be imported together, but only one table: of tables with one trial each, "
             "name the pattern of their paths, such as 'data/{label}_{trial}.csv'"
         )
     if columns is None:
-        raise ColumnsError(f"{paths[0].name}: name the columns.toml that says what its columns are")
+        raise TableError(f"{paths[0].name}: name the columns.toml that says what its columns are")
     return import_file(paths[0], columns, progress)
 
 
 def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[GraspSet, ImportReport]:
     """Import the accepted trials of recordings of one glove and one taxonomy; subjects may differ.
 
-    As a `stream` they have a row every 10 ms, and every restart is a separate session. Raises McapError, TableError or
-    RecordingError naming the file, and OSError.
+    As a `stream` they have a row every 10 ms, and every restart is a separate session. Raises FormatError, TableError
+    or RecordingError naming the file, and OSError.
     """
     parts: list[_Part] = []
     findings: list[Oddity] = []
@@ -125,7 +123,7 @@ def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[Gras
     for path in paths:
         reader = Reader(path)
         parts += _parts(reader, stream)
-        findings += [Oddity(fault.kind, fault.count, fault.message) for fault in reader.faults()]
+        findings += reader.faults()
         size += reader.end.size if reader.end is not None else 0
     what = ", ".join(path.name for path in paths)
     _check_alike(parts)

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from thenar.runtime.names import SHOWN, list_names, shortened
 from thenar.runtime.published import NONE
+from thenar.runtime.recording.reader import Oddity
 
 from ..arrays import groups, otsu
-from . import ColumnsError, RecordingError, TableError, check_room, list_rows
+from . import RecordingError, TableError, check_room, list_rows
 from .cells import Parsed, Value, bits, codes, integers, names, natural_key, numbers, times, unit_of_time
-from .columns import KEYS, ColumnRoles, Selection
-from .summary import Oddity
+from .columns import KEYS, CodedInputs, ColumnRoles, SwitchInputs
 from .table import Table
 from .taxonomy import plain
 
@@ -50,7 +50,7 @@ class Readings:
 
 
 def read_cells(
-    table: Table, columns: ColumnRoles, selection: Selection
+    table: Table, columns: ColumnRoles, switches: SwitchInputs, coded: CodedInputs
 ) -> tuple[Readings, NDArray[np.int64], list[Oddity], list[str]]:
     """Return the content of `table`, its times in microseconds (none if unknown), oddities, and notes on conversions.
 
@@ -68,8 +68,8 @@ def read_cells(
         sessions=reader.names(columns.parts("session")),
         trials=reader.trials(columns.parts("trial"), notes),
         time=reader.time(columns.time),
-        switches=reader.switches(selection, notes),
-        joints=reader.joints(selection),
+        switches=reader.switches(switches, notes),
+        joints=reader.joints(coded),
     )
     none = nothing_held(columns, labels)
     reader.fill_from_next_grasp(readings, none, columns)
@@ -86,7 +86,7 @@ def read_cells(
     independent = columns.frames == "independent"
     trial_ids = np.arange(len(readings.rows)) if independent else readings.trial_ids()
     if untold and (shared := int((np.bincount(trial_ids)[trial_ids] > 1).sum())):
-        raise ColumnsError(
+        raise TableError(
             f"{table.what}: {shared} rows share subject, grasp type, object and session with others, and nothing says "
             "which of them are frames of one trial: name the column that does (`trial = ...`, or a list of them), or "
             'state that each row is a separate trial (`frames = "independent"`)'
@@ -95,7 +95,7 @@ def read_cells(
         order = in_time(trial_ids, readings.time)
         readings = readings.kept(order)
         missing = {name: mask[order] for name, mask in missing.items()}
-    warnings += _filled(table, readings, selection, missing, trial_ids)
+    warnings += _filled(table, readings, [name for name, _ in (*switches, *coded)], missing, trial_ids)
     micros = _micros(table, columns, readings.time, notes)
     readings = _reduced(readings, columns.reduce, trial_ids, notes)
     times_us = np.rint(readings.time * micros).astype(np.int64) if micros else np.empty(0, np.int64)
@@ -162,12 +162,11 @@ def _kept(values: NDArray[Value], keep: NDArray[np.bool_] | NDArray[np.intp]) ->
 def _filled(
     table: Table,
     readings: Readings,
-    selection: Selection,
+    inputs: Sequence[str],
     missing: dict[str, NDArray[np.bool_]],
     trial_ids: NDArray[np.intp],
 ) -> list[Oddity]:
-    """Fill the cells of inputs that are `missing`, in place, and return a finding about them."""
-    inputs = [name for name, _ in (*selection.switches, *selection.coded)]
+    """Fill the cells of `inputs` that are `missing`, in place, and return a finding about them."""
     values = dict(zip(inputs, (*readings.switches.T, *readings.joints.T), strict=True))
     missing = {name: mask for name, mask in missing.items() if name in values and mask.any()}
     if not missing:
@@ -231,11 +230,11 @@ class _Reader:
             self.wrong.setdefault(expected, {})[name] = parsed.wrong
         return parsed.values
 
-    def switches(self, selection: Selection, notes: list[str]) -> NDArray[np.bool_]:
+    def switches(self, inputs: SwitchInputs, notes: list[str]) -> NDArray[np.bool_]:
         """Return the switches, with those made by thresholds last."""
-        switches = np.empty((len(self.table.rows), len(selection.switches)), np.bool_, order="F")
+        switches = np.empty((len(self.table.rows), len(inputs)), np.bool_, order="F")
         shown = []
-        for number, (name, taxel) in enumerate(selection.switches):
+        for number, (name, taxel) in enumerate(inputs):
             if taxel is None:
                 switches[:, number] = self._read(name, bits, "0 or 1")
                 continue
@@ -247,10 +246,10 @@ class _Reader:
             notes.append(f"{len(shown)} analog columns became switches, closed {list_names(shown)}")
         return switches
 
-    def joints(self, selection: Selection) -> NDArray[np.float64]:
+    def joints(self, inputs: CodedInputs) -> NDArray[np.float64]:
         """Return the columns that become codes: the joints, then the analog taxels."""
-        joints = np.empty((len(self.table.rows), len(selection.coded)), order="F")
-        for number, (name, entry) in enumerate(selection.coded):
+        joints = np.empty((len(self.table.rows), len(inputs)), order="F")
+        for number, (name, entry) in enumerate(inputs):
             parse, expected = (codes, "codes 0..65535") if entry.is_counts else (numbers, "finite numbers")
             joints[:, number] = self._read(name, parse, expected)
         return joints

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.names import SHOWN, list_names
+from thenar.runtime.recording.reader import Oddity
 
 from ..arrays import groups, otsu
 from . import list_rows
@@ -28,16 +29,6 @@ def contacts(grasp_set: GraspSet) -> NDArray[np.bool_]:
         same = np.column_stack([values[place] for place in own])
         pressed[:, own] = same > otsu(same.ravel())
     return np.hstack([grasp_set.switches, pressed])
-
-
-class Oddity(msgspec.Struct, frozen=True):
-    """One kind of oddity: its count, the first rows as the user counts them, the columns, and a sentence."""
-
-    kind: str
-    count: int
-    message: str
-    rows: tuple[int, ...] = ()
-    columns: tuple[str, ...] = ()
 
 
 def find_oddities(grasp_set: GraspSet, rows: NDArray[np.int64]) -> tuple[Oddity, ...]:

@@ -22,7 +22,7 @@ from thenar.runtime.published import NONE
 from thenar.runtime.recording.session import CollectionTask
 from thenar.runtime.toml_source import TomlText, read_source
 
-from . import ColumnsError, RecordingError, check_names
+from . import RecordingError, TableError, check_names
 
 # Kamakura et al. 1980, Patterns of static prehension in normal hands, Am. J. Occup. Ther. 34(7):437-445, with the usual
 # abbreviations.
@@ -186,7 +186,7 @@ def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[
     """Return the taxonomy of this name and the tasks to collect: those that `objects` lists, or every type.
 
     With `none`, movements of the empty hand are included. "own" is the user's own taxonomy: the types that `objects`
-    lists, in its order. Raises RecordingError, or ColumnsError naming file, line and key.
+    lists, in its order. Raises RecordingError, or TableError naming file, line and key.
     """
     if objects is None:
         types = published(taxonomy)
@@ -194,12 +194,12 @@ def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[
             *(CollectionTask(grasp, (ANY,)) for grasp in types.types),
             *(CollectionTask(NONE, tuple(MOVEMENTS)),) * none,
         )
-    source = read_source(objects, ColumnsError)
+    source = read_source(objects, TableError)
     tables = source.tables()
     listed = [key for key in tables if plain(key) == NONE]
     movements = _objects(source, listed[0], tables.pop(listed[0])) if listed else tuple(MOVEMENTS)
     if len(tables) < 2:
-        raise ColumnsError(f"{objects.name} names {len(tables)} grasp types: a collection takes two at least")
+        raise TableError(f"{objects.name} names {len(tables)} grasp types: a collection takes two at least")
     types = own(tables) if taxonomy == "own" else published(taxonomy)
     find = types.finder()
     tasks: dict[str, CollectionTask] = {}

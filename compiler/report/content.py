@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.errors import ThenarError
+from thenar.runtime.errors import BuildError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.model.integers import IntegerTables
@@ -20,11 +20,6 @@ from ..model.compare import Comparison, WorstCase
 from ..model.faults import FaultCounts
 from ..movements.transitions import Transitions
 from ..placement.tree import Tree
-
-
-class ReportError(ThenarError, ValueError):
-    """The parts of a report are inconsistent."""
-
 
 _MARGIN_MM = 4.0
 _NEAREST_MM = 0.5  # outline points closer than this to the last drawn one are skipped
@@ -51,7 +46,7 @@ class ReportContent:
     worst         the worst case of the integers over all possible frames
     has_page      whether try.html is in the same folder
 
-    Raises ReportError where parts are inconsistent.
+    Raises BuildError where parts are inconsistent.
     """
 
     manifest: Manifest
@@ -76,15 +71,15 @@ class ReportContent:
     def __post_init__(self) -> None:
         grasps, classes = len(self.manifest.grasps), len(self.manifest.classes)
         if self.tables.n_classes != grasps or self.tables.n_switches != len(self.manifest.switches):
-            raise ReportError("the tables do not match build.json: compile the build again")
+            raise BuildError("the tables do not match build.json: compile the build again")
         if self.confusion is not None and self.confusion.shape not in ((grasps, grasps), (classes, classes)):
-            raise ReportError(f"the confusion matrix of {grasps} grasp types has the shape {self.confusion.shape}")
+            raise BuildError(f"the confusion matrix of {grasps} grasp types has the shape {self.confusion.shape}")
         if self.tree is not None and len(self.tree.classes) > grasps:
-            raise ReportError("the tree has more grasp types than the build: it belongs to other recordings")
+            raise BuildError("the tree has more grasp types than the build: it belongs to other recordings")
         if self.hand is not None and not self.hand.knows(self.sources):
-            raise ReportError("the hand lacks a kept switch: it belongs to another glove")
+            raise BuildError("the hand lacks a kept switch: it belongs to another glove")
         if self.scan is not None and (self.harness is None or self.scan.harness != self.harness.fingerprint):
-            raise ReportError(
+            raise BuildError(
                 "the scan map does not match the harness: compile with ``glove`` and the glove.toml in use"
             )
 

@@ -11,6 +11,7 @@ from msgspec import Struct
 
 from thenar.drivers.extras import optional
 
+from ..evaluation.rates import interval
 from ..frontier.plots import POINT_ID, RING_ID, pictures
 from ..frontier.points import Frontier, FrontierPoint, PointTime
 from ..frontier.words import (
@@ -28,7 +29,7 @@ from ..frontier.words import (
 )
 from ..hand import HandShape
 from ..pictures import PALETTE
-from ..text import DASH, NBSP, counted, interval, microseconds, sentence
+from ..text import DASH, NBSP, counted, microseconds, sentence
 from .content import HandPicture, PlainTable, hand_picture
 
 with optional():

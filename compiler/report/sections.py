@@ -278,7 +278,7 @@ def _plain(value: object) -> str:
 
 def protocols(study: Study) -> tuple[tuple[str, str], ...]:
     """Return the study's protocols and their meanings."""
-    return tuple((f"{each.name} protocol", each.meaning) for each in PROTOCOLS if each.name in study.options.protocols)
+    return tuple((f"{name} protocol", said) for name, said in PROTOCOLS.items() if name in study.options.protocols)
 
 
 def study_tables(study: Study) -> tuple[PlainTable, ...]:

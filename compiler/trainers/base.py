@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.drivers.errors import ThenarError
 from thenar.drivers.members import Members
 from thenar.runtime.manifest import Fitting
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.recipe import AUTO, Recipe
 
 from ..elementary import Floats
+from ..samples import TrainingError
 from .stumps import Stumps
 
 if TYPE_CHECKING:
@@ -24,14 +24,6 @@ if TYPE_CHECKING:
 Model = Stumps | ScoreTables
 Report = Callable[[int, int], None]
 Number = float | int | str | None
-
-
-class TrainerError(ThenarError, ValueError):
-    """An unknown setting of a trainer, or a value out of its range."""
-
-
-class BoostingError(ThenarError, ValueError):
-    """An invalid training set, or an invalid option of a fit to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,18 +61,18 @@ class Setting:
     names: tuple[str, ...] = ()
 
     def checked(self, value: Number) -> Number:
-        """Return the value converted to its kind. Raises TrainerError for an invalid one."""
+        """Return the value converted to its kind. Raises TrainingError for an invalid one."""
         if value is None:
             return None
         if self.names or isinstance(value, str):
             if value not in self.names:
                 wanted = f"one of {', '.join(self.names)}" if self.names else "a number"
-                raise TrainerError(f"{self.name}={value!r} must be {wanted}")
+                raise TrainingError(f"{self.name}={value!r} must be {wanted}")
             return value
         if self.least is not None and not value >= self.least:
-            raise TrainerError(f"{self.name}={value} must be at least {self.least}")
+            raise TrainingError(f"{self.name}={value} must be at least {self.least}")
         if self.most is not None and not value <= self.most:
-            raise TrainerError(f"{self.name}={value} must be at most {self.most}")
+            raise TrainingError(f"{self.name}={value} must be at most {self.most}")
         return self.kind(value)
 
 
@@ -145,7 +137,7 @@ class Trainer(ABC):
     def candidates(self, given: Mapping[str, Number]) -> tuple[dict[str, Number], ...]:
         """Return all combinations of settings to compare when these settings are `given`.
 
-        Raises TrainerError for an unknown setting, or a value out of its range.
+        Raises TrainingError for an unknown setting, or a value out of its range.
         """
         fixed = self.checked(given)
         defaults = {setting.name: setting.default for setting in self.settings}
@@ -158,13 +150,13 @@ class Trainer(ABC):
     def checked(self, given: Mapping[str, Number]) -> dict[str, Number]:
         """Return given settings as values of their kind.
 
-        Raises TrainerError for an unknown setting, or a value out of its range.
+        Raises TrainingError for an unknown setting, or a value out of its range.
         """
         settings = {setting.name: setting for setting in self.settings}
         values: dict[str, Number] = {}
         for name, value in given.items():
             if name not in settings:
-                raise TrainerError(f"trainer {self.name!r} has no setting {name!r}: leave it out")
+                raise TrainingError(f"trainer {self.name!r} has no setting {name!r}: leave it out")
             values[name] = settings[name].checked(value)
         return values
 
@@ -191,7 +183,7 @@ class Training:
     def of(cls, options: Recipe) -> "Training":
         """Return the training that `options` define, with defaults for what is not given.
 
-        If no trainer is given, the defaults are the paper's, of LogitBoost. Raises MemberError or TrainerError for
+        If no trainer is given, the defaults are the paper's, of LogitBoost. Raises SettingError or TrainingError for
         invalid options.
         """
         trainer, given = _asked(options)[0]
@@ -205,7 +197,7 @@ class Training:
     def candidates(cls, options: Recipe) -> "tuple[Training, ...]":
         """Return every training that `options` allow, to be compared: a single one if nothing is left open.
 
-        Raises MemberError or TrainerError for invalid options.
+        Raises SettingError or TrainingError for invalid options.
         """
         asked = _asked(options)
         if options.trainer == AUTO and len(asked) > 1:
@@ -258,7 +250,7 @@ def _asked(options: Recipe) -> list[tuple[Trainer, dict[str, Number]]]:
             if lacking
             else f"no trainer has all of {', '.join(sorted(given))}"
         )
-        raise TrainerError(f"{wrong}: leave it out")
+        raise TrainingError(f"{wrong}: leave it out")
     if len(takers) < len(names):
         size = {name: len(names[name]) for name in takers}
         takers = [name for at, name in enumerate(takers) if not any(size[one] < size[name] for one in takers[:at])]
@@ -266,19 +258,19 @@ def _asked(options: Recipe) -> list[tuple[Trainer, dict[str, Number]]]:
 
 
 def check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int, weights: Floats | None) -> None:
-    """Raise BoostingError unless these arguments form a valid training set."""
+    """Raise TrainingError unless these arguments form a valid training set."""
     if X.ndim != 2 or len(X) == 0 or labels.shape != (len(X),):
-        raise BoostingError(f"inputs {X.shape} and labels {labels.shape} must be (n, d) and (n,) with at least one row")
+        raise TrainingError(f"inputs {X.shape} and labels {labels.shape} must be (n, d) and (n,) with at least one row")
     if labels.min() < 0 or labels.max() >= n_classes:
-        raise BoostingError(f"labels run from {labels.min()} to {labels.max()}, classes from 0 to {n_classes - 1}")
+        raise TrainingError(f"labels run from {labels.min()} to {labels.max()}, classes from 0 to {n_classes - 1}")
     if weights is not None:
         check_weights(weights, len(X))
     if X.dtype.kind == "f" and np.isinf(X).any():
         row, column = np.argwhere(np.isinf(X))[0]
-        raise BoostingError(f"row {row}, column {column} is infinite; a joint angle is finite or NaN for missing")
+        raise TrainingError(f"row {row}, column {column} is infinite; a joint angle is finite or NaN for missing")
 
 
 def check_weights(weights: Floats, n: int) -> None:
-    """Raise BoostingError unless these are valid weights of n rows."""
+    """Raise TrainingError unless these are valid weights of n rows."""
     if weights.shape != (n,) or not (np.isfinite(weights).all() and (weights >= 0).all() and weights.any()):
-        raise BoostingError("row weights must be (n,) finite, non-negative numbers, not all zero")
+        raise TrainingError("row weights must be (n,) finite, non-negative numbers, not all zero")

@@ -13,8 +13,9 @@ from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.model.terms.line import Line
 
 from ..elementary import Floats, on_one_grid
+from ..samples import TrainingError
 from ..workers import check_memory
-from .base import BoostingError, Report, Setting, Trainer, check_rows
+from .base import Report, Setting, Trainer, check_rows
 from .newton import DRAFT_TOLERANCE, TOLERANCE, Column, Fit, Ruler, columns_of
 
 if TYPE_CHECKING:
@@ -105,18 +106,18 @@ def fit_logit(
     pulls the contribution of one standard deviation. The number of set bits among the first `counted` columns adds
     scores as well, with the weak pull of a bin, so that their common effect is learned at once. Frames in `held` (n,)
     are known not to be of the last class, which learns nothing from them. No derivative of the loss is larger at the
-    solution than `tolerance` times the sum of weights. Raises BoostingError.
+    solution than `tolerance` times the sum of weights. Raises TrainingError.
     """
     if not (0 < penalty < math.inf and 0 <= smoothness < math.inf):
-        raise BoostingError(f"penalty={penalty} must be above 0, and smoothness={smoothness} at least 0, both finite")
+        raise TrainingError(f"penalty={penalty} must be above 0, and smoothness={smoothness} at least 0, both finite")
     if max_bins is not None and max_bins < 2:
-        raise BoostingError(f"max_bins={max_bins} must be at least 2: a single bin carries no information")
+        raise TrainingError(f"max_bins={max_bins} must be at least 2: a single bin carries no information")
     if not FINEST <= tolerance < 1:
-        raise BoostingError(f"tolerance={tolerance} must be at least {FINEST:g} and below 1")
+        raise TrainingError(f"tolerance={tolerance} must be at least {FINEST:g} and below 1")
     check_rows(X, labels, n_classes, weights)
     if X.dtype.kind == "f" and np.isnan(X).any():
-        raise BoostingError("the inputs hold NaN: a logit has no scores for a missing value")
-    check_memory(len(X), n_classes, BoostingError, *X.shape[1:])
+        raise TrainingError("the inputs hold NaN: a logit has no scores for a missing value")
+    check_memory(len(X), n_classes, TrainingError, *X.shape[1:])
     scale = 1.0
     if weights is not None:
         # Scale by a power of two, which changes no result: sums of huge weights stay finite, of tiny ones exact.
@@ -194,7 +195,7 @@ class Logit(Trainer):
     )
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> ScoreTables:
-        """Return the tables. Raises BoostingError for settings that make no sense."""
+        """Return the tables. Raises TrainingError for settings that make no sense."""
         given = {**settings, "max_bins": settings["max_bins"] or BINS, "linear": bool(settings["linear"])}
         tables = fit_logit(samples.inputs, samples.labels, samples.n_classes, **given, **of_none(samples))
         return tables.score_tables(samples.n_switches)

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..elementary import Floats, add_exactly, softmax, softmax_and_loss
+from ..samples import TrainingError
 from ..workers import check_memory
-from .base import BoostingError, Number, Report, Setting, Trainer, check_rows
+from .base import Number, Report, Setting, Trainer, check_rows
 from .binning import bin_columns
 from .stumps import Stumps, Targets, centred, fit_stumps
 
@@ -50,7 +51,7 @@ def boost(
     that the fewest stumps have used so far ("least-used"). `on_round(done, rounds)` is called after every round.
 
     Return the ensemble, and the losses before the first round and after every round: the mean of -ln P(true class).
-    They take a sixth of the time; without `with_losses`, they are computed for a tolerance only. Raises BoostingError.
+    They take a sixth of the time; without `with_losses`, they are computed for a tolerance only. Raises TrainingError.
     """
     _check_options(rounds, shrinkage, z_max, tolerance, max_bins, ties)
     check_rows(X, labels, n_classes, weights)
@@ -58,7 +59,7 @@ def boost(
         # Scale by a power of two, which changes no result: sums of huge weights stay finite, of tiny ones exact.
         weights = np.ldexp(weights, -np.frexp(weights.max())[1])
     binned = bin_columns(X, max_bins)
-    check_memory(len(X), n_classes, BoostingError, len(binned.two.columns), len(binned.many.columns))
+    check_memory(len(X), n_classes, TrainingError, len(binned.two.columns), len(binned.many.columns))
     member = labels == np.arange(n_classes)[:, np.newaxis]
     scores = carry = np.zeros((n_classes, len(X)))
     losses: list[float] = []
@@ -119,17 +120,17 @@ def _check_options(
     rounds: int, shrinkage: float, z_max: float, tolerance: float | None, max_bins: int | None, ties: str
 ) -> None:
     if ties not in TIES:
-        raise BoostingError(f"ties={ties!r} must be one of {', '.join(TIES)}")
+        raise TrainingError(f"ties={ties!r} must be one of {', '.join(TIES)}")
     if rounds < 1:
-        raise BoostingError(f"rounds={rounds} must be at least 1")
+        raise TrainingError(f"rounds={rounds} must be at least 1")
     if max_bins is not None and max_bins < 2:
-        raise BoostingError(f"max_bins={max_bins} must be at least 2: a single bin carries no information")
+        raise TrainingError(f"max_bins={max_bins} must be at least 2: a single bin carries no information")
     if not SMALLEST_SHRINKAGE <= shrinkage <= 1:
-        raise BoostingError(f"shrinkage={shrinkage} must be at least {SMALLEST_SHRINKAGE:g} and at most 1")
+        raise TrainingError(f"shrinkage={shrinkage} must be at least {SMALLEST_SHRINKAGE:g} and at most 1")
     if not 1 < z_max <= LARGEST_Z_MAX:
-        raise BoostingError(f"z_max={z_max} must be above 1 and at most {LARGEST_Z_MAX:g}")
+        raise TrainingError(f"z_max={z_max} must be above 1 and at most {LARGEST_Z_MAX:g}")
     if tolerance is not None and not 0 <= tolerance < math.inf:
-        raise BoostingError(
+        raise TrainingError(
             f"tolerance={tolerance} must be a change of the loss of at least 0; leave it out to train all rounds"
         )
 
@@ -161,7 +162,7 @@ class LogitBoost(Trainer):
         return super().candidates({**recipe, **given})
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> Stumps:
-        """Return the ensemble. Raises BoostingError for settings that make no sense."""
+        """Return the ensemble. Raises TrainingError for settings that make no sense."""
         given = {**settings, "on_round": report, "with_losses": False}
         return boost(samples.inputs, samples.labels, samples.n_classes, **given)[0]
 

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..elementary import Floats, dot, exact_sum, on_one_grid, softmax_and_loss
-from .base import BoostingError
+from ..samples import TrainingError
 from .binning import bin_columns
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Ruler:
         """Return the ruler for numbers (n,), at least two of which differ."""
         low, high = float(x.min()), float(x.max())
         if not math.isfinite(high - low):
-            raise BoostingError(f"a column from {low} to {high} is too wide for a line: scale it")
+            raise TrainingError(f"a column from {low} to {high} is too wide for a line: scale it")
         # A power of two, so that integers within a range below 1024 lie on marks.
         unit = math.ldexp(1.0, math.frexp(high - low)[1] - 1)
         places, total = _marked((x - low) / unit), exact_sum(weights)
@@ -213,7 +213,7 @@ class Fit:
                     del MINIMA[next(iter(MINIMA))]
                 return point.rows
             point = self._along(point, self._direction(point, max(_UNSOLVED * steep, 0.5 * wanted)))
-        raise BoostingError(
+        raise TrainingError(
             f"no minimum was found in {_MOST_STEPS} steps: the penalty is too small for such unequal weights"
         )
 

@@ -19,8 +19,9 @@ from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid
 
 from ..elementary import Floats, exact_sum, on_one_grid
+from ..samples import TrainingError
 from ..workers import check_memory
-from .base import BoostingError, Report, Setting, Trainer, check_rows
+from .base import Report, Setting, Trainer, check_rows
 from .binning import BinnedColumn, bin_columns
 from .logit import BINS, count_of, of_none, spread_out, tables_of
 from .logit import MEMBER as LOGIT
@@ -52,15 +53,15 @@ def fit_pairs(
     """Fit switches (n, s), codes (n, j) and labels (n,) in 0..n_classes-1, with at most `pairs` pairs of joints.
 
     `pair_smoothness` pulls neighbouring cells of a pair towards each other; joints have at most `pair_bins` bins in a
-    pair. The other parameters are those of `fit_logit`. Raises BoostingError.
+    pair. The other parameters are those of `fit_logit`. Raises TrainingError.
     """
     if not 2 <= pair_bins <= MOST_PAIR_BINS:
-        raise BoostingError(f"pair_bins={pair_bins} must be 2 to {MOST_PAIR_BINS}: a pair is one lookup of bytes")
+        raise TrainingError(f"pair_bins={pair_bins} must be 2 to {MOST_PAIR_BINS}: a pair is one lookup of bytes")
     X, s = np.hstack([switches, codes]), switches.shape[1]
     if not (0 < penalty < np.inf and 0 <= smoothness < np.inf and 0 <= pair_smoothness < np.inf):
-        raise BoostingError(f"penalty={penalty} must be above 0, and smoothness at least 0, all finite")
+        raise TrainingError(f"penalty={penalty} must be above 0, and smoothness at least 0, all finite")
     check_rows(X, labels, n_classes, None)
-    check_memory(len(X), n_classes, BoostingError, *X.shape[1:])
+    check_memory(len(X), n_classes, TrainingError, *X.shape[1:])
     columns = columns_of(X, max_bins, None, None)
     count = count_of(columns[:counted], np.ones(len(X)))
     alone = Fit([*columns, *count], labels, n_classes, penalty, smoothness, None, held)
@@ -134,7 +135,7 @@ class Pairs(Trainer):
     )
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> ScoreTables:
-        """Return the tables. Raises BoostingError for settings that make no sense."""
+        """Return the tables. Raises TrainingError for settings that make no sense."""
         given = {**settings, "max_bins": settings["max_bins"] or BINS}
         return fit_pairs(
             samples.switches, samples.codes, samples.labels, samples.n_classes, **given, **of_none(samples)

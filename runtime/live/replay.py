@@ -32,7 +32,7 @@ def replayed(
     The newest frames at each moment are those that precede it in the recording, as the live loop wrote them. At the end
     `warn` takes a sentence on each fault of the file.
 
-    Raises McapError if it is not a recording, SettingError if it is from another build.
+    Raises FormatError if it is not a recording, SettingError if it is from another build.
     """
     for entry, moment in moments(build, recording, policy, warn):
         yield entry, moment.grasp
@@ -64,7 +64,7 @@ def recognised(build: Build, recording: Path, warn: Callable[[str], None] = lamb
     switches and joints are matched by name, and levels of taxels taken from the recorded counts. `warn` as for
     `replayed`.
 
-    Raises McapError if it is not a recording, SettingError if it lacks an input of the build.
+    Raises FormatError if it is not a recording, SettingError if it lacks an input of the build.
     """
     reader = Reader(recording)
     if reader.session.build == build.manifest.checksum:

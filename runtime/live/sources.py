@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from threading import Condition, Event, Thread
 from types import TracebackType
-from typing import Generic, Protocol, Self, TypeVar
+from typing import Self
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -36,46 +36,26 @@ _LONGEST_WAIT_US = 250_000
 _MOST_FAULTS = 20
 
 _log = logging.getLogger("thenar")
-T_co = TypeVar("T_co", covariant=True)
-T = TypeVar("T")
 
 
-class Readable(Protocol[T_co]):
-    """An object that can be kept open: usually a `Source`."""
+class DeviceThread:
+    """Keeps a source open and passes every frame to `take`, in a separate thread, until it is closed.
 
-    def open(self) -> object:
-        """Open it; raises DeviceError if it is not there, SettingError if no retry helps."""
-
-    def read(self, timeout_s: float) -> T_co | None:
-        """Return the next sample, or None if none arrives in time; raises as `open` does."""
-
-    def close(self) -> None:
-        """Close it, in whatever state it is."""
-
-
-class DeviceState(Struct, frozen=True):
-    """The state of a device: `error` is the current or last error, opened how often it was opened, faults how often an
-    exception ended its reading that only a bug in the program explains.
-    """
-
-    name: str
-    connected: bool
-    error: str
-    opened: int
-    faults: int = 0
-
-
-class DeviceThread(Generic[T]):
-    """Keeps `device` open and passes every sample to `take`, in a separate thread, until it is closed.
-
-    A SettingError ends it unless the device was open before: `failure` then holds it, for callers that wait.
+    A SettingError ends it unless the device was open before: `failure` then holds it, for callers that wait. `opened`
+    says how often it was opened, `faults` how often an exception ended its reading that only a bug in the program
+    explains.
     """
 
     def __init__(
-        self, name: str, device: Readable[T], take: Callable[[T], None], changed: Callable[[], None] = lambda: None
+        self,
+        name: str,
+        device: Source,
+        take: Callable[[SwitchFrame | GloveFrame], None],
+        changed: Callable[[], None] = lambda: None,
     ) -> None:
         """changed() is called whenever the state changes."""
-        self.state = DeviceState(name, connected=False, error=NOT_YET, opened=0)
+        self.state = DeviceHealth(name, connected=False, error=NOT_YET)
+        self.opened = self.faults = 0
         self.failure: SettingError | None = None
         self._device, self._take, self._changed = device, take, changed
         self._logged: set[str] = set()
@@ -105,7 +85,7 @@ class DeviceThread(Generic[T]):
             except SettingError as wrong:
                 self._become(connected=False, error=str(wrong))
                 # It worked before, so it can again: only a garbled reply can say otherwise.
-                if not self.state.opened:
+                if not self.opened:
                     self.failure = wrong
                     return
             except DeviceError as wrong:
@@ -126,23 +106,24 @@ class DeviceThread(Generic[T]):
 
     def _read(self) -> None:
         while not self._stop.is_set():
-            sample = self._device.read(READ_S)
-            if sample is not None:
-                self._take(sample)
+            frame = self._device.read(READ_S)
+            if frame is not None:
+                self._take(frame)
 
     def _blame(self, fault: str) -> None:
         """Count an exception, and log it with its trace, once: a device that opens and then fails does so for hours."""
         if fault not in self._logged and len(self._logged) < _MOST_FAULTS:
             self._logged.add(fault)
             _log.exception("%s: a bug in the program", self.state.name)
-        self.state = replace(self.state, faults=self.state.faults + 1)
+        self.faults += 1
         self._become(connected=False, error=fault)
 
     def _become(self, *, connected: bool, error: str) -> None:
         old = self.state
         if (old.connected, old.error) != (connected, error):
             _log.info("%s: %s", old.name, error or "connected")
-            self.state = DeviceState(old.name, connected, error, old.opened + connected, old.faults)
+            self.opened += connected
+            self.state = DeviceHealth(old.name, connected, error)
             self._changed()
 
 
@@ -304,8 +285,7 @@ class Sources:
         self.take: Callable[..., Snapshot] = partial(self._arrivals.take, self._patience_us)
         self.changed = True
         self._keepers = [
-            DeviceThread[SwitchFrame | GloveFrame](source.name, source, self._taking(source), self._change)
-            for source in self._devices
+            DeviceThread(source.name, source, self._taking(source), self._change) for source in self._devices
         ]
 
     def _change(self) -> None:
@@ -324,20 +304,19 @@ class Sources:
         """The longest expected period of the glove; None if there is none."""
         return max((glove.period_us for glove in self._gloves), default=None)
 
-    def devices(self) -> tuple[DeviceState, ...]:
+    def devices(self) -> tuple[DeviceHealth, ...]:
         """Return the state of every device."""
         return tuple(keeper.state for keeper in self._keepers)
 
     def health(self) -> tuple[DeviceHealth, ...]:
         """Return the state of every device, with its driver's counters."""
         return tuple(
-            DeviceHealth(
-                state.name,
-                state.connected,
-                state.error or device.fault_message(),
-                (*device.counts(), Count("program faults", state.faults)),
+            replace(
+                state,
+                error=state.error or device.fault_message(),
+                counts=(*device.counts(), Count("program faults", keeper.faults)),
             )
-            for state, device in zip(self.devices(), self._devices, strict=True)
+            for state, keeper, device in zip(self.devices(), self._keepers, self._devices, strict=True)
         )
 
     @property

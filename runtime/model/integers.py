@@ -328,7 +328,7 @@ def tables_to_bytes(tables: IntegerTables) -> bytes:
 def tables_from_bytes(data: bytes, what: str = "tables.bin") -> IntegerTables:
     """Return the tables of a `tables.bin`, whose name in messages is `what`.
 
-    Raises SealError for a file that is foreign, truncated, altered or newer, BuildError for one with inconsistent
+    Raises FormatError for a file that is foreign, truncated, altered or newer, BuildError for one with inconsistent
     content. Every count is checked against the length before anything is allocated.
     """
     if len(data) > MAX_BYTES:

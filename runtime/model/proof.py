@@ -52,7 +52,7 @@ class Rounding:
         if (tables.n_switches, tables.n_joints) != (integers.n_switches, integers.n_joints):
             raise ValueError("the tables and the integers are of other inputs")
         choices = list(_choices(tables, integers))
-        self._values = [choice.values for choice in choices[1:]]
+        self._values = [values for values, _, _ in choices[1:]]
         errors, self._step = _errors(choices, integers.scale)
         self._pairs = _Pairs(errors)
 
@@ -126,24 +126,18 @@ class _Pairs:
         return max(found, key=lambda pair: pair[0])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Choice:
-    """What a unit can say: values (c, inputs), the parts of its rows in units of score (`Term.parts`), which are added
-    up, and its rows in steps (c, K).
-    """
-
-    values: NDArray[np.int64]
-    parts: tuple[tuple[Floats, NDArray[np.int64]], ...]
-    steps: NDArray[np.integer]
+# What a unit can say: values (c, inputs), the parts of its rows in units of score (`Term.parts`), which are added up,
+# and its rows in steps (c, K).
+_Choice = tuple[NDArray[np.int64], tuple[tuple[Floats, NDArray[np.int64]], ...], NDArray[np.integer]]
 
 
 def _choices(tables: ScoreTables, integers: IntegerTables) -> Iterator[_Choice]:
     """Yield bias, switches and joints, those of a grid together."""
     once = np.ones((1, 1), np.int64)
-    yield _Choice(np.zeros((1, 0), np.int64), ((tables.bias[np.newaxis], once),), integers.bias[np.newaxis])
+    yield np.zeros((1, 0), np.int64), ((tables.bias[np.newaxis], once),), integers.bias[np.newaxis]
     for bit, whole in zip(tables.bits, integers.bits, strict=True):
         states = np.arange(2)
-        yield _Choice(states[:, np.newaxis], (bit.parts(states),), whole.of(states))
+        yield states[:, np.newaxis], (bit.parts(states),), whole.of(states)
     for unit in integers.units:
         ours, theirs = (
             [term for term in of.core_terms if not isinstance(term, Bit) and set(term.inputs) <= set(unit)]
@@ -153,7 +147,7 @@ def _choices(tables: ScoreTables, integers: IntegerTables) -> Iterator[_Choice]:
         of_joint = dict(zip(unit, (each.ravel() for each in codes), strict=True))
         parts = tuple(term.parts(*(of_joint[joint] for joint in term.inputs)) for term in ours)
         steps = [term.of(*(of_joint[joint] for joint in term.inputs)) for term in theirs]
-        yield _Choice(np.stack([*of_joint.values()], axis=1), parts, np.sum(steps, axis=0, dtype=np.int64))
+        yield np.stack([*of_joint.values()], axis=1), parts, np.sum(steps, axis=0, dtype=np.int64)
 
 
 def _turning_codes(joint: int, terms: Sequence[CoreTerm]) -> NDArray[np.int64]:
@@ -174,15 +168,15 @@ def _turning_codes(joint: int, terms: Sequence[CoreTerm]) -> NDArray[np.int64]:
 
 def _errors(choices: Sequence[_Choice], scale: float) -> tuple[list[Exact], int]:
     """Return scale * rows - steps of every choice, (c, K), as whole numbers; and how many of them make a step."""
-    cut = [[(np.frexp(rows), times) for rows, times in choice.parts] for choice in choices]
+    cut = [[(np.frexp(rows), times) for rows, times in parts] for _, parts, _ in choices]
     # Doubles are whole numbers below 2^53 times a power of two: the least power is a grid for all.
     lowest = min(0, *(int(powers.min()) - 53 for parts in cut for (_, powers), _ in parts))
     above, below = scale.as_integer_ratio()
     step = below << -lowest
     errors = []
-    for choice, parts in zip(choices, cut, strict=True):
+    for (_, _, steps), parts in zip(choices, cut, strict=True):
         exact = sum(_whole(*rows, lowest) * times.astype(object) for rows, times in parts)
-        errors.append(exact * above - choice.steps.astype(object) * step)
+        errors.append(exact * above - steps.astype(object) * step)
     return errors, step
 
 

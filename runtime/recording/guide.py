@@ -64,7 +64,7 @@ def planned(collection: Collection) -> tuple[Trial, ...]:
 
 
 def read_journal(path: Path) -> Journal:
-    """Return the collection in a recording. Raises McapError, SettingError if it has none, or OSError."""
+    """Return the collection in a recording. Raises FormatError, SettingError if it has none, or OSError."""
     reader = Reader(path)
     first = reader.session
     if first.collection is None:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from thenar.drivers.errors import SettingError
 
-from ..errors import FrameError, McapError
+from ..errors import FormatError, FrameError
 from ..frames import GloveFrame, Mask, SwitchFrame
 from .mcap import LARGEST_RECORD, MAGIC, Opcode, encode
 from .session import METADATA, Session, from_metadata, to_metadata
@@ -108,7 +108,7 @@ def session_record(session: Session) -> bytes:
     texts = to_metadata(session)
     try:
         from_metadata(texts)
-    except McapError as wrong:
+    except FormatError as wrong:
         raise SettingError(f"this cannot be recorded: {wrong}") from None
     record = encode(Opcode.METADATA, METADATA, texts)
     if len(record) > LARGEST_RECORD:
@@ -164,20 +164,20 @@ def encode_bytes(data: bytes) -> bytes:
 
 
 def decode_text(message: bytes) -> bytes:
-    """Return the UTF-8 text of a std_msgs/msg/String. Raises McapError."""
+    """Return the UTF-8 text of a std_msgs/msg/String. Raises FormatError."""
     encapsulation, length = _unpack(_TEXT, message)
     text = message[_TEXT.size :]
     if encapsulation != _ENCAPSULATION or length != len(text) or not text.endswith(b"\0"):
-        raise McapError("is no little-endian CDR string")
+        raise FormatError("is no little-endian CDR string")
     return text[:-1]
 
 
 def decode_bytes(message: bytes) -> bytes:
-    """Return the data of a std_msgs/msg/UInt8MultiArray without dimensions. Raises McapError."""
+    """Return the data of a std_msgs/msg/UInt8MultiArray without dimensions. Raises FormatError."""
     encapsulation, dimensions, data_offset, length = _unpack(_BYTES, message)
     data = message[_BYTES.size :]
     if encapsulation != _ENCAPSULATION or dimensions or data_offset or length != len(data):
-        raise McapError("is no little-endian CDR array of bytes without dimensions")
+        raise FormatError("is no little-endian CDR array of bytes without dimensions")
     return data
 
 
@@ -185,7 +185,7 @@ def _unpack(layout: Struct, message: bytes) -> tuple[bytes, ...] | tuple[int, ..
     try:
         return layout.unpack_from(message)
     except error:
-        raise McapError(f"has {len(message)} bytes, too few for what its channel carries") from None
+        raise FormatError(f"has {len(message)} bytes, too few for what its channel carries") from None
 
 
 _CLOSED, _LOST = 1, 2
@@ -209,13 +209,13 @@ def switch_bytes(frame: SwitchFrame, switches: int, sensors: int) -> bytes:
 
 
 def switch_frame(time_us: int, data: bytes, switches: int, sensors: int) -> SwitchFrame:
-    """Return the frame written by `switch_bytes`. Raises McapError."""
+    """Return the frame written by `switch_bytes`. Raises FormatError."""
     states, rest = data[:switches], data[switches:]
     if len(states) < switches or 0 < len(rest) < _TIME_BYTES:
-        raise McapError(f"holds {len(data)} bytes, but its session names {switches} switches")
+        raise FormatError(f"holds {len(data)} bytes, but its session names {switches} switches")
     array = np.frombuffer(states, np.uint8)
     if switches and int(array.max()) > _CLOSED | _LOST:
-        raise McapError(f"holds a switch in state {int(array.max())}")
+        raise FormatError(f"holds a switch in state {int(array.max())}")
     glove_us = int.from_bytes(rest[:_TIME_BYTES], "little")
     return SwitchFrame(
         time_us,
@@ -234,9 +234,9 @@ def glove_bytes(frame: GloveFrame, sensors: int) -> bytes:
 
 
 def glove_frame(time_us: int, data: bytes, sensors: int) -> GloveFrame:
-    """Return the frame written by `glove_bytes`. Raises McapError."""
+    """Return the frame written by `glove_bytes`. Raises FormatError."""
     if len(data) - sensors not in (0, 1):
-        raise McapError(f"holds {len(data)} bytes, but its session names {sensors} sensors")
+        raise FormatError(f"holds {len(data)} bytes, but its session names {sensors} sensors")
     return GloveFrame(time_us, data[:sensors], data[sensors] if len(data) > sensors else None)
 
 
@@ -253,9 +253,9 @@ def taxel_bytes(codes: Sequence[int | None], taxels: int) -> bytes:
 
 
 def taxel_codes(data: bytes, taxels: int) -> tuple[int | None, ...]:
-    """Return the codes written by `taxel_bytes`. Raises McapError."""
+    """Return the codes written by `taxel_bytes`. Raises FormatError."""
     if len(data) != 2 * taxels:
-        raise McapError(f"holds {len(data)} bytes, but its session names {taxels} taxels")
+        raise FormatError(f"holds {len(data)} bytes, but its session names {taxels} taxels")
     return tuple(None if code == _NOT_READ else code for code in Struct(f"<{taxels}H").unpack(data))
 
 

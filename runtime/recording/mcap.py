@@ -14,7 +14,7 @@ from struct import Struct
 from typing import Any, BinaryIO
 from zlib import crc32
 
-from ..errors import McapError
+from ..errors import FormatError
 from ..files import open_file
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -160,22 +160,22 @@ class RecordStream:
     """
 
     def __init__(self, path: Path) -> None:
-        """Raises McapError if the file is no regular one or does not begin as MCAP does, OSError as it comes."""
+        """Raises FormatError if the file is no regular one or does not begin as MCAP does, OSError as it comes."""
         self.end: End | None = None
         self._crc = crc32(MAGIC)
         self._path = path
-        with open_file(path, McapError) as file:
+        with open_file(path, FormatError) as file:
             self.size = file.seek(0, SEEK_END)
             file.seek(0)
             if file.read(len(MAGIC)) != MAGIC:
-                raise McapError(f"{path.name} does not begin like an MCAP file: it is another kind of file, or empty")
+                raise FormatError(f"{path.name} does not begin like an MCAP file: it is another kind of file, or empty")
 
     def __iter__(self) -> Iterator[RawRecord]:
         return self.since(len(MAGIC))
 
     def since(self, offset: int) -> Iterator[RawRecord]:
         """Iterate from `offset` on, where a record is known to begin."""
-        with open_file(self._path, McapError) as file:
+        with open_file(self._path, FormatError) as file:
             file.seek(offset)
             while (record := self._next(file)) is not None:
                 yield record

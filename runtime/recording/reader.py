@@ -7,7 +7,6 @@ anywhere, it is scanned once (`Index`), most of its messages undecoded.
 from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from struct import Struct, pack
 from typing import Any
@@ -15,7 +14,7 @@ from zlib import crc32
 
 import msgspec
 
-from ..errors import McapError
+from ..errors import FormatError
 from ..frames import GloveFrame, SwitchFrame
 from ..names import SHOWN, list_names, shortened
 from ..published import LiveGrasp
@@ -65,11 +64,11 @@ class EntryDecoder:
         return self._channels.get(int.from_bytes(content[:2], "little")) if len(content) >= _MESSAGE.size else None
 
     def entries(self, record: RawRecord) -> Iterator[Entry]:
-        """Yield the record's entries. Raises McapError, whose text continues "the record at byte 17 "."""
+        """Yield the record's entries. Raises FormatError, whose text continues "the record at byte 17 "."""
         self.count(record)
         content = record.content
         if record.opcode == Opcode.CHUNK:
-            raise McapError(
+            raise FormatError(
                 "is a chunk, which thenar's recordings do not have: another program packed them; read the original, or "
                 "save other programs' data as CSV"
             )
@@ -89,10 +88,10 @@ class EntryDecoder:
             self.first_skipped.append(f"{what} at byte {offset}")
 
     def count(self, record: RawRecord) -> None:
-        """Count a record that holds no measurements. Raises McapError if there are too many to read in seconds."""
+        """Count a record that holds no measurements. Raises FormatError if there are too many to read in seconds."""
         self._others += record.opcode != Opcode.MESSAGE
         if self._others > OTHER_RECORDS:
-            raise McapError(
+            raise FormatError(
                 f"is one of more than {OTHER_RECORDS} that hold no measurements, the most that are read: the file is "
                 "damaged, or not a recording of thenar"
             )
@@ -111,7 +110,7 @@ class EntryDecoder:
             self._schemas[number] = name
 
     def _parsed(self, opcode: Opcode, record: RawRecord, content: bytes) -> list[Any]:
-        """Return the fields of a record. Raises McapError."""
+        """Return the fields of a record. Raises FormatError."""
         found, rest = parsed(opcode, content)
         if rest:
             # MCAP lets later versions add fields. This version of the record has none.
@@ -121,15 +120,15 @@ class EntryDecoder:
 
     def _message(self, content: bytes) -> Entry | None:
         if len(content) < _MESSAGE.size:
-            raise McapError("is a truncated message")
+            raise FormatError("is a truncated message")
         number, _, logged_ns, published_ns = _MESSAGE.unpack_from(content)
         if number not in self._channels:
-            raise McapError(f"is a message of channel {number}, which the file does not name")
+            raise FormatError(f"is a message of channel {number}, which the file does not name")
         channel, session = self._channels[number], self.session
         if channel is None:
             return None
         if session is None:
-            raise McapError("is a message before any session of thenar")
+            raise FormatError("is a message before any session of thenar")
         self._tail.add_message(channel, logged_ns)
         data = content[_MESSAGE.size :]
         time_us = (published_ns - session.clock_ns) // 1000
@@ -151,7 +150,7 @@ class EntryDecoder:
             return
         before, session = self.session, from_metadata(texts)
         if before is not None and _wired(before) != _wired(session):
-            raise McapError(
+            raise FormatError(
                 "begins a session of another glove than the one before: its switches, taxels or sensors differ"
             )
         self.session, self._codes = session, (None, ())
@@ -164,7 +163,7 @@ class EntryDecoder:
                 found = self._schemas.get(schema, "nothing")
                 if (found, encoding) != (name, "cdr"):
                     found = shortened(f"{encoding} of {found}")
-                    raise McapError(f"says that {topic} holds {found}, not cdr of {name}")
+                    raise FormatError(f"says that {topic} holds {found}, not cdr of {name}")
                 self._channels[number] = ours
                 self.foreign |= number != ours
                 return
@@ -177,11 +176,11 @@ def _wired(session: Session) -> tuple[tuple[str, ...], ...]:
 
 
 def parsed(opcode: Opcode, content: bytes) -> tuple[list[Any], int]:
-    """Return the fields of a record, and the number of bytes left. Raises McapError."""
+    """Return the fields of a record, and the number of bytes left. Raises FormatError."""
     try:
         return decode(opcode, content)
     except ValueError as wrong:
-        raise McapError(f"is not a valid {kind_of(opcode)}: {shortened(str(wrong))}") from None
+        raise FormatError(f"is not a valid {kind_of(opcode)}: {shortened(str(wrong))}") from None
 
 
 def _from_json(channel: int, text: bytes) -> LiveGrasp | Label | Mark | None:
@@ -191,11 +190,11 @@ def _from_json(channel: int, text: bytes) -> LiveGrasp | Label | Mark | None:
     try:
         entry = decoder(text)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
-        raise McapError(f"cannot be read: {shortened(str(wrong), _REASON)}") from None
+        raise FormatError(f"cannot be read: {shortened(str(wrong), _REASON)}") from None
     for name in entry.__struct_fields__:
         value = getattr(entry, name)
         if isinstance(value, int) and not _LEAST <= value <= _LARGEST:
-            raise McapError(f"cannot be read: its {name!r} has more than 64 bits")
+            raise FormatError(f"cannot be read: its {name!r} has more than 64 bits")
     return entry
 
 
@@ -205,13 +204,16 @@ _CHECKED_FOOTER = 16
 _LARGEST_MADE = 20_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """A fault of a file that could still be read: its kind, how often it occurs, a sentence for people."""
+class Oddity(msgspec.Struct, frozen=True):
+    """One kind of oddity of a file that could still be read: its count, and a sentence; of a table also the first rows,
+    as the user counts them, and the columns.
+    """
 
     kind: str
     count: int
     message: str
+    rows: tuple[int, ...] = ()
+    columns: tuple[str, ...] = ()
 
 
 class Reader:
@@ -225,7 +227,7 @@ class Reader:
     """
 
     def __init__(self, path: Path) -> None:
-        """Raise McapError if `path` is not a recording of thenar, OSError as it comes."""
+        """Raise FormatError if `path` is not a recording of thenar, OSError as it comes."""
         self.path = path
         self.tail = Tail()
         self._wrong: list[str] = []
@@ -235,7 +237,7 @@ class Reader:
         self._entries = self._read()
         first = next(self._entries, None)
         if not isinstance(first, Session):
-            raise McapError(f"{path.name} holds no session of thenar: cut at its beginning, or from another program")
+            raise FormatError(f"{path.name} holds no session of thenar: cut at its beginning, or from another program")
         self.session = first
 
     @property
@@ -260,23 +262,23 @@ class Reader:
                 self.session = entry
             yield entry
 
-    def faults(self) -> Iterator[Fault]:
+    def faults(self) -> Iterator[Oddity]:
         """Yield the faults of the file, once its end is reached."""
         name, end, skipped = self.path.name, self.end, self._decoder.skipped
         if end is not None and (end.whole < end.size or not (end.closed or self._in_data)):
-            yield Fault("cut recordings", 1, _cut_message(name, end))
+            yield Oddity("cut recordings", 1, _cut_message(name, end))
         if self._wrong:
-            yield Fault("altered recordings", 1, f"{name} is altered: {'; '.join(self._wrong)}")
+            yield Oddity("altered recordings", 1, f"{name} is altered: {'; '.join(self._wrong)}")
         if skipped:
             message = f"{name} holds records that thenar skips: {list_names(self._decoder.first_skipped, skipped)}"
-            yield Fault("records passed over", skipped, message)
+            yield Oddity("records passed over", skipped, message)
 
     def _read(self) -> Iterator[Entry]:
         for record in self._records:
             try:
                 yield from self._taken(record)
-            except McapError as wrong:
-                raise McapError(f"{self.path.name}: the record at byte {record.offset} {wrong}") from None
+            except FormatError as wrong:
+                raise FormatError(f"{self.path.name}: the record at byte {record.offset} {wrong}") from None
 
     def _taken(self, record: RawRecord) -> Iterator[Entry]:
         """Yield the entries of a record of the data section; later sections repeat known content."""
@@ -313,12 +315,14 @@ class Reader:
 
 
 def check_made(what: str, made: int, size: int) -> None:
-    """Raise McapError if `made` bytes of `what` are to be allocated for recordings of `size` bytes.
+    """Raise FormatError if `made` bytes of `what` are to be allocated for recordings of `size` bytes.
 
     Every row was captured from frames of its length, so a valid recording is at least as long as its rows.
     """
     if made > size + _LARGEST_MADE:
-        raise McapError(f"{what} would take {made >> 20} MiB, more than {size} bytes can have recorded: it is damaged")
+        raise FormatError(
+            f"{what} would take {made >> 20} MiB, more than {size} bytes can have recorded: it is damaged"
+        )
 
 
 def _cut_message(name: str, end: End) -> str:
@@ -343,7 +347,7 @@ class Index:
     """
 
     def __init__(self, path: Path) -> None:
-        """Raise McapError if `path` is not a recording of thenar, OSError as it comes."""
+        """Raise FormatError if `path` is not a recording of thenar, OSError as it comes."""
         self.path, self.session = path, Reader(path).session
         self._head, self._sessions = list[RawRecord](), list[tuple[int, RawRecord]]()
         self._times, self._offsets = array("q"), array("q")
@@ -379,7 +383,7 @@ class Index:
                 if not self._sessions:
                     self._head.append(record)
                 self.scanned = record.end
-        except McapError as wrong:
+        except FormatError as wrong:
             self.fault = f"{self.path.name}: {wrong}"
             return
         end = stream.end
@@ -424,8 +428,8 @@ class Index:
 def _entries(decoder: EntryDecoder, record: RawRecord) -> Iterator[Entry]:
     try:
         yield from decoder.entries(record)
-    except McapError as wrong:
-        raise McapError(f"the record at byte {record.offset} {wrong}, and nothing behind it is read") from None
+    except FormatError as wrong:
+        raise FormatError(f"the record at byte {record.offset} {wrong}, and nothing behind it is read") from None
 
 
 def _unix_us(entry: Entry, decoder: EntryDecoder) -> int:

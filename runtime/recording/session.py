@@ -12,7 +12,7 @@ from msgspec.structs import fields
 
 from thenar.drivers.calibration import GloveCalibration
 
-from ..errors import McapError
+from ..errors import FormatError
 from ..names import fault, shortened
 from ..policy import Policy
 from ..taxels import TaxelCalibration
@@ -116,16 +116,16 @@ def to_metadata(session: Session) -> dict[str, str]:
 
 
 def from_metadata(texts: dict[str, str]) -> Session:
-    """Return the session that a Metadata record holds. Raises McapError saying which key is wrong."""
+    """Return the session that a Metadata record holds. Raises FormatError saying which key is wrong."""
     version = texts.get("version", "")
     # No more digits than any version will have, and than int() accepts.
     if not re.fullmatch("[0-9]{1,9}", version):
-        raise McapError(f"its version is {shortened(repr(version), 20)}, not a number: it was not recorded by thenar")
+        raise FormatError(f"its version is {shortened(repr(version), 20)}, not a number: it was not recorded by thenar")
     if int(version) != VERSION:
-        raise McapError(f"it is of version {version}, this thenar reads {VERSION}: use the thenar that recorded it")
+        raise FormatError(f"it is of version {version}, this thenar reads {VERSION}: use the thenar that recorded it")
     for field in _FIELDS:
         if field.required and field.name not in texts:
-            raise McapError(f"its metadata lack {field.name!r}: damaged, or not recorded by thenar")
+            raise FormatError(f"its metadata lack {field.name!r}: damaged, or not recorded by thenar")
     session = Session(**{field.name: _value(field, texts) for field in _FIELDS if field.name in texts})
     _check_names(session)
     return session
@@ -138,7 +138,7 @@ def _check_names(session: Session) -> None:
         names |= {name for task in collected.tasks for name in (task.grasp, *task.objects)}
     for name in sorted(names):
         if reason := fault(name):
-            raise McapError(f"its metadata name {shortened(repr(name))}, which {reason}")
+            raise FormatError(f"its metadata name {shortened(repr(name))}, which {reason}")
 
 
 def _text(value: Any) -> str:
@@ -152,4 +152,4 @@ def _value(field: Any, texts: dict[str, str]) -> Any:
     try:
         return msgspec.json.decode(text, type=field.type)
     except (msgspec.DecodeError, ValueError, RecursionError) as wrong:
-        raise McapError(f"its metadata {field.name!r} cannot be read: {shortened(str(wrong), 200)}") from None
+        raise FormatError(f"its metadata {field.name!r} cannot be read: {shortened(str(wrong), 200)}") from None

@@ -1,6 +1,5 @@
 """I2C buses of a harness, their ports read in the order of a scan map."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
 from thenar.drivers.i2c.bus import I2cBus, PlacedPort, Scan
@@ -18,46 +17,30 @@ from ..taxels import TaxelCalibration, Taxels, calibration_of
 from .base import Pace, Source, SourceKind, debouncer_of, paced_us
 
 
-class _Port(ABC):
-    """The replies of a port, debounced. targets are the switches that they show."""
-
-    targets: Mask
-
-    def __init__(self, debounce: Debounce) -> None:
-        self._debouncer = debouncer_of(debounce)
-
-    def states(self, reply: int | None) -> tuple[Mask, Mask]:
-        """Return the closed and the lost switches from a reply that came now; None: none came."""
-        time_us = now_us()
-        closed, lost = self._states(reply, time_us)
-        if self._debouncer is None or reply is None:
-            return closed, lost
-        return self._debouncer.update(time_us, closed, self.targets & ~lost) & ~lost, lost
-
-    @abstractmethod
-    def _states(self, reply: int | None, time_us: int) -> tuple[Mask, Mask]: ...
-
-
-class _PortSwitches(_Port):
-    """Bits of a reply, some of them inverted."""
+class PortSwitches:
+    """The switches of a port, debounced: `targets`, bits of its replies, some of them inverted."""
 
     def __init__(self, port: Port, debounce: Debounce) -> None:
-        super().__init__(debounce)
+        self._debouncer = debouncer_of(debounce)
         self._inverted = 0 if port.closed_high else sum(1 << bit for bit, _ in port.switches)
         self._switches = BitRemap(port.switches)
         self.targets = self._switches.targets
 
-    def _states(self, reply: int | None, time_us: int) -> tuple[Mask, Mask]:
-        return (0, self.targets) if reply is None else (self._switches(reply ^ self._inverted), 0)
+    def states(self, reply: int | None) -> tuple[Mask, Mask]:
+        """Return the closed and the lost switches from a reply that came now; None: none came."""
+        if reply is None:
+            return 0, self.targets
+        closed = self._switches(reply ^ self._inverted)
+        return closed if self._debouncer is None else self._debouncer.update(now_us(), closed, self.targets), 0
 
 
-class PortLevels(_Port):
-    """Levels of the taxel that a conversion measures: its name, its place among the harness's taxels, and the
-    comparison of its counts.
+class PortLevels:
+    """Levels of the taxel that a conversion measures, debounced: `targets`, its name, its place among the harness's
+    taxels, and the comparison of its counts.
     """
 
     def __init__(self, port: Port, harness: Harness, calibration: TaxelCalibration | None) -> None:
-        super().__init__(harness.debounce)
+        self._debouncer = debouncer_of(harness.debounce)
         wired = harness.chip_of(port.bus, port.chip)
         channel = [reading.name for reading in wired.chip.readings].index(port.reading)
         self.name = wired.numbered_pins[channel]
@@ -66,8 +49,13 @@ class PortLevels(_Port):
         self.taxels = Taxels([self.name], [port.levels], calibration, harness.taxel_settings, self.highest)
         self.targets = self.taxels.owned
 
-    def _states(self, reply: int | None, time_us: int) -> tuple[Mask, Mask]:
-        return self.taxels.read(time_us, (reply,))
+    def states(self, reply: int | None) -> tuple[Mask, Mask]:
+        """Return the closed and the lost switches from a reply that came now; None: none came."""
+        time_us = now_us()
+        closed, lost = self.taxels.read(time_us, (reply,))
+        if self._debouncer is None or reply is None:
+            return closed, lost
+        return self._debouncer.update(time_us, closed, self.targets & ~lost) & ~lost, lost
 
 
 class I2cDevice(Source):
@@ -83,7 +71,7 @@ class I2cDevice(Source):
         self.longest_us = PERIODS * self.period_us
         calibration = calibration_of(harness.taxel_settings)
         self._ports = [
-            _PortSwitches(port, harness.debounce) if port.switches else PortLevels(port, harness, calibration)
+            PortSwitches(port, harness.debounce) if port.switches else PortLevels(port, harness, calibration)
             for port in ports
         ]
         self._taxels = len(harness.taxel_names)

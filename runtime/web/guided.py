@@ -14,11 +14,10 @@ from thenar.drivers.errors import SettingError
 
 from ..frames import SwitchFrame
 from ..hand import HandDrawing, drawn_joints
-from ..live.sources import DeviceState
 from ..manifest import Calibration
 from ..names import list_names
 from ..posing import POSE_KEYS, PoseGuide, PoseStage
-from ..published import NONE
+from ..published import NONE, DeviceHealth
 from ..recording.guide import KEYS, CollectionGuide, Trial
 from ..recording.session import Session
 from .server import Server, message
@@ -170,7 +169,7 @@ class _CollectionView:
         self._taxel_ends = [None if line is None else (line.rest, line.press) for line in fitted]
         self._calibrated = [line is not None for line in fitted]
 
-    def __call__(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceState]) -> dict[str, object]:
+    def __call__(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> dict[str, object]:
         trial, newest_us = guide.trial, guide.newest_us
         number = {"review": "✓"}.get(guide.stage, "")
         if guide.stage in ("countdown", "moving"):

@@ -123,7 +123,7 @@ class ReplayPage(Closing):
 
     Raises
     ------
-    McapError, OSError
+    FormatError, OSError
         If `path` is not a recording of thenar.
     BuildError, SettingError
         If the build cannot be read, or the recording lacks an input of it; and as `Server` does.

@@ -4,6 +4,7 @@ Every sensor is a linear function of the angles that bend it. Not modelled: that
 respond to flexion, that its two sensors of the thumb's base must be combined, and the wrist.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import Self
 
@@ -14,7 +15,7 @@ from thenar.compiler.elementary import Floats
 from thenar.compiler.recordings.graspset import Joint
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 
-from ..streams import Draw, DrawCounts, Site
+from ..streams import Draw, Site
 from .hand import DOF, FAN_DEG
 
 Bytes = NDArray[np.uint8]
@@ -82,7 +83,7 @@ class SubjectCalibration:
     def of_subject(cls, seed: int, subject: str) -> Self:
         """Return the calibration for a subject of the scene with this seed. Not an effect: no ledger counts it."""
         site = Site(subject, "", "", np.zeros(0, dtype=np.int64))
-        spread = 2.0 * Draw(seed, "glove.calibration", site, DrawCounts()).per_subject(2, 18).uniform() - 1.0
+        spread = 2.0 * Draw(seed, "glove.calibration", site, Counter()).per_subject(2, 18).uniform() - 1.0
         return cls._of(GAINS * (1.0 + _GAIN_SPREAD * spread[0]), ZEROS + _ZERO_SPREAD * spread[1])
 
     @classmethod

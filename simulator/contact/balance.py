@@ -22,10 +22,9 @@ from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats, add_up
 
-from ..body.condition import Condition
 from ..body.hand import LIMITS_DEG, Hand
 from ..body.shapes import Cylinder, Pose, Shape
-from .model import GRAVITY, STIFFNESS, torques
+from .model import GRAVITY, STIFFNESS, Load, torques
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -162,16 +161,6 @@ class Skin:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SolverCase:
-    """Repetitions of one condition: joint angles (20, n) in radians, object poses (6, n), grip forces (n,)."""
-
-    condition: Condition
-    angles: Floats
-    numbers: Floats
-    grip_n: Floats
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class HandCommand:
     """The commands of n hands of one size.
 
@@ -203,13 +192,13 @@ class HandCommand:
         )
 
 
-def command(cases: Sequence[SolverCase]) -> HandCommand:
-    """Return the commands of all `cases`, of one hand, one after the other."""
-    hand = cases[0].condition.hand
-    counts = [len(case.grip_n) for case in cases]
-    shapes = surfaces([case.condition.thing.shape for case in cases], counts)
-    angles = np.concatenate([case.angles for case in cases], axis=1)
-    pose = Pose.of(np.concatenate([case.numbers for case in cases], axis=1))
+def command(loads: Sequence[Load]) -> HandCommand:
+    """Return the commands of all `loads`, of one hand, one after the other."""
+    hand = loads[0].condition.hand
+    counts = [len(load.grip_n) for load in loads]
+    shapes = surfaces([load.condition.thing.shape for load in loads], counts)
+    angles = np.concatenate([load.angles for load in loads], axis=1)
+    pose = Pose.of(np.concatenate([load.pose.T for load in loads], axis=1))
     skeleton = hand.skeleton(angles)
     centres = hand.spheres(skeleton)
     touch = centres - hand.sphere_radii[:, None, None] * shapes.at(pose, centres)[1]
@@ -217,9 +206,9 @@ def command(cases: Sequence[SolverCase]) -> HandCommand:
     relative = touch - skeleton.origins[hand.sphere_capsules]
     own = np.stack([dot(frames[:, :, k], relative) for k in range(3)], axis=1)
     turning = [
-        torques(case.condition, hand.skeleton(case.angles), Pose.of(case.numbers)) * case.grip_n for case in cases
+        torques(load.condition, hand.skeleton(load.angles), Pose.of(load.pose.T)) * load.grip_n for load in loads
     ]
-    pulling = [case.condition.thing.mass_kg * GRAVITY * case.condition.held.down for case in cases]
+    pulling = [load.condition.thing.mass_kg * GRAVITY * load.condition.held.down for load in loads]
     weight = np.stack(pulling, axis=1).repeat(counts, axis=1)
     return HandCommand(hand, shapes, angles, pose, np.concatenate(turning, axis=1), weight, own, pose.inward(touch))
 

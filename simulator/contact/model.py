@@ -5,9 +5,8 @@ object, since all represent the same area of skin. No force is lost: the part th
 and is returned separately.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,13 +54,14 @@ class Load:
     pose: Floats
     grip_n: Floats
 
+    @property
+    def angles(self) -> Floats:
+        """The joint angles (20, n) in radians."""
+        return self.posture_deg.T * (np.pi / 180.0)
 
-class ContactModel(Protocol):
-    """Closes hands on objects."""
 
-    def solve(self, loads: Sequence[Load]) -> list[Contact]:
-        """Return the rest of the hands, one Contact per load. Repetitions are independent of each other."""
-        ...
+# Closes hands on objects: returns their rest, one Contact per load. Repetitions are independent of each other.
+ContactModel = Callable[[Sequence[Load]], list[Contact]]
 
 
 # Stiffness of the joints in N mm per radian, order of DOF: ours, of the order measured on human fingers (0.3 to 1.5 N m

@@ -18,7 +18,6 @@ from .balance import (
     Balance,
     HandCommand,
     Skin,
-    SolverCase,
     SolverSettings,
     command,
     contract,
@@ -26,7 +25,7 @@ from .balance import (
     dot,
     wrench,
 )
-from .model import STIFFNESS
+from .model import STIFFNESS, Load
 
 
 def cholesky(matrix: Floats) -> Floats:
@@ -228,9 +227,9 @@ class Rest:
         return Rest(pose=self.pose.rows(slice(first, last)), **arrays)
 
 
-def close(cases: Sequence[SolverCase], skin: Skin, most_steps: int, pace: SolverSettings = USUAL) -> list[Rest]:
-    """Return the rest of the hands of `cases`, all of one size, one Rest per case."""
-    target = command(cases)
+def close(loads: Sequence[Load], skin: Skin, most_steps: int, pace: SolverSettings = USUAL) -> list[Rest]:
+    """Return the rest of the hands of `loads`, all of one size, one Rest per load."""
+    target = command(loads)
     rest, walk = Rest.of(target), _Walk.start(target)
     left = np.arange(target.angles.shape[1])
     for count in range(most_steps * pace.parts + 1):
@@ -246,8 +245,8 @@ def close(cases: Sequence[SolverCase], skin: Skin, most_steps: int, pace: Solver
         walk = walk.onward(balance, going, (0.5 if whole >= _HALF_FROM else 1.0) / pace.parts, always=slipping)
         if going.size < left.size:
             left, target = left[going], target.rows(going)
-    ends = np.cumsum([len(case.grip_n) for case in cases])
-    return [rest.part(int(end) - len(case.grip_n), int(end)) for case, end in zip(cases, ends, strict=True)]
+    ends = np.cumsum([len(load.grip_n) for load in loads])
+    return [rest.part(int(end) - len(load.grip_n), int(end)) for load, end in zip(loads, ends, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ import numpy as np
 from ..body.hand import CAPSULES, Hand
 from ..body.layout import SwitchPlaces, murakami160
 from ..body.shapes import rotation_vector
-from ..contact.balance import USUAL, Skin, SolverCase, SolverSettings
+from ..contact.balance import USUAL, Skin, SolverSettings
 from ..contact.model import Contact, ContactModel, Load, split
 from ..contact.settle import Rest, close
 from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, SceneSetting
@@ -47,11 +47,7 @@ class Quasistatic:
         solved: list[Contact] = []
         for _, same_hand in groupby(loads, key=lambda load: load.condition.hand.size):
             for together in _bundles(list(same_hand)):
-                cases = [
-                    SolverCase(load.condition, load.posture_deg.T * (np.pi / 180.0), load.pose.T, load.grip_n)
-                    for load in together
-                ]
-                rests = close(cases, self.skin, self.most_steps, self.pace)
+                rests = close(together, self.skin, self.most_steps, self.pace)
                 solved += [self._contact(load, rest) for load, rest in zip(together, rests, strict=True)]
         return solved
 
@@ -107,7 +103,7 @@ def model(
     drag_n_per_mm, friction  sideways, until it slips
     reach_mm, most_steps     `Quasistatic`
     """
-    return Quasistatic(Skin(press_n_per_mm, soft_mm, drag_n_per_mm, friction), reach_mm, most_steps)
+    return Quasistatic(Skin(press_n_per_mm, soft_mm, drag_n_per_mm, friction), reach_mm, most_steps).solve
 
 
 MEMBER = Effect(

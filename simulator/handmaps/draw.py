@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,17 +63,10 @@ class Picture:
     hollow_mark: str = ""  # text in the hollow dot of the key
 
 
-class _Words(NamedTuple):
-    """The drawn event: as a word, for one switch, and for several."""
-
-    word: str
-    full: str
-    plural: str
-
-
-_CLOSED = _Words("closed", "the switch closed", "switches closed")
-_PRESSED = _Words("pressed", "the taxel was pressed", "taxels pressed")
-_EITHER = _Words("touched", "the switch closed or the taxel was pressed", "switches and taxels touched")
+# The drawn event: as a word, for one switch, and for several.
+_CLOSED = ("closed", "the switch closed", "switches closed")
+_PRESSED = ("pressed", "the taxel was pressed", "taxels pressed")
+_EITHER = ("touched", "the switch closed or the taxel was pressed", "switches and taxels touched")
 
 
 def all_switches(glove: HandShape, numbered: bool) -> Picture:
@@ -109,14 +102,14 @@ def contacts(glove: HandShape, grasp_set: GraspSet, per_grasp: bool) -> Picture:
         groups = [np.flatnonzero(grasp_set.labels == label) for label in present]
         titles = [_type_title(grasp_set, label) for label in present]
     touched, what = touches(grasp_set), _CLOSED if grasp_set.switch_names else _PRESSED
-    what = _EITHER if grasp_set.switch_names and grasp_set.taxel_columns else what
+    word, full, plural = _EITHER if grasp_set.switch_names and grasp_set.taxel_columns else what
     closed = [touched[rows].sum(axis=0) for rows in groups]
     top = max(float((count / len(rows)).max()) for count, rows in zip(closed, groups, strict=True)) or 1.0
     panels = (
-        _contact_panel(glove, title, numbers, count, len(rows), top, what)
+        _contact_panel(glove, title, numbers, count, len(rows), top, word, plural)
         for title, count, rows in zip(titles, closed, groups, strict=True)
     )
-    return Picture(glove, tuple(panels), f"share of grasps in which {what.full}", f"never {what.word}", top)
+    return Picture(glove, tuple(panels), f"share of grasps in which {full}", f"never {word}", top)
 
 
 def kept(glove: HandShape, placements: Sequence[tuple[str, Sequence[str]]]) -> Picture:
@@ -135,13 +128,14 @@ def _contact_panel(
     closed: NDArray[np.intp],
     rows: int,
     top: float,
-    what: _Words,
+    word: str,
+    plural: str,
 ) -> Panel:
     dots = [Dot(f"{name}: not in the set", absent=True) for name in glove.names]
     for number, count in zip(numbers.tolist(), closed.tolist(), strict=True):
-        hint = f"{glove.names[number]}: {what.word} in {count} of {rows} grasps ({count / rows:.1%})"
+        hint = f"{glove.names[number]}: {word} in {count} of {rows} grasps ({count / rows:.1%})"
         dots[number] = Dot(hint, count / rows / top if count else None)
-    return Panel(title, f"{rows} grasps, {float(closed.sum()) / rows:.1f} {what.plural} on average", tuple(dots))
+    return Panel(title, f"{rows} grasps, {float(closed.sum()) / rows:.1f} {plural} on average", tuple(dots))
 
 
 def _type_title(grasp_set: GraspSet, label: int) -> str:

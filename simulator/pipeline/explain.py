@@ -16,7 +16,7 @@ from .steps import Ledger, PipelineStep, StepCost, compile_pipeline
 def middle_session(scene: Scene) -> SubjectSession:
     """Return the session of the middle subject; the order of trials of all subjects alone can take minutes.
 
-    Raises SceneError or PlanError if any subject's hand cannot hold an object.
+    Raises SceneError if any subject's hand cannot hold an object.
     """
     postures = postures_of(scene)
     conditions = [conditions_of(scene, subject, postures) for subject in scene.subjects]

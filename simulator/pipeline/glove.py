@@ -4,6 +4,7 @@ Every scene has `STEPS`, one with taxels `TAXEL_STEPS`, one with rests between g
 and after them, by their order numbers.
 """
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,7 +19,7 @@ from thenar.compiler.recordings.graspset import Joint
 from ..body.cyberglove import SubjectCalibration, sensors_deg
 from ..body.hand import DOF, LIMITS_DEG, RESTS_DEG
 from ..errors import SceneError
-from ..streams import Draw, DrawCounts
+from ..streams import Draw
 from .batch import Batch
 from .effect import Effect, SceneSetting, Step, frame_times
 from .ramp import NEVER
@@ -169,7 +170,7 @@ def _prepare_rest(setting: SceneSetting, *, sd_deg: float, habit_sd_deg: float, 
     usual = RESTS_DEG[setting.rest]
 
     def step(batch: Batch, draw: Draw) -> None:
-        style = replace(draw, effect=_STYLE, draws=DrawCounts()).per_subject(len(DOF) + 1).normal()[:-1]
+        style = replace(draw, effect=_STYLE, draws=Counter()).per_subject(len(DOF) + 1).normal()[:-1]
         resting = draw.at_rest(batch.trials)
         mean = usual + sd_deg * style + habit_sd_deg * resting.per_type(len(DOF)).normal()
 

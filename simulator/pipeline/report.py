@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import Taxonomy
-from thenar.runtime.published import NONE
+from thenar.runtime.published import NONE, Count
 
 from ..body.condition import Condition
 from .batch import SLID_OUT_MM, Batch, Bits
@@ -216,17 +216,11 @@ class GraspReport(msgspec.Struct, frozen=True):
     between_n: float
 
 
-class StepCount(msgspec.Struct, frozen=True):
-    """A count of a step: solver steps, bytes sent, ..."""
-
-    what: str
-    number: int
-
-
 class StepReport(msgspec.Struct, frozen=True):
     """The cost of a step: an effect, or (`own`) one that every scene has. Seconds are summed over all workers.
 
     calls  batches      grasps  repetitions in them      draws  random numbers      share  of the time of all steps
+    counts  of the step's own: solver steps, bytes sent, ...
     """
 
     name: str
@@ -237,7 +231,7 @@ class StepReport(msgspec.Struct, frozen=True):
     seconds: float
     us_a_grasp: float
     share: float
-    counts: tuple[StepCount, ...]
+    counts: tuple[Count, ...]
 
 
 class SimulationReport(msgspec.Struct, frozen=True):
@@ -307,5 +301,5 @@ def step_reports(ledger: Ledger) -> Iterator[StepReport]:
             seconds=entry.nanoseconds / 1e9,
             us_a_grasp=entry.nanoseconds / 1e3 / entry.grasps,
             share=entry.nanoseconds / total if total else 0.0,
-            counts=tuple(StepCount(what, number) for what, number in sorted(entry.counters.items())),
+            counts=tuple(Count(what, number) for what, number in sorted(entry.counters.items())),
         )

@@ -35,29 +35,23 @@ _SHAPES: dict[str, type[Shape]] = {str(shape.__struct_config__.tag): shape for s
 _OF_ANY_SHAPE = SceneObject.__struct_encode_fields__
 
 
-@dataclass(frozen=True, slots=True)
-class Catalogue:
-    """Objects for a taxonomy, under a name."""
-
-    name: str
-    taxonomy: str
-    objects: tuple[SceneObject, ...]
-
-
 class _CatalogueFile(msgspec.Struct, frozen=True):
     taxonomy: str
     objects: list[object]
 
 
-def load_catalogue(name_or_path: str | Path) -> Catalogue:
-    """Read a shipped catalogue by name, or a file. Raises SceneError with file, line and key."""
+def load_catalogue(name_or_path: str | Path) -> tuple[Taxonomy, tuple[SceneObject, ...]]:
+    """Return the taxonomy and the objects of a shipped catalogue, by name, or of a file.
+
+    Raises SceneError with file, line and key.
+    """
     file = name_or_path if isinstance(name_or_path, Path) else _shipped(name_or_path)
     source = read_source(file, SceneError)
     tables = source.tables()
     check_finite(source, (), tables)
     catalogue = convert(source, (), tables, _CatalogueFile)
     taxonomy = find_taxonomy(source, catalogue.taxonomy)
-    return Catalogue(file.name.removesuffix(".toml"), taxonomy.name, objects_of(source, catalogue.objects, taxonomy))
+    return taxonomy, objects_of(source, catalogue.objects, taxonomy)
 
 
 def find_taxonomy(source: TomlText, name: str) -> Taxonomy:
@@ -143,16 +137,9 @@ class _SceneFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     effects: object = {}
 
 
-class Shipped(msgspec.Struct, frozen=True):
-    """A shipped scene: its name, and the first comment in its file."""
-
-    name: str
-    what: str
-
-
-def shipped_scenes() -> list[Shipped]:
-    """Return the shipped scenes."""
-    return [Shipped(name, file.read_text().partition("\n")[0].removeprefix("# ")) for name, file in shipped().items()]
+def shipped_scenes() -> dict[str, str]:
+    """Return the shipped scenes by name, each with the first comment in its file."""
+    return {name: file.read_text().partition("\n")[0].removeprefix("# ") for name, file in shipped().items()}
 
 
 def load_scene(name_or_path: str | Path) -> Scene:
@@ -227,13 +214,13 @@ class _Decoder:
         if not isinstance(name, str):
             return objects_of(self.source, name, taxonomy)
         try:
-            catalogue = load_catalogue(name)
+            of, objects = load_catalogue(name)
         except SceneError as reason:
             raise self.source.error(("objects",), str(reason)) from reason
-        if catalogue.taxonomy != taxonomy.name:
-            fits = f"catalogue {name!r} is for taxonomy {catalogue.taxonomy!r}, not {taxonomy.name!r}"
+        if of.name != taxonomy.name:
+            fits = f"catalogue {name!r} is for taxonomy {of.name!r}, not {taxonomy.name!r}"
             raise self.source.error(("objects",), fits)
-        return catalogue.objects
+        return objects
 
     def _subjects(self) -> tuple[Subject, ...]:
         source, listed, population = self.source, self.file.subjects, self.file.population

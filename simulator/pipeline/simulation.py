@@ -1,7 +1,8 @@
 """`simulate`: a scene in, a set of grasps and a report out."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from time import perf_counter
 
@@ -19,7 +20,7 @@ from ..errors import SceneError
 from ..planning.plan import Progress, postures_of
 from ..planning.postures import Postures
 from ..scenes.scene import Scene, Subject
-from ..streams import Draw, DrawCounts
+from ..streams import Draw
 from .batch import Batch, Integers
 from .effect import at_a_time
 from .glove import TAXEL_ADC, TaxelConverter
@@ -85,7 +86,7 @@ def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> SubjectSessio
     numbers = [share for _, share in scene.shares() if share]
     sites = [condition.site(np.array(share)) for condition, share in zip(conditions, numbers, strict=True)]
     # Repetitions are sorted by one random word each, which does not depend on other repetitions, types or objects.
-    words = [Draw(scene.seed, ORDER, site, DrawCounts()).per_repetition().words for site in sites]
+    words = [Draw(scene.seed, ORDER, site, Counter()).per_repetition().words for site in sites]
     counts = list(map(len, words))
     owner = np.repeat(np.arange(len(conditions)), counts)
     order = np.argsort(np.concatenate(words), kind="stable")
@@ -113,13 +114,8 @@ class Simulation:
 _Batches = tuple[tuple[int, Batch], ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Done:
-    """The results of a group of batches."""
-
-    rows: list[Rows] = field(default_factory=list)
-    notes: list[Notes] = field(default_factory=list)
-    ledger: Ledger = field(default_factory=Ledger)
+# The results of groups of batches.
+_Done = tuple[list[Rows], list[Notes], Ledger]
 
 
 def simulate(
@@ -137,8 +133,7 @@ def simulate(
     block     approximate number of repetitions simulated at a time, fewer if each has many frames
     keep_unsettled  keep repetitions that did not settle; the report names them in any case
 
-    Raises SceneError if the scene cannot be simulated, or if none of it settles; PlanError if a hand cannot hold an
-    object.
+    Raises SceneError if the scene cannot be simulated, if none of it settles, or if a hand cannot hold an object.
     """
     start = perf_counter()
     # Errors of the scene are raised here and not in a worker.
@@ -146,13 +141,15 @@ def simulate(
     plan = sessions(scene, postures_of(scene, jobs, progress))
     run = partial(_run, scene, keep_unsettled)
     total = sum(len(session.before) for session in plan)
-    made = _gathered(in_workers(run, _groups(plan, at_a_time(setting, block)), jobs), total, progress)
-    rows = joined(made.rows, np.repeat(np.arange(len(plan)), [len(session.conditions) for session in plan]))
+    done = in_workers(run, _groups(plan, at_a_time(setting, block)), jobs)
+    blocks, notes, ledger = _gathered(done, total, progress)
+    rows = joined(blocks, np.repeat(np.arange(len(plan)), [len(session.conditions) for session in plan]))
     if not len(rows):
-        why = _unsettled(scene, made)[0].why
+        why = _unsettled(scene, notes)[0].why
         raise SceneError(f"scene {scene.name}: none of its {total} repetitions can be trusted; of the first, {why}")
     found = _set_of(scene, plan, rows, _taxels(scene))
-    return Simulation(found, _report(scene, rows, found, made, perf_counter() - start, keep_unsettled=keep_unsettled))
+    reported = _report(scene, rows, found, notes, ledger, perf_counter() - start, keep_unsettled=keep_unsettled)
+    return Simulation(found, reported)
 
 
 def _groups(plan: Sequence[SubjectSession], block: int) -> Iterator[_Batches]:
@@ -175,13 +172,14 @@ _pipeline = lru_cache(maxsize=1)(compile_pipeline)
 
 
 def _run(scene: Scene, keep_unsettled: bool, batches: _Batches) -> _Done:
-    pipeline, done = _pipeline(scene), _Done()
-    pipeline.run([batch for _, batch in batches], done.ledger)
+    pipeline, ledger = _pipeline(scene), Ledger()
+    pipeline.run([batch for _, batch in batches], ledger)
+    rows, notes = [], []
     for number, batch in batches:
         kept = np.flatnonzero(batch.settled | keep_unsettled)
-        done.rows.append(rows_of(batch, kept, number, _codes(scene, batch), pipeline.setting))
-        done.notes.append(notes_of(batch))
-    return done
+        rows.append(rows_of(batch, kept, number, _codes(scene, batch), pipeline.setting))
+        notes.append(notes_of(batch))
+    return rows, notes, ledger
 
 
 def _codes(scene: Scene, batch: Batch) -> Codes:
@@ -191,15 +189,15 @@ def _codes(scene: Scene, batch: Batch) -> Codes:
 
 
 def _gathered(results: Iterator[_Done], total: int, progress: Progress | None) -> _Done:
-    everything, repetitions = _Done(), 0
-    for done in results:
-        everything.rows.extend(done.rows)
-        everything.notes.extend(done.notes)
-        everything.ledger.merge(done.ledger)
-        repetitions += sum(note.repetitions for note in done.notes)
+    all_rows, all_notes, ledger, repetitions = list[Rows](), list[Notes](), Ledger(), 0
+    for rows, notes, costs in results:
+        all_rows.extend(rows)
+        all_notes.extend(notes)
+        ledger.merge(costs)
+        repetitions += sum(note.repetitions for note in notes)
         if progress is not None:
             progress(repetitions, total)
-    return everything
+    return all_rows, all_notes, ledger
 
 
 def _taxels(scene: Scene) -> tuple[Joint, ...]:
@@ -218,7 +216,14 @@ def _set_of(scene: Scene, plan: Sequence[SubjectSession], rows: Rows, taxels: tu
 
 
 def _report(
-    scene: Scene, rows: Rows, found: GraspSet, made: _Done, seconds: float, *, keep_unsettled: bool
+    scene: Scene,
+    rows: Rows,
+    found: GraspSet,
+    notes: Sequence[Notes],
+    ledger: Ledger,
+    seconds: float,
+    *,
+    keep_unsettled: bool,
 ) -> SimulationReport:
     return SimulationReport(
         simulated=True,
@@ -226,19 +231,19 @@ def _report(
         seed=scene.seed,
         done=scene.done,
         subjects=tuple(subject.name for subject in scene.subjects),
-        repetitions=sum(note.repetitions for note in made.notes),
+        repetitions=sum(note.repetitions for note in notes),
         rows=len(rows),
         seconds=seconds,
-        lost_frames=sum(note.lost_frames for note in made.notes),
+        lost_frames=sum(note.lost_frames for note in notes),
         kept_unsettled=keep_unsettled,
-        unsettled=_unsettled(scene, made),
-        grasps=grasp_reports(rows, found.labels, found.taxonomy.types, made.notes),
-        steps=tuple(step_reports(made.ledger)),
+        unsettled=_unsettled(scene, notes),
+        grasps=grasp_reports(rows, found.labels, found.taxonomy.types, notes),
+        steps=tuple(step_reports(ledger)),
     )
 
 
-def _unsettled(scene: Scene, made: _Done) -> tuple[UnsettledGrasp, ...]:
+def _unsettled(scene: Scene, notes: Sequence[Notes]) -> tuple[UnsettledGrasp, ...]:
     """Return the repetitions that did not settle, in the order of the sessions."""
     place = {subject.name: number for number, subject in enumerate(scene.subjects)}
-    unsettled = (one for note in made.notes for one in note.unsettled)
+    unsettled = (one for note in notes for one in note.unsettled)
     return tuple(sorted(unsettled, key=lambda one: (place[one.subject], one.trial)))

@@ -12,7 +12,7 @@ from typing import Any, Self
 from ..contact.model import ContactModel
 from ..errors import SceneError
 from ..scenes.scene import Scene
-from ..streams import Draw, DrawCounts
+from ..streams import Draw
 from .batch import Batch
 from .effect import EFFECTS, Effect, SceneSetting, Together
 from .glove import STEPS, TAXEL_STEPS, rest_step
@@ -52,12 +52,12 @@ class Ledger:
 
     entries: dict[str, StepCost] = field(default_factory=dict)
 
-    def enter(self, name: str, own: bool, calls: int, grasps: int, nanoseconds: int, draws: DrawCounts) -> None:
+    def enter(self, name: str, own: bool, calls: int, grasps: int, nanoseconds: int, draws: Counter[str]) -> None:
         """Record `calls` calls of step `name`, one batch each, with `grasps` repetitions in total.
 
         `draws` holds the number of random numbers under that name, and the step's own counts under other names.
         """
-        counters = draws.counts.copy()
+        counters = draws.copy()
         drawn = counters.pop(name, 0)
         self._add(name, StepCost(own, calls, grasps, drawn, nanoseconds, counters))
 
@@ -102,7 +102,7 @@ class Pipeline:
         """
         repetitions = sum(map(len, batches))
         for step in self.steps:
-            draws = DrawCounts()
+            draws = Counter[str]()
             sites = [Draw(self.setting.seed, step.effect.name, batch.site(), draws) for batch in batches]
             began = perf_counter_ns()
             step.act(batches, sites)
@@ -111,7 +111,7 @@ class Pipeline:
 
 def _closing(model: ContactModel) -> Together:
     def act(batches: Sequence[Batch], draws: Sequence[Draw]) -> None:
-        contacts = model.solve([batch.load() for batch in batches])
+        contacts = model([batch.load() for batch in batches])
         for batch, contact, draw in zip(batches, contacts, draws, strict=True):
             batch.take(contact)
             draw.count("solver steps", contact.steps)

@@ -22,7 +22,7 @@ from thenar.compiler.workers import in_workers
 
 from ..body.condition import PlannedGrasp, Thing
 from ..body.hand import Hand, Size
-from ..errors import PlanError, SceneError
+from ..errors import SceneError
 from ..scenes.scene import Scene, SceneObject
 from .planner import TOLERANCE_MM, Plan, measure, plan
 from .postures import Entry, HeldAt, Postures
@@ -49,7 +49,7 @@ class Work:
     longest_mm: float
 
     def at(self, length_mm: float, near: Plan | None = None) -> Plan:
-        """Return a plan for one hand length. Raises PlanError."""
+        """Return a plan for one hand length. Raises SceneError."""
         return plan(average_hand(length_mm), self.grasp, self.prehension, self.thing, near.held if near else None)
 
 
@@ -61,7 +61,7 @@ def average_hand(length_mm: float) -> Hand:
 def plan_object(work: Work) -> Entry:
     """Return an object's postures for hands of all lengths.
 
-    Raises PlanError if a requested length fails; beyond these, the usual ones are planned until one fails.
+    Raises SceneError if a requested length fails; beyond these, the usual ones are planned until one fails.
     """
     plans = _outwards(work)
     entry = entry_of(work, plans)
@@ -81,7 +81,7 @@ def _outwards(work: Work) -> dict[float, Plan]:
         for length in np.arange(first + step, usual + step / 2, step).tolist():
             try:
                 plans[length] = work.at(length, plans[length - step])
-            except PlanError:
+            except SceneError:
                 if (needed - length) * step >= 0.0:
                     raise
                 break
@@ -96,7 +96,7 @@ def _evened(work: Work, plans: dict[float, Plan]) -> dict[float, Plan]:
     found, lengths = dict(plans), list(plans)
     for order in (lengths, lengths[::-1]):
         for before, length in pairwise(order):
-            with suppress(PlanError):
+            with suppress(SceneError):
                 again = work.at(length, found[before])
                 if again.cost < _BETTER * found[length].cost:
                     found[length] = again
@@ -153,7 +153,7 @@ def postures_of(scene: Scene, jobs: int = -1, progress: Progress | None = None) 
     """Return the postures of a scene's objects: shipped ones, those planned in an earlier call, and new plans.
 
     `progress(done, all)` is called after every new plan. Raises SceneError if the taxonomy has no table of prehensions,
-    PlanError if a hand of the scene cannot hold an object.
+    or if a hand of the scene cannot hold an object.
     """
     shipped = Postures.shipped(scene.taxonomy)
     works = list(lacking(scene, shipped))
@@ -187,9 +187,9 @@ def _cached(work: Work) -> Path:
 def planned(works: Sequence[Work], jobs: int = -1, progress: Progress | None = None) -> list[Entry]:
     """Return the plans of objects, the same for any `jobs`; `progress(done, all)` is called after each.
 
-    Raises the first PlanError, in the order of the objects, and names the others that cannot be held.
+    Raises the first SceneError, in the order of the objects, and names the others that cannot be held.
     """
-    results: dict[int, Entry | PlanError] = {}
+    results: dict[int, Entry | SceneError] = {}
     for number, result in in_workers(_result, enumerate(works), jobs if len(works) > 1 else 1):
         results[number] = result
         if progress is not None:
@@ -225,19 +225,19 @@ def lacking(scene: Scene, known: Postures) -> Iterator[Work]:
         yield Work(item.grasp, prehensions[item.grasp], item.thing(), shortest, longest)
 
 
-def _successes(results: Sequence[Entry | PlanError], works: Sequence[Work]) -> list[Entry]:
-    """Return the results. Raises the first PlanError among them, in the scene's order, and names the other objects."""
-    failed = [(result, work) for result, work in zip(results, works, strict=True) if isinstance(result, PlanError)]
+def _successes(results: Sequence[Entry | SceneError], works: Sequence[Work]) -> list[Entry]:
+    """Return the results. Raises the first SceneError among them, in the scene's order, and names the other objects."""
+    failed = [(result, work) for result, work in zip(results, works, strict=True) if isinstance(result, SceneError)]
     if failed:
         others = ", ".join(f"{work.thing.name!r} ({work.grasp})" for _, work in failed[1:])
-        raise PlanError(f"{failed[0][0]}; nor can these be held: {others}" if others else str(failed[0][0]))
+        raise SceneError(f"{failed[0][0]}; nor can these be held: {others}" if others else str(failed[0][0]))
     return [result for result in results if isinstance(result, Entry)]
 
 
-def _result(task: tuple[int, Work]) -> tuple[int, Entry | PlanError]:
+def _result(task: tuple[int, Work]) -> tuple[int, Entry | SceneError]:
     # Failures are results, too, so that an error does not depend on which worker is first.
     number, work = task
     try:
         return number, plan_object(work)
-    except PlanError as reason:
+    except SceneError as reason:
         return number, reason

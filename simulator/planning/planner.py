@@ -18,7 +18,7 @@ from thenar.compiler.elementary import Floats
 from ..body.condition import Pad, PlannedGrasp, Thing
 from ..body.hand import LIMITS_DEG, Hand, Skeleton
 from ..body.shapes import Cylinder, Pose, Shape, Sphere, rotation_vector
-from ..errors import PlanError
+from ..errors import SceneError
 from .postures import FRICTION
 from .prehension import Prehension, pad_side, pad_sphere
 
@@ -196,7 +196,7 @@ class Plan:
 def plan(hand: Hand, grasp: str, prehension: Prehension, thing: Thing, near: PlannedGrasp | None = None) -> Plan:
     """Return a posture of `hand` that holds `thing`; `near` is a starting posture of a hand of similar size.
 
-    Raises PlanError if the best one leaves a pad too far off or skin too deep, or pushes the object away.
+    Raises SceneError if the best one leaves a pad too far off or skin too deep, or pushes the object away.
     """
     from threadpoolctl import threadpool_limits
 
@@ -209,7 +209,7 @@ def plan(hand: Hand, grasp: str, prehension: Prehension, thing: Thing, near: Pla
     # The plan of the least cost among those that hold; if none does, the one closest to holding.
     best = min(plans, key=lambda one: (not one.holds(), one.cost if one.holds() else one.excess()))
     if not best.holds():
-        raise PlanError(_refusal(hand, grasp, thing, best))
+        raise SceneError(_refusal(hand, grasp, thing, best))
     return best
 
 

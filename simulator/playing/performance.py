@@ -291,7 +291,7 @@ Moment = tuple[int, bytes, tuple[int, ...], str]
 def of_recording(path: Path, period_us: int, warn: Callable[[str], None] = lambda _: None) -> Performance:
     """Return the newest frames of a recording every `period_us`, with the grasp type predicted, or collected, by then.
 
-    Without a CyberGlove its sensors rest. `warn` gets a sentence on each fault of the file. Raises McapError if it is
+    Without a CyberGlove its sensors rest. `warn` gets a sentence on each fault of the file. Raises FormatError if it is
     not a recording, SceneError if it holds no frames.
     """
     reader = Reader(path)

@@ -6,6 +6,7 @@ milliseconds.
 Every subject has separate draws, so that a larger count leaves the first subjects unchanged.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import floor, sqrt
@@ -21,7 +22,7 @@ from ..body.hand import Hand, Size
 from ..body.layout import taxel_places
 from ..body.shapes import Shape
 from ..errors import SceneError
-from ..streams import Draw, DrawCounts, Site
+from ..streams import Draw, Site
 
 # No hand is smaller or larger.
 HAND_LENGTHS_MM = (130.0, 240.0)
@@ -189,26 +190,18 @@ class SizeSpread:
         return min(max(round(self.mean + self.sd * normal, 1), limits[0]), limits[1])
 
 
-@dataclass(frozen=True, slots=True)
-class Hands:
-    """The hands of one sex in a survey."""
-
-    length: SizeSpread
-    breadth: SizeSpread
-
-
-# Men, then women. Published: lengths of the US Army (ANSUR II, NATICK/TR-15/007), lengths from the radial styloid (some
-# 6 mm more than from the wrist crease) and mean breadths of Japan (AIST 2012). Ours: ANSUR's mean breadths, 0.455 of
-# the mean lengths, and the spread of all breadths.
+# Length and breadth of men, then of women. Published: lengths of the US Army (ANSUR II, NATICK/TR-15/007), lengths from
+# the radial styloid (some 6 mm more than from the wrist crease) and mean breadths of Japan (AIST 2012). Ours: ANSUR's
+# mean breadths, 0.455 of the mean lengths, and the spread of all breadths.
 _BREADTH_SD = 4.0
 SURVEYS = {
     "ansur2": (
-        Hands(SizeSpread(193.3, 9.9), SizeSpread(0.455 * 193.3, _BREADTH_SD)),
-        Hands(SizeSpread(181.1, 10.1), SizeSpread(0.455 * 181.1, _BREADTH_SD)),
+        (SizeSpread(193.3, 9.9), SizeSpread(0.455 * 193.3, _BREADTH_SD)),
+        (SizeSpread(181.1, 10.1), SizeSpread(0.455 * 181.1, _BREADTH_SD)),
     ),
     "aist2012": (
-        Hands(SizeSpread(189.6, 8.1), SizeSpread(83.3, _BREADTH_SD)),
-        Hands(SizeSpread(175.4, 7.3), SizeSpread(74.4, _BREADTH_SD)),
+        (SizeSpread(189.6, 8.1), SizeSpread(83.3, _BREADTH_SD)),
+        (SizeSpread(175.4, 7.3), SizeSpread(74.4, _BREADTH_SD)),
     ),
 }
 
@@ -229,12 +222,12 @@ def draw_subjects(population: SurveyPopulation, seed: int) -> tuple[Subject, ...
 def _subject(population: SurveyPopulation, seed: int, number: int) -> Subject:
     name = f"P{number + 1:03d}"
     site = Site(name, "", "", np.zeros(1, dtype=np.int64))
-    first, second = Draw(seed, SITE, site, DrawCounts()).per_subject(2).normal().tolist()
+    first, second = Draw(seed, SITE, site, Counter()).per_subject(2).normal().tolist()
     woman = floor((number + 1) * population.women) > floor(number * population.women)
-    hands = SURVEYS[population.survey][woman]
+    length, breadth = SURVEYS[population.survey][woman]
     across = CORRELATION * first + sqrt(1.0 - CORRELATION * CORRELATION) * second
     return Subject(
         name=name,
-        hand_length_mm=hands.length.at(first, HAND_LENGTHS_MM),
-        hand_breadth_mm=hands.breadth.at(across, HAND_BREADTHS_MM),
+        hand_length_mm=length.at(first, HAND_LENGTHS_MM),
+        hand_breadth_mm=breadth.at(across, HAND_BREADTHS_MM),
     )

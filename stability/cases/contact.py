@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere, rotation, rotation_vector
-from thenar.simulator.contact.balance import USUAL, Skin, SolverCase, SolverSettings
+from thenar.simulator.contact.balance import USUAL, Skin, SolverSettings
 from thenar.simulator.contact.model import Contact, Load
 from thenar.simulator.contact.settle import close
 from thenar.simulator.effects import switch_threshold
@@ -200,14 +200,13 @@ def _balanced(grasps: Sequence[Grasp]) -> Iterator[Finding]:
     moments = Finding.of("quasistatic at rest: moment on the object", REFERENCE, USUAL.rest_nmm * (1 + 1e-6), "N mm")
     joints = Finding.of("quasistatic at rest: moment on a joint", REFERENCE, USUAL.rest_nmm * (1 + 1e-6), "N mm")
     for name, load in grasps:
-        case = SolverCase(load.condition, load.posture_deg.T * (np.pi / 180.0), load.pose.T, load.grip_n)
-        (rest,) = close([case], USUAL_SKIN, MOST_STEPS)
+        (rest,) = close([load], USUAL_SKIN, MOST_STEPS)
         # In the exact middle of an object the direction of a pad is arbitrary.
         pads = [pad.sphere for pad in load.condition.held.pads]
         hand = load.condition.hand
         away = hand.spheres(hand.skeleton(np.radians(load.posture_deg.T)))[pads, :, 0] - load.pose[0, :3]
         if rest.settled[0] and (np.abs(away).max(axis=1, initial=0.0) > 1e-9).all():
-            for worst, residual in zip((forces, moments, joints), residuals(case, rest, USUAL_SKIN), strict=True):
+            for worst, residual in zip((forces, moments, joints), residuals(load, rest, USUAL_SKIN), strict=True):
                 worst.see(residual, name)
     yield from (forces, moments, joints)
 

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from thenar.simulator.body.hand import LIMITS_DEG, Skeleton
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere, rotation
-from thenar.simulator.contact.balance import HOLD_N_PER_MM, HOLD_NMM_PER_RAD, LIMIT_NMM_PER_RAD, Skin, SolverCase
-from thenar.simulator.contact.model import GRAVITY, STIFFNESS
+from thenar.simulator.contact.balance import HOLD_N_PER_MM, HOLD_NMM_PER_RAD, LIMIT_NMM_PER_RAD, Skin
+from thenar.simulator.contact.model import GRAVITY, STIFFNESS, Load
 from thenar.simulator.contact.settle import Rest
 
 from ..reference.numbers import precisely
@@ -67,15 +67,15 @@ def _rounded(sides: Vector) -> tuple[mpf, Vector]:
     return sides[nearest], exactly(np.arange(len(sides)) == nearest)
 
 
-def touches_of(case: SolverCase, centres: Matrix, frame: Matrix, position: Vector) -> tuple[Vector, Matrix, Matrix]:
+def touches_of(load: Load, centres: Matrix, frame: Matrix, position: Vector) -> tuple[Vector, Matrix, Matrix]:
     """Return the depths (50,) of all spheres of skin in an object at `frame` and `position`, its normals, and points.
 
     Normals (50, 3) point outwards; points (50, 3) are those of contact, or for a sphere off the surface the nearest
     of its skin. The spheres' centres are (50, 3).
     """
     depths, normals, points = [], [], []
-    for centre, radius in zip(centres, map(mpf, case.condition.hand.sphere_radii.tolist()), strict=True):
-        distance, out = surface(case.condition.thing.shape, frame.T @ (centre - position))
+    for centre, radius in zip(centres, map(mpf, load.condition.hand.sphere_radii.tolist()), strict=True):
+        distance, out = surface(load.condition.thing.shape, frame.T @ (centre - position))
         normal = frame @ out
         depths.append(radius - distance)
         normals.append(normal)
@@ -90,40 +90,40 @@ def press(skin: Skin, sunk: mpf) -> mpf:
 
 
 @precisely()
-def residuals(case: SolverCase, rest: Rest, skin: Skin) -> tuple[float, float, float]:
+def residuals(load: Load, rest: Rest, skin: Skin) -> tuple[float, float, float]:
     """Return force and moment on the object, including its soft hold, and the largest moment on any joint.
 
     They are those of the only repetition, with friction as returned, and all else from angles and pose.
     """
-    hand, condition = case.condition.hand, case.condition
+    hand, condition = load.condition.hand, load.condition
     skeleton = hand.skeleton(rest.angles)
     frame, position = exactly(rest.pose.rotation[..., 0]), exactly(rest.pose.position[:, 0])
-    depths, normals, points = touches_of(case, exactly(hand.spheres(skeleton)[..., 0]), frame, position)
+    depths, normals, points = touches_of(load, exactly(hand.spheres(skeleton)[..., 0]), frame, position)
     pressed = np.array([press(skin, depth) for depth in depths])
     forces = exactly(rest.drags[..., 0]) + normals * pressed[:, None]
     loaded = mpf(condition.thing.mass_kg) * mpf(GRAVITY) * exactly(condition.held.down) - forces.sum(axis=0)
-    force = loaded - mpf(HOLD_N_PER_MM) * (position - exactly(case.numbers[:3, 0]))
-    initial = exactly(rotation(case.numbers[3:])[..., 0])
+    force = loaded - mpf(HOLD_N_PER_MM) * (position - exactly(load.pose[0, :3]))
+    initial = exactly(rotation(load.pose.T[3:])[..., 0])
     # sin(rotation) times its axis, from the object's initial pose: half the sum of its axes' cross products.
     turned = np.cross(initial.T, frame.T).sum(axis=0) / 2
     moment = -np.cross(points - position, forces).sum(axis=0) - mpf(HOLD_NMM_PER_RAD) * turned
     # The torque on a joint is that of its pads, its spring, its end stop and its skin.
-    start, now = exactly(case.angles[:, 0]), exactly(rest.angles[:, 0])
+    start, now = exactly(load.angles[:, 0]), exactly(rest.angles[:, 0])
     low, high = map(exactly, LIMITS_DEG.T * (np.pi / 180.0))
     over = np.maximum(now - high, mpf(0)) + np.minimum(now - low, mpf(0))
-    torques = _grip(case, initial) + _moments(skeleton, points, forces)
+    torques = _grip(load, initial) + _moments(skeleton, points, forces)
     torques -= exactly(STIFFNESS) * (now - start) + mpf(LIMIT_NMM_PER_RAD) * over
     return float(length(force)), float(length(moment)), float(abs(torques).max())
 
 
-def _grip(case: SolverCase, frame: Matrix) -> Vector:
+def _grip(load: Load, frame: Matrix) -> Vector:
     """Return the torques of the grip: every pad pushes its share into the surface at the target posture."""
-    hand, grip = case.condition.hand, mpf(float(case.grip_n[0]))
-    skeleton = hand.skeleton(case.angles)
+    hand, grip = load.condition.hand, mpf(float(load.grip_n[0]))
+    skeleton = hand.skeleton(load.angles)
     centres = exactly(hand.spheres(skeleton)[..., 0])
-    _, normals, _ = touches_of(case, centres, frame, exactly(case.numbers[:3, 0]))
+    _, normals, _ = touches_of(load, centres, frame, exactly(load.pose[0, :3]))
     pushes = exactly(np.zeros(centres.shape))
-    for pad in case.condition.held.pads:
+    for pad in load.condition.held.pads:
         pushes[pad.sphere] -= normals[pad.sphere] * mpf(pad.share) * grip
     return _moments(skeleton, centres, pushes)
 

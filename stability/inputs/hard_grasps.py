@@ -94,8 +94,8 @@ def planned(every: int) -> Iterator[Grasp]:
     scene = load_scene("kamakura")
     postures = Postures.shipped(scene.taxonomy)
     men, women = SURVEYS["ansur2"]
-    for share, hands, normal in ((1, women, -_ONE_IN_A_HUNDRED), (99, men, _ONE_IN_A_HUNDRED)):
-        size = Size(hands.length.at(normal, (0.0, 300.0)), hands.breadth.at(normal, (0.0, 300.0)))
+    for share, (length, breadth), normal in ((1, women, -_ONE_IN_A_HUNDRED), (99, men, _ONE_IN_A_HUNDRED)):
+        size = Size(length.at(normal, (0.0, 300.0)), breadth.at(normal, (0.0, 300.0)))
         for item in scene.objects[::every]:
             target = postures.held(Hand(size), item.grasp, item.thing())
             condition = Condition("A", Hand(size), item.grasp, item.thing(), target)

@@ -103,7 +103,8 @@ def test_json_holds_every_number_and_the_verdicts(here: Thenar) -> None:
     report = json.loads(done.stdout)
     assert (done.returncode, report["holds"], report["full"], report["weka"]) == (1, False, False, None)
     assert [(case["name"], case["holds"]) for case in report["cases"]] == [("sound", True), ("exceeding", False)]
-    assert report["cases"][1]["checks"][0]["finding"]["error"] == 1.5
+    finding = report["cases"][1]["findings"][0]
+    assert (finding["error"], finding["holds"]) == (1.5, False)
 
 
 def test_a_narrow_terminal_cuts_no_word_number_or_verdict(

@@ -13,12 +13,10 @@ from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.study import Study, StudyDesign, evaluate
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.placement import place
 from thenar.compiler.recogniser import check_inputs
-from thenar.compiler.samples import Samples, SamplesError
-from thenar.compiler.trainers.base import BoostingError
+from thenar.compiler.samples import Samples, TrainingError
 from thenar.compiler.trainers.logitboost import boost
 from thenar.compiler.workers import check_memory
 from thenar.drivers.errors import ThenarError
@@ -36,11 +34,11 @@ def many_types() -> GraspSet:
 @pytest.mark.parametrize(
     ("work", "error"),
     [
-        (lambda grasps, folder: compile_build(grasps, folder / "build"), SamplesError),
+        (lambda grasps, folder: compile_build(grasps, folder / "build"), TrainingError),
         (lambda grasps, _: find_frontier(grasps), FrontierError),
         (lambda grasps, _: evaluate(grasps), EvaluationError),
-        (lambda grasps, _: place(grasps), PlacementError),
-        (lambda grasps, _: Samples.of(grasps), SamplesError),
+        (lambda grasps, _: place(grasps), TrainingError),
+        (lambda grasps, _: Samples.of(grasps), TrainingError),
     ],
     ids=["compile", "frontier", "evaluate", "place", "place --method"],
 )
@@ -97,7 +95,7 @@ def test_more_stumps_than_an_ensemble_holds_are_refused_before_the_training(
 
 def test_rows_that_do_not_fit_into_memory_are_refused_before_the_training() -> None:
     labels = np.arange(8_000_000) % 1024
-    with pytest.raises(BoostingError, match=r"8000000 rows of 1024 grasp types needs some 983\.\d GB of memory"):
+    with pytest.raises(TrainingError, match=r"8000000 rows of 1024 grasp types needs some 983\.\d GB of memory"):
         boost((labels % 2 == 0)[:, np.newaxis], labels, 1024, rounds=1)
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.samples import Samples, SamplesError
+from thenar.compiler.samples import Samples, TrainingError
 
 
 def make(n: int = 4, labels: tuple[int, ...] = (0, 1, 1, 2), classes: int = 3) -> Samples:
@@ -19,5 +19,5 @@ def test_some_of_the_rows_are_a_learning_of_as_many_classes() -> None:
     ("n", "labels", "classes"), [(3, (0, 1, 1, 2), 3), (0, (), 1), (4, (0, 1, 1, 2), 2), (4, (0, -1, 1, 2), 3)]
 )
 def test_what_does_not_fit_together_is_refused(n: int, labels: tuple[int, ...], classes: int) -> None:
-    with pytest.raises(SamplesError):
+    with pytest.raises(TrainingError):
         make(n, labels, classes)

@@ -2,13 +2,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.compiler.evaluation.rates import Rate, interval
 from thenar.compiler.text import (
     DASH,
     NBSP,
     cell,
     counted,
     duration,
-    interval,
     listed,
     microseconds,
     percent,
@@ -16,15 +16,13 @@ from thenar.compiler.text import (
     text_of,
 )
 
-
-class Rate:
-    mean, low, high = 0.9634, 0.9512, 0.97249
+RATE = Rate("pooled", "trials", (1,), 1, 1, 0.9634, 0.9512, 0.97249)
 
 
 def test_rates_have_one_digit_and_a_missing_one_is_a_dash() -> None:
     assert percent(0.9634) == "96.3 %"
     assert percent(0.9634, NBSP) == f"96.3{NBSP}%"
-    assert interval(Rate()) == "96.3 [95.1, 97.2]"
+    assert interval(RATE) == "96.3 [95.1, 97.2]"
     assert interval(None) == DASH
 
 

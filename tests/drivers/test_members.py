@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from thenar.drivers.members import MemberError, Members, MembersByName
+from thenar.drivers.errors import SettingError
+from thenar.drivers.members import Members, MembersByName
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def test_members_of_other_packages_come_last_by_entry_point(site: Path, members:
 
 
 def test_an_unknown_name_is_answered_with_all_members(members: Callable[..., Members[Sort]]) -> None:
-    with pytest.raises(MemberError, match="there is no sort 'x': choose one of a, b"):
+    with pytest.raises(SettingError, match="there is no sort 'x': choose one of a, b"):
         members(a="MEMBER = Sort('b'), Sort('a')").named("x")
 
 
@@ -94,7 +95,7 @@ def test_an_invalid_foreign_member_is_refused_in_a_sentence(
     (site / "other_bad.py").write_text(OTHER)
     write_distribution(site, "somebody", b=value)
     registry = members(a="MEMBER = Sort('one')")
-    with pytest.raises(MemberError, match=said):
+    with pytest.raises(SettingError, match=said):
         list(registry)
 
 
@@ -121,25 +122,25 @@ def test_names_are_listed_without_an_import_and_a_member_is_imported_alone(
     )
     assert list(by_name) == ["sort.grip", "sort.object_pose", "joint.lost", "joint.offset"]
     assert (len(by_name), "sort.grip" in by_name, "sort_grip" in by_name) == (4, True, False)
-    with pytest.raises(MemberError, match=r"there is no sort 'x': choose one of sort.grip, sort.object_pose, joint"):
+    with pytest.raises(SettingError, match=r"there is no sort 'x': choose one of sort.grip, sort.object_pose, joint"):
         by_name.named("x")
     assert imported() == set()
     assert by_name["sort.object_pose"] == Sort("sort.object_pose")
     assert imported() == {"sort_object_pose"}
     assert by_name.named("joint.offset") == Sort("joint.offset")
     assert imported() == {"sort_object_pose", "other_joint"}
-    with pytest.raises(MemberError, match=r"'joint.lost' .* cannot be loaded: No module named 'no_such_module'; fix"):
+    with pytest.raises(SettingError, match=r"'joint.lost' .* cannot be loaded: No module named 'no_such_module'; fix"):
         by_name["joint.lost"]
 
 
 def test_taken_and_missing_member_names_are_refused(site: Path, by_name: MembersByName[Sort]) -> None:
     (site / "other_misnamed.py").write_text(OTHER)
     write_distribution(site, "somebody", **{"joint.one": "other_misnamed:ONE"})
-    with pytest.raises(MemberError, match=r"'joint.one' .* has a different name, 'one': give its entry point"):
+    with pytest.raises(SettingError, match=r"'joint.one' .* has a different name, 'one': give its entry point"):
         by_name["joint.one"]
     write_distribution(site, "another", **{"sort.grip": "other_misnamed:ONE"})
     taken = MembersByName("sort", Sort, by_name.package, "thenar.sorts")
-    with pytest.raises(MemberError, match=r"two packages define the sort 'sort.grip': uninstall one of them"):
+    with pytest.raises(SettingError, match=r"two packages define the sort 'sort.grip': uninstall one of them"):
         list(taken)
 
 

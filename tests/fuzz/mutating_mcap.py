@@ -10,7 +10,7 @@ from zlib import crc32
 
 from mutating import INTEGERS, TEXTS, altered, json_file
 
-from thenar.runtime.errors import McapError
+from thenar.runtime.errors import FormatError
 from thenar.runtime.recording.layout import decode_text, encode_bytes, encode_text
 from thenar.runtime.recording.mcap import MAGIC
 
@@ -109,7 +109,7 @@ def _message(content: bytes, random: Random) -> bytes:
         case _:
             try:
                 data = encode_text(json_file(decode_text(data), random))
-            except McapError:
+            except FormatError:
                 data = random.choice((_states, altered))(data, random)
     return _MESSAGE.pack(channel, sequence, logged, published) + data
 

@@ -99,7 +99,7 @@ def soak(build: Build, harness: Harness, rows: Path, folder: Path, frames: int) 
         sinks=("jsonl:/dev/null?every", f"unix:{folder}/socket"),
         record=folder / "soak.mcap",
         status=True,
-        feed=feed,
+        feed=feed.take,
     )
     with glove, socket.socket(socket.AF_UNIX) as reader:
         assert glove.recorder is not None

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.runtime.errors import SealError
+from thenar.runtime.errors import FormatError
 from thenar.runtime.sealed import HEADER, seal, unseal
 
 KIND = b"THNRTEST"
@@ -18,7 +18,7 @@ def test_any_flipped_bit_is_noticed(payload: bytes, data: st.DataObject) -> None
     sealed = bytearray(seal(KIND, 1, payload))
     position = data.draw(st.integers(0, 8 * len(sealed) - 1))
     sealed[position // 8] ^= 1 << position % 8
-    with pytest.raises(SealError):
+    with pytest.raises(FormatError):
         unseal(bytes(sealed), KIND, 1, "file")
 
 
@@ -26,28 +26,28 @@ def test_any_flipped_bit_is_noticed(payload: bytes, data: st.DataObject) -> None
 def test_a_truncated_file_is_refused_with_the_reason(payload: bytes, data: st.DataObject) -> None:
     sealed = seal(KIND, 1, payload)
     cut = data.draw(st.integers(8, len(sealed) - 1))
-    with pytest.raises(SealError, match="file is truncated"):
+    with pytest.raises(FormatError, match="file is truncated"):
         unseal(sealed[:cut], KIND, 1, "file")
 
 
 @given(st.binary(max_size=200))
 def test_random_bytes_are_refused(data: bytes) -> None:
-    with pytest.raises(SealError):
+    with pytest.raises(FormatError):
         unseal(data, KIND, 1, "file")
 
 
 def test_bytes_after_the_end_are_refused() -> None:
-    with pytest.raises(SealError, match="3 bytes too many"):
+    with pytest.raises(FormatError, match="3 bytes too many"):
         unseal(seal(KIND, 1, b"abc") + b"xyz", KIND, 1, "file")
 
 
 def test_a_newer_format_is_refused_by_its_number() -> None:
-    with pytest.raises(SealError, match="format 2, this thenar reads up to 1: update thenar"):
+    with pytest.raises(FormatError, match="format 2, this thenar reads up to 1: update thenar"):
         unseal(seal(KIND, 2, b"abc"), KIND, 1, "file")
 
 
 def test_another_kind_of_file_is_refused() -> None:
-    with pytest.raises(SealError, match="not a thenar THNRTEST file"):
+    with pytest.raises(FormatError, match="not a thenar THNRTEST file"):
         unseal(seal(b"THNRGRSP", 1, b"abc"), KIND, 1, "file")
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.runtime.errors import BuildError, SealError, ThenarError
+from thenar.runtime.errors import BuildError, FormatError, ThenarError
 from thenar.runtime.model import integers as module
 from thenar.runtime.model.integers import (
     COARSEST_SCALE,
@@ -186,7 +186,7 @@ def test_an_oversized_file_is_refused() -> None:
 
 
 def test_a_newer_file_is_refused_by_its_number() -> None:
-    with pytest.raises(SealError, match="format 4"):
+    with pytest.raises(FormatError, match="format 4"):
         tables_from_bytes(seal(KIND, 4, b""))
 
 
@@ -234,7 +234,7 @@ def test_counts_without_the_thresholds_counts_they_announce_are_refused(make_tab
 
 
 def test_a_file_that_is_no_table_is_named() -> None:
-    with pytest.raises(SealError, match=r"^glove/tables"):
+    with pytest.raises(FormatError, match=r"^glove/tables"):
         tables_from_bytes(b"something else altogether, long enough to have had a seal", "glove/tables")
 
 

@@ -1,5 +1,6 @@
 """A hand round a bar, batches of it, settings and scenes, as small as can be."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -9,11 +10,11 @@ from msgspec.structs import asdict
 from thenar.simulator.body.condition import Condition, Pad, PlannedGrasp, Thing
 from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Cylinder
-from thenar.simulator.contact.balance import SolverCase
+from thenar.simulator.contact.model import Load
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS, SceneSetting
 from thenar.simulator.scenes.scene import ListedEffect, Recording, Scene, SceneGlove, SceneObject, Subject
-from thenar.simulator.streams import Draw, DrawCounts, Site
+from thenar.simulator.streams import Draw, Site
 
 BAR = Cylinder(diameter_mm=40.0, length_mm=120.0)
 # Fingers bent round it, the thumb in opposition, order of DOF.
@@ -57,7 +58,7 @@ def make_draw(effect: str, batch: Batch, seed: int = 7) -> Draw:
     """Return the draw of an effect, by its name, for a batch."""
     condition = batch.condition
     site = Site(condition.subject, condition.grasp, condition.thing.name, batch.repetitions)
-    return Draw(seed, effect, site, DrawCounts())
+    return Draw(seed, effect, site, Counter())
 
 
 def make_scene(effects: Sequence[str | tuple[str, dict[str, Any]]] = (), **changes: object) -> Scene:
@@ -79,9 +80,9 @@ def make_scene(effects: Sequence[str | tuple[str, dict[str, Any]]] = (), **chang
     return Scene(effects=listed, **(usual | changes))  # type: ignore[arg-type]
 
 
-def make_case(condition: Condition, n: int = 3, seed: int = 1, share: float = 1.0) -> SolverCase:
+def make_load(condition: Condition, n: int = 3, seed: int = 1, share: float = 1.0) -> Load:
     """Return n repetitions that vary by `share` of what shipped scenes vary; 0: just as planned."""
     draw, held = np.random.default_rng(seed), condition.held
     angles = held.posture_deg[:, None] + share * 1.5 * draw.normal(size=(20, n))
     numbers = held.pose[:, None] + share * draw.normal(size=(6, n)) * np.array([1.5] * 3 + [0.044] * 3)[:, None]
-    return SolverCase(condition, np.radians(angles), numbers, held.grip_n * np.exp(share * 0.25 * draw.normal(size=n)))
+    return Load(condition, angles.T, numbers.T, held.grip_n * np.exp(share * 0.25 * draw.normal(size=n)))

@@ -1,12 +1,13 @@
 """Random numbers by draw site."""
 
+from collections import Counter
 from fractions import Fraction
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.streams import Draw, DrawCounts, RandomWords, Site
+from thenar.simulator.streams import Draw, RandomWords, Site
 from thenar.stability.reference.intervals import normal_quantile
 from thenar.stability.reference.numbers import distance
 
@@ -22,7 +23,7 @@ def draw_for(
     repetitions: list[int] | None = None,
 ) -> Draw:
     numbers = np.array([0, 1, 2] if repetitions is None else repetitions, dtype=np.int64)
-    return Draw(seed, effect, Site(subject, grasp, thing, numbers), DrawCounts())
+    return Draw(seed, effect, Site(subject, grasp, thing, numbers), Counter())
 
 
 def every_draw(draw: Draw) -> tuple[bytes, bytes, bytes]:
@@ -84,7 +85,7 @@ def test_names_that_read_alike_when_joined_draw_apart() -> None:
 def test_every_number_drawn_is_counted() -> None:
     draw = draw_for()
     every_draw(draw)
-    assert dict(draw.draws.counts) == {"joint.noise": 3 * 2 + 2 + 2}
+    assert dict(draw.draws) == {"joint.noise": 3 * 2 + 2 + 2}
 
 
 def test_words_are_those_of_philox_on_every_machine_and_of_every_numpy() -> None:

@@ -26,7 +26,7 @@ def test_every_case_has_a_title_and_a_danger_in_one_line() -> None:
 def _holds(found: CaseReport) -> None:
     assert found.failure is None
     assert msgspec.json.decode(msgspec.json.encode(found), type=CaseReport) == found
-    assert not [check.finding for check in found.checks if not check.holds]
+    assert not [finding for finding in found.findings if not finding.holds]
     assert found.holds
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from thenar.stability import cases, report
 from thenar.stability.finding import Case, Finding
-from thenar.stability.report import CaseReport, Check, Report, failures, legend, run, run_case
+from thenar.stability.report import CaseReport, Report, failures, legend, run, run_case
 
 SOUND = """
 from thenar.stability.finding import Finding
@@ -76,8 +76,7 @@ def test_the_worst_is_kept_with_its_place_nan_worst() -> None:
 
 
 def reported(*findings: Finding, failure: str | None = None) -> Report:
-    checks = tuple(Check(finding, finding.holds) for finding in findings)
-    return Report(False, (CaseReport("case", Case("A case", ""), checks, failure, False),), None, False)
+    return Report(False, (CaseReport("case", Case("A case", ""), findings, failure, False),), None, False)
 
 
 def test_failures_name_case_check_size_count_and_place() -> None:

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from thenar.drivers.members import Members
 from thenar.runtime.names import shortened
 
-from ...samples import Columns, Samples
-from .. import PlacementError
+from ...samples import Columns, Samples, TrainingError
 from ..ports import PortCosts
 
 Chooser = Callable[[float], Columns]
@@ -68,7 +67,7 @@ class Method:
 
     Raises
     ------
-    PlacementError
+    TrainingError
         If the parameter is neither of the two.
     """
 
@@ -90,7 +89,7 @@ class Method:
 
     def __post_init__(self) -> None:
         if self.parameter not in ("switches", "S"):
-            raise PlacementError(f"method {self.name!r}: its parameter is 'switches' or 'S', not {self.parameter!r}")
+            raise TrainingError(f"method {self.name!r}: its parameter is 'switches' or 'S', not {self.parameter!r}")
 
     @property
     def installed(self) -> bool:
@@ -108,13 +107,13 @@ class Method:
         return self.parameter == "switches"
 
     def check_given(self, keep: int | None, prune: int) -> None:
-        """Raise PlacementError unless the method's parameter is given, and nothing else."""
+        """Raise TrainingError unless the method's parameter is given, and nothing else."""
         if self.by_number and keep is None:
-            raise PlacementError(f"method {self.name!r} needs ``keep`` M: how many switches to keep")
+            raise TrainingError(f"method {self.name!r} needs ``keep`` M: how many switches to keep")
         if self.by_number and prune:
-            raise PlacementError(f"method {self.name!r} takes ``keep`` M and no ``prune``")
+            raise TrainingError(f"method {self.name!r} takes ``keep`` M and no ``prune``")
         if not self.by_number and keep is not None:
-            raise PlacementError(f"method {self.name!r} takes ``prune`` S and no ``keep``: choose another ``method``")
+            raise TrainingError(f"method {self.name!r} takes ``prune`` S and no ``keep``: choose another ``method``")
 
     def ladder(self, n_elements: int) -> tuple[int, ...]:
         """Return the parameters that a frontier tries among `n_elements` switches."""
@@ -125,22 +124,22 @@ class Method:
     def chooser(self, samples: Samples, ports: PortCosts | None = None) -> Chooser:
         """Do the expensive work, and return the kept switches as a function of the parameter.
 
-        Numbers of switches are rounded down. Without `ports` all switches cost the same. Raises PlacementError if
+        Numbers of switches are rounded down. Without `ports` all switches cost the same. Raises TrainingError if
         there are no switches, if `ports` are those of other switches, if the required package is missing, or if the
         method chooses a column twice or one that there is not.
         """
         if not self.installed:
-            raise PlacementError(f"{self.name} needs {self.imports}, which is missing: pip install {self.install}")
+            raise TrainingError(f"{self.name} needs {self.imports}, which is missing: pip install {self.install}")
         if not samples.n_switches:
-            raise PlacementError("there are no switches to choose from: the set holds joints only")
+            raise TrainingError("there are no switches to choose from: the set holds joints only")
         if ports is not None and len(ports.port_of) != samples.n_switches:
-            raise PlacementError(f"ports are given for {len(ports.port_of)} switches, the set has {samples.n_switches}")
+            raise TrainingError(f"ports are given for {len(ports.port_of)} switches, the set has {samples.n_switches}")
         learnt = self.learn(samples, ports)
 
         def chosen(parameter: float) -> Columns:
             columns = tuple(learnt(parameter))
             if len(set(columns)) < len(columns) or not all(0 <= column < samples.n_switches for column in columns):
-                raise PlacementError(
+                raise TrainingError(
                     f"method {self.name!r} chose the columns {shortened(str(columns))} of {samples.n_switches}: each "
                     "may be chosen once; report this to the method's authors"
                 )

@@ -9,8 +9,7 @@ from functools import cache, cmp_to_key
 import numpy as np
 
 from ...elementary import Floats, add_up, log
-from ...samples import Columns
-from .. import PlacementError
+from ...samples import Columns, TrainingError
 from ..gain import Cooccurrence, n_log_n
 from .base import Bits, Labels, Method, ranked
 
@@ -26,7 +25,7 @@ _MODES, _PENALTY = 20, 0.01
 def random_placement(n_inputs: int, m: int, seed: int) -> Columns:
     """Return m distinct inputs out of n_inputs, drawn with `seed`; all of them, in drawn order, if m is larger."""
     if m < 0:
-        raise PlacementError(f"{m} inputs were requested, a number >= 0 is needed")
+        raise TrainingError(f"{m} inputs were requested, a number >= 0 is needed")
     return tuple(np.random.default_rng(seed).permutation(n_inputs)[:m].tolist())
 
 

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from sklearn.linear_model import LogisticRegression
 
 from thenar.compiler.elementary import softmax
-from thenar.compiler.trainers.base import BoostingError
+from thenar.compiler.samples import TrainingError
 from thenar.compiler.trainers.logit import PENALTY, SMOOTHNESS, ColumnTables, fit_logit
 from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE, MINIMA
 
@@ -164,7 +164,7 @@ def test_score_tables_add_what_the_columns_add(linear: bool) -> None:
     ],
 )
 def test_what_makes_no_sense_is_refused(changes: dict[str, Any], because: str) -> None:
-    with pytest.raises(BoostingError, match=because):
+    with pytest.raises(TrainingError, match=because):
         fit_logit(*grasps(0), 3, **changes)
 
 

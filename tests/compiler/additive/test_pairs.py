@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.linalg import block_diag
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.trainers.base import TRAINERS, BoostingError
+from thenar.compiler.samples import TrainingError
+from thenar.compiler.trainers.base import TRAINERS
 from thenar.compiler.trainers.logit import fit_logit
 from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE
 from thenar.compiler.trainers.pairs import fit_pairs
@@ -101,5 +102,5 @@ def test_pairs_share_no_joint_and_need_two_bins() -> None:
     "wrong", [{"penalty": 0.0}, {"smoothness": -1.0}, {"pair_smoothness": np.inf}, {"pair_bins": 17}]
 )
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, Any]) -> None:
-    with pytest.raises(BoostingError, match=r"finite|pair_bins=17 must be 2 to 16"):
+    with pytest.raises(TrainingError, match=r"finite|pair_bins=17 must be 2 to 16"):
         fit_pairs(*grasps(0), 3, **{**FIXED, **wrong})

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.elementary import softmax, softmax_and_loss
-from thenar.compiler.trainers.base import BoostingError
+from thenar.compiler.samples import TrainingError
 from thenar.compiler.trainers.logitboost import LARGEST_Z_MAX, SMALLEST_SHRINKAGE, boost
 from thenar.runtime.model.tables import winners
 
@@ -136,7 +136,7 @@ def test_the_tolerance_stops_early_and_says_so() -> None:
 def test_options_out_of_range_are_refused_by_name(change: dict[str, Any], word: str) -> None:
     X, labels = grasps(9)
     arguments = {"X": X, "labels": labels, "n_classes": 3, **change}
-    with pytest.raises(BoostingError) as refusal:
+    with pytest.raises(TrainingError) as refusal:
         boost(**arguments)
     assert word in str(refusal.value)
 
@@ -144,7 +144,7 @@ def test_options_out_of_range_are_refused_by_name(change: dict[str, Any], word: 
 def test_an_infinite_input_is_refused_with_row_and_column() -> None:
     X = np.zeros((5, 3))
     X[3, 1] = -np.inf
-    with pytest.raises(BoostingError, match="row 3, column 1"):
+    with pytest.raises(TrainingError, match="row 3, column 1"):
         boost(X, np.array([0, 1, 0, 1, 0]), 2)
 
 
@@ -200,7 +200,7 @@ def test_options_at_the_end_of_their_range_are_taken(options: dict[str, Any]) ->
 
 @pytest.mark.parametrize("shape", [(6,), (6, 1, 1), (0, 3), (5, 1)])
 def test_inputs_that_are_no_table_of_the_labels_rows_are_refused(shape: tuple[int, ...]) -> None:
-    with pytest.raises(BoostingError, match="must be"):
+    with pytest.raises(TrainingError, match="must be"):
         boost(np.zeros(shape), np.zeros(6 if shape[0] else 0, np.intp), 2)
 
 

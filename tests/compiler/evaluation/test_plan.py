@@ -9,7 +9,7 @@ from sklearn.neighbors import KNeighborsClassifier
 
 from thenar.compiler import LogitBoostClassifier, grow_id3
 from thenar.compiler.evaluation.choosing import InputChoices
-from thenar.compiler.evaluation.folds import NESTED, PAPER, Fold, Protocol, populations_of, weka_folds
+from thenar.compiler.evaluation.folds import PROTOCOLS, Fold, ProtocolName, populations_of, weka_folds
 from thenar.compiler.evaluation.plan import (
     CLASSIFIERS,
     COMPOSITIONS,
@@ -57,7 +57,7 @@ def test_a_set_gets_the_compositions_it_has_inputs_for(n_switches: int, n_joints
     assert [composition.name for composition in available(n_switches, n_joints)] == names
 
 
-both_protocols = pytest.mark.parametrize("protocol", [PAPER, NESTED], ids=lambda protocol: protocol.name)
+both_protocols = pytest.mark.parametrize("protocol", PROTOCOLS)
 
 
 def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
@@ -76,7 +76,7 @@ def row(table: list[RowPlan], name: str) -> RowPlan:
 
 
 @both_protocols
-def test_every_cell_tests_each_row_of_its_subject_once_a_repeat(planner: Planner, protocol: Protocol) -> None:
+def test_every_cell_tests_each_row_of_its_subject_once_a_repeat(planner: Planner, protocol: ProtocolName) -> None:
     for name in ("compositions", "generality", "pruning"):
         for line in planner.table(name, protocol):
             for cell in line.cells:
@@ -85,21 +85,21 @@ def test_every_cell_tests_each_row_of_its_subject_once_a_repeat(planner: Planner
 
 
 def test_the_papers_placement_is_per_subject_the_nested_one_per_fold(planner: Planner) -> None:
-    for cell in row(planner.table("compositions", PAPER), "VI").cells:
+    for cell in row(planner.table("compositions", "paper"), "VI").cells:
         assert len({fit.elements for fit in cell.fits}) == 1
-    columns = [{fit.elements for fit in cell.fits} for cell in row(planner.table("compositions", NESTED), "VI").cells]
+    columns = [{fit.elements for fit in cell.fits} for cell in row(planner.table("compositions", "nested"), "VI").cells]
     assert max(map(len, columns)) > 1
 
 
 @both_protocols
-def test_the_diagonal_of_generality_is_composition_six(planner: Planner, protocol: Protocol) -> None:
+def test_the_diagonal_of_generality_is_composition_six(planner: Planner, protocol: ProtocolName) -> None:
     six = row(planner.table("compositions", protocol), "VI")
     for i, line in enumerate(planner.table("generality", protocol)):
         assert line.cells[i] == six.cells[i]
 
 
 def test_off_the_diagonal_both_protocols_take_the_others_placement(planner: Planner) -> None:
-    paper, nested = (planner.table("generality", protocol) for protocol in (PAPER, NESTED))
+    paper, nested = (planner.table("generality", protocol) for protocol in PROTOCOLS)
     for i, line in enumerate(paper):
         giver = planner.populations[i]
         given = tuple(sorted(planner.chosen(giver.rows)))
@@ -111,7 +111,7 @@ def test_off_the_diagonal_both_protocols_take_the_others_placement(planner: Plan
 
 @both_protocols
 def test_pruning_starts_from_all_switches_and_takes_one_placement_for_all_subjects(
-    planner: Planner, protocol: Protocol
+    planner: Planner, protocol: ProtocolName
 ) -> None:
     table = planner.table("pruning", protocol)
     assert [line.name for line in table] == ["all", "0", "30"]
@@ -120,12 +120,12 @@ def test_pruning_starts_from_all_switches_and_takes_one_placement_for_all_subjec
     for line, least in zip(table[1:], (0, 30), strict=True):
         for cell in line.cells:
             for fit in cell.fits:
-                seen = everyone if protocol is PAPER else np.setdiff1d(everyone, fit.fold.test)
+                seen = everyone if protocol == "paper" else np.setdiff1d(everyone, fit.fold.test)
                 assert fit.elements == tuple(sorted(planner.chosen(seen, prune=least)))
 
 
 @both_protocols
-def test_baselines_have_as_many_switches_as_id3_in_every_fold(planner: Planner, protocol: Protocol) -> None:
+def test_baselines_have_as_many_switches_as_id3_in_every_fold(planner: Planner, protocol: ProtocolName) -> None:
     table = planner.table("baselines", protocol)
     id3 = row(table, "ID3")
     assert [line.name for line in table] == ["ID3", "CMIM", "top-k", "random"]
@@ -138,12 +138,12 @@ def test_baselines_have_as_many_switches_as_id3_in_every_fold(planner: Planner, 
 
 
 @both_protocols
-def test_baselines_choose_from_the_rows_that_id3_may_choose_from(planner: Planner, protocol: Protocol) -> None:
+def test_baselines_choose_from_the_rows_that_id3_may_choose_from(planner: Planner, protocol: ProtocolName) -> None:
     table = planner.table("baselines", protocol)
     for name, method in (("CMIM", "cmim"), ("top-k", "mutual-information")):
         for cell in row(table, name).cells:
             for fit in cell.fits:
-                seen = cell.population.rows if protocol is PAPER else fit.fold.train
+                seen = cell.population.rows if protocol == "paper" else fit.fold.train
                 assert fit.elements == tuple(sorted(planner.chosen(seen, placement=method, keep=len(fit.elements))))
 
 
@@ -160,7 +160,7 @@ def test_every_method_sees_exactly_the_rows_given_in_whatever_order() -> None:
 
 
 def test_any_method_can_be_a_baseline() -> None:
-    table = replace(planner_of(make_grasps()), baselines=("mrmr",)).table("baselines", NESTED)
+    table = replace(planner_of(make_grasps()), baselines=("mrmr",)).table("baselines", "nested")
     assert [line.name for line in table] == ["ID3", "mrmr", "random"]
 
 

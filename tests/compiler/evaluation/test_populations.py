@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.folds import (
-    NESTED,
-    PAPER,
     EvaluationError,
     Scheme,
     concerns,
+    may_choose,
+    may_choose_pooled,
     populations_of,
     weka_folds,
 )
@@ -85,18 +85,18 @@ def test_the_paper_lets_test_rows_choose_and_honesty_does_not() -> None:
     for scheme in ("trial", "object", "block"):
         for population in populations_of(grasps, scheme, 4, 2, 1):
             for fold in population.folds:
-                assert set(PAPER.may_choose(population, fold)) == set(population.rows)
-                assert set(NESTED.may_choose(population, fold)) == set(population.rows) - set(fold.test)
-                assert set(PAPER.may_choose_pooled(everyone, fold)) == set(everyone)
-                assert set(NESTED.may_choose_pooled(everyone, fold)) == set(everyone) - set(fold.test)
+                assert set(may_choose("paper", population, fold)) == set(population.rows)
+                assert set(may_choose("nested", population, fold)) == set(population.rows) - set(fold.test)
+                assert set(may_choose_pooled("paper", everyone, fold)) == set(everyone)
+                assert set(may_choose_pooled("nested", everyone, fold)) == set(everyone) - set(fold.test)
 
 
 def test_a_left_out_subject_has_no_say_in_a_nested_placement() -> None:
     grasps = make_grasps()
     for population in populations_of(grasps, "subject", 4, 1, 1):
         (fold,) = population.folds
-        assert population.name not in grasps.subjects[NESTED.may_choose(population, fold)]
-        assert population.name in grasps.subjects[PAPER.may_choose(population, fold)]
+        assert population.name not in grasps.subjects[may_choose("nested", population, fold)]
+        assert population.name in grasps.subjects[may_choose("paper", population, fold)]
 
 
 def keep_some(grasps: GraspSet, grasp: str, n: int) -> GraspSet:

@@ -34,7 +34,7 @@ from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS
 from thenar.compiler.trainers.logitboost import boost
 from thenar.drivers.cyberglove_protocol import SENSORS_18
-from thenar.drivers.members import MemberError
+from thenar.drivers.errors import SettingError
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scores import Scorer
@@ -272,7 +272,7 @@ def test_a_build_of_other_switches_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_unknown_baseline_is_told(tmp_path: Path) -> None:
-    with pytest.raises(MemberError, match="there is no placement method 'nonsense'"):
+    with pytest.raises(SettingError, match="there is no placement method 'nonsense'"):
         found_of(asked(tmp_path, make_set(), baselines=("nonsense",)))
 
 

@@ -3,10 +3,10 @@
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.glove.spec import SpecError, glove_spec
+from thenar.compiler.glove.spec import glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.drivers.i2c.chips import expanders
-from thenar.runtime.errors import HarnessError
+from thenar.runtime.errors import BuildError, HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness, StreamWiring
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
@@ -44,7 +44,7 @@ def test_a_board_with_kept_switches_takes_from_row_to_row() -> None:
 
 
 def test_a_build_without_switches_has_no_glove() -> None:
-    with pytest.raises(SpecError, match="keeps no switch"):
+    with pytest.raises(BuildError, match="keeps no switch"):
         glove_spec(manifest_of([]))
 
 
@@ -52,7 +52,7 @@ def test_a_scan_map_needs_its_own_harness() -> None:
     harness = propose_harness(["a", "b"])
     scan = whole_scan(harness, ["a"])
     assert glove_spec(manifest_of(["a"]), scan, harness).scan is scan
-    with pytest.raises(SpecError, match="compiled for a specific wiring"):
+    with pytest.raises(BuildError, match="compiled for a specific wiring"):
         glove_spec(manifest_of(["a"]), scan)
     with pytest.raises(HarnessError, match="another wiring"):
         glove_spec(manifest_of(["a"]), scan, propose_harness(["b", "a"]))

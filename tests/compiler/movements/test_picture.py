@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 
 from thenar.compiler.artifact import timeline as timelines
 from thenar.compiler.artifact.timeline import Timeline
-from thenar.compiler.movements.streams import MovementError
+from thenar.compiler.recordings import RecordingError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,5 +59,5 @@ def test_equal_timelines_are_equal_bytes() -> None:
 
 def test_of_nothing_there_is_no_picture() -> None:
     nothing = replace(timeline(), states=np.zeros(0, np.intp), truth=None)
-    with pytest.raises(MovementError, match="no frame"):
+    with pytest.raises(RecordingError, match="no frame"):
         timelines.draw([nothing], "svg")

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.movements.streams import PAUSE_US, MovementError, streams_of
+from thenar.compiler.movements.streams import PAUSE_US, streams_of
+from thenar.compiler.recordings import RecordingError
 from thenar.compiler.recordings.merging import merge
 
 from .conftest import make_movements
@@ -68,9 +69,9 @@ def test_sessions_are_streams_of_their_own() -> None:
 def test_rows_that_are_trials_of_their_own_are_no_movements() -> None:
     grasp_set = make_movements()
     held = grasp_set.rows(np.unique(grasp_set.trial_ids, return_index=True)[1]).without_none()
-    with pytest.raises(MovementError, match="whole movements"):
+    with pytest.raises(RecordingError, match="whole movements"):
         streams_of(held)
-    with pytest.raises(MovementError, match="separate trial"):
+    with pytest.raises(RecordingError, match="separate trial"):
         streams_of(replace(grasp_set, independent=True))
 
 

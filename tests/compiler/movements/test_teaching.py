@@ -21,8 +21,8 @@ from thenar.compiler.artifact.teaching import (
     taught,
 )
 from thenar.compiler.movements.segments import levenshtein
-from thenar.compiler.movements.streams import MovementError
 from thenar.compiler.movements.transitions import Transitions
+from thenar.compiler.recordings import RecordingError
 from thenar.runtime import Build
 from thenar.runtime.preshape import Preshape, PreshapeTable
 from thenar.runtime.task import Task
@@ -80,7 +80,7 @@ def test_a_step_has_medians_limit_preshape_and_frequent_successors(build: Path) 
 
 
 def test_demonstrations_with_nothing_in_common_teach_nothing(build: Path) -> None:
-    with pytest.raises(MovementError, match=r"have no grasp that occurs in most of them: 1: pinch; 2: hook"):
+    with pytest.raises(RecordingError, match=r"have no grasp that occurs in most of them: 1: pinch; 2: hook"):
         taught(Build.load(build), [demo("1", "p"), demo("2", "h"), demo("3", "f")], "t")
 
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
-from thenar.compiler.movements.streams import MovementError
 from thenar.compiler.movements.transitions import FREQUENT, Transitions
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.runtime.errors import FormatError
 
 from .conftest import make_movements
 
@@ -49,7 +49,7 @@ def test_nothing_held_is_passed_over_and_what_is_written_is_read(tmp_path: Path)
     assert (again.types, again.counts.tolist()) == (found.types, found.counts.tolist())
     for wrong in (b"{}", b'{"types":["a"],"counts":[[1,2]],"probabilities":[[1]]}', b"\xff"):
         path.write_bytes(wrong)
-        with pytest.raises(MovementError, match=r"graph\.json is not a transitions file"):
+        with pytest.raises(FormatError, match=r"graph\.json is not a transitions file"):
             Transitions.load(path)
 
 

@@ -8,13 +8,12 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.constraints import Bound, Limits
 from thenar.compiler.placement.elements import Element, Elements
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.placement import choose, kept_joints
 from thenar.compiler.placement.ports import PortCosts, record_times_us
-from thenar.compiler.samples import Columns, Samples
+from thenar.compiler.samples import Columns, Samples, TrainingError
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.runtime.harness.wiring import GloveWiring
 
@@ -66,7 +65,7 @@ def bound_limits(draw: st.DrawFn) -> tuple[Limits, Bound]:
             places=PLACES,
         )
         return limits, limits.on(ELEMENTS, PORTS)
-    except PlacementError:
+    except TrainingError:
         assume(False)
         raise
 
@@ -118,15 +117,15 @@ def test_limits_are_obeyed_and_idle_ones_change_nothing(name: str) -> None:
     ],
 )
 def test_contradictions_are_refused_by_both_names(asked: dict[str, object], message: str) -> None:
-    with pytest.raises(PlacementError, match=message):
+    with pytest.raises(TrainingError, match=message):
         Limits(names=NAMES, n_switches=3, **{"places": PLACES, **asked}).on(ELEMENTS, PORTS)  # type: ignore[arg-type]
 
 
 def test_too_many_forced_switches_and_budgets_without_costs_are_refused() -> None:
     limits = Limits(names=NAMES, n_switches=3, keep=("a", "b", "q"), budget_us=99.0)
-    with pytest.raises(PlacementError, match="``keep_these`` names 3, ``keep`` allows 2"):
+    with pytest.raises(TrainingError, match="``keep_these`` names 3, ``keep`` allows 2"):
         choose(samples_of(1), "cmim", 2, PORTS, limits.on(ELEMENTS, PORTS))
-    with pytest.raises(PlacementError, match="``budget_us`` needs the cost of reading"):
+    with pytest.raises(TrainingError, match="``budget_us`` needs the cost of reading"):
         limits.on(ELEMENTS, None)
 
 
@@ -140,9 +139,9 @@ def test_joints_are_kept_and_left_out_by_name_as_switches_are() -> None:
     assert kept_joints(samples, 2, limits) == (1, 3)
     assert kept_joints(samples, None, limits) == (1, 2, 3)
     assert kept_joints(samples, 1, limits) == (3,)
-    with pytest.raises(PlacementError, match="``keep_these`` names 2 joints, ``keep_joints`` allows 1"):
+    with pytest.raises(TrainingError, match="``keep_these`` names 2 joints, ``keep_joints`` allows 1"):
         kept_joints(samples, 1, Limits(**own, keep=("j3", "j1")))  # type: ignore[arg-type]
-    with pytest.raises(PlacementError, match="``keep_these`` names a, and ``inputs`` leaves that out"):
+    with pytest.raises(TrainingError, match="``keep_these`` names a, and ``inputs`` leaves that out"):
         Limits(**own, keep=("a",)).on((), None)  # type: ignore[arg-type]
     limits.on((), None)
 
@@ -171,7 +170,7 @@ def test_no_more_joints_are_kept_than_a_record_within_the_budget_has(budget_us: 
     assert len(kept) == max(map(len, allowed))
     assert len(kept_joints(samples, 2, limits)) == min(2, len(kept))
     if len(kept) < 3:
-        with pytest.raises(PlacementError, match=r"``keep_these`` names 3 joints, whose record takes \d+\.\d us"):
+        with pytest.raises(TrainingError, match=r"``keep_these`` names 3 joints, whose record takes \d+\.\d us"):
             kept_joints(samples, None, replace(limits, keep=joints[:3]))
 
 

@@ -12,7 +12,7 @@ from sklearn.tree import DecisionTreeClassifier
 from thenar.compiler.placement.elements import Element, bits_of, elements_of, ports_of, taxel_levels
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.ports import PortCosts
-from thenar.compiler.samples import Samples, SamplesError
+from thenar.compiler.samples import Samples, TrainingError
 
 
 def samples_of(codes: list[int], labels: list[int]) -> Samples:
@@ -94,7 +94,7 @@ def test_thresholds_of_the_training_rows_make_switches_of_all_rows() -> None:
     assert plain.switches[:, 0].tolist() == [False, False, True, True, False, True]
     assert plain.inputs.shape == (6, 1)
     assert bits_of(plain, elements_of(plain)) is plain
-    with pytest.raises(SamplesError, match="taxels are no inputs"):
+    with pytest.raises(TrainingError, match="taxels are no inputs"):
         _ = whole.inputs
 
 

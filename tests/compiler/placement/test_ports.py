@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.ports import PortCosts, port_costs, ports_of_whole_glove
+from thenar.compiler.samples import TrainingError
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 from thenar.runtime.scanning.ports import whole_scan
@@ -35,7 +35,7 @@ def test_a_port_is_shared_out_over_those_kept_on_it() -> None:
 
 @pytest.mark.parametrize(("port_of", "us"), [((1,), (1.0,)), ((-1,), (1.0,)), ((0,), (-1.0,)), ((0,), (float("nan"),))])
 def test_ports_must_be_there_and_take_some_time(port_of: tuple[int, ...], us: tuple[float, ...]) -> None:
-    with pytest.raises(PlacementError):
+    with pytest.raises(TrainingError):
         PortCosts(port_of, us)
 
 

@@ -16,7 +16,7 @@ from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.placement import place
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.placement.selectors import SwitchSelector
-from thenar.drivers.members import MemberError
+from thenar.drivers.errors import SettingError
 from thenar.runtime.recipe import Recipe
 
 from ..conftest import make_set, with_none
@@ -90,7 +90,7 @@ def test_numbers_become_bits_at_a_threshold_or_are_refused(data: tuple[Any, Any]
 
 
 def test_what_cannot_be_chosen_is_said(data: tuple[Any, Any]) -> None:
-    with pytest.raises(MemberError, match="there is no placement method 'best'"):
+    with pytest.raises(SettingError, match="there is no placement method 'best'"):
         SwitchSelector("best").fit(*data)
     for number in (-1, 0, 2.5, 10, 999):
         with pytest.raises(ValueError, match=rf"n_switches={number}, and X has n_features = 9: give a whole number"):

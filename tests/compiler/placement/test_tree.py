@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.tree import Tree, check_bits, check_matrix, grow_id3
+from thenar.compiler.samples import TrainingError
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def test_a_mixed_leaf_and_pruning_are_printed() -> None:
 
 
 def test_names_that_are_too_few_are_refused(tree: Tree) -> None:
-    with pytest.raises(PlacementError, match="1 input and 3 class names were given, the tree has 2 inputs"):
+    with pytest.raises(TrainingError, match="1 input and 3 class names were given, the tree has 2 inputs"):
         tree.text(["thumb"])
 
 
@@ -37,7 +37,7 @@ def test_a_value_never_met_gets_the_nodes_majority(tree: Tree) -> None:
 
 
 def test_rows_of_another_width_are_refused(tree: Tree) -> None:
-    with pytest.raises(PlacementError, match="X has 3 inputs, the tree was grown on 2"):
+    with pytest.raises(TrainingError, match="X has 3 inputs, the tree was grown on 2"):
         tree.predict([[0, 0, 0]])
 
 
@@ -63,7 +63,7 @@ def test_unseparable_leaves_are_counted_but_pruned_ones_are_not() -> None:
     ],
 )
 def test_what_is_no_matrix_of_whole_numbers_is_refused_where_it_is(X: object, reason: str) -> None:
-    with pytest.raises(PlacementError, match=reason):
+    with pytest.raises(TrainingError, match=reason):
         grow_id3(np.array(X), [0] * len(np.array(X)))
 
 
@@ -78,14 +78,14 @@ def test_what_is_no_matrix_of_whole_numbers_is_refused_where_it_is(X: object, re
     ],
 )
 def test_labels_that_do_not_fit_are_refused(y: object, reason: str) -> None:
-    with pytest.raises(PlacementError, match=reason):
+    with pytest.raises(TrainingError, match=reason):
         grow_id3([[0], [1]], np.asarray(y))
 
 
 def test_no_rows_and_a_negative_number_of_samples_are_refused() -> None:
-    with pytest.raises(PlacementError, match="there are no rows"):
+    with pytest.raises(TrainingError, match="there are no rows"):
         grow_id3(np.zeros((0, 3), bool), [])
-    with pytest.raises(PlacementError, match="min_samples is -1"):
+    with pytest.raises(TrainingError, match="min_samples is -1"):
         grow_id3([[0]], [0], min_samples=-1)
 
 
@@ -94,5 +94,5 @@ def test_whole_floats_are_taken_as_whole_numbers() -> None:
 
 
 def test_a_two_among_bits_is_refused_where_it_is() -> None:
-    with pytest.raises(PlacementError, match="X holds 2 in row 1, column 0: neither 0 nor 1"):
+    with pytest.raises(TrainingError, match="X holds 2 in row 1, column 0: neither 0 nor 1"):
         check_bits([[0], [2]])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.arrays import pack, unpack
-from thenar.runtime.errors import SealError
+from thenar.runtime.errors import FormatError
 
 
 def test_numpy_reads_what_is_packed() -> None:
@@ -36,14 +36,14 @@ def npy(array: np.ndarray) -> bytes:
 
 
 def test_a_compressed_member_is_refused_before_it_is_unpacked() -> None:
-    with pytest.raises(SealError, match="compressed"):
+    with pytest.raises(FormatError, match="compressed"):
         unpack(with_members(zipfile.ZIP_DEFLATED, header=npy(np.zeros(10**6, np.uint8))))
 
 
 def test_overstated_members_are_refused_before_allocation() -> None:
     lie = npy(np.zeros(8, np.uint8)).replace(b"(8,), }" + b" " * 12, b"(8000000000000,), }")
     assert b"8000000000000" in lie
-    with pytest.raises(SealError, match="not plain numbers of its shape"):
+    with pytest.raises(FormatError, match="not plain numbers of its shape"):
         unpack(with_members(header=lie))
 
 
@@ -61,12 +61,12 @@ def test_overstated_members_are_refused_before_allocation() -> None:
     ],
 )
 def test_what_is_no_such_npz_is_refused_with_the_reason(payload: bytes, reason: str) -> None:
-    with pytest.raises(SealError, match=reason):
+    with pytest.raises(FormatError, match=reason):
         unpack(payload, "set.grasps")
 
 
 def test_a_member_that_occurs_twice_is_refused() -> None:
     header = npy(np.zeros(1, np.uint8))
     payload = with_members(header=header, HEADER=header).replace(b"HEADER", b"header")
-    with pytest.raises(SealError, match="holds an array twice"):
+    with pytest.raises(FormatError, match="holds an array twice"):
         unpack(payload)

@@ -9,7 +9,7 @@ from hypothesis import given
 
 from thenar.compiler.arrays import pack, unpack
 from thenar.compiler.recordings.graspset import KIND, VERSION, GraspSet
-from thenar.runtime.errors import SealError
+from thenar.runtime.errors import FormatError
 from thenar.runtime.sealed import seal, unseal
 
 from .conftest import grasp_sets
@@ -48,7 +48,7 @@ def good(small: GraspSet, tmp_path: Path) -> bytes:
 def refusal(data: bytes, folder: Path) -> str:
     path = folder / "set.grasps"
     path.write_bytes(data)
-    with pytest.raises(SealError) as refused:
+    with pytest.raises(FormatError) as refused:
         GraspSet.load(path)
     assert "set.grasps" in str(refused.value)
     return str(refused.value)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from thenar.compiler.recordings import ColumnsError, RecordingError, TableError
+from thenar.compiler.recordings import RecordingError, TableError
 from thenar.compiler.recordings.columns import CalibrationPoints, ColumnRoles, JointColumns, TaxelColumns, sound_grid
 from thenar.compiler.recordings.export import export
 from thenar.compiler.recordings.graspset import GraspSet
@@ -63,7 +63,7 @@ def test_all_unknown_labels_are_named_at_once_with_suggestions() -> None:
 
 def test_rows_that_may_be_frames_of_one_trial_are_asked_about() -> None:
     columns = ColumnRoles("g", joints=JOINTS)
-    with pytest.raises(ColumnsError, match=r"2 rows share .* \(`trial = \.\.\.`, .* \(`frames = \"independent\"`\)"):
+    with pytest.raises(TableError, match=r"2 rows share .* \(`trial = \.\.\.`, .* \(`frames = \"independent\"`\)"):
         import_table(table("a", "b", "a"), columns)
     grasp_set, report = import_table(table("a", "b", "a"), replace(columns, frames="independent"))
     assert grasp_set.independent
@@ -186,7 +186,7 @@ def test_a_coarse_grid_of_radians_warns_with_a_better_one() -> None:
 
 
 def test_an_unknown_taxonomy_is_refused() -> None:
-    with pytest.raises(ColumnsError, match="taxonomy: no taxonomy is called 'feix'"):
+    with pytest.raises(TableError, match="taxonomy: no taxonomy is called 'feix'"):
         import_table(table("a", "b"), ColumnRoles("g", joints=JOINTS, taxonomy="feix"))
 
 

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from thenar.compiler.recordings.mcap_recording import import_files, import_recordings
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14, MOVEMENTS, collected
-from thenar.runtime.errors import McapError
+from thenar.runtime.errors import FormatError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.recording.guide import MOVING_US, CollectionGuide, planned, read_journal
 from thenar.runtime.recording.reader import Reader
@@ -193,7 +193,7 @@ def test_a_stream_longer_than_its_file_can_have_recorded_is_refused(
     recorded: tuple[Path, Wearer], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("thenar.runtime.recording.reader._LARGEST_MADE", -recorded[0].stat().st_size)
-    with pytest.raises(McapError, match="its stream would take"):
+    with pytest.raises(FormatError, match="its stream would take"):
         import_recordings([recorded[0]], stream=True)
 
 

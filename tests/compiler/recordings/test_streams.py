@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.movements.streams import frames_are_dense, movements_of
-from thenar.compiler.recordings import ColumnsError, TableError
+from thenar.compiler.recordings import TableError
 from thenar.compiler.recordings.cells import Column, unit_of_time
 from thenar.compiler.recordings.columns import ColumnRoles, JointColumns
 from thenar.compiler.recordings.graspset import GraspSet
@@ -162,7 +162,7 @@ def test_what_a_columns_toml_says_of_none_is_enough(time: str | None, tmp_path: 
 
 def test_rows_of_none_that_lie_in_no_runs_say_nothing_of_trials() -> None:
     table = Table("t.csv", {"g": ["a", "none"] * 9, "s": ["0", "1"] * 9}, np.arange(18))
-    with pytest.raises(ColumnsError, match="18 rows share subject"):
+    with pytest.raises(TableError, match="18 rows share subject"):
         import_table(table, ColumnRoles("g", switches=("s",)))
 
 

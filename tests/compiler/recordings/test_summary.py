@@ -8,7 +8,6 @@ from hypothesis import given
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.summary import (
     JointRange,
-    Oddity,
     constant_columns,
     contacts,
     disagreeing,
@@ -18,6 +17,7 @@ from thenar.compiler.recordings.summary import (
     summarise,
 )
 from thenar.compiler.recordings.taxonomy import own
+from thenar.runtime.recording.reader import Oddity
 
 from .conftest import grasp_sets
 

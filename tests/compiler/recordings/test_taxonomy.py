@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.recordings import ColumnsError, RecordingError
+from thenar.compiler.recordings import RecordingError, TableError
 from thenar.compiler.recordings.taxonomy import (
     CUTKOSKY_16,
     FEIX_33,
@@ -149,7 +149,7 @@ def test_a_taxonomy_of_ones_own_is_what_the_list_names(file: Path) -> None:
 )
 def test_a_list_that_is_wrong_is_named_with_line_and_key(file: Path, text: str, said: str) -> None:
     file.write_text(text)
-    with pytest.raises(ColumnsError, match=said):
+    with pytest.raises(TableError, match=said):
         collected("kamakura14", file)
 
 

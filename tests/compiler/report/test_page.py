@@ -11,8 +11,9 @@ import pytest
 
 from thenar.cli.compile_command import command
 from thenar.compiler.frontier.points import Frontier
-from thenar.compiler.report.content import ReportContent, ReportError
+from thenar.compiler.report.content import ReportContent
 from thenar.compiler.report.page import report_html
+from thenar.runtime.errors import BuildError
 
 VOID = {"meta", "input", "br", "img", "link", "path", "circle"}
 
@@ -194,10 +195,10 @@ def test_a_frontier_without_points_is_shown_as_such(whole: ReportContent, fronti
 
 
 def test_parts_that_do_not_belong_together_are_refused(bare: ReportContent) -> None:
-    with pytest.raises(ReportError, match="confusion matrix of 4 grasp types has the shape"):
+    with pytest.raises(BuildError, match="confusion matrix of 4 grasp types has the shape"):
         replace(bare, confusion=np.zeros((3, 3), np.intp))
-    with pytest.raises(ReportError, match="does not match the harness"):
+    with pytest.raises(BuildError, match="does not match the harness"):
         replace(bare, harness=None)
     assert bare.hand is not None
-    with pytest.raises(ReportError, match="lacks a kept switch"):
+    with pytest.raises(BuildError, match="lacks a kept switch"):
         replace(bare, hand=replace(bare.hand, names=tuple(f"x{number}" for number in range(160))))

@@ -13,8 +13,8 @@ import pytest
 from thenar.runtime import Glove
 from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.live.sources import DeviceState
 from thenar.runtime.policy import Policy
+from thenar.runtime.published import DeviceHealth
 
 from ..conftest import on_bench
 
@@ -68,7 +68,7 @@ class Run:
         counts = self.counts(kind)
         return sum(counts[name] for name in counted)
 
-    def device(self, kind: str) -> DeviceState:
+    def device(self, kind: str) -> DeviceHealth:
         return next(state for state in self.sources.devices() if state.name.startswith(kind))
 
     def counts(self, kind: str) -> dict[str, int]:

@@ -16,6 +16,7 @@ from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.live.sources import DeviceThread, FrameBuffer
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import LiveGrasp
+from thenar.runtime.sources.base import Source
 
 MakeBuild = Callable[..., Build]
 PERIOD_US = 10_000_000
@@ -210,11 +211,11 @@ def test_a_part_that_has_not_come_yet_is_lost(joined: Joined) -> None:
 LONG_S = 10.0
 
 
-class Device:
+class Device(Source):
     """Hands out what the test puts in, one thing a reading; an exception is raised."""
 
     def __init__(self) -> None:
-        self.samples: Queue[int | Exception] = Queue()
+        self.samples: Queue[SwitchFrame | Exception] = Queue()
         self.openings: Queue[Exception | None] = Queue()
         self.closed = Event()
 
@@ -223,7 +224,7 @@ class Device:
         if wrong is not None:
             raise wrong
 
-    def read(self, timeout_s: float) -> int | None:
+    def read(self, timeout_s: float) -> SwitchFrame | None:
         if self.samples.empty():
             self.closed.wait(0.001)
             return None
@@ -239,7 +240,7 @@ class Device:
 class Kept:
     def __init__(self) -> None:
         self.device = Device()
-        self.taken: Queue[int] = Queue()
+        self.taken: Queue[SwitchFrame | GloveFrame] = Queue()
         self.changes: Queue[tuple[bool, str]] = Queue()
         self.keeper = DeviceThread("thing", self.device, self.taken.put, self._changed)
         self.keeper.start()
@@ -262,8 +263,8 @@ def kept() -> Iterator[Kept]:
 def test_every_sample_is_taken_in_order(kept: Kept) -> None:
     kept.device.openings.put(None)
     for number in range(100):
-        kept.device.samples.put(number)
-    assert [kept.taken.get(timeout=LONG_S) for _ in range(100)] == list(range(100))
+        kept.device.samples.put(SwitchFrame(number, 0))
+    assert [kept.taken.get(timeout=LONG_S) for _ in range(100)] == [SwitchFrame(number, 0) for number in range(100)]
     assert kept.next_change() == (True, "")
 
 
@@ -275,9 +276,9 @@ def test_a_lost_device_is_closed_and_reopened_and_reported(kept: Kept) -> None:
     assert kept.device.closed.wait(LONG_S)
     kept.device.openings.put(None)
     assert kept.next_change() == (True, "")
-    kept.device.samples.put(7)
-    assert kept.taken.get(timeout=LONG_S) == 7
-    assert kept.keeper.state.opened == 2
+    kept.device.samples.put(SwitchFrame(7, 0))
+    assert kept.taken.get(timeout=LONG_S) == SwitchFrame(7, 0)
+    assert kept.keeper.opened == 2
 
 
 def test_failing_again_in_the_same_way_is_no_news(kept: Kept) -> None:
@@ -316,7 +317,7 @@ def test_a_program_fault_is_traced_counted_and_survived(kept: Kept, caplog: pyte
     assert kept.next_change() == (False, "ZeroDivisionError: oops")
     kept.device.openings.put(None)
     assert kept.next_change() == (True, "")
-    assert kept.keeper.state.faults >= 3
+    assert kept.keeper.faults >= 3
     traces = [record for record in caplog.records if record.name == "thenar" and record.exc_info]
     assert "thing" in traces[0].getMessage()
     assert "ZeroDivisionError: oops" in caplog.text
@@ -329,5 +330,5 @@ def test_a_fault_after_each_opening_is_logged_once(kept: Kept, caplog: pytest.Lo
         assert kept.next_change() == (True, "")
         kept.device.samples.put(ZeroDivisionError("oops"))
         assert kept.next_change() == (False, "ZeroDivisionError: oops")
-    assert kept.keeper.state.faults == 3
+    assert kept.keeper.faults == 3
     assert len([record for record in caplog.records if record.exc_info]) == 1

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from thenar.runtime.errors import FrameError, McapError
+from thenar.runtime.errors import FormatError, FrameError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.recording.layout import glove_bytes, glove_frame, switch_bytes, switch_frame
 
@@ -58,17 +58,17 @@ def test_a_record_of_another_glove_is_refused_with_advice() -> None:
 def test_any_bytes_are_a_frame_or_refused(data: bytes, switches: int, sensors: int) -> None:
     try:
         frame = switch_frame(1, data, switches, sensors)
-    except McapError:
+    except FormatError:
         return
     assert switch_bytes(frame, switches, sensors) == data
 
 
 def test_a_state_that_no_switch_has_is_refused() -> None:
-    with pytest.raises(McapError, match="a switch in state 8"):
+    with pytest.raises(FormatError, match="a switch in state 8"):
         switch_frame(0, b"\x00\x08", 2, 0)
 
 
 @pytest.mark.parametrize("length", [17, 20])
 def test_a_glove_of_another_length_is_refused(length: int) -> None:
-    with pytest.raises(McapError, match=f"{length} bytes, but its session names 18 sensors"):
+    with pytest.raises(FormatError, match=f"{length} bytes, but its session names 18 sensors"):
         glove_frame(0, bytes(length), 18)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from thenar.runtime.errors import McapError
+from thenar.runtime.errors import FormatError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.reader import Entry, Index, Reader
@@ -142,5 +142,5 @@ def test_a_damaged_recording_is_read_up_to_the_named_place(path: Path) -> None:
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "no.mcap").write_bytes(b"no")
-    with pytest.raises(McapError, match="does not begin like an MCAP file"):
+    with pytest.raises(FormatError, match="does not begin like an MCAP file"):
         Index(tmp_path / "no.mcap")

@@ -16,7 +16,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 from msgspec.structs import replace
 
-from thenar.runtime.errors import McapError
+from thenar.runtime.errors import FormatError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.guide import read_journal
@@ -58,7 +58,7 @@ def test_a_file_cut_at_any_byte_gives_its_whole_entries(recording: Path, tmp_pat
     for cut in range(len(data), -1, -1):
         os.truncate(path, cut)
         if cut < session_end:
-            with pytest.raises(McapError, match=r"cut.mcap (does not begin like an MCAP file|holds no session)"):
+            with pytest.raises(FormatError, match=r"cut.mcap (does not begin like an MCAP file|holds no session)"):
                 Reader(path)
             continue
         found, reader = read(path)
@@ -135,7 +135,7 @@ def test_no_flipped_bit_of_a_closed_recording_is_silent(
         data[place // 8] ^= 1 << place % 8
         try:
             _, reader = read(path)
-        except McapError:
+        except FormatError:
             continue
         faults = list(reader.faults())
         assert faults, divmod(place, 8)
@@ -158,7 +158,7 @@ def test_a_record_whose_kind_is_damaged_is_named_with_its_place(
     recording.write_bytes(data)
     try:
         _, reader = read(recording)
-    except McapError:
+    except FormatError:
         return
     assert any(f"byte {begin}" in fault.message for fault in reader.faults()), list(reader.faults())
 
@@ -199,7 +199,7 @@ def test_no_damage_raises_anything_but_its_own_error(recording: Path, data: st.D
         bad[place : place + cut] = data.draw(st.binary(max_size=12))
     path = recording.with_name("bad.mcap")
     path.write_bytes(bytes(bad))
-    with suppress(McapError):
+    with suppress(FormatError):
         read(path)
 
 
@@ -207,7 +207,7 @@ def test_what_is_no_mcap_is_named(tmp_path: Path) -> None:
     path = tmp_path / "set.mcap"
     for content in (b"", b"PK\x03\x04", b"\x80\x04\x95pickle"):
         path.write_bytes(content)
-        with pytest.raises(McapError, match=r"set\.mcap does not begin like an MCAP file"):
+        with pytest.raises(FormatError, match=r"set\.mcap does not begin like an MCAP file"):
             Reader(path)
 
 
@@ -217,7 +217,7 @@ def test_a_recording_of_another_program_is_named(tmp_path: Path) -> None:
         writer: Any = Writer(file, compression=CompressionType.NONE)
         writer.start()
         writer.finish()
-    with pytest.raises(McapError, match="holds no session of thenar"):
+    with pytest.raises(FormatError, match="holds no session of thenar"):
         Reader(path)
 
 
@@ -259,7 +259,7 @@ def test_what_other_programs_made_of_a_recording_is_read(recording: Path, tmp_pa
 def test_a_copy_in_chunks_is_refused_with_advice(recording: Path, tmp_path: Path) -> None:
     path = tmp_path / "copy.mcap"
     copied(recording, path, compression=CompressionType.NONE)
-    with pytest.raises(McapError, match=r"copy\.mcap: the record at byte \d+ is a chunk, .* data as CSV"):
+    with pytest.raises(FormatError, match=r"copy\.mcap: the record at byte \d+ is a chunk, .* data as CSV"):
         read(path)
 
 
@@ -267,7 +267,7 @@ def test_a_session_of_another_glove_is_refused(recording: Path, session: Session
     tail = read_journal(recording).tail
     with Recorder(recording, replace(session, switches=session.switches[1:]), tail=tail):
         pass
-    with pytest.raises(McapError, match="begins a session of another glove"):
+    with pytest.raises(FormatError, match="begins a session of another glove"):
         read(recording)
 
 
@@ -280,7 +280,7 @@ def test_a_number_beyond_64_bits_is_refused(recording: Path) -> None:
     head = data[:begin] + pack("<BQ", 5, length) + data[begin + 9 : begin + 35] + pack("<I", text)
     larger = head + data[begin + 39 : place] + b'"number":1' + b"0" * 30 + data[place + 10 :]
     recording.write_bytes(larger)
-    with pytest.raises(McapError, match="its 'number' has more than 64 bits"):
+    with pytest.raises(FormatError, match="its 'number' has more than 64 bits"):
         read(recording)
 
 
@@ -299,7 +299,7 @@ def test_records_without_measurements_are_read_up_to_a_limit(
     }
     record = pack("<BQ", opcode, len(content.get(opcode, b""))) + content.get(opcode, b"")
     recording.write_bytes(data[:place] + record * (OTHER_RECORDS + 1) + data[place:])
-    with pytest.raises(McapError, match=r"is one of more than 100000 that hold no measurements, the most that are"):
+    with pytest.raises(FormatError, match=r"is one of more than 100000 that hold no measurements, the most that are"):
         read(recording)
 
 
@@ -308,7 +308,7 @@ def test_a_message_that_no_session_explains_is_named(recording: Path) -> None:
     ends = ends_of_records(data)
     begin = next(end for end in ends if data[end] == 0x0C)
     recording.write_bytes(data[:begin] + data[next(end for end in ends if end > begin) :])
-    with pytest.raises(McapError, match=f"the record at byte {begin} is a message before any session of thenar"):
+    with pytest.raises(FormatError, match=f"the record at byte {begin} is a message before any session of thenar"):
         Reader(recording)
 
 
@@ -317,7 +317,8 @@ def test_a_message_that_cannot_be_read_is_named_with_its_place(recording: Path) 
     place = data.index(b'"event":"captured"')
     begin = max(end for end in ends_of_records(data) if end < place)
     recording.write_bytes(data.replace(b'"event":"captured"', b'"event":"kaptured"'))
-    with pytest.raises(McapError, match=rf"whole\.mcap: the record at byte {begin} cannot be read: Invalid enum value"):
+    said = rf"whole\.mcap: the record at byte {begin} cannot be read: Invalid enum value"
+    with pytest.raises(FormatError, match=said):
         read(recording)
 
 
@@ -325,7 +326,7 @@ def test_topics_are_ours_only_with_our_types(recording: Path) -> None:
     data = recording.read_bytes()
     recording.write_bytes(data.replace(b"std_msgs/msg/String", b"std_msgs/msg/Strong"))
     with pytest.raises(
-        McapError, match=r"says that /thenar/grasp holds cdr of std_msgs/msg/Strong, not cdr of std_msgs/msg/String"
+        FormatError, match=r"says that /thenar/grasp holds cdr of std_msgs/msg/Strong, not cdr of std_msgs/msg/String"
     ):
         read(recording)
 

@@ -3,7 +3,7 @@ import json
 import pytest
 from msgspec.structs import replace
 
-from thenar.runtime.errors import McapError
+from thenar.runtime.errors import FormatError
 from thenar.runtime.recording.session import Session, from_metadata, to_metadata
 
 PLAN = (
@@ -63,7 +63,7 @@ def test_what_has_a_default_may_be_missing(session: Session) -> None:
 def test_a_session_that_cannot_be_read_is_refused_by_its_key(
     session: Session, change: dict[str, str], said: str
 ) -> None:
-    with pytest.raises(McapError, match=said):
+    with pytest.raises(FormatError, match=said):
         from_metadata({**to_metadata(session), **change})
 
 
@@ -80,7 +80,7 @@ def test_a_session_that_cannot_be_read_is_refused_by_its_key(
 def test_a_name_in_a_session_that_would_deceive_is_refused(session: Session, key: str, good: str, name: str) -> None:
     texts = to_metadata(session)
     assert f'"{good}"' in texts[key]
-    with pytest.raises(McapError, match=r"holds a control character|at most 200"):
+    with pytest.raises(FormatError, match=r"holds a control character|at most 200"):
         from_metadata({**texts, key: texts[key].replace(f'"{good}"', json.dumps(name))})
 
 
@@ -88,5 +88,5 @@ def test_a_name_in_a_session_that_would_deceive_is_refused(session: Session, key
 def test_what_is_needed_is_missed(session: Session, key: str) -> None:
     texts = to_metadata(session)
     del texts[key]
-    with pytest.raises(McapError, match=key):
+    with pytest.raises(FormatError, match=key):
         from_metadata(texts)

@@ -21,7 +21,7 @@ from mcap_ros2.decoder import DecoderFactory
 from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
-from thenar.runtime.errors import FrameError, McapError
+from thenar.runtime.errors import FormatError, FrameError
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.guide import read_journal
@@ -410,7 +410,7 @@ def test_taxels_have_a_topic_only_where_they_are_recorded(tmp_path: Path, sessio
     other = replace(analog, taxels=("p", "r"))
     with Recorder(path, other, tail=read_to_the_end(path)):
         pass
-    with pytest.raises(McapError, match="its switches, taxels or sensors differ"):
+    with pytest.raises(FormatError, match="its switches, taxels or sensors differ"):
         read_to_the_end(path)
 
 

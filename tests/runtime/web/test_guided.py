@@ -13,7 +13,7 @@ from websockets.typing import Origin
 
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.frames import OLD_US, GloveFrame, SwitchFrame
-from thenar.runtime.live.sources import DeviceState
+from thenar.runtime.published import DeviceHealth
 from thenar.runtime.recording.guide import CollectionGuide, planned
 from thenar.runtime.recording.session import Collection, CollectionTask, Session
 from thenar.runtime.recording.writer import Recorder
@@ -32,7 +32,7 @@ SESSION = Session(
     taxels=("p", "q"),
     taxel_calibration=TaxelCalibration(unit="N", taxels=(TaxelLine("p", 100, 900, 2.0),)),
 )
-DEVICES = (DeviceState("glove", True, "", 1), DeviceState("stream", False, "is gone", 1))
+DEVICES = (DeviceHealth("glove", True), DeviceHealth("stream", False, "is gone"))
 
 
 @pytest.fixture

@@ -10,10 +10,9 @@ import pytest
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.hand import CAPSULES, LIMITS_DEG, Hand, Size
-from thenar.simulator.contact.model import Load
 from thenar.simulator.effects.contact_quasistatic import Quasistatic
 
-from ..small import make_case
+from ..small import make_load
 
 THRESHOLD_N = 1.0
 
@@ -53,10 +52,7 @@ def jaccard(one: np.ndarray, other: np.ndarray) -> float:
 def test_two_programs_agree_on_one_grasp_better_than_one_program_on_two(
     oracle: ModuleType, planned: dict[str, tuple[Condition, ...]]
 ) -> None:
-    loads = []
-    for condition in planned["kamakura"]:
-        case = make_case(condition, n=2)
-        loads.append(Load(condition, np.degrees(case.angles.T), case.numbers.T, case.grip_n))
+    loads = [make_load(condition, n=2) for condition in planned["kamakura"]]
     ours, theirs = Quasistatic().solve(loads), [oracle.solve(load) for load in loads]
     assert np.concatenate([each.settled for each in theirs]).mean() > 0.9
     settled = [one.settled.all() and other.settled.all() for one, other in zip(ours, theirs, strict=True)]

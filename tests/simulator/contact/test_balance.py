@@ -22,7 +22,7 @@ from thenar.simulator.contact.balance import (
 )
 from thenar.simulator.contact.model import STIFFNESS, torques
 
-from ..small import make_case
+from ..small import make_load
 
 GRASPS = ("PoS", "PoH", "CMF", "PMF", "PE")
 
@@ -30,7 +30,7 @@ GRASPS = ("PoS", "PoH", "CMF", "PMF", "PE")
 @pytest.fixture(scope="module", params=GRASPS)
 def balance(request: pytest.FixtureRequest, by_grasp: dict[str, Condition], skin: Skin) -> Balance:
     """Hands a little off where they were told to be, so that skin is both pressed and dragged."""
-    told = command([make_case(by_grasp[request.param], 4)])
+    told = command([make_load(by_grasp[request.param], 4)])
     draw = np.random.default_rng(7)
     step = draw.normal(size=(6, 4)) * np.array([0.4] * 3 + [0.01] * 3)[:, None]
     return Balance(told, skin, told.angles + 0.02 * draw.normal(size=(20, 4)), told.pose.moved(step))
@@ -189,7 +189,7 @@ def test_deep_skin_is_a_spring_from_half_the_soft_depth(skin: Skin, deeper: floa
 
 
 def test_skin_first_touches_where_it_is(by_grasp: dict[str, Condition]) -> None:
-    told = command([make_case(by_grasp[grasp]) for grasp in ("PoS", "Tip", "CMF")])
+    told = command([make_load(by_grasp[grasp]) for grasp in ("PoS", "Tip", "CMF")])
     hand, skeleton = told.hand, told.hand.skeleton(told.angles)
     of_skin = skeleton.origins[hand.sphere_capsules] + turned(skeleton.frames[hand.sphere_capsules], told.skin_points)
     of_object = told.pose.outward(told.object_points) + told.pose.position
@@ -200,11 +200,11 @@ def test_skin_first_touches_where_it_is(by_grasp: dict[str, Condition]) -> None:
 
 def test_weight_pulls_down_with_mass(by_grasp: dict[str, Condition]) -> None:
     condition = by_grasp["PoS"]
-    weight = command([make_case(condition, 4)]).weight
+    weight = command([make_load(condition, 4)]).weight
     assert weight == pytest.approx(np.tile(condition.held.down[:, None] * condition.thing.mass_kg * 9.80665, 4))
 
 
 def test_torque_is_that_of_the_grip(by_grasp: dict[str, Condition]) -> None:
-    case = make_case(by_grasp["Tip"], 4)
-    unit = torques(case.condition, case.condition.hand.skeleton(case.angles), Pose.of(case.numbers))
-    assert command([case]).torque == pytest.approx(unit * case.grip_n)
+    load = make_load(by_grasp["Tip"], 4)
+    unit = torques(load.condition, load.condition.hand.skeleton(load.angles), Pose.of(load.pose.T))
+    assert command([load]).torque == pytest.approx(unit * load.grip_n)

@@ -19,10 +19,11 @@ from scipy.spatial.transform import Rotation
 from thenar.simulator.body.condition import Condition, Pad, PlannedGrasp, Thing
 from thenar.simulator.body.hand import LIMITS_DEG, Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.contact.balance import Balance, Skin, SolverCase, command
+from thenar.simulator.contact.balance import Balance, Skin, command
+from thenar.simulator.contact.model import Load
 from thenar.simulator.contact.settle import newton_step, solve_arrow, stiffness
 
-from ..small import make_case
+from ..small import make_load
 
 HAND = Hand(Size(185.0, 83.0))
 HARD = Skin(press_n_per_mm=3.0, soft_mm=1e-4, drag_n_per_mm=1.5, friction=2.0)
@@ -73,7 +74,7 @@ def touched(sphere: int, shape: Shape, angles: np.ndarray, way: np.ndarray, sunk
     pose = np.concatenate([centre + depth * way, Rotation.from_matrix(axes).as_rotvec()])
     held = PlannedGrasp(np.degrees(angles), pose, (Pad(sphere, 1.0),), 0.0)
     condition = Condition("A", HAND, "touch", Thing("thing", shape, 0.0), held)
-    told = command([SolverCase(condition, angles[:, None], pose[:, None], np.zeros(1))])
+    told = command([Load(condition, np.degrees(angles)[None], pose[None], np.zeros(1))])
     return Balance(told, skin, told.angles, told.pose, 2.0)
 
 
@@ -114,10 +115,10 @@ def test_on_planned_grasps_the_matrix_is_near_the_differences(
 ) -> None:
     off = []
     for condition in planned[scene]:
-        case = make_case(condition, 1, share=0.0)
+        load = make_load(condition, 1, share=0.0)
         # Joints planned to their limits stand on a kink: a hair within, they do not.
-        within = np.clip(case.angles, *np.radians(LIMITS_DEG.T[..., None] + [[[0.1]], [[-0.1]]]))
-        told = command([replace(case, angles=within)])
+        within = np.clip(load.posture_deg, LIMITS_DEG[:, 0] + 0.1, LIMITS_DEG[:, 1] - 0.1)
+        told = command([replace(load, posture_deg=within)])
         balance = Balance(told, skin, told.angles, told.pose, 2.0)
         found = matrix(balance)
         off.append(np.linalg.norm(scaled(found - differences(balance), found), ord=2))
@@ -130,13 +131,13 @@ def test_the_matrix_is_positive_definite_on_planned_grasps(
     planned: dict[str, tuple[Condition, ...]], skin: Skin
 ) -> None:
     for condition in (*planned["kamakura"], *planned["cutkosky"]):
-        told = command([make_case(condition, 1)])
+        told = command([make_load(condition, 1)])
         assert np.linalg.eigvalsh(matrix(Balance(told, skin, told.angles, told.pose)))[0] > 0.0
 
 
 def test_a_step_solves_the_matrix_or_a_part_of_it(planned: dict[str, tuple[Condition, ...]], skin: Skin) -> None:
     for condition in planned["kamakura"]:
-        told = command([make_case(condition, 1)])
+        told = command([make_load(condition, 1)])
         balance = Balance(told, skin, told.angles, told.pose)
         whole = np.linalg.solve(matrix(balance), np.concatenate([balance.on_joints, balance.on_object])[:, 0])
         step = newton_step(balance)[:, 0]
@@ -149,7 +150,7 @@ def test_no_step_is_longer_than_joints_and_objects_may_move_at_once(
     planned: dict[str, tuple[Condition, ...]], skin: Skin
 ) -> None:
     for condition in planned["cutkosky"]:
-        told = command([make_case(condition, 8, share=3.0)])
+        told = command([make_load(condition, 8, share=3.0)])
         step = np.abs(newton_step(Balance(told, skin, told.angles, told.pose)))
         assert step[:20].max() <= 0.12 + 1e-12
         assert step[20:23].max() <= 3.0 + 1e-12

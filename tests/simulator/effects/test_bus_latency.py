@@ -21,7 +21,7 @@ def delay(
     draw = make_draw("bus.latency", batch)
     prepare(setting, **parameters)(batch, draw)
     assert batch.delay_us is not None
-    return batch.delay_us, draw.draws.counts["bus.latency"]
+    return batch.delay_us, draw.draws["bus.latency"]
 
 
 def test_one_port_follows_the_other_and_nothing_is_drawn() -> None:

@@ -48,7 +48,7 @@ def assert_same(one: Contact, other: Contact, rows: slice = slice(None)) -> None
 
 
 def test_no_force_is_lost_between_segments_and_switches(conditions: list[Condition], default: ContactModel) -> None:
-    for contact in default.solve([load(condition) for condition in conditions]):
+    for contact in default([load(condition) for condition in conditions]):
         shared = contact.forces_n.sum(axis=1) + contact.between_n
         assert shared == pytest.approx(contact.capsules_n.sum(axis=1), rel=1e-12)
         assert (contact.forces_n >= 0.0).all()
@@ -59,22 +59,22 @@ def test_loads_of_several_hands_come_back_in_their_order(conditions: list[Condit
     loads = [load(condition, 2 + number % 3) for number, condition in enumerate(conditions)]
     assert len({id(one.condition.hand) for one in loads}) > 1
     mixed = loads[::2] + loads[1::2]  # hands in turn, so that none of them stands together
-    for one, contact in zip(mixed, default.solve(mixed), strict=True):
-        assert_same(default.solve([one])[0], contact)
+    for one, contact in zip(mixed, default(mixed), strict=True):
+        assert_same(default([one])[0], contact)
 
 
 def test_more_repetitions_than_are_solved_at_a_time_come_out_the_same(
     conditions: list[Condition], default: ContactModel
 ) -> None:
     many = [load(conditions[0], 300, seed) for seed in range(3)]  # bundles hold about 512
-    together = default.solve(many)
-    assert_same(default.solve(many[2:])[0], together[2])
-    assert_same(default.solve(many[:1])[0], together[0])
+    together = default(many)
+    assert_same(default(many[2:])[0], together[2])
+    assert_same(default(many[:1])[0], together[0])
 
 
 def test_a_pose_at_rest_is_where_the_object_is_felt(conditions: list[Condition], default: ContactModel) -> None:
     told = load(conditions[0], 4)
-    (contact,) = default.solve([told])
+    (contact,) = default([told])
     condition = told.condition
     centres = condition.hand.spheres(condition.hand.skeleton(np.radians(contact.posture_deg.T)))
     distance = Pose.of(contact.pose.T).distance(condition.thing.shape, centres)[0]
@@ -92,14 +92,14 @@ def test_a_pose_at_rest_is_where_the_object_is_felt(conditions: list[Condition],
 def test_a_switch_that_reaches_further_feels_more(conditions: list[Condition]) -> None:
     told = [load(condition) for condition in conditions]
     lost = [
-        sum(contact.between_n.sum() for contact in model(make_setting(), reach_mm=reach).solve(told))
+        sum(contact.between_n.sum() for contact in model(make_setting(), reach_mm=reach)(told))
         for reach in (0.0, 1.0, 3.0)
     ]
     assert lost[0] > lost[1] > lost[2]
 
 
 def test_what_does_not_come_to_rest_is_marked(conditions: list[Condition]) -> None:
-    (contact,) = model(make_setting(), most_steps=1).solve([load(conditions[0])])
+    (contact,) = model(make_setting(), most_steps=1)([load(conditions[0])])
     assert not contact.settled.any()
     assert contact.steps == 3
 

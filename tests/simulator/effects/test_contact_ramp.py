@@ -24,7 +24,7 @@ class Press:
     forces: Callable[[np.ndarray], np.ndarray]
     settles_n: float = 0.0
 
-    def solve(self, loads: Sequence[Load]) -> list[Contact]:
+    def __call__(self, loads: Sequence[Load]) -> list[Contact]:
         return [self._solve(load.posture_deg, load.pose, load.grip_n) for load in loads]
 
     def _solve(self, posture_deg: np.ndarray, pose: np.ndarray, grip_n: np.ndarray) -> Contact:
@@ -55,7 +55,7 @@ def test_what_was_solved_on_the_way_is_counted() -> None:
     """Two hands at four levels below the full grip, three steps each."""
     batch, draw = ramped(Press(lambda grip: grip)), make_draw("contact.ramp", make_batch(range(2)))
     prepare(make_setting(), Press(lambda grip: grip), levels=5)([batch], [draw])
-    assert draw.draws.counts == {"grips solved": 8, "solver steps": 24}
+    assert draw.draws == {"grips solved": 8, "solver steps": 24}
 
 
 def test_a_switch_closes_when_the_growing_force_passes_its_threshold() -> None:

@@ -1,7 +1,7 @@
 import msgspec
 import pytest
 
-from thenar.simulator.errors import PlanError
+from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.explain import explain
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.steps import compile_pipeline
@@ -48,5 +48,5 @@ def test_draws_are_counted_a_grasp() -> None:
 def test_a_scene_with_an_unholdable_object_cannot_be_explained() -> None:
     (bead,) = (item for item in QUICK.objects if item.name == "bead")
     large = msgspec.structs.replace(bead, shape=msgspec.structs.replace(bead.shape, diameter_mm=190.0))
-    with pytest.raises(PlanError, match="cannot hold 'bead' with grasp type 'Tip'"):
+    with pytest.raises(SceneError, match="cannot hold 'bead' with grasp type 'Tip'"):
         explain(msgspec.structs.replace(QUICK, objects=(large,)))

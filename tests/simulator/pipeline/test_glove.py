@@ -23,7 +23,7 @@ def take(name: str, batch: Batch, setting: SceneSetting) -> None:
     (effect,) = (step for step in glove.STEPS if step.name == name)
     assert effect.prepare is not None
     effect.prepare(setting)(batch, draw)
-    assert not draw.draws.counts
+    assert not draw.draws
 
 
 def test_recall_takes_what_was_planned_for_every_repetition() -> None:

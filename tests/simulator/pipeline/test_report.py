@@ -3,20 +3,19 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from thenar.runtime.published import Count
 from thenar.simulator.contact.model import Contact
 from thenar.simulator.pipeline.batch import SLID_OUT_MM, Batch
 from thenar.simulator.pipeline.report import (
     GraspReport,
     Notes,
     Rows,
-    StepCount,
     UnsettledGrasp,
     grasp_reports,
     notes_of,
     step_reports,
 )
 from thenar.simulator.pipeline.steps import Ledger
-from thenar.simulator.streams import DrawCounts
 
 from ..small import make_batch
 
@@ -63,15 +62,15 @@ def test_only_rows_that_are_read_out_tell_of_switches() -> None:
 
 def test_steps_are_reported_in_their_order_with_their_share_of_the_time() -> None:
     ledger = Ledger()
-    ledger.enter("glove.recall", True, 1, 10, 1_000_000, DrawCounts())
+    ledger.enter("glove.recall", True, 1, 10, 1_000_000, Counter())
     for _ in range(2):
-        drawn = DrawCounts(Counter({"joint.noise": 40, "bytes sent": 3, "a": 1}))
+        drawn = Counter({"joint.noise": 40, "bytes sent": 3, "a": 1})
         ledger.enter("joint.noise", False, 1, 10, 1_500_000, drawn)
     recall, noise = step_reports(ledger)
     assert (recall.name, recall.own, recall.us_a_grasp, recall.share) == ("glove.recall", True, 100.0, 0.25)
     assert (noise.calls, noise.grasps, noise.draws, noise.own) == (2, 20, 80, False)
     assert (noise.seconds, noise.us_a_grasp, noise.share) == pytest.approx((0.003, 150.0, 0.75))
-    assert noise.counts == (StepCount("a", 2), StepCount("bytes sent", 6))
+    assert noise.counts == (Count("a", 2), Count("bytes sent", 6))
 
 
 def went_through(batch: Batch) -> Batch:

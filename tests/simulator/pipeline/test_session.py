@@ -1,3 +1,5 @@
+from collections import Counter
+
 import msgspec
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import SubjectSession, sessions
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.scenes.scene import Scene
-from thenar.simulator.streams import Draw, DrawCounts, Site
+from thenar.simulator.streams import Draw, Site
 
 from ..small import make_scene
 
@@ -47,7 +49,7 @@ def test_every_repetition_has_one_trial_of_its_own(repetitions: int, seed: int) 
 def test_trials_follow_the_random_words_that_every_repetition_draws_alone() -> None:
     for session in sessions(QUICK, POSTURES):
         words = [
-            Draw(QUICK.seed, "session.order", site, DrawCounts()).per_repetition().words[0]
+            Draw(QUICK.seed, "session.order", site, Counter()).per_repetition().words[0]
             for condition in session.conditions
             for site in (
                 Site(condition.subject, condition.grasp, condition.thing.name, np.array([number]))

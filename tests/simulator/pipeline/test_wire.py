@@ -179,7 +179,7 @@ def test_bytes_are_counted() -> None:
     batch = make_sent(every_10_ms(3))
     draw = make_draw("glove.send", batch)
     prepared(SEND, make_setting(timed=True))(batch, draw)
-    assert draw.draws.counts == {"bytes sent": 3 * FRAMES * (ROW_BYTES + RECORD_BYTES)}
+    assert draw.draws == {"bytes sent": 3 * FRAMES * (ROW_BYTES + RECORD_BYTES)}
 
 
 def test_frames_faster_than_the_line_are_refused() -> None:

@@ -9,7 +9,7 @@ import pytest
 from thenar.simulator.body.condition import PlannedGrasp, Thing
 from thenar.simulator.body.hand import Hand
 from thenar.simulator.body.shapes import Pose, Shape, Sphere
-from thenar.simulator.errors import PlanError
+from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.planning.plan import Work, average_hand, entry_of, plan_object, shipped_prehensions
 from thenar.simulator.planning.planner import Plan
@@ -112,7 +112,7 @@ def test_a_thing_for_large_hands_is_planned_for_large_hands_alone() -> None:
     lengths = [held.length_mm for held in entry.held]
     assert 150.0 < lengths[0] <= 195.0
     assert lengths[-1] == 225.0
-    with pytest.raises(PlanError, match=f"a hand of {lengths[0] - 15.0:g} mm cannot hold 'ball'"):
+    with pytest.raises(SceneError, match=f"a hand of {lengths[0] - 15.0:g} mm cannot hold 'ball'"):
         plan_object(Work("CMF", TYPES["CMF"], ball, 150.0, 210.0))
 
 

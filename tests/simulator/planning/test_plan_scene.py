@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from thenar.simulator.body.condition import Thing
 from thenar.simulator.body.hand import LIMITS_DEG
 from thenar.simulator.body.shapes import Shape, Sphere, rotation
-from thenar.simulator.errors import PlanError, SceneError
+from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.planning.plan import (
     Work,
@@ -186,7 +186,7 @@ def test_the_result_does_not_depend_on_the_number_of_jobs() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_unholdable_objects_are_named_and_the_first_explained(jobs: int) -> None:
-    with pytest.raises(PlanError) as refusal:
+    with pytest.raises(SceneError) as refusal:
         postures_of(make_scene(objects=(PEA, MELON, BALL, MOON), subjects=(hand(160.0),)), jobs)
     assert str(refusal.value).startswith("a hand of 165 mm cannot hold 'melon' with grasp type 'CMF': ")
     assert str(refusal.value).endswith("; nor can these be held: 'moon' (CMF)")

@@ -7,7 +7,7 @@ import pytest
 from thenar.simulator.body.condition import Thing
 from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.errors import PlanError
+from thenar.simulator.errors import SceneError
 from thenar.simulator.planning.plan import shipped_prehensions
 from thenar.simulator.planning.planner import BORNE, TOLERANCE_MM, Plan, measure, plan
 from thenar.simulator.planning.prehension import pad_sphere
@@ -87,7 +87,7 @@ NOT_HELD: list[tuple[str, Shape, str]] = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("grasp", "shape", "wrong"), NOT_HELD, ids=[f"{g} {type(s).__name__}" for g, s, _ in NOT_HELD])
 def test_an_unholdable_object_is_refused_with_reason_and_advice(grasp: str, shape: Shape, wrong: str) -> None:
-    with pytest.raises(PlanError) as refusal:
+    with pytest.raises(SceneError) as refusal:
         plan(HAND, grasp, TYPES[grasp], Thing("monster", shape, 0.1))
     words = str(refusal.value)
     assert words.startswith(f"a hand of 188 mm cannot hold 'monster' with grasp type '{grasp}': the best posture l")

@@ -5,7 +5,8 @@ import pytest
 from thenar.compiler.recordings.taxonomy import published
 from thenar.simulator.body.shapes import Box, Cylinder, Sphere
 from thenar.simulator.errors import SceneError
-from thenar.simulator.pipeline.scene_file import Catalogue, load_catalogue
+from thenar.simulator.pipeline.scene_file import load_catalogue
+from thenar.simulator.scenes.scene import SceneObject
 
 
 def table(name: str, grasp: str, shape: str = 'shape = "sphere"\ndiameter_mm = 50') -> str:
@@ -16,10 +17,10 @@ def table(name: str, grasp: str, shape: str = 'shape = "sphere"\ndiameter_mm = 5
 FULL = 'taxonomy = "kamakura14"\n' + "".join(table(f"for {g}", g) for g in published("kamakura14").types)
 
 
-def load(tmp_path: Path, text: str) -> Catalogue:
+def load(tmp_path: Path, text: str) -> tuple[SceneObject, ...]:
     path = tmp_path / "mine.toml"
     path.write_text(text)
-    return load_catalogue(path)
+    return load_catalogue(path)[1]
 
 
 def complaint(tmp_path: Path, text: str) -> str:
@@ -30,17 +31,17 @@ def complaint(tmp_path: Path, text: str) -> str:
 
 @pytest.mark.parametrize("name", ["kamakura14", "cutkosky16"])
 def test_a_shipped_catalogue_has_two_objects_for_every_type(name: str) -> None:
-    catalogue = load_catalogue(name)
-    grasps = [item.grasp for item in catalogue.objects]
-    assert (catalogue.name, catalogue.taxonomy) == (name, name)
+    taxonomy, objects = load_catalogue(name)
+    grasps = [item.grasp for item in objects]
+    assert taxonomy.name == name
     assert {grasp: grasps.count(grasp) for grasp in grasps} == dict.fromkeys(published(name).types, 2)
-    assert len({item.name for item in catalogue.objects}) == len(catalogue.objects)
+    assert len({item.name for item in objects}) == len(objects)
 
 
 def test_the_three_shapes_are_read_with_their_sizes(tmp_path: Path) -> None:
     bar = 'shape = "cylinder"\ndiameter_mm = 20\nlength_mm = 90'
     card = 'shape = "box"\nlength_mm = 80\nwidth_mm = 50\nheight_mm = 4\nedge_mm = 1.5'
-    objects = load(tmp_path, FULL + table("bar", "PoS", bar) + table("card", "Lat", card)).objects
+    objects = load(tmp_path, FULL + table("bar", "PoS", bar) + table("card", "Lat", card))
     assert objects[0].shape == Sphere(diameter_mm=50.0)
     assert objects[-2].shape == Cylinder(diameter_mm=20.0, length_mm=90.0)
     assert objects[-1].shape == Box(length_mm=80.0, width_mm=50.0, height_mm=4.0, edge_mm=1.5)
@@ -49,7 +50,7 @@ def test_the_three_shapes_are_read_with_their_sizes(tmp_path: Path) -> None:
 
 def test_a_grasp_type_may_be_written_out_or_numbered(tmp_path: Path) -> None:
     more = table("a", "Power grip, hook type") + table("b", "12") + table("c", "tvii")
-    assert [item.grasp for item in load(tmp_path, FULL + more).objects[-3:]] == ["PoH", "Tip", "TVII"]
+    assert [item.grasp for item in load(tmp_path, FULL + more)[-3:]] == ["PoH", "Tip", "TVII"]
 
 
 def test_other_tables_of_a_catalogue_are_not_its_business(tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ def test_the_least_scene_has_defaults_for_everything_else(scene: Load) -> None:
         name="mine",
         seed=1,
         taxonomy="kamakura14",
-        objects=load_catalogue("kamakura14").objects,
+        objects=load_catalogue("kamakura14")[1],
         subjects=(Subject(name="A", hand_length_mm=188.0, hand_breadth_mm=84.0),),
         repetitions=4,
         recording=Recording(rate_hz=100.0, lead_ms=0.0, hold_ms=500.0, release_ms=0.0, rows="last"),
@@ -120,7 +120,7 @@ def test_a_population_is_drawn_with_the_seed_of_the_scene(scene: Load) -> None:
 def test_objects_of_ones_own_are_read_like_a_catalogue(scene: Load) -> None:
     data = ROOT / "simulator" / "planning" / "data" / "kamakura14.toml"
     objects = data.read_text()[data.read_text().index("[[objects]]") :]
-    assert scene(LEAST.replace('objects = "kamakura14"', "") + objects).objects == load_catalogue("kamakura14").objects
+    assert scene(LEAST.replace('objects = "kamakura14"', "") + objects).objects == load_catalogue("kamakura14")[1]
 
 
 @pytest.mark.parametrize(

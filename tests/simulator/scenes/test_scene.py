@@ -109,8 +109,7 @@ def test_drawn_hands_have_the_statistics_of_the_survey(survey: str, women: float
     people = draw_subjects(SurveyPopulation(survey=survey, count=count, women=women), seed=5)  # type: ignore[arg-type]
     length = np.array([subject.hand_length_mm for subject in people])
     breadth = np.array([subject.hand_breadth_mm for subject in people])
-    hands = SURVEYS[survey][int(women)]
-    for drawn, wanted in ((length, hands.length), (breadth, hands.breadth)):
+    for drawn, wanted in zip((length, breadth), SURVEYS[survey][int(women)], strict=True):
         assert abs(drawn.mean() - wanted.mean) < 4 * wanted.sd / sqrt(count)
         assert abs(drawn.std() - wanted.sd) < 4 * wanted.sd / sqrt(2 * count)
     assert abs(np.corrcoef(length, breadth)[0, 1] - CORRELATION) < 0.04

@@ -7,7 +7,7 @@ from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS, Target, kinds, timed
-from thenar.drivers.members import MemberError
+from thenar.drivers.errors import SettingError
 
 from ....conftest import tool
 from ....tables import describe
@@ -35,7 +35,7 @@ def test_what_is_verified_and_what_is_timed_is_read_off_the_targets() -> None:
 
 
 def test_a_target_that_is_none_is_refused_with_those_that_are() -> None:
-    with pytest.raises(MemberError, match="no firmware target 'attiny85': choose one of host, avr328p, avr2560"):
+    with pytest.raises(SettingError, match="no firmware target 'attiny85': choose one of host, avr328p, avr2560"):
         TARGETS.named("attiny85")
 
 

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.methods.base import METHODS, Method, usual
 from thenar.compiler.placement.ports import PortCosts
-from thenar.compiler.samples import Samples
-from thenar.drivers.members import MemberError
+from thenar.compiler.samples import Samples, TrainingError
+from thenar.drivers.errors import SettingError
 
 OURS = [name for name, method in METHODS.items() if method.ours]
 BY_NUMBER = [name for name in OURS if METHODS[name].by_number]
@@ -45,7 +44,7 @@ def test_a_ladder_ends_at_all_switches_where_a_method_says_so() -> None:
 
 
 def test_a_parameter_is_one_of_two() -> None:
-    with pytest.raises(PlacementError, match="method 'odd': its parameter is 'switches' or 'S', not 'lambda'"):
+    with pytest.raises(TrainingError, match="method 'odd': its parameter is 'switches' or 'S', not 'lambda'"):
         Method(name="odd", help="", learn=METHODS["cmim"].learn, parameter="lambda")  # type: ignore[arg-type]
 
 
@@ -77,12 +76,12 @@ def test_methods_that_heed_time_read_fewer_ports(name: str) -> None:
 
 
 def test_a_method_that_is_not_there_is_named_with_those_that_are() -> None:
-    with pytest.raises(MemberError, match=r"'id4'.*id3, id3-cost"):
+    with pytest.raises(SettingError, match=r"'id4'.*id3, id3-cost"):
         METHODS.named("id4")
 
 
 def test_there_must_be_switches_and_ports_for_each() -> None:
-    with pytest.raises(PlacementError, match="joints only"):
+    with pytest.raises(TrainingError, match="joints only"):
         METHODS["id3"].chooser(learning(0))
-    with pytest.raises(PlacementError, match="2 switches, the set has 14"):
+    with pytest.raises(TrainingError, match="2 switches, the set has 14"):
         METHODS["elimination"].chooser(learning(), PortCosts((0, 0), (1.0,)))

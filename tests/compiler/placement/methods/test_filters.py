@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.gain import Cooccurrence
 from thenar.compiler.placement.methods import baselines
 from thenar.compiler.placement.methods.baselines import cmim, most_informative, random_placement
+from thenar.compiler.samples import TrainingError
 
 Bits = npt.NDArray[np.bool_]
 Data = tuple[Bits, npt.NDArray[np.int64]]
@@ -108,5 +108,5 @@ def test_a_random_placement_is_different_inputs_drawn_by_the_seed(n_inputs: int,
 
 
 def test_a_negative_size_is_refused() -> None:
-    with pytest.raises(PlacementError, match="-1 inputs were requested"):
+    with pytest.raises(TrainingError, match="-1 inputs were requested"):
         random_placement(5, -1, 0)

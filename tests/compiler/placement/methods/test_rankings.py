@@ -6,9 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from thenar.compiler.placement import PlacementError
 from thenar.compiler.placement.methods.base import METHODS
-from thenar.compiler.samples import Samples
+from thenar.compiler.samples import Samples, TrainingError
 
 BASELINES = [
     pytest.param(name, marks=pytest.mark.skipif(not method.installed, reason=f"{method.install} is not installed"))
@@ -95,5 +94,5 @@ def test_without_pysensors_its_methods_say_what_to_install(
     name: str, learning: Samples, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pysensors", None)
-    with pytest.raises(PlacementError, match="pip install python-sensors"):
+    with pytest.raises(TrainingError, match="pip install python-sensors"):
         METHODS[name].chooser(learning)
