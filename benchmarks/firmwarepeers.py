@@ -124,7 +124,7 @@ class Network:
         from sklearn.preprocessing import StandardScaler
 
         X = _levels(fold.X)
-        scaler = StandardScaler().fit(X)
+        scaler: Any = StandardScaler().fit(X)
         network = MLPClassifier((neurons,), solver="lbfgs", alpha=1.0, max_iter=2000, random_state=1).fit(
             scaler.transform(X), fold.y
         )
