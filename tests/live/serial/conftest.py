@@ -71,6 +71,10 @@ class Run:
     def device(self, kind: str) -> DeviceHealth:
         return next(state for state in self.sources.devices() if state.name.startswith(kind))
 
+    def opened(self, kind: str = "") -> list[int]:
+        """Return how often each device of a kind was opened."""
+        return [keeper.opened for keeper in self.sources._keepers if keeper.state.name.startswith(kind)]
+
     def counts(self, kind: str) -> dict[str, int]:
         found = next(device for device in self.sources.health() if device.name.startswith(kind))
         return {count.name: count.value for count in found.counts}

@@ -78,7 +78,7 @@ def test_damaged_bytes_give_no_wrong_answer_and_cease_with_repair(
     scene.settled(25)
     if (line, damage) != (GLOVE, flip):
         assert scene.check() > 0
-    assert all(device.opened == 1 for device in running.sources.devices())
+    assert set(running.opened()) == {1}
     assert running.damaged(line) > 0 or damage in (drop, flood)
 
 
