@@ -6,6 +6,8 @@ Switches come every millisecond, the glove every ten, but for half a second in t
 files may have MOST_BYTES at most, so that the recording ends amid the run. After every WINDOW frames a line of JSON.
 """
 
+import ctypes
+import gc
 import os
 import resource
 import socket
@@ -127,6 +129,9 @@ def soak(build: Build, harness: Harness, rows: Path, folder: Path, frames: int) 
 
 
 def _sample(frame: int, calls: float, recorder: LiveRecorder) -> Sample:
+    # What is free goes back first: how far a queue once grew depends on the load of the machine.
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
     status = Path("/proc/self/status").read_text().splitlines()
     rss_kib = next(int(line.split()[1]) for line in status if line.startswith("VmRSS"))
     files = len(os.listdir("/proc/self/fd"))  # noqa: PTH208

@@ -1,3 +1,4 @@
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -45,7 +46,9 @@ def samples(
     np.savez(folder / "rows.npz", bits=truth.bits, sensors=stage.performance.sensors)
     inputs = [stage.builds["both"], folder / "glove.toml", folder / "rows.npz", folder]
     command = [sys.executable, str(SOAKED), *map(str, (*inputs, FRAMES, MOST_BYTES))]
-    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=600, check=True)
+    # Python's own allocator takes a mebibyte at a time, and glibc's an arena a thread, as the load of the machine has it.
+    environment = {**os.environ, "PYTHONMALLOC": "malloc", "MALLOC_ARENA_MAX": "1"}
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, timeout=600, check=True)
     found = [msgspec.json.decode(line, type=Sample) for line in done.stdout.splitlines()]
     print(f"{found[-1].frames} frames, {found[-1].frames / 60_000:.1f} minutes of them")
     return found
