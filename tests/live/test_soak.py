@@ -46,7 +46,7 @@ def samples(
     np.savez(folder / "rows.npz", bits=truth.bits, sensors=stage.performance.sensors)
     inputs = [stage.builds["both"], folder / "glove.toml", folder / "rows.npz", folder]
     command = [sys.executable, str(SOAKED), *map(str, (*inputs, FRAMES, MOST_BYTES))]
-    # Python's own allocator takes a mebibyte at a time, and glibc's an arena a thread, as the load of the machine has it.
+    # Python's allocator takes a mebibyte at a time, and glibc an arena a thread, as the load of the machine has it.
     environment = {**os.environ, "PYTHONMALLOC": "malloc", "MALLOC_ARENA_MAX": "1"}
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, timeout=600, check=True)
     found = [msgspec.json.decode(line, type=Sample) for line in done.stdout.splitlines()]
