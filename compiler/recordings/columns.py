@@ -7,6 +7,7 @@ import re
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from fnmatch import translate
 from itertools import islice
 from pathlib import Path
@@ -205,10 +206,16 @@ def _is_encoding(name: str) -> bool:
         return False
 
 
-# Inputs of a table, by name, with the entries that say how to read them: the switches, without an entry, and the taxels
-# with a threshold; and the columns that become codes, the joints and the analog taxels.
-SwitchInputs = tuple[tuple[str, TaxelColumns | None], ...]
-CodedInputs = tuple[tuple[str, JointColumns], ...]
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """The inputs in one table, by name, with the entries that say how to read them.
+
+    switches  the switches, without an entry, then the taxels with a threshold
+    coded     the columns that become codes: the joints, then the analog taxels
+    """
+
+    switches: tuple[tuple[str, TaxelColumns | None], ...]
+    coded: tuple[tuple[str, JointColumns], ...]
 
 
 def read_columns(path: Path) -> ColumnRoles:
@@ -221,7 +228,7 @@ def read_columns(path: Path) -> ColumnRoles:
 KEYS = ("label", "subject", "object", "session", "trial", "time")
 
 
-def select(columns: ColumnRoles, names: Sequence[str]) -> tuple[SwitchInputs, CodedInputs]:
+def select(columns: ColumnRoles, names: Sequence[str]) -> Selection:
     """Find the inputs that `columns` refers to among a table's `names`.
 
     Raises TableError if a column is missing or used twice, a glob matches nothing, or there are no inputs.
@@ -252,11 +259,13 @@ def select(columns: ColumnRoles, names: Sequence[str]) -> tuple[SwitchInputs, Co
         raise TableError("no column is an input: name some under `switches`, `[[taxels]]` or `[[joints]]`")
     taxels = [(name, entry) for name, entry in found if isinstance(entry, TaxelColumns)]
     joints = [(name, entry) for name, entry in found if entry is not None and not isinstance(entry, TaxelColumns)]
-    switches: SwitchInputs = (
-        *((name, None) for name, entry in found if entry is None),
-        *((name, entry) for name, entry in taxels if entry.threshold != "learnt"),
+    return Selection(
+        switches=(
+            *((name, None) for name, entry in found if entry is None),
+            *((name, entry) for name, entry in taxels if entry.threshold != "learnt"),
+        ),
+        coded=(*joints, *((name, entry) for name, entry in taxels if entry.threshold == "learnt")),
     )
-    return switches, (*joints, *((name, entry) for name, entry in taxels if entry.threshold == "learnt"))
 
 
 def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:

@@ -81,23 +81,24 @@ def import_file(
 def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportReport]:
     """Import `table` with `columns`; raises TableError or RecordingError."""
     table = _renamed(table, columns.rename)
-    switches, coded = select(columns, list(table.columns))
-    readings, times_us, warnings, notes = read_cells(table, columns, switches, coded)
+    selection = select(columns, list(table.columns))
+    readings, times_us, warnings, notes = read_cells(table, columns, selection)
     table = replace(table, columns={})  # its cells were read: their memory is needed
     grasps, taxonomy, aliases = _labels(table, columns, readings)
-    made = [
-        code_joint(name, entry, readings.joints[:, column], readings.rows) for column, (name, entry) in enumerate(coded)
+    coded = [
+        code_joint(name, entry, readings.joints[:, column], readings.rows)
+        for column, (name, entry) in enumerate(selection.coded)
     ]
-    costs = tuple(cost for _, _, cost in made)
-    count = sum(not isinstance(entry, TaxelColumns) for _, entry in coded)
-    joints, taxels = made[:count], made[count:]
+    costs = tuple(cost for _, _, cost in coded)
+    count = sum(not isinstance(entry, TaxelColumns) for _, entry in selection.coded)
+    joints, taxels = coded[:count], coded[count:]
     empty = np.zeros((len(grasps), 0), np.uint16)
     # Read-only, so that the set uses them without copies.
     for name in readings.__slots__:
         getattr(readings, name).setflags(write=False)
     grasp_set = GraspSet(
         switches=readings.switches,
-        switch_names=tuple(name for name, _ in switches),
+        switch_names=tuple(name for name, _ in selection.switches),
         codes=np.stack([codes for codes, _, _ in joints], axis=1) if joints else empty,
         joints=tuple(joint for _, joint, _ in joints),
         taxels=np.stack([codes for codes, _, _ in taxels], axis=1) if taxels else empty,
@@ -119,7 +120,9 @@ def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportRe
         *aliases,
         *coarse(zip(costs, readings.joints.T, strict=True)),
         *find_oddities(grasp_set, readings.rows),
-        *possible_clocks(zip((name for name, _ in coded), readings.joints.T, strict=True), _course(readings, columns)),
+        *possible_clocks(
+            zip((name for name, _ in selection.coded), readings.joints.T, strict=True), _course(readings, columns)
+        ),
     ]
     if taxels:
         notes.append(

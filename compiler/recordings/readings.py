@@ -18,7 +18,7 @@ from thenar.runtime.recording.reader import Oddity
 from ..arrays import groups, otsu
 from . import RecordingError, TableError, check_room, list_rows
 from .cells import Parsed, Value, bits, codes, integers, names, natural_key, numbers, times, unit_of_time
-from .columns import KEYS, CodedInputs, ColumnRoles, SwitchInputs
+from .columns import KEYS, ColumnRoles, Selection
 from .table import Table
 from .taxonomy import plain
 
@@ -50,7 +50,7 @@ class Readings:
 
 
 def read_cells(
-    table: Table, columns: ColumnRoles, switches: SwitchInputs, coded: CodedInputs
+    table: Table, columns: ColumnRoles, selection: Selection
 ) -> tuple[Readings, NDArray[np.int64], list[Oddity], list[str]]:
     """Return the content of `table`, its times in microseconds (none if unknown), oddities, and notes on conversions.
 
@@ -68,8 +68,8 @@ def read_cells(
         sessions=reader.names(columns.parts("session")),
         trials=reader.trials(columns.parts("trial"), notes),
         time=reader.time(columns.time),
-        switches=reader.switches(switches, notes),
-        joints=reader.joints(coded),
+        switches=reader.switches(selection, notes),
+        joints=reader.joints(selection),
     )
     none = nothing_held(columns, labels)
     reader.fill_from_next_grasp(readings, none, columns)
@@ -95,7 +95,7 @@ def read_cells(
         order = in_time(trial_ids, readings.time)
         readings = readings.kept(order)
         missing = {name: mask[order] for name, mask in missing.items()}
-    warnings += _filled(table, readings, [name for name, _ in (*switches, *coded)], missing, trial_ids)
+    warnings += _filled(table, readings, selection, missing, trial_ids)
     micros = _micros(table, columns, readings.time, notes)
     readings = _reduced(readings, columns.reduce, trial_ids, notes)
     times_us = np.rint(readings.time * micros).astype(np.int64) if micros else np.empty(0, np.int64)
@@ -162,11 +162,12 @@ def _kept(values: NDArray[Value], keep: NDArray[np.bool_] | NDArray[np.intp]) ->
 def _filled(
     table: Table,
     readings: Readings,
-    inputs: Sequence[str],
+    selection: Selection,
     missing: dict[str, NDArray[np.bool_]],
     trial_ids: NDArray[np.intp],
 ) -> list[Oddity]:
-    """Fill the cells of `inputs` that are `missing`, in place, and return a finding about them."""
+    """Fill the cells of inputs that are `missing`, in place, and return a finding about them."""
+    inputs = [name for name, _ in (*selection.switches, *selection.coded)]
     values = dict(zip(inputs, (*readings.switches.T, *readings.joints.T), strict=True))
     missing = {name: mask for name, mask in missing.items() if name in values and mask.any()}
     if not missing:
@@ -230,11 +231,11 @@ class _Reader:
             self.wrong.setdefault(expected, {})[name] = parsed.wrong
         return parsed.values
 
-    def switches(self, inputs: SwitchInputs, notes: list[str]) -> NDArray[np.bool_]:
+    def switches(self, selection: Selection, notes: list[str]) -> NDArray[np.bool_]:
         """Return the switches, with those made by thresholds last."""
-        switches = np.empty((len(self.table.rows), len(inputs)), np.bool_, order="F")
+        switches = np.empty((len(self.table.rows), len(selection.switches)), np.bool_, order="F")
         shown = []
-        for number, (name, taxel) in enumerate(inputs):
+        for number, (name, taxel) in enumerate(selection.switches):
             if taxel is None:
                 switches[:, number] = self._read(name, bits, "0 or 1")
                 continue
@@ -246,10 +247,10 @@ class _Reader:
             notes.append(f"{len(shown)} analog columns became switches, closed {list_names(shown)}")
         return switches
 
-    def joints(self, inputs: CodedInputs) -> NDArray[np.float64]:
+    def joints(self, selection: Selection) -> NDArray[np.float64]:
         """Return the columns that become codes: the joints, then the analog taxels."""
-        joints = np.empty((len(self.table.rows), len(inputs)), order="F")
-        for number, (name, entry) in enumerate(inputs):
+        joints = np.empty((len(self.table.rows), len(selection.coded)), order="F")
+        for number, (name, entry) in enumerate(selection.coded):
             parse, expected = (codes, "codes 0..65535") if entry.is_counts else (numbers, "finite numbers")
             joints[:, number] = self._read(name, parse, expected)
         return joints
