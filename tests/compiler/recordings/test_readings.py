@@ -22,7 +22,7 @@ GOOD = {
 
 def read(columns: ColumnRoles, **cells: Column) -> None:
     table = Table("t.csv", GOOD | cells, np.array([2, 3, 5]))
-    read_cells(table, columns, *select(columns, list(table.columns)))
+    read_cells(table, columns, select(columns, list(table.columns)))
 
 
 ALL = ColumnRoles("g", subject="who", trial="n", switches=("s",), joints=(JointColumns(("j",)),))
@@ -59,7 +59,7 @@ def test_the_first_wrong_cells_are_named_and_the_rest_counted() -> None:
     table = Table("t.csv", {"g": ["a"] * 9} | {name: ["7"] * 9 for name in columns}, np.arange(1, 10))
     wanted = ColumnRoles("g", switches=("s*",))
     with pytest.raises(TableError) as refused:
-        read_cells(table, wanted, *select(wanted, list(table.columns)))
+        read_cells(table, wanted, select(wanted, list(table.columns)))
     shown = ", ".join(f"row 1 's{number}' ('7')" for number in range(5))
     assert str(refused.value) == f"t.csv: not 0 or 1: 90 cells, {shown} and 85 more"
 
