@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from thenar.compiler.recordings.importer import ImportReport
     from thenar.compiler.recordings.propose import ColumnProposal
 
-# The joints whose coding is shown: those of a hand.
+# The coding of so many inputs is shown: a hand has no more joints.
 _MOST_CODED = 24
 
 
@@ -149,7 +149,7 @@ def _print(report: "ImportReport", output: Path) -> None:
             coding.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
         out().print(coding)
         if len(rounded) > _MOST_CODED:
-            echo(f"and {counted(len(rounded) - _MOST_CODED, 'joint')} more: --json lists them all")
+            echo(f"and {len(rounded) - _MOST_CODED:,} more: --json lists them all")
     echo(
         f"{output}: {trials_of_frames(report.frames, report.trials, report.rests)}, "
         f"{counted(report.grasp_types, 'grasp type')} ({report.taxonomy}); "

@@ -25,7 +25,7 @@ FRAMES = 32
 
 
 class TrainingError(ThenarError, ValueError):
-    """Rows that cannot be learnt from, or choices by which nothing can be: settings, limits of a placement."""
+    """Rows, settings or limits of a placement from which nothing can be learnt."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -97,9 +97,7 @@ def _fence(ascending: NDArray[np.int64]) -> int:
 
 
 def _split(counts: Counts, start: int, stop: int) -> tuple[int, int, int, Counts]:
-    """Return `start`, the value before which the best threshold splits the values `start` to `stop` - 1, `stop`, and
-    the resulting counts (K, 2).
-    """
+    """Return (start, at, stop, counts (K, 2)): the best threshold lies before value `at` of `start` to `stop` - 1."""
     inside = counts[:, start:stop]
     totals = inside.sum(axis=1)
     above = totals[:, np.newaxis] - np.cumsum(inside, axis=1)[:, :-1]

@@ -204,7 +204,7 @@ class CellCounter:
         for start in range(0, len(rows), _BLOCK):
             block = rows[start : start + _BLOCK]
             member = (self._labels[block] == self._classes).astype(np.float32)
-            # Of numbers that it does not use, a BLAS may say that they are invalid.
+            # OpenBLAS may set this flag for finite numbers (numpy issue 24067).
             with np.errstate(invalid="ignore"):
                 counts += (member @ self._cells[block].astype(np.float32)).astype(np.int64)
         return counts
