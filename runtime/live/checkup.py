@@ -187,8 +187,8 @@ def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[CheckResult, ...
     times = scan_us(msgspec.structs.replace(scan, ports=ports), harness)
     try:
         device.open()
-        chips = dict(zip(sorted(time.chip for time in times.chips), device.bus.chips, strict=True))
-        found = [_chip(device, chips[time.chip], time) for time in times.chips]
+        # Both are in the order of the chips' numbers.
+        found = [_chip(device, chip, time) for chip, time in zip(device.bus.chips, times.chips, strict=True)]
         whole = _duration(device.scan().read)
         frames = [device.read(_LISTEN_S) for _ in range(_SCANS)] if device.taxels else []
         way = (device.bus.fault_message,) if device.bus.fault_message else (f"reads {device.bus.way}",)
