@@ -94,6 +94,8 @@ class Trainer(ABC):
         first; other settings have their defaults. Empty: the trainer is used only if named.
     staged : bool
         Whether `rounds` is a setting, and one training also gives the models of all smaller numbers of rounds.
+    drafting : mapping
+        Arguments that `train` takes among its settings where a less precise model will do.
     """
 
     name: str
@@ -101,6 +103,7 @@ class Trainer(ABC):
     settings: tuple[Setting, ...] = ()
     tried: tuple[Mapping[str, Number], ...] = ({},)
     staged: bool = False
+    drafting: Mapping[str, Number] = {}
 
     @abstractmethod
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> Model:
@@ -124,7 +127,7 @@ class Trainer(ABC):
 
     def draft(self, samples: "Samples", settings: Mapping[str, Any]) -> Model:
         """Return a model to compare settings and trainers by, which need not be as precise as that of `train`."""
-        return self.train(samples, settings)
+        return self.train(samples, {**settings, **self.drafting})
 
     def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> tuple[Model, ...]:
         """Return a model for each of these numbers of rounds, from one training; see `train`.

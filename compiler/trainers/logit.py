@@ -16,7 +16,7 @@ from ..elementary import Floats, on_one_grid
 from ..samples import TrainingError
 from ..workers import check_memory
 from .base import Report, Setting, Trainer, check_rows
-from .newton import DRAFT_TOLERANCE, TOLERANCE, Column, Fit, Ruler, columns_of
+from .newton import DRAFT, TOLERANCE, Column, Fit, Ruler, columns_of
 
 if TYPE_CHECKING:
     from ..samples import Samples
@@ -185,6 +185,7 @@ class Logit(Trainer):
     )
 
     # The best smoothness grows with the number of bins: more bins mean smaller steps between them.
+    drafting = DRAFT
     tried = (
         {"penalty": 1.0, "smoothness": 4.0, "max_bins": 16},
         {"penalty": 3.0, "smoothness": 24.0, "max_bins": 32},
@@ -199,10 +200,6 @@ class Logit(Trainer):
         given = {**settings, "max_bins": settings["max_bins"] or BINS, "linear": bool(settings["linear"])}
         tables = fit_logit(samples.inputs, samples.labels, samples.n_classes, **given, **of_none(samples))
         return tables.score_tables(samples.n_switches)
-
-    def draft(self, samples: "Samples", settings: Mapping[str, Any]) -> ScoreTables:
-        """Return the tables of a less precise minimum."""
-        return self.train(samples, {**settings, "tolerance": DRAFT_TOLERANCE})
 
 
 def of_none(samples: "Samples") -> dict[str, Any]:

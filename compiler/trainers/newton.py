@@ -36,7 +36,7 @@ BIN_SHARE, BIAS_SHARE = 2.0**-4, 2.0**-10
 # No derivative of the loss is larger than this at the solution, relative to the total weight of the frames.
 TOLERANCE = 1e-7
 # In comparisons this is enough: the accuracies are the same, in half the steps.
-DRAFT_TOLERANCE = 1e-4
+DRAFT = {"tolerance": 1e-4}
 # Limits of Newton steps, of conjugate gradients per step, and of halvings of a step: far more than were ever needed.
 _MOST_STEPS, _MOST_DIRECTIONS, _MOST_HALVINGS = 500, 2000, 40
 _ENOUGH = 1e-4  # of the slope, for Armijo's rule

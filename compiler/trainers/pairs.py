@@ -25,7 +25,7 @@ from .base import Report, Setting, Trainer, check_rows
 from .binning import BinnedColumn, bin_columns
 from .logit import BINS, count_of, of_none, spread_out, tables_of
 from .logit import MEMBER as LOGIT
-from .newton import DRAFT_TOLERANCE, TOLERANCE, Column, Fit, columns_of, sparse
+from .newton import DRAFT, TOLERANCE, Column, Fit, columns_of, sparse
 
 if TYPE_CHECKING:
     from ..samples import Samples
@@ -129,6 +129,7 @@ class Pairs(Trainer):
             1e6,
         ),
     )
+    drafting = DRAFT
     tried = (
         {"penalty": 1.0, "smoothness": 8.0, "max_bins": 32, "pair_smoothness": 1.0},
         {"penalty": 0.3, "smoothness": 2.0, "max_bins": 32, "pair_smoothness": 0.3},
@@ -140,10 +141,6 @@ class Pairs(Trainer):
         return fit_pairs(
             samples.switches, samples.codes, samples.labels, samples.n_classes, **given, **of_none(samples)
         )
-
-    def draft(self, samples: "Samples", settings: Mapping[str, Any]) -> ScoreTables:
-        """Return the tables of less precise minima."""
-        return self.train(samples, {**settings, "tolerance": DRAFT_TOLERANCE})
 
 
 MEMBER = Pairs()
