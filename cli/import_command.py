@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from thenar.compiler.recordings.importer import ImportReport
     from thenar.compiler.recordings.propose import ColumnProposal
 
-# The coding of so many inputs is shown: a hand has no more joints.
+# At most this many inputs are listed with their coding: a hand has no more joints.
 _MOST_CODED = 24
 
 

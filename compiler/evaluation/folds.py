@@ -273,7 +273,7 @@ def groups_of(grasp_set: GraspSet, by: Scheme) -> NDArray[np.str_] | None:
 ProtocolName = Literal["paper", "nested"]
 
 
-# Each with its meaning, in a sentence.
+# The protocols, each with a sentence on its meaning.
 PROTOCOLS: dict[ProtocolName, str] = {
     "paper": "The placement is chosen once, from all rows, test rows included, as the paper did: optimistic.",
     "nested": (

@@ -95,7 +95,7 @@ def _first_oddity(table: Table) -> str:
 
 
 def _oddities(table: Table, names: Iterable[str]) -> Iterator[tuple[int, str, str]]:
-    """Yield the first cell of each column that is no number where others are: its row, the column, and a sentence."""
+    """Yield the first cell that is no number, of each column of numbers: its row, the column, and a sentence."""
     for name in names:
         column = table.columns[name]
         wrong = np.flatnonzero(numbers(column, table.decimal).wrong)
