@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split
-from firmwarepeers import SHARES, peers
+from firmwarepeers import peers
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
@@ -121,7 +121,7 @@ OURS = (
     Ours("logit", 16, (BINS,)),
     Ours("logit", 16, FEW),
     Ours("linear", 8, LINE),
-    *(Ours("linear", 8, (*LINE, ("sparsity", 1.0 - share))) for share in SHARES[1:]),
+    *(Ours("linear", 8, (*LINE, ("sparsity", sparsity))) for sparsity in (0.5, 0.6)),
     Ours("logit", 16, (BINS,), joints=False),
 )
 

@@ -16,7 +16,7 @@ thenar import "$TABLE" -o set.grasps --yes --overwrite
 # How many grasps of whom, what the pads read, and how well they can tell the grasps apart.
 thenar info set.grasps --plot set.png --overwrite
 # Rates for people whom nothing was learnt from, placement inside the folds.
-thenar evaluate set.grasps --by subject --protocol nested --tables compositions --trainer linear -o rates.json --overwrite
+thenar evaluate set.grasps --by subject --tables compositions --trainer linear -o rates.json --overwrite
 # Which pads and levels are worth keeping.
 thenar place set.grasps --method elimination --keep 16 -o kept.json --overwrite
 # The build: integer tables with their proof, report and spec.

@@ -146,8 +146,6 @@ class LogitBoost(Trainer):
     tried = (
         {"rounds": 30, "max_bins": 16, "ties": "least-used"},
         {"rounds": 100, "max_bins": 16, "ties": "least-used"},
-        {"rounds": 100, "max_bins": 16, "ties": "least-used", "shrinkage": 0.3},
-        {"rounds": 100},
     )
     settings = (
         Setting("rounds", "Rounds of LogitBoost.", int, 100, 1),
