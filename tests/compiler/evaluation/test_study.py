@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from thenar.compiler.evaluation.folds import EvaluationError, Fold, Population, Scheme
+from thenar.compiler.evaluation.folds import PROTOCOLS, EvaluationError, Fold, Population, Scheme
 from thenar.compiler.evaluation.plan import CLASSIFIERS, REFERENCE, CellPlan, FoldFit, RowPlan, TableName, learners
 from thenar.compiler.evaluation.rates import Rate, RecipeWords
-from thenar.compiler.evaluation.study import PROTOCOLS, TABLES, Study, StudyDesign, draw, evaluate
+from thenar.compiler.evaluation.study import TABLES, Study, StudyDesign, draw, evaluate
 from thenar.compiler.evaluation.tables import RateReader, RateRow, RateTable, draw_matrix
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.samples import Samples
