@@ -84,18 +84,6 @@ def test_effects_come_by_their_rank_with_their_parameters(scene: Load) -> None:
     assert found[1].parameters == (("sd_deg", 3.0), ("trial_sd_deg", 0.0))
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "[effects]\njoint.noise.sd_deg = 3\n",
-        "[effects.joint]\nnoise = {sd_deg = 3}\n",
-        "[effects.joint.noise]\nsd_deg=3.0",
-    ],
-)
-def test_an_effect_may_be_spelled_in_every_way_of_toml(scene: Load, text: str) -> None:
-    assert scene(LEAST + text).effects == (("joint.noise", (("sd_deg", 3.0), ("trial_sd_deg", 0.0))),)
-
-
 def test_every_effect_may_be_listed_without_parameters(scene: Load) -> None:
     found = scene(LEAST + "".join(f"[effects.{name}]\n" for name in NAMES))
     assert [name for name, _ in found.effects] == sorted(NAMES, key=lambda name: EFFECTS[name].order)
