@@ -65,18 +65,6 @@ def test_a_damaged_set_is_refused_with_the_reason(grasps: Path, capsys: pytest.C
     assert capsys.readouterr().err.startswith("thenar: set.grasps is truncated: ")
 
 
-@pytest.mark.parametrize(("table", "columns"), [("set.grasps", None), ("t.csv", "set.grasps"), ("t.csv", "t.csv")])
-def test_neither_the_set_nor_the_table_is_overwritten(
-    grasps: Path, table: str, columns: str | None, capsys: pytest.CaptureFixture[str]
-) -> None:
-    before = grasps.read_bytes()
-    more = [] if columns is None else ["--columns", str(grasps.with_name(columns))]
-    assert run(["export", str(grasps), "-o", str(grasps.with_name(table)), "--overwrite", *more]) == 2
-    assert ": the name of the output file must end in " in capsys.readouterr().err
-    assert [path.name for path in grasps.parent.iterdir()] == ["set.grasps"]
-    assert grasps.read_bytes() == before
-
-
 def test_an_unwritable_columns_file_stops_the_export_before_it_begins(grasps: Path) -> None:
     columns = grasps.with_name("no") / "columns.toml"
     assert run(["export", str(grasps), "-o", str(grasps.with_name("t.csv")), "--columns", str(columns)]) == 2
