@@ -175,11 +175,3 @@ def test_a_folder_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(FirmwareError, match="is not empty and was not written by thenar"):
         write_folder(NEW, tmp_path / "firmware", overwrite=True)
     assert content(tmp_path / "firmware") == {"main.c": "mine"}
-
-
-def test_a_place_that_cannot_be_is_named(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(FirmwareError, match="file is a file: name a folder"):
-        write_folder(NEW, tmp_path / "file")
-    with pytest.raises(FirmwareError, match="nowhere is no folder: make it first"):
-        write_folder(NEW, tmp_path / "nowhere" / "firmware")
