@@ -7,24 +7,6 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
-from thenar.compiler.recordings.graspset import Joint
-from thenar.compiler.recordings.taxonomy import own
-
-
-@pytest.fixture
-def grasps(tmp_path: Path) -> Path:
-    GraspSet(
-        switches=np.array([[0, 1], [1, 1], [0, 1], [1, 1]]),
-        switch_names=("thumb", "palm"),
-        codes=np.array([[3], [5], [3], [6]]),
-        joints=(Joint("index", "deg", 0, 10.0, 1, 10.5),),
-        grasps=np.array(["mug", "ball", "mug", "ball"]),
-        taxonomy=own(["mug", "ball"]),
-        subjects=np.array(["A", "B", "A", "A"]),
-        objects=np.array(["x", "x", "y", "x"]),
-        trials=np.arange(4),
-    ).save(tmp_path / "set.grasps")
-    return tmp_path / "set.grasps"
 
 
 def test_a_set_is_described_for_people(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
