@@ -115,13 +115,15 @@ def test_json_on_stdout_and_in_the_file_are_one_document(
 def test_confusion_matrices_are_printed_and_drawn_on_request(
     grasps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["--tables", "compositions", "--protocol", "nested", "--confusion", "--plot", str(tmp_path / "drawn")]
+    arguments = ["--tables", "compositions", "--confusion", "--plot", str(tmp_path / "drawn")]
     assert run(["evaluate", grasps, *QUICK, *arguments]) == 0
     printed = capsys.readouterr().out
     assert "VII NoSel-Co, subject [b]Bob, nested protocol" in printed
     assert "pinch [tip]" in printed
-    names = [f"confusion-nested-{name}.png" for name in ("I", "II", "III", "IV", "V", "VI", "VII")]
-    assert sorted(path.name for path in (tmp_path / "drawn").iterdir()) == sorted(names)
+    rows = [(protocol, name) for protocol in ("paper", "nested") for name in ("I", "II", "III", "IV", "V", "VI", "VII")]
+    drawn = {path.name: path.read_bytes() for path in (tmp_path / "drawn").iterdir()}
+    assert drawn.keys() == {f"confusion-{protocol}-{name}.png" for protocol, name in rows}
+    assert all(picture.startswith(b"\x89PNG") for picture in drawn.values())
 
 
 @pytest.mark.parametrize(("by", "said"), [("subject", "one subject left out"), ("block", "4 blocks of trials")])
