@@ -159,6 +159,20 @@ def reviewed(terminal: Terminal, number: int) -> None:
         terminal.press(b"\r")
 
 
+def command_of(folder: Path, *more: object) -> list[str]:
+    """Return the command that records in a folder without a terminal."""
+    options = ["--glove", folder / "glove.toml", "--subject", "A", "-o", folder / "set.grasps", *more]
+    return [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
+
+
+def refused(command: list[str]) -> str:
+    """Return the sentence in which a command is refused that has written nothing."""
+    done = subprocess.run(command, stdin=subprocess.PIPE, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert not list(Path(command[command.index("-o") + 1]).parent.glob("set.*"))
+    return done.stderr
+
+
 def test_a_whole_collection_becomes_a_set(folder: Path, start: Start, board: BoardSender) -> None:
     terminal = start("--seed", "5", "--no-none")
     terminal.until(rb"Enter: start the countdown")
@@ -273,17 +287,11 @@ def test_a_port_without_anybody_at_its_other_end_is_no_device(folder: Path) -> N
     (folder / "glove.toml").write_text(
         f'name = "bench"\n[[stream]]\nport = "unix:{folder}/rows"\nswitches = ["a", "b"]\n'
     )
-    options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
-    options += ["--subject", "A", "-o", folder / "set.grasps"]
-    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
     with socket.socket(socket.AF_UNIX) as silent:
         silent.bind(str(folder / "rows"))
         silent.listen()
-        done = subprocess.run(command, stdin=subprocess.PIPE, capture_output=True, text=True, check=False, timeout=60)
-    assert done.returncode == 2
-    assert "nothing came in 3 s; nothing is recorded" in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert not list(folder.glob("set.*"))
+        said = refused(command_of(folder, "--taxonomy", "own", "--objects", folder / "objects.toml"))
+    assert "nothing came in 3 s; nothing is recorded" in said
 
 
 def test_a_full_disk_ends_recording_and_room_lets_it_resume(folder: Path, start: Start) -> None:
@@ -358,34 +366,25 @@ def test_a_set_that_was_not_collected_here_is_not_replaced(folder: Path, start: 
 
 
 def test_ones_own_grasp_types_come_from_a_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--subject", "A", "-o", folder / "set.grasps"]
-    assert run(["record", *map(str, options)]) == 2
+    assert run(command_of(folder, "--taxonomy", "own")[3:]) == 2
     assert "name it with --objects" in capsys.readouterr().err
 
 
 def test_a_glove_without_devices_collects_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "glove.toml").write_text('name = "bare"\n')
-    options = ["--glove", folder / "glove.toml", "--subject", "A", "-o", folder / "set.grasps"]
-    assert run(["record", *map(str, options)]) == 2
+    assert run(command_of(folder)[3:]) == 2
     assert "glove.toml names no device" in capsys.readouterr().err
 
 
 def test_without_its_devices_nothing_is_recorded(folder: Path) -> None:
     (folder / "glove.toml").write_text(GLOVE.format(folder=folder / "none"))
-    options = ["--glove", folder / "glove.toml", "--subject", "A", "-o", folder / "set.grasps"]
-    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
-    done = subprocess.run(command, stdin=subprocess.PIPE, capture_output=True, text=True, check=False, timeout=60)
-    assert done.returncode == 2
-    assert "there is no such port" in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert not list(folder.glob("set.*"))
+    assert "there is no such port" in refused(command_of(folder))
 
 
 def test_without_a_terminal_lines_are_keys(folder: Path, board: BoardSender) -> None:
     board.show({"s1": 0, "s2": 0})
-    options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
-    options += ["--subject", "A", "--repetitions", "1", "--countdown", "0", "-o", folder / "set.grasps"]
-    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
+    taxonomy = ("--taxonomy", "own", "--objects", folder / "objects.toml")
+    command = command_of(folder, *taxonomy, "--repetitions", "1", "--countdown", "0")
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdin is not None
         assert process.stderr is not None
@@ -415,9 +414,9 @@ def test_without_a_terminal_lines_are_keys(folder: Path, board: BoardSender) -> 
 
 
 def test_without_stdin_it_says_where_keys_would_come_from(folder: Path) -> None:
-    options = ["--glove", folder / "glove.toml", "--subject", "A", "-o", folder / "set.grasps"]
-    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
-    done = subprocess.run(["sh", "-c", '"$@" <&-', "sh", *command], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        ["sh", "-c", '"$@" <&-', "sh", *command_of(folder)], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 2
     assert "stdin is closed" in done.stderr
     assert not (folder / "set.mcap").exists()
