@@ -25,6 +25,7 @@ from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live import checkup
 from thenar.runtime.live.replay import replayed
 
+from ..sets import grasp_set_of
 from .conftest import thenar
 
 STREAM = """name = "maker"
@@ -448,14 +449,8 @@ def test_a_second_board_on_the_port_and_impossible_clocks_change_no_answer(
 def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(tmp_path: Path) -> None:
     high = {"cup": (200, 30), "pen": (30, 200), "rod": (200, 200)}
     labels = np.arange(60) % 3
-    from thenar.compiler.recordings.taxonomy import own
-
-    recorded = GraspSet(
-        switches=np.zeros((60, 0), bool), switch_names=(), codes=np.array(list(high.values()), np.uint16)[labels],
-        joints=tuple(Joint(f"flex_{number}", "raw", 1, 1.0, 255, 255.0) for number in (1, 2)),
-        grasps=np.array(list(high))[labels], taxonomy=own(list(high)), subjects=np.full(60, "A"),
-        objects=np.full(60, "thing"), trials=np.arange(60),
-    )  # fmt: skip
+    joints = tuple(Joint(f"flex_{number}", "raw", 1, 1.0, 255, 255.0) for number in (1, 2))
+    recorded = grasp_set_of(list(high), labels, codes=np.array(list(high.values()))[labels], joints=joints)
     recorded.save(tmp_path / "set.grasps")
     build = compile_build(recorded, tmp_path / "build", rounds=10, folds=0, inputs="joints").folder
     (tmp_path / "mine.toml").write_text(
