@@ -129,6 +129,7 @@ OPEN: dict[str, Any] = {"trainer": "logit", "penalty": 1.0, "max_bins": 4, "line
         {"rounds": ROUNDS, "prune": 5, "width": 5},
         {"prune": 5, "width": 6, **OPEN},
         {"table_bits": 8, "keep": 4, "placement": "cmim", **OPEN},
+        {"rounds": 4, "keep_joints": 2},
         pytest.param({"width": 6}, marks=pytest.mark.slow),
     ],
 )
