@@ -42,8 +42,9 @@ def test_simulated_grasps_stay_simulated_on_the_way_through_a_table(grasps: Path
 
 def test_a_damaged_set_is_refused_with_the_reason(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
     grasps.write_bytes(grasps.read_bytes()[:-1])
-    assert run(["export", str(grasps), "-o", str(grasps.with_name("t.csv"))]) == 2
-    assert capsys.readouterr().err.startswith("thenar: set.grasps is truncated: ")
+    for arguments in (["export", str(grasps), "-o", str(grasps.with_name("t.csv"))], ["info", str(grasps)]):
+        assert run(arguments) == 2
+        assert capsys.readouterr().err.startswith("thenar: set.grasps is truncated: ")
 
 
 def test_an_unwritable_columns_file_stops_the_export_before_it_begins(grasps: Path) -> None:

@@ -48,12 +48,6 @@ def test_a_picture_is_drawn_when_asked_for(grasps: Path, suffix: str, start: byt
     assert picture.read_bytes().startswith(start)
 
 
-def test_another_file_is_refused_with_the_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "set.grasps").write_bytes(b"label,s1\n")
-    assert run(["info", str(tmp_path / "set.grasps")]) == 2
-    assert "set.grasps is not a thenar THNRGRSP file" in capsys.readouterr().err
-
-
 def test_a_picture_never_replaces_the_set(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
     named = grasps.rename(grasps.with_name("set.png"))
     assert run(["info", str(named), "--plot", str(named), "--overwrite"]) == 2
