@@ -37,7 +37,7 @@ class Browser:
         WebDriverWait(self.driver, PATIENCE_S, poll_frequency=0.02).until(lambda _: until())
 
     def log(self, kind: str = "browser") -> list[dict[str, Any]]:
-        """Return what is new in a log: of the "browser", what the page complained of."""
+        """Return the new messages of a log: of the "browser", what the page complained of."""
         entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
         return entries
 
@@ -48,7 +48,7 @@ class Browser:
         return [message["params"]["request"]["url"] for message in sent]
 
     def axe(self, *impacts: str) -> list[str]:
-        """Return what axe-core finds wrong, of these impacts or of any: the rule, and where."""
+        """Return the rules that axe-core finds broken, of these impacts or of any, and where."""
         self.script((files("axe_core_python") / "axe.min.js").read_text())
         found = self.driver.execute_async_script(
             "axe.run({resultTypes: ['violations']}).then(arguments[0], (wrong) => arguments[0](String(wrong)))"

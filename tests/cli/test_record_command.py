@@ -229,7 +229,7 @@ def test_after_a_kill_the_same_command_goes_on_where_it_was(folder: Path, start:
     assert "4 of 4 trials are done" in text
 
 
-def test_pads_are_recorded_beside_the_rest(
+def test_pads_are_recorded_with_the_rest(
     folder: Path, start: Start, board: BoardSender, glove: EmulatedCyberGlove
 ) -> None:
     taxels = 'taxels = { p0 = [0, 1023], p1 = [0, 1023] }\n[taxels]\ncalibration = "pads.toml"\n'

@@ -105,7 +105,7 @@ def test_adding_any_other_effect_leaves_its_draws_as_they_were(
             assert_undisturbed(effect, alone[effect], both)
 
 
-# What a repetition has of its own; some only where an effect makes it.
+# What each repetition has for itself; some only where an effect makes it.
 FIELDS = (
     *("posture_deg", "pose", "grip_n", "forces_n", "settled", "residual_n", "on_us", "off_us"),
     *("frame_us", "bits", "sensors_deg", "raw", "taxels", "lost"),
