@@ -105,12 +105,13 @@ class Samples:
     def of(cls, grasp_set: GraspSet, inputs: Inputs = "both") -> "Samples":
         """Return all rows of a set, with the inputs that `inputs` selects, and the grasp types that occur."""
         classes, labels = np.unique(grasp_set.labels, return_inverse=True)
+        names = grasp_set.taxonomy.names
         none, session = grasp_set.is_none, groups(grasp_set.subjects, grasp_set.sessions)
         return cls(
             switches=grasp_set.switches[:, : None if inputs != "joints" else 0],
             codes=grasp_set.codes[:, : None if inputs != "switches" else 0],
             labels=labels,
-            grasps=tuple(grasp_set.taxonomy.names[label] for label in classes),
+            grasps=tuple(names[label] for label in classes),
             trials=grasp_set.trial_ids,
             subjects=np.unique(grasp_set.subjects, return_inverse=True)[1],
             taxels=grasp_set.taxels[:, : None if inputs != "joints" else 0],

@@ -230,6 +230,33 @@ def new_chromium() -> Callable[..., Any]:
     return start
 
 
+ARDUINO = Path("/usr/share/arduino/hardware")
+BUILDER = Path("/usr/share/arduino-builder")  # where Debian's package says where the IDE's tools are
+
+
+@pytest.fixture(scope="session")
+def arduino(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Return a function that has Arduino's builder compile a sketch for a board; no warning may name `quiet`."""
+    if not ARDUINO.is_dir():
+        tool("arduino-core-avr")
+    cores = tmp_path_factory.mktemp("cores")  # of Arduino, compiled once
+    shipped = ARDUINO / "arduino" / "avr" / "libraries"
+
+    def compiled(sketch: Path, quiet: str, board: str = "uno", libraries: Path = shipped, given: str = "") -> Path:
+        out = tmp_path_factory.mktemp("sketch")
+        # <float.h> of avr-g++ 5.4 lacks what the core asks for.
+        flags = f"-DDECIMAL_DIG=__DECIMAL_DIG__ {given}"
+        options = ["-tools=/usr/bin", f"-prefs=compiler.cpp.extra_flags={flags}", "-warnings=all"]
+        where = [f"-hardware={BUILDER}", f"-hardware={ARDUINO}", f"-libraries={libraries}", f"-build-path={out}"]
+        command = [tool("arduino-builder"), *options, *where, f"-build-cache={cores}", f"-fqbn=arduino:avr:{board}"]
+        done = subprocess.run([*command, str(sketch)], capture_output=True, text=True, check=False, timeout=120)
+        assert done.returncode == 0, done.stderr
+        assert quiet not in done.stderr, done.stderr
+        return out / f"{sketch.name}.elf"
+
+    return compiled
+
+
 @pytest.fixture(scope="session")
 def weka_data() -> Path:
     return need(SHARED_DATA / "weka")

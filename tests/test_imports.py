@@ -2,7 +2,7 @@
 
 import ast
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -162,11 +162,27 @@ def sources() -> dict[str, Path]:
 
 
 SOURCES = sources()
+Import = ast.Import | ast.ImportFrom
+
+
+def statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
+    """Yield statements and those inside them: no expression holds an import."""
+    for node in body:
+        yield node
+        for part in ("body", "orelse", "finalbody"):
+            yield from statements(getattr(node, part, ()))
+        for branch in (*getattr(node, "handlers", ()), *getattr(node, "cases", ())):
+            yield from statements(branch.body)
 
 
 @cache
 def tree_of(name: str) -> ast.Module:
     return ast.parse(SOURCES[name].read_text())
+
+
+@cache
+def imports_in(name: str) -> list[Import]:
+    return [node for node in statements(tree_of(name).body) if isinstance(node, Import)]
 
 
 def resolve(name: str, is_package: bool, node: ast.ImportFrom) -> str:
@@ -178,12 +194,12 @@ def resolve(name: str, is_package: bool, node: ast.ImportFrom) -> str:
     return ".".join([*base, *(node.module or "").split(".")]).strip(".")
 
 
-def imports(name: str, tree: ast.Module) -> Iterator[str]:
+def imports(name: str, nodes: Iterable[Import]) -> Iterator[str]:
     is_package = SOURCES[name].name == "__init__.py"
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             yield from (alias.name.removeprefix("thenar.") for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             yield resolve(name, is_package, node)
 
 
@@ -194,12 +210,12 @@ def fits(name: str, rooms: tuple[str, ...]) -> bool:
 def faults_of(name: str) -> Iterator[str]:
     """Yield what a module imports that its room may not, and imports that are written in the wrong way."""
     room = max((key for key in ALLOWED if fits(name, (key,))), key=len)
-    ours = {imported for imported in imports(name, tree_of(name)) if imported.split(".")[0] in (*PACKAGES, "thenar")}
+    ours = {imported for imported in imports(name, imports_in(name)) if imported.split(".")[0] in (*PACKAGES, "thenar")}
     for imported in sorted(ours):
         if not fits(imported, (*ALLOWED[room], "drivers.extras", name)):
             yield f"{name} imports {imported}, which {room} may not"
     depth = len(name.split(".")) - (SOURCES[name].name != "__init__.py")
-    for node in ast.walk(tree_of(name)):
+    for node in imports_in(name):
         if isinstance(node, ast.ImportFrom):
             if node.level > depth:
                 yield f"{name}, line {node.lineno} leaves the room: write from thenar."
@@ -215,7 +231,7 @@ def test_the_boards_side_names_no_workstation_package_at_the_top() -> None:
     wrong = []
     for name in SOURCES:
         if fits(name, ("runtime", "drivers", "cli", "compiler.recordings")):
-            top = ast.Module([node for node in tree_of(name).body if isinstance(node, ast.Import | ast.ImportFrom)], [])
+            top = [node for node in tree_of(name).body if isinstance(node, Import)]
             packages = WORKSTATION_ONLY & {imported.split(".")[0] for imported in imports(name, top)}
             wrong += [f"{name} imports {package}" for package in sorted(packages)]
     assert wrong == []
@@ -224,11 +240,11 @@ def test_the_boards_side_names_no_workstation_package_at_the_top() -> None:
 def parts_imported(name: str) -> set[str]:
     """Return the modules of ours that `name` imports: at the top, in functions, and for type checkers alone."""
     found = set[str]()
-    for node in ast.walk(tree_of(name)):
+    for node in imports_in(name):
         if isinstance(node, ast.ImportFrom):
             base = resolve(name, SOURCES[name].name == "__init__.py", node)
             found |= {inner if (inner := f"{base}.{alias.name}") in SOURCES else base for alias in node.names}
-        elif isinstance(node, ast.Import):
+        else:
             found |= {alias.name.removeprefix("thenar.") for alias in node.names}
     return (found & SOURCES.keys()) - {name}
 
@@ -261,7 +277,9 @@ def test_no_folders_of_a_room_import_each_other_in_a_circle() -> None:
 
 def test_the_reference_is_written_from_the_formulas_and_nothing_else() -> None:
     reference = [name for name in SOURCES if fits(name, ("stability.reference",))]
-    named = {imported for name in reference for imported in imports(name, tree_of(name)) if imported not in reference}
+    named = {
+        imported for name in reference for imported in imports(name, imports_in(name)) if imported not in reference
+    }
     assert {imported.split(".")[0] for imported in named} <= {"mpmath", *sys.stdlib_module_names}
     assert len(reference) > 5
 

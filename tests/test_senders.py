@@ -21,7 +21,6 @@ from .conftest import tool
 
 SENDERS = Path(__file__).resolve().parents[1] / "examples" / "senders"
 COLUMNS = ("ms", "thumb", "index", "flex_index", "pad_palm")
-ARDUINO = Path("/usr/share/arduino/hardware/arduino/avr")
 LONG_S = 60.0
 # Of the pins and converters of a board, which MicroPython's Unix port has not.
 MACHINE = """
@@ -113,31 +112,10 @@ def test_the_micropython_sender_runs_in_the_unix_port(started: Callable[..., obj
 
 
 @pytest.mark.slow
-def test_the_arduino_sender_runs_on_an_uno_in_simavr(started: Callable[..., object], tmp_path: Path) -> None:
-    if not ARDUINO.is_dir():
-        tool("arduino-core-avr")
-    core, variant = ARDUINO / "cores" / "arduino", ARDUINO / "variants" / "standard"
-    flags = ["-mmcu=atmega328p", "-Os", "-DF_CPU=16000000L", "-DARDUINO=10819", "-DARDUINO_AVR_UNO"]
-    flags += ["-DARDUINO_ARCH_AVR", f"-I{core}", f"-I{variant}", "-ffunction-sections", "-fdata-sections"]
-    loose = [
-        "-std=gnu++11",
-        "-fpermissive",
-        "-fno-exceptions",
-        "-fno-threadsafe-statics",
-        "-DDECIMAL_DIG=__DECIMAL_DIG__",
-    ]
-    sketch = tmp_path / "sketch.cpp"
-    sketch.write_text("#include <Arduino.h>\n" + (SENDERS / "glove_lines" / "glove_lines.ino").read_text())
-    objects = []
-    for source in [sketch, *sorted(core.glob("*.c")), *sorted(core.glob("*.cpp")), *sorted(core.glob("*.S"))]:
-        objects.append(tmp_path / f"{source.name}.o")
-        strict = ["-Wall", "-Wextra", "-Werror"] if source == sketch else ["-w"]
-        compiler, more = ("avr-g++", loose) if source.suffix == ".cpp" else ("avr-gcc", [])
-        command = [tool(compiler), *flags, *more, *strict, "-c", str(source), "-o", str(objects[-1])]
-        subprocess.run(command, check=True, timeout=120)
-    elf = tmp_path / "sketch.elf"
-    link = [tool("avr-gcc"), "-mmcu=atmega328p", "-Os", "-Wl,--gc-sections", *map(str, objects), "-lm", "-o", str(elf)]
-    subprocess.run(link, check=True, timeout=120)
+def test_the_arduino_sender_runs_on_an_uno_in_simavr(
+    started: Callable[..., object], arduino: Callable[..., Path]
+) -> None:
+    elf = arduino(SENDERS / "glove_lines" / "glove_lines.ino", "glove_lines")
     command = [tool("simavr"), "-m", "atmega328p", "-f", "16000000", str(elf)]
     process = started(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     assert isinstance(process, subprocess.Popen)

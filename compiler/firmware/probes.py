@@ -195,17 +195,17 @@ def turns(tables: IntegerTables, joint: int) -> NDArray[np.uint16]:
     """Return, in order, 0, each threshold of a joint, the code after it, and the highest code; for a joint with a
     slope, also codes near its ends and some between.
     """
-    thresholds = tables.steps_of(joint)
-    codes = np.concatenate([[0, _top(tables)], thresholds, thresholds + 1])
+    thresholds, top = tables.steps_of(joint), _top(tables)
+    codes = np.concatenate([[0, top], thresholds, thresholds + 1])
     for slope in (slope for slope in tables.slopes if slope.joint == joint):
         between = np.linspace(slope.low, slope.high, _BETWEEN).astype(np.int64)
         codes = np.concatenate([codes, between, [abs(slope.low - 1), slope.low + 1, slope.high - 1, slope.high + 1]])
     codes = np.unique(codes)
-    return codes[codes <= _top(tables)].astype(np.uint16)
+    return codes[codes <= top].astype(np.uint16)
 
 
 def _top(tables: IntegerTables) -> int:
-    steps = [int(tables.steps_of(joint)[-1]) for joint in range(tables.n_joints) if len(tables.steps_of(joint))]
+    steps = [int(steps[-1]) for term in (*tables.bins, *tables.grids) for steps in term.steps if len(steps)]
     return _WORD if max([0, *steps, *(slope.high - 1 for slope in tables.slopes)]) >= _BYTE else _BYTE
 
 

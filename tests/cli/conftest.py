@@ -14,6 +14,7 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.recordings.graspset import Joint
 
 from ..sets import grasp_set_of
 
@@ -61,6 +62,23 @@ def set_file(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
     path = tmp_path_factory.mktemp("recordings") / "set.grasps"
     small_set.save(path)
     return path
+
+
+@pytest.fixture
+def grasps(tmp_path: Path) -> Path:
+    """Store four rows of two types, two people and two objects."""
+    four = grasp_set_of(
+        ["mug", "ball"],
+        [0, 1, 0, 1],
+        switches=[[0, 1], [1, 1], [0, 1], [1, 1]],
+        switch_names=("thumb", "palm"),
+        codes=[[3], [5], [3], [6]],
+        joints=(Joint("index", "deg", 0, 10.0, 1, 10.5),),
+        subjects=np.array(["A", "B", "A", "A"]),
+        objects=np.array(["x", "x", "y", "x"]),
+    )
+    four.save(tmp_path / "set.grasps")
+    return tmp_path / "set.grasps"
 
 
 @pytest.fixture(scope="session")

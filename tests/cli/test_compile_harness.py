@@ -102,14 +102,6 @@ def test_options_that_do_not_go_together_are_refused(set_file: Path, tmp_path: P
     assert not (tmp_path / "build").exists()
 
 
-def test_a_wrong_harness_is_told_before_the_training(set_file: Path, tmp_path: Path) -> None:
-    glove = tmp_path / "glove.toml"
-    glove.write_text('[[bus]]\ndevice = "d"\n[[bus.chip]]\nkind = "mcp23017"\naddress = 0x20\npins = { GPA7 = "s1" }\n')
-    done = thenar("compile", set_file, "-o", tmp_path / "build", "--glove", glove)
-    assert done.returncode == 2
-    assert "glove.toml, line 6: bus[0].chip[0].pins.GPA7: must not be an input" in done.stderr
-
-
 def test_a_harness_without_the_kept_switches_is_told_which(set_file: Path, tmp_path: Path) -> None:
     glove = tmp_path / "glove.toml"
     glove.write_text("")

@@ -159,11 +159,6 @@ def test_a_mistake_is_one_sentence_and_code_two(
     assert reason in capsys.readouterr().err
 
 
-def test_a_picture_needs_a_name(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["draw"]) == 2
-    assert "--output" in capsys.readouterr().err
-
-
 def test_nothing_that_is_read_is_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     listed = tmp_path / "kept.svg"
     listed.write_text(NAMES[0])

@@ -1,10 +1,4 @@
-import contextlib
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -121,13 +115,15 @@ def test_json_on_stdout_and_in_the_file_are_one_document(
 def test_confusion_matrices_are_printed_and_drawn_on_request(
     grasps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["--tables", "compositions", "--protocol", "nested", "--confusion", "--plot", str(tmp_path / "drawn")]
+    arguments = ["--tables", "compositions", "--confusion", "--plot", str(tmp_path / "drawn")]
     assert run(["evaluate", grasps, *QUICK, *arguments]) == 0
     printed = capsys.readouterr().out
     assert "VII NoSel-Co, subject [b]Bob, nested protocol" in printed
     assert "pinch [tip]" in printed
-    names = [f"confusion-nested-{name}.png" for name in ("I", "II", "III", "IV", "V", "VI", "VII")]
-    assert sorted(path.name for path in (tmp_path / "drawn").iterdir()) == sorted(names)
+    rows = [(protocol, name) for protocol in ("paper", "nested") for name in ("I", "II", "III", "IV", "V", "VI", "VII")]
+    drawn = {path.name: path.read_bytes() for path in (tmp_path / "drawn").iterdir()}
+    assert drawn.keys() == {f"confusion-{protocol}-{name}.png" for protocol, name in rows}
+    assert all(picture.startswith(b"\x89PNG") for picture in drawn.values())
 
 
 @pytest.mark.parametrize(("by", "said"), [("subject", "one subject left out"), ("block", "4 blocks of trials")])
@@ -201,85 +197,6 @@ def test_trainers_are_compared_in_a_table(grasps: str, capsys: pytest.CaptureFix
     printed = capsys.readouterr().out
     for text in ("against logitboost", "logistic-regression", "5-nearest-neighbours", "logit ", ", p "):
         assert text in printed
-
-
-def test_an_install_without_the_extra_says_what_is_missing(
-    grasps: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "joblib", None)
-    assert run(["evaluate", grasps, *QUICK, "--jobs", "2"]) == 2
-    assert capsys.readouterr().err == 'thenar: joblib is not installed: pip install "thenar[compiler]"\n'
-
-
-def descendants(pid: int) -> list[int]:
-    children: list[int] = []
-    for thread in Path(f"/proc/{pid}/task").glob("*"):
-        children += map(int, (thread / "children").read_text().split())
-    return children + [deeper for child in children for deeper in descendants(child)]
-
-
-def is_running(pid: int) -> bool:
-    status = Path(f"/proc/{pid}/status")
-    return status.exists() and "State:\tZ" not in status.read_text()
-
-
-def all_end(pids: list[int], within_s: float) -> bool:
-    deadline = time.monotonic() + within_s
-    while any(map(is_running, pids)) and time.monotonic() < deadline:
-        time.sleep(0.002)
-    return not any(map(is_running, pids))
-
-
-def processor_time_s(pid: int) -> float:
-    user, system = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
-    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
-
-
-def wait_until_two_workers_are_at_work(evaluation: subprocess.Popen[str]) -> list[int]:
-    """Starting a worker takes less than a second of processor time; more of it is work."""
-    found: list[int] = []
-    deadline = time.monotonic() + 120
-    while sum(processor_time_s(pid) > 1 for pid in found) < 2:
-        assert time.monotonic() < deadline, "two workers were asked for and never came to work"
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            evaluation.wait(0.05)
-            raise AssertionError(evaluation.communicate())
-        found = descendants(evaluation.pid)
-    return found
-
-
-def is_worker(pid: int) -> bool:
-    return is_running(pid) and b"popen_loky" in Path(f"/proc/{pid}/cmdline").read_bytes()
-
-
-def blocks_interrupts(pid: int) -> bool:
-    (line,) = (line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("SigBlk"))
-    return bool(int(line.split()[1], 16) >> (signal.SIGINT - 1) & 1)
-
-
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
-@pytest.mark.parametrize("whole_group", [True, False], ids=["as Ctrl-C in a terminal", "as kill -INT"])
-def test_an_interrupt_ends_the_workers_and_writes_nothing(grasps: str, tmp_path: Path, whole_group: bool) -> None:
-    output = tmp_path / "result.json"
-    program = [sys.executable, "-c", "from thenar.cli import main; main()", "evaluate", grasps]
-    endless = [*program, "--rounds", "1000000", "--jobs", "2", "-o", str(output)]
-    evaluation = subprocess.Popen(
-        endless, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    try:
-        workers = wait_until_two_workers_are_at_work(evaluation)
-        # From their first moment: an interrupt while Python starts would be a traceback of theirs.
-        assert sum(map(blocks_interrupts, filter(is_worker, workers))) >= 2
-        (os.killpg if whole_group else os.kill)(evaluation.pid, signal.SIGINT)
-        printed, complaints = evaluation.communicate(timeout=30)
-    finally:
-        if evaluation.poll() is None:
-            os.killpg(evaluation.pid, signal.SIGKILL)
-    assert evaluation.returncode == 130
-    assert complaints.strip() == "thenar: interrupted"
-    assert not printed
-    assert list(tmp_path.iterdir()) == []
-    assert all_end(workers, within_s=10)
 
 
 def test_the_recipe_of_the_tables_is_the_one_that_is_asked_for(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -72,13 +72,6 @@ def test_what_is_wrong_is_said_in_a_sentence(
     assert "Traceback" not in complaint
 
 
-def test_a_file_is_no_folder_and_is_left_alone(set_file: Path, tmp_path: Path, capsys: Captured) -> None:
-    (tmp_path / "notes.txt").write_text("mine")
-    assert run(["frontier", str(set_file), "-o", str(tmp_path / "notes.txt")]) == 2
-    assert "notes.txt' is a file." in " ".join(capsys.readouterr().err.split())
-    assert (tmp_path / "notes.txt").read_text() == "mine"
-
-
 def test_a_folder_that_holds_other_things_is_left_alone(set_file: Path, tmp_path: Path, capsys: Captured) -> None:
     (tmp_path / "found").mkdir()
     (tmp_path / "found" / "notes.txt").write_text("mine")

@@ -7,24 +7,6 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
-from thenar.compiler.recordings.graspset import Joint
-from thenar.compiler.recordings.taxonomy import own
-
-
-@pytest.fixture
-def grasps(tmp_path: Path) -> Path:
-    GraspSet(
-        switches=np.array([[0, 1], [1, 1], [0, 1], [1, 1]]),
-        switch_names=("thumb", "palm"),
-        codes=np.array([[3], [5], [3], [6]]),
-        joints=(Joint("index", "deg", 0, 10.0, 1, 10.5),),
-        grasps=np.array(["mug", "ball", "mug", "ball"]),
-        taxonomy=own(["mug", "ball"]),
-        subjects=np.array(["A", "B", "A", "A"]),
-        objects=np.array(["x", "x", "y", "x"]),
-        trials=np.arange(4),
-    ).save(tmp_path / "set.grasps")
-    return tmp_path / "set.grasps"
 
 
 def test_a_set_is_described_for_people(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -64,12 +46,6 @@ def test_a_picture_is_drawn_when_asked_for(grasps: Path, suffix: str, start: byt
     picture = grasps.with_name(f"set.{suffix}")
     assert run(["info", str(grasps), "--plot", str(picture)]) == 0
     assert picture.read_bytes().startswith(start)
-
-
-def test_another_file_is_refused_with_the_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "set.grasps").write_bytes(b"label,s1\n")
-    assert run(["info", str(tmp_path / "set.grasps")]) == 2
-    assert "set.grasps is not a thenar THNRGRSP file" in capsys.readouterr().err
 
 
 def test_a_picture_never_replaces_the_set(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:

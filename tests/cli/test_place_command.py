@@ -50,11 +50,7 @@ def test_nodes_at_which_nothing_gains_are_said(
     small_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bits = np.array([[0, 0], [0, 1], [1, 0], [1, 1]], bool)
-    rows = small_set.rows([0, 1, 4, 3])
-    exclusive_or = GraspSet(
-        bits, ("a", "b"), rows.codes, rows.joints, rows.grasps, rows.taxonomy, rows.subjects, rows.objects, rows.trials
-    )
-    exclusive_or.save(tmp_path / "xor.grasps")
+    replace(small_set.rows([0, 1, 4, 3]), switches=bits, switch_names=("a", "b")).save(tmp_path / "xor.grasps")
     assert run(["place", str(tmp_path / "xor.grasps")]) == 0
     assert "at 1 node no switch gains anything alone" in capsys.readouterr().out
 
@@ -62,11 +58,7 @@ def test_nodes_at_which_nothing_gains_are_said(
 def test_a_set_without_switches_is_refused(
     small_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    s = small_set
-    none = np.zeros((len(s), 0), bool)
-    GraspSet(none, (), s.codes, s.joints, s.grasps, s.taxonomy, s.subjects, s.objects, s.trials).save(
-        tmp_path / "joints.grasps"
-    )
+    replace(small_set, switches=small_set.switches[:, :0], switch_names=()).save(tmp_path / "joints.grasps")
     assert run(["place", str(tmp_path / "joints.grasps")]) == 2
     assert capsys.readouterr().err == "thenar: there are no switches to place: the set holds joints only\n"
 

@@ -159,6 +159,20 @@ def reviewed(terminal: Terminal, number: int) -> None:
         terminal.press(b"\r")
 
 
+def command_of(folder: Path, *more: object) -> list[str]:
+    """Return the command that records in a folder without a terminal."""
+    options = ["--glove", folder / "glove.toml", "--subject", "A", "-o", folder / "set.grasps", *more]
+    return [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
+
+
+def refused(command: list[str]) -> str:
+    """Return the sentence in which a command is refused that has written nothing."""
+    done = subprocess.run(command, stdin=subprocess.PIPE, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert not list(Path(command[command.index("-o") + 1]).parent.glob("set.*"))
+    return done.stderr
+
+
 def test_a_whole_collection_becomes_a_set(folder: Path, start: Start, board: BoardSender) -> None:
     terminal = start("--seed", "5", "--no-none")
     terminal.until(rb"Enter: start the countdown")
@@ -215,102 +229,28 @@ def test_after_a_kill_the_same_command_goes_on_where_it_was(folder: Path, start:
     assert "4 of 4 trials are done" in text
 
 
-def test_pads_are_recorded_beside_the_rest_and_survive_a_kill(
+def test_pads_are_recorded_with_the_rest(
     folder: Path, start: Start, board: BoardSender, glove: EmulatedCyberGlove
 ) -> None:
     taxels = 'taxels = { p0 = [0, 1023], p1 = [0, 1023] }\n[taxels]\ncalibration = "pads.toml"\n'
     (folder / "glove.toml").write_text(GLOVE.format(folder=folder) + taxels)
     (folder / "pads.toml").write_text(TaxelCalibration(unit="N", taxels=(TaxelLine("p0", 100, 900, 2.0),)).to_toml())
     board.show({"p0": 500, "p1": 40})
-    first = start("--seed", "5", "--no-none")
-    first.until(rb"Enter: start the countdown")
-    first.press(b"\r")
-    reviewed(first, 1)
-    first.press(b"\r")
-    reviewed(first, 2)
-    os.killpg(first.process.pid, signal.SIGKILL)
-    first.process.wait()
-    second = start()
-    second.until(rb"Enter: start the countdown")
-    second.press(b"\r")
-    reviewed(second, 2)
-    second.press(b"\r")
-    reviewed(second, 3)
-    second.press(b"q")
-    code, said = second.finish()
+    terminal = start("--seed", "5", "--no-none")
+    terminal.until(rb"Enter: start the countdown")
+    terminal.press(b"\r")
+    for number in (1, 2):
+        reviewed(terminal, number)
+        terminal.press(b"\r")
+    reviewed(terminal, 3)
+    terminal.press(b"q")
+    code, said = terminal.finish()
     assert code == 0, said
     grasp_set = GraspSet.load(folder / "set.grasps")
     assert grasp_set.taxels.tolist() == [[500, 40]] * 2
     assert grasp_set.taxel_columns == (Joint("p0", "N", 100, 0.0, 900, 2.0), Joint("p1", "counts", 0, 0.0, 1, 1.0))
     assert run(["import", str(folder / "set.mcap"), "-o", str(folder / "again.grasps")]) == 0
     assert (folder / "again.grasps").read_bytes() == (folder / "set.grasps").read_bytes()
-
-
-def test_redone_and_left_is_what_was_accepted(folder: Path, start: Start, board: BoardSender) -> None:
-    terminal = start()
-    terminal.until(rb"Enter: start the countdown")
-    terminal.press(b"\r")
-    reviewed(terminal, 1)
-    terminal.press(b"r")
-    terminal.until(rb"hold it in")
-    reviewed(terminal, 1)
-    terminal.press(b"a")
-    terminal.until(rb"2 of 4: ")
-    terminal.press(b"q")
-    code, said = terminal.finish()
-    assert code == 0, said
-    assert "1 of 4 trials are done; run the same command to continue" in said
-    assert len(GraspSet.load(folder / "set.grasps")) == 1
-
-
-def test_a_trial_is_undone_another_skipped_and_a_pause_is_one(folder: Path, start: Start, board: BoardSender) -> None:
-    terminal = start("--seed", "5", "--no-none")
-    terminal.until(rb"s: skip this one")
-    terminal.press(b"s")
-    terminal.until(rb"2 of 4: .*?u: undo the last")
-    terminal.press(b"\r")
-    reviewed(terminal, 2)
-    terminal.press(b"\r")
-    reviewed(terminal, 3)
-    board.show({"s2": 0})
-    # The second was a mistake, and so is the third.
-    terminal.press(b"u")
-    reviewed(terminal, 2)
-    terminal.press(b"\r")
-    reviewed(terminal, 3)
-    os.killpg(terminal.process.pid, signal.SIGKILL)
-    terminal.process.wait()
-    assert read_journal(folder / "set.mcap").accepted == (2,)
-
-    again = start()
-    again.until(rb"2 of 4: .*?Enter: start the countdown")
-    again.press(b"\r")
-    # The skipped one is asked for again.
-    reviewed(again, 2)
-    again.press(b"\r")
-    again.until(rb"p: pause")
-    again.press(b"p")
-    again.until(rb"paused; nothing is recorded meanwhile.*?Enter: continue")
-    again.press(b"q")
-    code, said = again.finish()
-    assert code == 0, said
-    grasp_set = GraspSet.load(folder / "set.grasps")
-    assert grasp_set.trials.tolist() == [2, 1]
-    assert grasp_set.switches.tolist() == [[True, False, False]] * 2
-
-
-def test_with_a_page_the_terminal_is_still_one(folder: Path, start: Start) -> None:
-    terminal = start("--no-none", "--web", "127.0.0.1:0")
-    terminal.until(rb"the page is at http://127.0.0.1:\d+/")
-    terminal.until(rb"Enter: start the countdown")
-    terminal.press(b"\r")
-    reviewed(terminal, 1)
-    terminal.press(b"\r")
-    terminal.until(rb"2 of 4: ")
-    terminal.press(b"q")
-    code, said = terminal.finish()
-    assert code == 0, said
-    assert "1 of 4 trials are done" in said
 
 
 def test_the_page_ends_with_the_warnings_of_the_set(folder: Path, start: Start) -> None:
@@ -340,17 +280,11 @@ def test_a_port_without_anybody_at_its_other_end_is_no_device(folder: Path) -> N
     (folder / "glove.toml").write_text(
         f'name = "bench"\n[[stream]]\nport = "unix:{folder}/rows"\nswitches = ["a", "b"]\n'
     )
-    options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
-    options += ["--subject", "A", "-o", folder / "set.grasps"]
-    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
     with socket.socket(socket.AF_UNIX) as silent:
         silent.bind(str(folder / "rows"))
         silent.listen()
-        done = subprocess.run(command, stdin=subprocess.PIPE, capture_output=True, text=True, check=False, timeout=60)
-    assert done.returncode == 2
-    assert "nothing came in 3 s; nothing is recorded" in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert not list(folder.glob("set.*"))
+        said = refused(command_of(folder, "--taxonomy", "own", "--objects", folder / "objects.toml"))
+    assert "nothing came in 3 s; nothing is recorded" in said
 
 
 def test_a_full_disk_ends_recording_and_room_lets_it_resume(folder: Path, start: Start) -> None:
@@ -374,22 +308,6 @@ def test_a_signal_ends_it_cleanly(folder: Path, start: Start, number: signal.Sig
     assert code == 0, said
     assert "no trial was accepted" in said
     assert not (folder / "set.grasps").exists()
-
-
-def test_a_device_that_is_gone_is_no_grasp(folder: Path, start: Start, glove: EmulatedCyberGlove) -> None:
-    terminal = start()
-    terminal.until(rb"Enter: start the countdown")
-    terminal.press(b"\r")
-    reviewed(terminal, 1)
-    glove.close()
-    terminal.press(b"r")
-    while b"not captured: the CyberGlove is silent" not in terminal.until(
-        rb"hold it in.*?(not captured: .{25}|: keep it)"
-    ):
-        terminal.press(b"r")
-    terminal.press(b"q")
-    code, said = terminal.finish()
-    assert code == 0, said
 
 
 @pytest.mark.parametrize(
@@ -425,34 +343,25 @@ def test_a_set_that_was_not_collected_here_is_not_replaced(folder: Path, start: 
 
 
 def test_ones_own_grasp_types_come_from_a_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--subject", "A", "-o", folder / "set.grasps"]
-    assert run(["record", *map(str, options)]) == 2
+    assert run(command_of(folder, "--taxonomy", "own")[3:]) == 2
     assert "name it with --objects" in capsys.readouterr().err
 
 
 def test_a_glove_without_devices_collects_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "glove.toml").write_text('name = "bare"\n')
-    options = ["--glove", folder / "glove.toml", "--subject", "A", "-o", folder / "set.grasps"]
-    assert run(["record", *map(str, options)]) == 2
+    assert run(command_of(folder)[3:]) == 2
     assert "glove.toml names no device" in capsys.readouterr().err
 
 
 def test_without_its_devices_nothing_is_recorded(folder: Path) -> None:
     (folder / "glove.toml").write_text(GLOVE.format(folder=folder / "none"))
-    options = ["--glove", folder / "glove.toml", "--subject", "A", "-o", folder / "set.grasps"]
-    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
-    done = subprocess.run(command, stdin=subprocess.PIPE, capture_output=True, text=True, check=False, timeout=60)
-    assert done.returncode == 2
-    assert "there is no such port" in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert not list(folder.glob("set.*"))
+    assert "there is no such port" in refused(command_of(folder))
 
 
 def test_without_a_terminal_lines_are_keys(folder: Path, board: BoardSender) -> None:
     board.show({"s1": 0, "s2": 0})
-    options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
-    options += ["--subject", "A", "--repetitions", "1", "--countdown", "0", "-o", folder / "set.grasps"]
-    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
+    taxonomy = ("--taxonomy", "own", "--objects", folder / "objects.toml")
+    command = command_of(folder, *taxonomy, "--repetitions", "1", "--countdown", "0")
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdin is not None
         assert process.stderr is not None
@@ -482,9 +391,9 @@ def test_without_a_terminal_lines_are_keys(folder: Path, board: BoardSender) -> 
 
 
 def test_without_stdin_it_says_where_keys_would_come_from(folder: Path) -> None:
-    options = ["--glove", folder / "glove.toml", "--subject", "A", "-o", folder / "set.grasps"]
-    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
-    done = subprocess.run(["sh", "-c", '"$@" <&-', "sh", *command], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        ["sh", "-c", '"$@" <&-', "sh", *command_of(folder)], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 2
     assert "stdin is closed" in done.stderr
     assert not (folder / "set.mcap").exists()

@@ -263,11 +263,3 @@ def test_a_sequential_test_takes_no_settings_of_the_hysteresis(build_folder: Pat
     done = thenar("run", build_folder, "--replay", tmp_path / "run.mcap", "--error-rate", 0.1, "--dwell-ms", 20)
     assert done.returncode == 2
     assert "--dwell-ms has no effect with --error-rate" in done.stderr
-
-
-def test_a_recording_has_the_ending_that_replay_knows_it_by(build_folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "glove.toml").write_text('[cyberglove]\nport = "none"\n')
-    done = thenar("run", build_folder, "--glove", tmp_path / "glove.toml", "--record", tmp_path / "run.dat")
-    assert done.returncode == 2
-    assert "run.dat: the name of the output file must end in .mcap" in done.stderr
-    assert not (tmp_path / "run.dat").exists()

@@ -315,15 +315,6 @@ def test_on_a_full_disk_files_go_on_once_there_is_room(start: Start, tmp_path: P
     assert f"jsonl:{lines}?every: {sent} frames sent, {lost} lost: File too large" in run.said
 
 
-def test_a_kill_leaves_all_that_was_in_the_file(start: Start, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    run = start("--sink", "jsonl:-?every", "--record", path)
-    run.until(lambda: path.exists() and len(grasps_of(path)) > 100)
-    before = grasps_of(path)
-    assert run.end(signal.SIGKILL) == -signal.SIGKILL
-    assert grasps_of(path)[: len(before)] == before
-
-
 def test_a_signal_ends_a_run_whose_device_is_slow_and_silent(start: Start) -> None:
     run = start("--sink", "jsonl:-?every", rate=0.1)
     run.line(lambda line: line["kind"] == "grasp" and line["health"] == "ok")

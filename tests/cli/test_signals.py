@@ -20,7 +20,7 @@ from contextlib import contextmanager
 ready = pathlib.Path("ready")
 @contextmanager
 def telling(what):
-    yield lambda done, total: ready.touch()
+    yield lambda done, total: done and ready.touch()
 printing.progress = telling
 import thenar.compiler.workers as workers
 held = workers._interrupts_held
@@ -35,12 +35,19 @@ main()
 # Linux, include/linux/sched.h: in the flags of /proc/*/stat.
 PF_EXITING = 4
 COMMANDS = {
-    "simulate": "simulate crowd -o new.grasps --jobs 2",
-    "evaluate": "evaluate set.grasps --repeats 50 -o new.json --jobs 2",
+    "simulate": "simulate crowd -o old.grasps --overwrite --jobs 2",
+    "evaluate": "evaluate set.grasps --repeats 50 --tables compositions --protocol paper -o new.json --jobs 2",
     "compile": "compile set.grasps -o new --rounds 100000 --folds 10",
     "verify": "verify build set.grasps --firmware host",
     "frontier": "frontier set.grasps -o new --jobs 2",
+    "stability": "stability --jobs 2",
 }
+CTRL_C = (signal.SIGINT, "thenar: interrupted", 130)
+SIGTERM = (signal.SIGTERM, "thenar: terminated", 143)
+SENT = {"ctrl-c": (*CTRL_C, True), "kill -INT": (*CTRL_C, False)}
+SENT |= {"sigterm": (*SIGTERM, False), "sigterm to all": (*SIGTERM, True)}
+# Of all commands with all signals, the quick half takes these.
+QUICK = {("simulate", "ctrl-c"), ("stability", "ctrl-c"), ("evaluate", "ctrl-c"), ("evaluate", "kill -INT")}
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +66,7 @@ def folder(tmp_path: Path, material: Path, monkeypatch: pytest.MonkeyPatch) -> P
     (tmp_path / "temporary").mkdir()
     for path in material.iterdir():
         (tmp_path / "work" / path.name).symlink_to(path)
+    (tmp_path / "work" / "old.grasps").write_text("old")
     monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
     monkeypatch.setenv("JOBLIB_TEMP_FOLDER", str(tmp_path / "temporary"))
     monkeypatch.chdir(tmp_path / "work")
@@ -78,23 +86,19 @@ def _of_group(group: int) -> Iterator[str]:
             yield process.name
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("line", COMMANDS.values(), ids=COMMANDS)
 @pytest.mark.parametrize(
-    ("number", "to_all", "said", "code"),
+    ("command", "sent"),
     [
-        (signal.SIGINT, True, "thenar: interrupted", 130),
-        (signal.SIGTERM, False, "thenar: terminated", 143),
-        (signal.SIGTERM, True, "thenar: terminated", 143),
+        pytest.param(command, sent, id=f"{sent}-{command}", marks=[pytest.mark.slow] * ((command, sent) not in QUICK))
+        for sent in SENT
+        for command in COMMANDS
     ],
-    ids=["ctrl-c", "sigterm", "sigterm to all"],
 )
-def test_a_signal_ends_all_of_it_and_leaves_nothing(
-    line: str, number: signal.Signals, to_all: bool, said: str, code: int, folder: Path
-) -> None:
+def test_a_signal_ends_all_of_it_and_leaves_nothing(command: str, sent: str, folder: Path) -> None:
+    number, said, code, to_all = SENT[sent]
     before = {path.name for path in Path().iterdir()}
     process = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, *line.split()],
+        [sys.executable, "-c", PROGRAM, *COMMANDS[command].split()],
         start_new_session=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -114,8 +118,9 @@ def test_a_signal_ends_all_of_it_and_leaves_nothing(
             os.kill(int(one), signal.SIGKILL)
     assert (process.returncode, printed, complaints.strip()) == (code, "", said)
     # Its store, from which the same command goes on, is all that a frontier leaves.
-    kept = {"ready", "new"} if line.startswith("frontier") else {"ready"}
+    kept = {"ready", "new"} if command == "frontier" else {"ready"}
     assert {path.name for path in Path().iterdir()} - before <= kept
+    assert Path("old.grasps").read_text() == "old"
     assert left == []
     assert list((folder / "temporary").iterdir()) == []
     marks = (f"-{process.pid}-", f"_{process.pid}_")

@@ -1,9 +1,6 @@
 import json
-import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import msgspec
@@ -181,16 +178,6 @@ def test_what_cannot_be_done_is_one_sentence(arguments: list[str], reason: str, 
     assert reason in complaint(capsys)
 
 
-def test_a_bad_scene_is_one_sentence_with_file_and_line(tmp_path: Path, capsys: Captured) -> None:
-    scene = tmp_path / "bad.toml"
-    scene.write_text(shipped()["quick"].read_text() + "\n[effects.joint.noize]\n")
-    assert run(["simulate", str(scene), "-o", str(tmp_path / "set.grasps")]) == 2
-    said = complaint(capsys)
-    assert "bad.toml, line" in said
-    assert "did you mean 'joint.noise'" in said
-    assert not (tmp_path / "set.grasps").exists()
-
-
 @pytest.mark.parametrize(
     ("added", "sentence"),
     [
@@ -206,37 +193,6 @@ def test_faults_of_combined_effects_name_file_and_line(
     scene.write_text(text + "\n" * (44 - text.count("\n")) + added)
     assert run(["simulate", str(scene), "--explain"]) == 2
     assert complaint(capsys).startswith(f"thenar: bad.toml, {sentence}")
-
-
-def test_an_interrupt_ends_with_130_and_leaves_the_old_set_alone(tmp_path: Path) -> None:
-    old, ready = tmp_path / "set.grasps", tmp_path / "ready"
-    old.write_bytes(b"old")
-    program = (
-        "import pathlib, sys\n"
-        "from contextlib import contextmanager\n"
-        "from thenar.cli import simulate_command as module\n"
-        "@contextmanager\n"
-        f"def telling(what): yield lambda done, total: pathlib.Path({str(ready)!r}).touch()\n"
-        "module.progress = telling\n"
-        "from thenar.cli import run\n"
-        "sys.exit(run(sys.argv[1:]))"
-    )
-    command = [sys.executable, "-c", program, "simulate", "crowd", "--jobs", "2", "-o", str(old), "--overwrite"]
-    process = subprocess.Popen(
-        command, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    try:
-        while not ready.exists():
-            assert process.poll() is None
-            time.sleep(0.002)
-        os.killpg(process.pid, signal.SIGINT)
-        printed, complaints = process.communicate(timeout=60)
-    finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-    assert (process.returncode, printed, complaints.strip()) == (130, "", "thenar: interrupted")
-    assert old.read_bytes() == b"old"
-    assert {path.name for path in tmp_path.iterdir()} == {"set.grasps", "ready"}
 
 
 WITH_THE_BASE_ALONE = """

@@ -1,9 +1,7 @@
 import json
 import re
-import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -127,32 +125,3 @@ def test_without_java_the_table_says_what_was_not_run(
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     assert "not run: java or Weka is not installed" in here().stdout
-
-
-def test_a_missing_package_is_one_sentence_with_what_to_install() -> None:
-    program = "import sys; sys.modules['mpmath'] = None; from thenar.cli import run; sys.exit(run(sys.argv[1:]))"
-    command = [sys.executable, "-c", program, "stability"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == 'thenar: mpmath is not installed: pip install "thenar[stability]"\n'
-
-
-def test_ctrl_c_exits_with_130_and_leaves_nothing(folder: Path, tmp_path: Path) -> None:
-    ready = tmp_path / "ready"
-    endless = CASE.format(name="endless", error=0.5) + f"    open({str(ready)!r}, 'w').close()\n    while True: pass\n"
-    (folder / "endless.py").write_text(endless)
-    program = (
-        "import sys; from thenar.stability import cases, report as catalogue; from thenar.cli import run; "
-        "from thenar.stability.finding import Case; "
-        f"cases.__path__ = [{str(folder)!r}]; catalogue.CASES = {{'endless': Case('', '')}}; "
-        "sys.exit(run(sys.argv[1:]))"
-    )
-    command = [sys.executable, "-c", program, "stability", "--jobs", "1"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        while not ready.exists():
-            assert process.poll() is None
-            time.sleep(0.002)
-        process.send_signal(signal.SIGINT)
-        stdout, stderr = process.communicate(timeout=60)
-    assert (process.returncode, stdout, stderr.strip()) == (130, "", "thenar: interrupted")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["cases", "ready"]

@@ -8,7 +8,7 @@ import pty
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
@@ -25,6 +25,7 @@ from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live import checkup
 from thenar.runtime.live.replay import replayed
 
+from ..sets import grasp_set_of
 from .conftest import thenar
 
 STREAM = """name = "maker"
@@ -46,25 +47,38 @@ PORTS = [
 ]
 
 
+@contextlib.contextmanager
+def sending(send: Callable[[int], object], every_s: float = 0.01) -> Iterator[None]:
+    """Call `send` with 1, 2 and so on in another thread, until the block ends."""
+    done = Event()
+
+    def go() -> None:
+        number = 0
+        while not done.wait(every_s):
+            send(number := number + 1)
+
+    thread = Thread(target=go)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
+
+
 @pytest.fixture
 def moving(tmp_path: Path) -> Iterator[LineServer]:
     """Yield a sender of a clock, a count, two switches, a pad and a flex sensor, which all move."""
-    done = Event()
+    began = monotonic()
     with LineServer(tmp_path / "line") as lines:
 
-        def move() -> None:
-            began, n = monotonic(), 0
-            while not done.wait(0.01):
-                n += 1
-                row = [1000 * (monotonic() - began), n, n // 10 % 2, n // 15 % 2]
-                row += [400 + 300 * math.sin(n / 5), 1500 + 18 * (n % 40)]
-                lines.send(",".join(str(round(number)) for number in row).encode() + b"\n")
+        def move(n: int) -> None:
+            row = [1000 * (monotonic() - began), n, n // 10 % 2, n // 15 % 2]
+            row += [400 + 300 * math.sin(n / 5), 1500 + 18 * (n % 40)]
+            lines.send(",".join(str(round(number)) for number in row).encode() + b"\n")
 
-        mover = Thread(target=move)
-        mover.start()
-        yield lines
-        done.set()
-        mover.join()
+        with sending(move):
+            yield lines
 
 
 @pytest.mark.slow
@@ -211,24 +225,19 @@ def test_words_are_shown_and_rows_ending_in_carriage_returns_read(cases: Path, w
 
 
 def test_doctor_reports_two_senders_and_late_rows(tmp_path: Path) -> None:
-    path, done = tmp_path / "glove.toml", Event()
+    path = tmp_path / "glove.toml"
     with DatagramLines() as first, DatagramLines() as second:
         second.to = first.to
 
-        def send() -> None:
-            n = 0
-            while not done.wait(0.01):
-                n += 1
-                first.send(b"%d,%d,%d" % (10 * n, n % 2, 40 * (n % 9)))
-                if n % 20 == 0:
-                    first.send(b"%d,0,0" % (10 * n - 15))
-                second.send(b"%d,1,7" % (10 * n))
+        def send(n: int) -> None:
+            first.send(b"%d,%d,%d" % (10 * n, n % 2, 40 * (n % 9)))
+            if n % 20 == 0:
+                first.send(b"%d,0,0" % (10 * n - 15))
+            second.send(b"%d,1,7" % (10 * n))
 
-        sender = Thread(target=send)
-        sender.start()
-        found = thenar("doctor", "--line", first.port, "--baud", "9600", "--seconds", "2", "--propose", path, "--json")
-        done.set()
-        sender.join()
+        asked = ("--baud", "9600", "--seconds", "2", "--propose", path, "--json")
+        with sending(send):
+            found = thenar("doctor", "--line", first.port, *asked)
     assert found.returncode == 0, found.stderr
     remarks = "\n".join(json.loads(found.stdout)["remarks"])
     for said in (
@@ -259,22 +268,17 @@ def test_doctor_says_what_is_wrong_with_rows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rate_hz: int, line: str, said: str
 ) -> None:
     monkeypatch.setattr(checkup, "_STARTS_S", 0.0)  # no board is reset here
-    path, done = tmp_path / "glove.toml", Event()
+    path, began = tmp_path / "glove.toml", monotonic()
     with LineServer(tmp_path / "line") as lines:
         text = STREAM.format(port=lines.port, joints="{ j0 = [0, 127.5], j1 = [0, 127.5] }")
         path.write_text(text.replace("rate_hz = 100", f"rate_hz = {rate_hz}"))
 
-        def send() -> None:
-            began = monotonic()
-            while not done.wait(0.01):
-                ms = round(1000 * (monotonic() - began))
-                lines.send(line.format(ms=ms, late=ms - 50, other=ms + 60_000).encode() + b"\n")
+        def send(_number: int) -> None:
+            ms = round(1000 * (monotonic() - began))
+            lines.send(line.format(ms=ms, late=ms - 50, other=ms + 60_000).encode() + b"\n")
 
-        sender = Thread(target=send)
-        sender.start()
-        found = thenar("doctor", path, "--json")
-        done.set()
-        sender.join()
+        with sending(send):
+            found = thenar("doctor", path, "--json")
     assert said in json.loads(found.stdout)[0]["remarks"][0]
 
 
@@ -371,6 +375,15 @@ def test_a_board_printing_kept_elements_only_is_recognised_and_recorded(
     assert [now for _, now in again] == [then for then, _ in again]
 
 
+def counted_of_one_answer(lines: Path) -> tuple[dict[str, int], str]:
+    """Hold that all is one answer where all is well; return what the only device has counted, and its error."""
+    found = [json.loads(line) for line in lines.read_text().splitlines()]
+    well = [one for one in found if one["kind"] == "grasp" and one["health"] == "ok"]
+    assert (len({one["grasp"] for one in well}), len({one["candidate"] for one in well})) == (1, 1)
+    (device,) = [one for one in found if one["kind"] == "health"][-1]["devices"]
+    return {count["name"]: count["value"] for count in device["counts"]}, device["error"]
+
+
 @pytest.mark.slow
 def test_a_broken_sender_spoils_no_answer_and_is_counted(build_folder: Path, tmp_path: Path) -> None:
     odd = [
@@ -382,30 +395,23 @@ def test_a_broken_sender_spoils_no_answer_and_is_counted(build_folder: Path, tmp
         b"ms,s0\n",
         b"nan\n" * 9,
     ]
-    out, done, said = tmp_path / "out.jsonl", Event(), '[[stream]]\nrate_hz = 50\nswitches = ["s0", "s1", "s2", "s3", '
-    said += '"s4", "s5"]\njoints = { j0 = [0, 127.5], j1 = [0, 127.5] }\ntime = "ms"\n'
+    out, began = tmp_path / "out.jsonl", monotonic()
+    said = '[[stream]]\nrate_hz = 50\nswitches = ["s0", "s1", "s2", "s3", "s4", "s5"]\n'
+    said += 'joints = { j0 = [0, 127.5], j1 = [0, 127.5] }\ntime = "ms"\n'
     with LineServer(tmp_path / "s") as lines:
         (tmp_path / "mine.toml").write_text(f'{said}port = "{lines.port}"\n')
         values = {f"s{number}": number % 2 for number in range(6)} | {"j0": 60.0, "j1": 35.0}
 
-        def send() -> None:
-            began = monotonic()
-            while not done.wait(0.015):
-                now = round(1000 * (monotonic() - began))
-                lines.send(json.dumps({"ms": now} | values).encode() + b"\n" + odd[now % len(odd)])
-                lines.send(json.dumps({"ms": now - 50} | values).encode() + b"\n")
+        def send(_number: int) -> None:
+            now = round(1000 * (monotonic() - began))
+            lines.send(json.dumps({"ms": now} | values).encode() + b"\n" + odd[now % len(odd)])
+            lines.send(json.dumps({"ms": now - 50} | values).encode() + b"\n")
 
-        sender = Thread(target=send)
-        sender.start()
         command = ["run", build_folder, "--glove", tmp_path / "mine.toml", "--frames", "150", "--status"]
-        finished = thenar(*command, "--sink", f"jsonl:{out}?every")
-        done.set()
-        sender.join()
+        with sending(send, 0.015):
+            finished = thenar(*command, "--sink", f"jsonl:{out}?every")
     assert finished.returncode == 0, finished.stderr
-    found = [json.loads(line) for line in out.read_text().splitlines()]
-    assert len({one["grasp"] for one in found if one["kind"] == "grasp" and one["health"] == "ok"}) == 1
-    (device,) = [one for one in found if one["kind"] == "health"][-1]["devices"]
-    counts = {count["name"]: count["value"] for count in device["counts"]}
+    counts, _ = counted_of_one_answer(out)
     assert min(counts[name] for name in ("rows", "late", "misfits", "overlong", "wrong columns")) > 0
     assert counts["program faults"] == counts["restarts"] == 0
 
@@ -415,7 +421,7 @@ def test_a_broken_sender_spoils_no_answer_and_is_counted(build_folder: Path, tmp
 def test_a_second_board_on_the_port_and_impossible_clocks_change_no_answer(
     build_folder: Path, tmp_path: Path, named: bool
 ) -> None:
-    out, done, path = tmp_path / "out.jsonl", Event(), tmp_path / "mine.toml"
+    out, began, path = tmp_path / "out.jsonl", monotonic(), tmp_path / "mine.toml"
     with DatagramLines() as first, DatagramLines() as second:
         second.to = first.to
         first._line.bind(("127.0.0.1", 0))
@@ -423,27 +429,18 @@ def test_a_second_board_on_the_port_and_impossible_clocks_change_no_answer(
         text = STREAM.format(port=first.port, joints="{ j0 = [0, 127.5], j1 = [0, 127.5] }")
         path.write_text(text.replace("rate_hz = 100\n", f"rate_hz = 50\n{sender}"))
 
-        def send() -> None:
-            began = monotonic()
-            while not done.wait(0.015):
-                now = round(1000 * (monotonic() - began))
-                first.send(b"%d,0,1,0,1,0,1,60,35\nA512B300C200\n1e305,0,0,0,0,0,0,0,0" % now)
-                if named or (out.exists() and '"health":"ok"' in out.read_text()):
-                    second.send(b"%d,1,0,1,0,1,0,35,60" % (now + 5))
+        def send(_number: int) -> None:
+            now = round(1000 * (monotonic() - began))
+            first.send(b"%d,0,1,0,1,0,1,60,35\nA512B300C200\n1e305,0,0,0,0,0,0,0,0" % now)
+            if named or (out.exists() and '"health":"ok"' in out.read_text()):
+                second.send(b"%d,1,0,1,0,1,0,35,60" % (now + 5))
 
-        thread = Thread(target=send)
-        thread.start()
-        finished = thenar(
-            "run", build_folder, "--glove", path, "--frames", "200", "--status", "--sink", f"jsonl:{out}?every"
-        )
-        done.set()
-        thread.join()
+        command = ["run", build_folder, "--glove", path, "--frames", "200", "--status"]
+        with sending(send, 0.015):
+            finished = thenar(*command, "--sink", f"jsonl:{out}?every")
     assert finished.returncode == 0, finished.stderr
-    found = [json.loads(line) for line in out.read_text().splitlines()]
-    assert len({one["candidate"] for one in found if one["kind"] == "grasp" and one["health"] == "ok"}) == 1
-    (device,) = [one for one in found if one["kind"] == "health"][-1]["devices"]
-    assert re.match(r"127.0.0.1:\d+ sends, too, and its lines are left out: those of 127.0.0.1", device["error"])
-    counts = {count["name"]: count["value"] for count in device["counts"]}
+    counts, error = counted_of_one_answer(out)
+    assert re.match(r"127.0.0.1:\d+ sends, too, and its lines are left out: those of 127.0.0.1", error)
     assert min(counts[name] for name in ("rows", "foreign", "untimed", "misfits")) > 0
     assert counts["program faults"] == counts["late"] == counts["restarts"] == 0
 
@@ -452,14 +449,8 @@ def test_a_second_board_on_the_port_and_impossible_clocks_change_no_answer(
 def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(tmp_path: Path) -> None:
     high = {"cup": (200, 30), "pen": (30, 200), "rod": (200, 200)}
     labels = np.arange(60) % 3
-    from thenar.compiler.recordings.taxonomy import own
-
-    recorded = GraspSet(
-        switches=np.zeros((60, 0), bool), switch_names=(), codes=np.array(list(high.values()), np.uint16)[labels],
-        joints=tuple(Joint(f"flex_{number}", "raw", 1, 1.0, 255, 255.0) for number in (1, 2)),
-        grasps=np.array(list(high))[labels], taxonomy=own(list(high)), subjects=np.full(60, "A"),
-        objects=np.full(60, "thing"), trials=np.arange(60),
-    )  # fmt: skip
+    joints = tuple(Joint(f"flex_{number}", "raw", 1, 1.0, 255, 255.0) for number in (1, 2))
+    recorded = grasp_set_of(list(high), labels, codes=np.array(list(high.values()))[labels], joints=joints)
     recorded.save(tmp_path / "set.grasps")
     build = compile_build(recorded, tmp_path / "build", rounds=10, folds=0, inputs="joints").folder
     (tmp_path / "mine.toml").write_text(

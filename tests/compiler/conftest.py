@@ -1,6 +1,7 @@
 """Small sets of grasps that can be learnt, with switches and joints."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,6 +39,16 @@ def make_set(
 @pytest.fixture(scope="session")
 def grasp_set() -> GraspSet:
     return make_set()
+
+
+def grasps(seed: int, n: int = 60, bits: int = 6, joints: int = 2, classes: int = 3) -> tuple[Any, Any]:
+    """Return rows of bits and of joints' codes, and their labels, which both tell with some noise."""
+    rng = np.random.default_rng(seed)
+    labels = rng.integers(0, classes, size=n)
+    prototypes = rng.random((classes, bits)) < 0.4
+    switches = prototypes[labels] ^ (rng.random((n, bits)) < 0.15)
+    codes = rng.integers(1, 256, size=(n, joints)) // 3 + labels[:, None] * 9
+    return np.column_stack([switches, codes]).astype(np.int64), labels.astype(np.intp)
 
 
 def with_none(grasp_set: GraspSet) -> GraspSet:

@@ -501,32 +501,3 @@ def test_a_closed_glove_says_so_and_streams_no_more(line: PtyLine) -> None:
             after.drain(0.1)
             assert after.read(0.05) == b""
         assert not emulated.box.streaming
-
-
-def test_a_glove_behind_tcp_is_read(line: PtyLine) -> None:
-    with EmulatedCyberGlove(line) as emulated, SerialLine(str(line.link), 115_200) as port:
-        emulated.set(VALUES[18])
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            server.settimeout(SOON_S)
-            bridge = threading.Thread(target=lambda: bridged(server, port))
-            bridge.start()
-            with CyberGlove(f"socket://127.0.0.1:{server.getsockname()[1]}") as glove:
-                assert read(glove) == Record(VALUES[18], status=0x81)
-            bridge.join(SOON_S)
-        assert not bridge.is_alive()
-
-
-def bridged(server: socket.socket, port: SerialLine) -> None:
-    """Carry bytes between the first client of `server` and `port` until the client goes."""
-    client, _ = server.accept()
-    with client:
-        client.settimeout(0.005)
-        while True:
-            try:
-                data = client.recv(100)
-            except TimeoutError:
-                client.sendall(port.read(0.0))
-                continue
-            if not data:
-                return
-            port.write(data)

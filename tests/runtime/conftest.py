@@ -5,6 +5,8 @@ from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Event
+from time import monotonic
 from types import ModuleType
 
 import numpy as np
@@ -52,6 +54,14 @@ def _slope(random: np.random.Generator, joint: int, classes: int) -> Slope:
     low, gain = int(random.integers(0, 200)), int(random.integers(-2, 3))
     high = low + int(random.integers(8, 254 / 2**gain))
     return Slope(joint, low, high, gain, random.integers(-9, 10, classes).astype(np.int8))
+
+
+def eventually(condition: Callable[[], bool]) -> None:
+    """Wait until a condition holds of which nobody is told."""
+    end, never = monotonic() + 60, Event()
+    while not condition():
+        assert monotonic() < end
+        never.wait(0.002)
 
 
 @pytest.fixture(scope="session")

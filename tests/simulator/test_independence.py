@@ -105,6 +105,11 @@ def test_adding_any_other_effect_leaves_its_draws_as_they_were(
             assert_undisturbed(effect, alone[effect], both)
 
 
+# What each repetition has for itself; some only where an effect makes it.
+FIELDS = (
+    *("posture_deg", "pose", "grip_n", "forces_n", "settled", "residual_n", "on_us", "off_us"),
+    *("frame_us", "bits", "sensors_deg", "raw", "taxels", "lost"),
+)
 SUBSETS = st.sets(st.sampled_from(OTHERS)).map(lambda others: {"contact.quasistatic", *others})
 
 
@@ -125,6 +130,6 @@ def test_a_repetition_made_alone_is_the_one_of_the_full_run(names: set[str], rep
     for row, number in enumerate(repetitions):
         _, few, single = record(names, [number])
         assert few.items() <= words.items()
-        for field in ("forces_n", "bits", "raw", "settled", "taxels"):
+        for field in FIELDS:
             if getattr(batch, field) is not None:
                 assert getattr(single, field)[0].tobytes() == getattr(batch, field)[row].tobytes(), field

@@ -18,19 +18,6 @@ from .small import make_batch, make_scene
 OWN = {f"glove.{step}" for step in ("recall", "threshold", "close", "frames", "sense", "encode", "sample")} | {
     "contact.quasistatic"
 }
-# Of a scene with bytes on a wire and with taxels.
-MORE = {"glove.send", "glove.receive", "glove.feel", "glove.count"}
-# These draw no random numbers: what they do follows from what there is.
-DRAWS_NOTHING = {
-    *("contact.quasistatic", "contact.ramp", "bus.latency", "hand.transition", "frame.at_force", "switch.ghosting"),
-    *("taxel.hysteresis", "taxel.creep", "taxel.crosstalk", "taxel.adc"),
-}
-# What these count beside; the others count nothing.
-COUNTS = {
-    "contact.quasistatic": {"solver steps"},
-    "contact.ramp": {"grips solved", "solver steps"},
-    "glove.send": {"bytes sent"},
-}
 NEEDED = {"thenar.simulator.pipeline.wire", "thenar.simulator.pipeline.parts", "thenar.drivers.lines"}
 
 # Runs in a fresh interpreter: simulates the effects that it is given on a batch, and prints what was imported.
@@ -56,15 +43,6 @@ def test_what_only_some_effects_need_is_imported_for_these_alone() -> None:
     assert bare & (effects | NEEDED) == {"thenar.simulator.effects.contact_quasistatic"}
     assert all_of_them >= effects | NEEDED
     assert not {"scipy", "sklearn", "matplotlib", "joblib"} & {name.split(".")[0] for name in bare | all_of_them}
-
-
-def test_only_some_effects_draw_and_count() -> None:
-    batch, ledger = make_batch(range(2)), Ledger()
-    compile_pipeline(make_scene(tuple(EFFECTS))).run([batch], ledger)
-    assert {name for name, entry in ledger.entries.items() if not entry.draws} == DRAWS_NOTHING | OWN | MORE
-    assert {name for name, entry in ledger.entries.items() if entry.own} == (OWN | MORE) - {"contact.quasistatic"}
-    assert {name: {*entry.counters} for name, entry in ledger.entries.items() if entry.counters} == COUNTS
-    assert all(number > 0 for entry in ledger.entries.values() for number in entry.counters.values())
 
 
 def test_a_bare_scene_has_no_arrays_for_what_it_does_not_simulate() -> None:

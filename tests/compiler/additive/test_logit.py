@@ -16,16 +16,9 @@ from thenar.compiler.samples import TrainingError
 from thenar.compiler.trainers.logit import PENALTY, SMOOTHNESS, ColumnTables, fit_logit
 from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE, MINIMA
 
+from ..conftest import grasps
+
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def grasps(seed: int, n: int = 60, bits: int = 6, joints: int = 2, classes: int = 3) -> tuple[Any, Any]:
-    rng = np.random.default_rng(seed)
-    labels = rng.integers(0, classes, size=n)
-    prototypes = rng.random((classes, bits)) < 0.4
-    switches = prototypes[labels] ^ (rng.random((n, bits)) < 0.15)
-    codes = rng.integers(1, 256, size=(n, joints)) // 3 + labels[:, None] * 9
-    return np.column_stack([switches, codes]).astype(np.int64), labels.astype(np.intp)
 
 
 def numbers(tables: ColumnTables) -> bytes:

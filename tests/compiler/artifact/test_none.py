@@ -23,6 +23,8 @@ from thenar.runtime.manifest import Rejection
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.scores import refused
 
+from ...sets import grasp_set_of
+
 TYPES, TRIALS, FRAMES = ("pinch", "hook", "disk"), 20, 4
 
 
@@ -31,22 +33,21 @@ def moving(subjects: int = 3) -> GraspSet:
     random, rows = np.random.default_rng(5), []
     for subject in range(subjects):
         for trial in range(TRIALS):
-            for label, grasp in enumerate(TYPES):
+            for label in range(len(TYPES)):
                 for frame in range(3 * FRAMES):
                     held = FRAMES <= frame < 2 * FRAMES
                     closed = random.random(9) < np.where(np.arange(9) // 3 == label, 0.9, 0.05) * (held or 0.1)
                     codes = np.asarray(random.normal(100 + 30 * (label == np.arange(3)) * held, 6)).astype(np.uint16)
-                    rows.append((closed, codes, grasp if held else "none", f"S{subject}", trial))
-    switches, codes, grasps, people, trials = (np.array(column) for column in zip(*rows, strict=True))
-    return GraspSet(
+                    rows.append((closed, codes, label if held else len(TYPES), f"S{subject}", trial))
+    switches, codes, labels, people, trials = (np.array(column) for column in zip(*rows, strict=True))
+    return grasp_set_of(
+        TYPES,
+        labels,
         switches=switches,
-        switch_names=tuple(f"s{number}" for number in range(9)),
         codes=codes,
         joints=tuple(Joint(f"j{number}", "raw", 0, 0.0, 255, 255.0) for number in range(3)),
-        grasps=grasps,
-        taxonomy=own(TYPES),
         subjects=people,
-        objects=np.repeat([f"of {grasp}" for grasp in grasps[FRAMES :: 3 * FRAMES]], 3 * FRAMES),
+        objects=np.repeat([f"of {TYPES[label]}" for label in labels[FRAMES :: 3 * FRAMES]], 3 * FRAMES),
         trials=trials,
     )
 

@@ -19,7 +19,6 @@ from thenar.compiler.model.collapse import collapse
 from thenar.compiler.trainers.base import Training
 from thenar.runtime import Build, BuildError
 from thenar.runtime.build import SCAN_NAME
-from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_from_bytes, tables_to_bytes
@@ -209,9 +208,3 @@ def test_the_build_holds_a_map_of_the_harness_and_says_its_checksum(
     build = Build.load(tmp_path / "build")
     assert build.scan == report.scan
     check_harness(report.scan, harness, [switch.name for switch in build.manifest.switches])
-
-
-def test_a_harness_that_lacks_a_kept_switch_makes_no_build(grasp_set: GraspSet, tmp_path: Path) -> None:
-    with pytest.raises(HarnessError, match="'bare' has no pin or column for s"):
-        compile_build(grasp_set, tmp_path / "build", rounds=2, folds=0, harness=Harness(name="bare"))
-    assert not (tmp_path / "build").exists()

@@ -12,18 +12,7 @@ from thenar.compiler.samples import TrainingError
 from thenar.compiler.trainers.logitboost import LARGEST_Z_MAX, SMALLEST_SHRINKAGE, boost
 from thenar.runtime.model.tables import winners
 
-
-def grasps(seed: int, n: int = 60, bits: int = 6, joints: int = 2, classes: int = 3) -> tuple[np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(seed)
-    labels = rng.integers(0, classes, size=n)
-    prototypes = rng.random((classes, bits)) < 0.4
-    X = np.column_stack(
-        [
-            prototypes[labels] ^ (rng.random((n, bits)) < 0.15),
-            rng.integers(1, 256, size=(n, joints)) // 3 + labels[:, None] * 9,
-        ]
-    )
-    return X.astype(np.int64), labels.astype(np.intp)
+from ..conftest import grasps
 
 
 @given(st.integers(0, 2**32))

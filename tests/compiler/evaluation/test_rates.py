@@ -34,15 +34,6 @@ def repeated(draw: st.DrawFn) -> tuple[tuple[int, ...], int]:
     return tuple(draw(st.lists(st.integers(0, total), min_size=1, max_size=6))), total
 
 
-@given(st.data())
-def test_one_repeat_has_wilsons_interval_as_scipy_computes_it(data: st.DataObject) -> None:
-    total = data.draw(totals)
-    correct = data.draw(st.integers(0, total))
-    rate = counted((correct,), total)
-    expected = binomtest(correct, total).proportion_ci(0.95, method="wilson")
-    assert (rate.low, rate.high) == pytest.approx((expected.low, expected.high), abs=1e-12)
-
-
 @given(repeated())
 @example(((0, 0, 0), 5))
 @example(((5, 5, 5), 5))

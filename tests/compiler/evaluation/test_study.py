@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -9,7 +8,7 @@ from matplotlib.figure import Figure
 from thenar.compiler.evaluation.folds import PROTOCOLS, EvaluationError, Fold, Population, Scheme
 from thenar.compiler.evaluation.plan import CLASSIFIERS, REFERENCE, CellPlan, FoldFit, RowPlan, TableName, learners
 from thenar.compiler.evaluation.rates import Rate, RecipeWords
-from thenar.compiler.evaluation.study import TABLES, Study, StudyDesign, draw, evaluate
+from thenar.compiler.evaluation.study import TABLES, Study, StudyDesign, evaluate
 from thenar.compiler.evaluation.tables import RateReader, RateRow, RateTable, draw_matrix
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.samples import Samples
@@ -221,23 +220,9 @@ def test_trainers_are_not_compared_where_test_rows_choose() -> None:
     assert [left.reason for left in study.left_out] == ["trainers are compared under the nested protocol only"]
 
 
-def test_an_unknown_subject_is_refused_with_those_there_are() -> None:
-    with pytest.raises(EvaluationError, match="no subject 'Z' in the set; its subjects are A, B"):
-        evaluate(make_grasps(), QUICK.changed(subjects=("A", "Z")))
-
-
 def test_a_set_without_rows_is_refused() -> None:
     with pytest.raises(EvaluationError, match="no rows"):
         evaluate(make_grasps().rows([]), QUICK)
-
-
-def test_every_composition_and_protocol_has_its_picture(tmp_path: Path) -> None:
-    options = QUICK.changed(rounds=2, repeats=1, tables=("compositions", "pruning"))
-    study = evaluate(make_grasps(n_joints=0), options, jobs=1)
-    drawn = draw(study, tmp_path / "new" / "folder")
-    names = [f"confusion-{protocol}-{name}.png" for protocol in ("paper", "nested") for name in ("V", "VI", "VII")]
-    assert [path.name for path in drawn] == names
-    assert all(path.read_bytes().startswith(b"\x89PNG") for path in drawn)
 
 
 def test_numbers_and_colours_are_shares_of_the_true_types_rows() -> None:

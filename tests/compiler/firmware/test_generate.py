@@ -143,17 +143,6 @@ def test_firmware_is_replaced_only_where_that_is_asked_for(folder: Path) -> None
     assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
 
 
-def test_what_the_user_put_there_stays(folder: Path) -> None:
-    mine = {"main.c": "int main(void)\n", "examples/one/notes": "mine", "build/thenar_glove.o": "object"}
-    (folder / "build").mkdir()
-    for path, text in mine.items():
-        (folder / path).write_text(text)
-    (folder / "link").symlink_to("main.c")
-    write_folder(NEW, folder, overwrite=True)
-    assert content(folder) == {**NEW, **mine, "link": "int main(void)\n", SUMS: sums(NEW)}
-    assert (folder / "link").is_symlink()
-
-
 def test_what_was_changed_since_is_not_replaced(folder: Path) -> None:
     (folder / "thenar_glove.c").write_text("better\n")
     with pytest.raises(FirmwareError, match=r"thenar_glove\.c was changed since thenar wrote it"):
@@ -175,11 +164,3 @@ def test_a_folder_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(FirmwareError, match="is not empty and was not written by thenar"):
         write_folder(NEW, tmp_path / "firmware", overwrite=True)
     assert content(tmp_path / "firmware") == {"main.c": "mine"}
-
-
-def test_a_place_that_cannot_be_is_named(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(FirmwareError, match="file is a file: name a folder"):
-        write_folder(NEW, tmp_path / "file")
-    with pytest.raises(FirmwareError, match="nowhere is no folder: make it first"):
-        write_folder(NEW, tmp_path / "nowhere" / "firmware")

@@ -30,8 +30,6 @@ Named = Callable[[Sequence[str], Sequence[str], Sequence[str]], Manifest]
 SHIM = Path(__file__).with_name("arduino")
 STRICT = ("-std=gnu++11", "-Wall", "-Wextra", "-Werror")
 SANITIZED = ("-O1", "-shared", "-fPIC", "-fsanitize=undefined", "-fno-sanitize-recover=all")
-ARDUINO = Path("/usr/share/arduino/hardware")
-BUILDER = Path("/usr/share/arduino-builder")
 LOW, HIGH, OUTPUT, PULLED_UP = 0, 1, 1, 2
 A0 = 100
 WRAP = 1 << 32
@@ -450,35 +448,16 @@ pins = { a = "2", b = "3", c = "8", d = "12", e = "A3", i = "A0", k = "A1" }
 AVR_PINS = {"a": "D2", "b": "D3", "c": "B0", "d": "B4", "e": "C3"}
 
 
-@pytest.fixture(scope="session")
-def cores_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("cores")
-
-
 @pytest.fixture
-def built(tmp_path: Path, cores_folder: Path) -> Callable[..., Path]:
+def built(tmp_path: Path, arduino: Callable[..., Path]) -> Callable[..., Path]:
     """Return what has Arduino's builder compile a sketch for an Uno, without a warning."""
-    if not ARDUINO.is_dir():
-        tool("arduino-core-avr")
 
     def built(files: dict[str, str]) -> Path:
         for name, text in files.items():
             (tmp_path / name).parent.mkdir(exist_ok=True)
             (tmp_path / name).write_text(text)
-        out = tmp_path / "out"
-        out.mkdir()
-        hardware = [f"-hardware={folder}" for folder in (BUILDER, ARDUINO)]
-        # <float.h> of avr-g++ 5.4 lacks what the core asks for.
-        options = ["-tools=/usr/bin", "-prefs=compiler.cpp.extra_flags=-DDECIMAL_DIG=__DECIMAL_DIG__", "-warnings=all"]
-        where = [f"-built-in-libraries={ARDUINO}/arduino/avr/libraries", f"-build-path={out}"]
-        command = [tool("arduino-builder"), *hardware, *options, *where, f"-build-cache={cores_folder}"]
         (sketch,) = tmp_path.glob("*/*.ino")
-        done = subprocess.run(
-            [*command, "-fqbn=arduino:avr:uno", str(sketch)], capture_output=True, text=True, check=False, timeout=120
-        )
-        assert done.returncode == 0, done.stderr
-        assert sketch.name not in done.stderr, done.stderr
-        return out / f"{sketch.name}.elf"
+        return arduino(sketch, sketch.name)
 
     return built
 

@@ -21,7 +21,8 @@ from thenar.compiler.frontier.replay import (
     replay_of,
 )
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import own
+
+from ...sets import grasp_set_of
 
 TYPES = ("cup", "pen", "rod", "ball")
 FRAMES = 40
@@ -36,10 +37,11 @@ def whole_movements(labels: list[int], codes_too: bool = True) -> GraspSet:
     way = np.clip(np.arange(FRAMES) / 10, 0, 1)
     codes = 300 - 100 * way[np.newaxis, :, np.newaxis] + 9 * np.array(labels)[:, np.newaxis, np.newaxis]
     return grasp_set_of(
-        switches.reshape(-1, 6),
-        codes.reshape(-1, 1)[:, : int(codes_too)],
+        TYPES,
         np.repeat(labels, FRAMES),
-        np.repeat(np.arange(len(labels)), FRAMES),
+        switches=switches.reshape(-1, 6),
+        codes=codes.reshape(-1, 1)[:, : int(codes_too)],
+        trials=np.repeat(np.arange(len(labels)), FRAMES),
     )
 
 
@@ -47,21 +49,7 @@ def single_trials(seed: int, rows: int = 60, joints: int = 3, types: int = 4) ->
     random = np.random.default_rng(seed)
     labels = random.permutation(np.arange(rows) % types)
     codes = random.integers(200, 400, (rows, joints))
-    return grasp_set_of(random.random((rows, 6)) < 0.4, codes, labels, np.arange(rows))
-
-
-def grasp_set_of(switches: np.ndarray, codes: np.ndarray, labels: np.ndarray, trials: np.ndarray) -> GraspSet:
-    return GraspSet(
-        switches=switches,
-        switch_names=tuple(f"s{number}" for number in range(6)),
-        codes=codes.astype(np.uint16),
-        joints=tuple(Joint(f"j{number}", "deg", 0, -250.0, 1000, 250.0) for number in range(codes.shape[1])),
-        grasps=np.array(TYPES)[labels],
-        taxonomy=own(TYPES),
-        subjects=np.full(len(labels), "A"),
-        objects=np.full(len(labels), "thing"),
-        trials=trials,
-    )
+    return grasp_set_of(TYPES, labels, switches=random.random((rows, 6)) < 0.4, codes=codes)
 
 
 def flat(replay: Replay) -> SimpleNamespace:

@@ -19,6 +19,8 @@ from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Line
 from thenar.runtime.scores import LANE_OFFSET, LiveScores, Scorer
 
+from .conftest import UNIT, exact_scores, lost_in_parts
+
 Drawn = tuple[ScoreTables, np.ndarray, np.ndarray]
 Make = Callable[[int], Drawn]
 
@@ -66,21 +68,6 @@ def with_pairs(seed: int, joints: int = 5, switches: int = 3) -> Drawn:
     return ScoreTables.of(bias, rows, thresholds, own, pairs), random.random((40, switches)) < 0.5, codes
 
 
-def exact_scores(tables: ScoreTables, bits: np.ndarray, codes: np.ndarray) -> list[Fraction]:
-    """Return the scores of a frame, by definition."""
-    added = [tables.bias, *(row for row, closed in zip(tables.switch_rows, bits, strict=True) if closed)]
-    for steps, rows, code in zip(tables.thresholds, tables.joint_rows, codes.tolist(), strict=True):
-        added.append(rows[int((steps < code).sum())])
-    for pair in tables.grids:
-        a, b = (int((steps < codes[joint]).sum()) for joint, steps in zip(pair.joints, pair.thresholds, strict=True))
-        added.append(pair.rows[a, b])
-    sums = [sum(map(Fraction, column), Fraction(0)) for column in zip(*(row.tolist() for row in added), strict=True)]
-    for line in tables.lines:
-        above = min(max(int(codes[line.joint]), line.low), line.high) - line.low
-        sums = [total + above * Fraction(each) for total, each in zip(sums, line.row.tolist(), strict=True)]
-    return sums
-
-
 EACH = pytest.mark.parametrize("make", [with_lines, with_pairs])
 seeds = st.integers(0, 10_000)
 entries = st.sampled_from([8, 16])
@@ -95,11 +82,10 @@ def test_integers_keep_their_bounds_on_every_row_and_are_read_again(make: Make, 
     assert comparison.holds
     assert integers.bound <= LIMIT
     scores = integers.scores(bits, codes)
-    for row in range(5):
-        exact = exact_scores(tables, bits[row], codes[row])
-        exact = [x - exact[-1] for x in exact] if integers.grid > 1 else exact
-        most = max(abs(x * Fraction(integers.scale) - n) for x, n in zip(exact, scores[row].tolist(), strict=True))
-        assert most <= comparison.integer_bound + comparison.slack
+    exact = exact_scores(tables, bits[:5], codes[:5])
+    exact = exact - exact[:, -1:] if integers.grid > 1 else exact
+    for wanted, found in zip(exact.ravel().tolist(), scores[:5].ravel().tolist(), strict=True):
+        assert abs(wanted * UNIT * Fraction(integers.scale) - found) <= comparison.integer_bound + comparison.slack
     worst = worst_case(tables, integers, comparison, [*"abcd"], [*"stuv"[: bits.shape[1]]])
     assert worst.holds
     assert abs(worst.reach) == integers.bound
@@ -124,23 +110,17 @@ SMALL = {
 def test_of_all_codes_none_loses_more_and_the_witness_as_much(kind: str, seed: int, entry_bits: int) -> None:
     tables, bits, codes = SMALL[kind](seed)
     integers = quantise(tables, bits, codes, entry_bits=entry_bits)
-    rounding, scale = Rounding(tables, integers), Fraction(integers.scale)
-
-    def errors(frame: np.ndarray, at: np.ndarray) -> list[Fraction]:
-        steps = integers.scores(frame[np.newaxis], at[np.newaxis])[0].tolist()
-        return [scale * x - n for x, n in zip(exact_scores(tables, frame, at), steps, strict=True)]
-
+    rounding = Rounding(tables, integers)
     of_a_joint = range(43) if tables.grids else range(1100)
-    every = [
-        errors(np.array(frame, bool), np.array(at, np.uint16))
-        for frame in product((False, True), repeat=bits.shape[1])
-        for at in product(of_a_joint, repeat=codes.shape[1])
-    ]
+    frames = list(product((False, True), repeat=bits.shape[1]))
+    at = np.array(list(product(of_a_joint, repeat=codes.shape[1])), np.uint16)
+    whole = np.repeat(np.array(frames, bool).reshape(len(frames), -1), len(at), axis=0)
+    every, parts = lost_in_parts(tables, integers, whole, np.tile(at, (len(frames), 1)))
     for leader, competitor in permutations(range(integers.n_classes), 2):
         worst = rounding.worst(leader, competitor)
-        assert worst.loss == max(each[leader] - each[competitor] for each in every)
-        own = errors(worst.bits, worst.codes)
-        assert worst.loss == own[leader] - own[competitor]
+        assert worst.loss == Fraction(max(every[:, leader] - every[:, competitor]), parts)
+        own, _ = lost_in_parts(tables, integers, worst.bits[np.newaxis], worst.codes[np.newaxis])
+        assert worst.loss == Fraction(own[0, leader] - own[0, competitor], parts)
 
 
 @given(seed=seeds)

@@ -87,12 +87,14 @@ def test_coarse_steps_are_those_that_change_the_fewest_rows(seed: int, shape: tu
     tables = balance(unbalanced)
     finest = finest_scale(tables, 32767, 31)
 
+    bins = [np.searchsorted(*pair) for pair in zip(tables.thresholds, rows[1].T, strict=True)]
+    right = winners(stumps.scores(np.hstack(rows)))
+
     def changed(scale: float) -> int:
         steps = [np.rint(tables.switch_rows * scale), *(np.rint(joint * scale) for joint in tables.joint_rows)]
-        bins = [np.searchsorted(*pair) for pair in zip(tables.thresholds, rows[1].T, strict=True)]
         scores = np.rint(tables.bias * scale) + rows[0].astype(float) @ steps[0]
         scores += sum((joint[bin_] for joint, bin_ in zip(steps[1:], bins, strict=True)), np.zeros_like(scores))
-        return int(np.count_nonzero(scores.argmax(axis=1) != winners(stumps.scores(np.hstack(rows)))))
+        return int(np.count_nonzero(scores.argmax(axis=1) != right))
 
     counts = [changed(finest * (1 - i / 160)) for i in range(TRIED)]
     assert least_disruptive_scale(tables, finest, *rows) == finest * (1 - counts.index(min(counts)) / 160)

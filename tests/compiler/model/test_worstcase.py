@@ -1,5 +1,4 @@
 import tracemalloc
-from collections.abc import Iterator
 from fractions import Fraction
 from itertools import permutations, product
 
@@ -15,36 +14,16 @@ from thenar.runtime.model.proof import Rounding, _Pairs
 from thenar.runtime.model.quantise import quantise, rounding_error
 from thenar.runtime.model.tables import ScoreTables
 
-from .conftest import make_rows, make_stumps
-
-Ran = tuple[list[Fraction], list[int]]
+from .conftest import UNIT, exact_scores, lost_in_parts, make_rows, make_stumps
 
 widths = st.sampled_from([4, 5, 6, 8, 16])
 
 
-def _score(of: ScoreTables | IntegerTables, bits: tuple[bool, ...], codes: tuple[int, ...]) -> list[Fraction]:
-    rows = [of.bias, *of.switch_rows[np.array(bits, bool)]]
-    for steps, bins, code in zip(of.thresholds, list(of.joint_rows), codes, strict=True):
-        rows.append(np.asarray(bins)[int((steps < code).sum())])
-    return [sum(map(Fraction, column), Fraction(0)) for column in np.stack(rows).T.tolist()]
-
-
-def _run(tables: ScoreTables, integers: IntegerTables, bits: tuple[bool, ...], codes: tuple[int, ...]) -> Ran:
-    """Return the scores of a frame in steps: exact ones and integers."""
-    exact, deployed = _score(tables, bits, codes), _score(integers, bits, codes)
-    return [score * Fraction(integers.scale) for score in exact], [int(score) for score in deployed]
-
-
-def _every_run(tables: ScoreTables, integers: IntegerTables) -> Iterator[Ran]:
+def _every_frame(tables: ScoreTables) -> tuple[np.ndarray, np.ndarray]:
+    """Return frames of all bits, and of codes on both sides of all thresholds."""
     codes = [sorted({0, 65535, *(int(t) for t in steps), *(int(t) + 1 for t in steps)}) for steps in tables.thresholds]
-    for bits in product((False, True), repeat=len(tables.switch_rows)):
-        for frame in product(*codes):
-            yield _run(tables, integers, bits, frame)
-
-
-def _lost(run: Ran, leader: int, competitor: int) -> Fraction:
-    exact, deployed = run
-    return (exact[leader] - exact[competitor]) - (deployed[leader] - deployed[competitor])
+    frames = [*product(product((False, True), repeat=len(tables.switch_rows)), product(*codes))]
+    return np.array([bits for bits, _ in frames]), np.array([at for _, at in frames], np.uint16)
 
 
 def _small(seed: int, width: int) -> tuple[ScoreTables, IntegerTables]:
@@ -56,12 +35,14 @@ def _small(seed: int, width: int) -> tuple[ScoreTables, IntegerTables]:
 @given(seed=st.integers(0, 10_000), width=widths)
 def test_of_all_frames_none_loses_more_and_the_witness_as_much(seed: int, width: int) -> None:
     tables, integers = _small(seed, width)
-    rounding, runs = Rounding(tables, integers), list(_every_run(tables, integers))
-    for pair in permutations(range(3), 2):
-        frame = rounding.worst(*pair)
-        assert (frame.leader, frame.competitor) == pair
-        assert frame.loss == max(_lost(run, *pair) for run in runs)
-        assert frame.loss == _lost(_run(tables, integers, tuple(frame.bits), tuple(frame.codes.tolist())), *pair)
+    rounding = Rounding(tables, integers)
+    lost, parts = lost_in_parts(tables, integers, *_every_frame(tables))
+    for leader, competitor in permutations(range(3), 2):
+        frame = rounding.worst(leader, competitor)
+        assert (frame.leader, frame.competitor) == (leader, competitor)
+        assert frame.loss == Fraction(max(lost[:, leader] - lost[:, competitor]), parts)
+        own, _ = lost_in_parts(tables, integers, frame.bits[np.newaxis], frame.codes[np.newaxis])
+        assert frame.loss == Fraction(own[0, leader] - own[0, competitor], parts)
     assert rounding.worst_of_all().loss == max(rounding.worst(*pair).loss for pair in permutations(range(3), 2))
 
 
@@ -70,9 +51,11 @@ def test_of_all_frames_none_loses_more_and_the_witness_as_much(seed: int, width:
 def test_no_frame_with_more_than_the_safe_margin_changes_class(seed: int, width: int) -> None:
     tables, integers = _small(seed, width)
     safe = Rounding(tables, integers).safe_margin()
-    for exact, deployed in _every_run(tables, integers):
-        if exact.index(max(exact)) != deployed.index(max(deployed)):
-            assert max(exact) - sorted(exact)[-2] <= safe
+    frames = _every_frame(tables)
+    scores = exact_scores(tables, *frames)
+    changed = scores.argmax(axis=1) != integers.scores(*frames).argmax(axis=1)
+    for second, best in np.sort(scores[changed], axis=1)[:, -2:].tolist():
+        assert (best - second) * UNIT * Fraction(integers.scale) <= safe
 
 
 @given(seed=st.integers(0, 10_000), width=widths)

@@ -10,9 +10,9 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.recordings.summary import check_trials, looks_like_frames
-from thenar.compiler.recordings.taxonomy import own
 
 from ...conftest import calls, peak_bytes
+from ...sets import grasp_set_of
 
 COLUMNS = Path(__file__).resolve().parents[3] / "examples" / "columns"
 
@@ -37,16 +37,13 @@ def make(
     likely = random.uniform(0.1, 0.9, (subjects, types, 1, n_switches))
     closed = random.random((subjects, types, trials, n_switches)) < likely
     rows = subjects * types * trials * frames
-    names = tuple(f"type {number}" for number in range(types))
-    return GraspSet(
+    return grasp_set_of(
+        [f"type {number}" for number in range(types)],
+        np.tile(np.repeat(np.arange(types), trials * frames), subjects),
         switches=np.repeat(closed.reshape(rows // frames, n_switches), frames, axis=0),
-        switch_names=tuple(f"s{number}" for number in range(n_switches)),
-        codes=np.clip(joints, 0, 1023).astype(np.uint16).reshape(rows, n_joints),
+        codes=np.clip(joints, 0, 1023).reshape(rows, n_joints),
         joints=tuple(Joint(f"j{number}", "deg", 0, 0.0, 200, 100.0) for number in range(n_joints)),
-        grasps=np.tile(np.repeat(names, trials * frames), subjects),
-        taxonomy=own(names),
         subjects=np.repeat([f"p{number}" for number in range(subjects)], rows // subjects),
-        objects=np.full(rows, "cup"),
         trials=np.tile(np.repeat(np.arange(trials), frames), subjects * types),
     )
 

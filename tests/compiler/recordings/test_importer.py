@@ -185,11 +185,6 @@ def test_a_coarse_grid_of_radians_warns_with_a_better_one() -> None:
     assert import_table(Table("t.csv", rows, np.arange(60)), columns)[1].warnings == ()
 
 
-def test_an_unknown_taxonomy_is_refused() -> None:
-    with pytest.raises(TableError, match="taxonomy: no taxonomy is called 'feix'"):
-        import_table(table("a", "b"), ColumnRoles("g", joints=JOINTS, taxonomy="feix"))
-
-
 def test_oddities_are_warnings_with_the_users_rows() -> None:
     columns = ColumnRoles("g", subject="who", switches=("s",))
     rows = {"g": ["a", "b", "a", "b"], "who": ["x", "x", "y", "y"], "s": ["0", "1", "0", "1"]}

@@ -1,10 +1,8 @@
 """The report as a reader has it: opened from a file in a real browser, clicked, typed at, printed."""
 
 import base64
-import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from selenium import webdriver
@@ -12,38 +10,18 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.remote.webelement import WebElement
-from selenium.webdriver.support.wait import WebDriverWait
 
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.report.content import ReportContent
 from thenar.compiler.report.page import report_html
 
-PATIENCE_S = 30
+from ...browser import Browser
 
 pytestmark = pytest.mark.slow
 
 
-class Reader:
-    """A browser with one page open."""
-
-    def __init__(self, driver: webdriver.Chrome) -> None:
-        self.driver = driver
-
-    def open(self, path: Path) -> None:
-        self._log("performance")
-        self.scheme("light")
-        self.driver.get(path.as_uri())
-
-    def scheme(self, name: str) -> None:
-        """Let the reader's system be "light" or "dark"."""
-        features = [{"name": "prefers-color-scheme", "value": name}]
-        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-
-    def script(self, text: str, *arguments: object) -> object:
-        return self.driver.execute_script(text, *arguments)
-
-    def wait(self, until: Callable[[], object]) -> None:
-        WebDriverWait(self.driver, PATIENCE_S, poll_frequency=0.05).until(lambda _: until())
+class Reader(Browser):
+    """A browser with one report open."""
 
     def kept_on_hand(self) -> list[str]:
         """Return the names of the switches marked on the frontier's hand, in their order."""
@@ -53,10 +31,6 @@ class Reader:
         )
         assert isinstance(dots, list)
         return [name for _, name in sorted(dots)]
-
-    def _log(self, kind: str) -> list[dict[str, Any]]:
-        entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
-        return entries
 
     def said(self) -> str:
         return self.driver.find_element(By.ID, "picked-said").text
@@ -72,15 +46,6 @@ class Reader:
         numbers = self.script("return [...document.querySelectorAll('.picked')].map((one) => one.dataset.point)")
         assert isinstance(numbers, list)
         return set(numbers)
-
-    def complaints(self) -> list[dict[str, Any]]:
-        return self._log("browser")
-
-    def requests(self) -> list[str]:
-        """Return the addresses that were asked for since the page was opened."""
-        messages = [json.loads(entry["message"])["message"] for entry in self._log("performance")]
-        sent = [message for message in messages if message["method"] == "Network.requestWillBeSent"]
-        return [message["params"]["request"]["url"] for message in sent]
 
 
 @pytest.fixture(scope="module")
@@ -98,9 +63,9 @@ def path(whole: ReportContent, write: Callable[[bytes], Path]) -> Path:
 @pytest.fixture
 def opened(reader: Reader, path: Path) -> Iterator[Reader]:
     """Return the reader with the report open; nothing may have been complained of or asked for when the test ends."""
-    reader.open(path)
+    reader.open_file(path)
     yield reader
-    assert reader.complaints() == []
+    assert reader.log() == []
     assert reader.requests() == [path.as_uri()]
 
 
@@ -132,7 +97,7 @@ def test_a_click_on_a_point_shows_its_switches_on_the_hand(opened: Reader, front
 
 def test_hovering_over_a_point_describes_it_and_marks_its_row(opened: Reader) -> None:
     marker = opened.marker("by-frontier", 2)
-    assert opened.script("return arguments[0].querySelector('title').textContent", marker).startswith("Point 2: 10 of ")  # type: ignore[attr-defined]
+    assert opened.script("return arguments[0].querySelector('title').textContent", marker).startswith("Point 2: 10 of ")
     ActionChains(opened.driver).move_to_element(marker.find_element(By.CSS_SELECTOR, ".target")).perform()
     opened.wait(lambda: opened.driver.find_elements(By.CSS_SELECTOR, "#points tr.near[data-point='2']"))
     ActionChains(opened.driver).move_to_element(opened.driver.find_element(By.ID, "picked-heading")).perform()
@@ -171,7 +136,7 @@ def test_colours_follow_the_readers_system_in_page_hand_and_charts(opened: Reade
     light = opened.script(look)
     assert isinstance(light, list)
     opened.scheme("dark")
-    opened.wait(lambda: all(one != other for one, other in zip(light, opened.script(look), strict=True)))  # type: ignore[call-overload]
+    opened.wait(lambda: all(one != other for one, other in zip(light, opened.script(look), strict=True)))
     opened.scheme("light")
     opened.wait(lambda: opened.script(look) == light)
 
@@ -237,7 +202,7 @@ def test_names_that_hold_scripts_run_nothing(
     reader: Reader, nasty: ReportContent, write: Callable[[bytes], Path]
 ) -> None:
     path = write(report_html(nasty))
-    reader.open(path)
+    reader.open_file(path)
     reader.driver.find_element(By.CSS_SELECTOR, "#points input[value='1']").click()
     reader.wait(lambda: reader.said().startswith("Point 1:"))
     assert reader.driver.title == "thenar: report of a build"
@@ -249,5 +214,5 @@ def test_names_that_hold_scripts_run_nothing(
     ]
     charted = reader.driver.find_element(By.ID, "by-frontier").text
     assert "<img src=x onerror=" in charted
-    assert reader.complaints() == []
+    assert reader.log() == []
     assert reader.requests() == [path.as_uri()]

@@ -2,12 +2,10 @@
 
 import csv
 import io
-import json
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +16,6 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.remote.webelement import WebElement
-from selenium.webdriver.support.wait import WebDriverWait
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.export import to_csv
@@ -30,60 +27,20 @@ from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import PAIRED, PLAIN, SLOPED
 from thenar.simulator.handmaps.handmap import hand_map
 
+from ...browser import Browser
 from ..conftest import make_set, with_none
 
 pytestmark = pytest.mark.slow
 
-PATIENCE_S = 30
 
-
-class Trier:
-    """A browser with one page open."""
-
-    def __init__(self, driver: webdriver.Chrome) -> None:
-        self.driver = driver
-
-    def open(self, path: Path) -> None:
-        self.log("performance")
-        self.log("browser")
-        self.scheme("light")
-        self.driver.get(path.as_uri())
-
-    def scheme(self, name: str) -> None:
-        """Let the reader's system be "light" or "dark"."""
-        features = [{"name": "prefers-color-scheme", "value": name}]
-        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-
-    def script(self, text: str, *arguments: object) -> Any:
-        return self.driver.execute_script(text, *arguments)
-
-    def wait(self, until: Callable[[], object]) -> None:
-        WebDriverWait(self.driver, PATIENCE_S, poll_frequency=0.02).until(lambda _: until())
+class Trier(Browser):
+    """A browser with one page to try open."""
 
     def one(self, selector: str) -> WebElement:
         return self.driver.find_element(By.CSS_SELECTOR, selector)
 
     def text(self, ident: str) -> str:
         return self.driver.find_element(By.ID, ident).text
-
-    def log(self, kind: str) -> list[dict[str, Any]]:
-        entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
-        return entries
-
-    def faults(self) -> list[str]:
-        """Return what axe-core finds wrong: the rule, and where."""
-        self.script((files("axe_core_python") / "axe.min.js").read_text())
-        found = self.driver.execute_async_script(
-            "axe.run({resultTypes: ['violations']}).then(arguments[0], (wrong) => arguments[0](String(wrong)))"
-        )
-        assert found["passes"]
-        return [f"{one['id']}: {node['html']}" for one in found["violations"] for node in one["nodes"]]
-
-    def requests(self) -> list[str]:
-        """Return the addresses that were asked for since the page was opened."""
-        messages = [json.loads(entry["message"])["message"] for entry in self.log("performance")]
-        sent = [message for message in messages if message["method"] == "Network.requestWillBeSent"]
-        return [message["params"]["request"]["url"] for message in sent]
 
 
 @pytest.fixture(scope="module")
@@ -155,18 +112,18 @@ def test_all_rows_have_pythons_scores_and_answers(trier: Trier, tmp_path: Path, 
     grasp_set = make_set()
     build = compiled(grasp_set, tmp_path / "build", **options)
     assert (tmp_path / "build" / "tables.bin").read_bytes()[8] == version
-    trier.open(tmp_path / "build" / "try.html")
+    trier.open_file(tmp_path / "build" / "try.html")
     for lossy in (False, True):
         frames = frames_of(build, grasp_set, lossy)
         assert differing(build, frames, trier.script(ASK, frames)) == []
-    assert trier.log("browser") == []
+    assert trier.log() == []
 
 
 def test_the_page_predicts_none_as_python_does(trier: Trier, with_none_too: GraspSet, tmp_path: Path) -> None:
     for name, grasp_set in (("class", with_none_too), ("refusing", make_set())):
         build = compiled(grasp_set, tmp_path / name, rounds=8)
         assert (build.rejector is None) == (name == "class")
-        trier.open(tmp_path / name / "try.html")
+        trier.open_file(tmp_path / name / "try.html")
         warned = trier.script("return document.getElementById('empty-hand')?.checkVisibility() ?? false")
         assert warned == (name == "refusing")
         frames = frames_of(build, grasp_set, lossy=True)
@@ -206,9 +163,9 @@ def folder(gloved: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def opened(trier: Trier, folder: Path) -> Iterator[Trier]:
     """Return the browser with the page open; nothing may have been complained of or asked for when the test ends."""
-    trier.open(folder / "try.html")
+    trier.open_file(folder / "try.html")
     yield trier
-    assert trier.log("browser") == []
+    assert trier.log() == []
     assert trier.requests() == [(folder / "try.html").as_uri()]
 
 
@@ -340,7 +297,7 @@ def test_a_taxel_goes_from_level_to_level_and_recorded_values_are_levels(trier: 
     taxels = Counter(switch.source for switch in build.manifest.switches if switch.threshold is not None)
     name, levels = max(taxels.items(), key=lambda each: each[1])
     assert levels > 1
-    trier.open(tmp_path / "build" / "try.html")
+    trier.open_file(tmp_path / "build" / "try.html")
     button = trier.one(f"#hand [role=button][aria-label^='{name}']")
     rising = sorted(
         (switch.threshold.code, bit)
@@ -361,7 +318,7 @@ def test_a_taxel_goes_from_level_to_level_and_recorded_values_are_levels(trier: 
     )
     said = f"rows.csv: 96 rows, of 96 with a known grasp {right} are recognised."
     trier.wait(lambda: trier.text("rows-said") == said)
-    assert trier.log("browser") == []
+    assert trier.log() == []
 
 
 @pytest.mark.parametrize("width", [1400, 400])
@@ -380,10 +337,10 @@ def test_the_page_fits_light_and_dark_screens_with_readable_letters(opened: Trie
         light = opened.script(look)
         opened.scheme("dark")
         opened.wait(lambda: all(one != other for one, other in zip(light, opened.script(look), strict=True)))
-        assert opened.faults() == []
+        assert opened.axe() == []
         opened.scheme("light")
         opened.wait(lambda: opened.script(look) == light)
-        assert opened.faults() == []
+        assert opened.axe() == []
     finally:
         opened.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
@@ -404,13 +361,13 @@ def test_names_that_hold_scripts_run_nothing(trier: Trier, tmp_path: Path) -> No
         joints=tuple(replace(joint, name=f"joint {types[at]}") for at, joint in enumerate(made.joints)),
     )
     compile_build(nasty, tmp_path / "build", folds=0, rounds=8)
-    trier.open(tmp_path / "build" / "try.html")
+    trier.open_file(tmp_path / "build" / "try.html")
     assert trier.driver.title == "thenar: try a build"
     assert trier.driver.find_elements(By.CSS_SELECTOR, "img, b, main script") == []
     heads = [row.text.removeprefix("▶ ") for row in trier.driver.find_elements(By.CSS_SELECTOR, "#bars th")]
     assert set(types) <= set(heads)
     trier.one("#hand [role=button] .area").click()
-    assert trier.log("browser") == []
+    assert trier.log() == []
     assert trier.requests() == [(tmp_path / "build" / "try.html").as_uri()]
 
 
@@ -426,7 +383,7 @@ def parts(trier: Trier, tmp_path_factory: pytest.TempPathFactory) -> Trier:
     script = "".join(tryout.scoped(module.read_text()) for module in modules)
     page = tmp_path_factory.mktemp("parts") / "parts.html"
     page.write_text(f"<script type=module>{script}globalThis.parts = {{ {', '.join(PARTS)} }};</script>")
-    trier.open(page)
+    trier.open_file(page)
     return trier
 
 

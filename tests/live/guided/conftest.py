@@ -78,7 +78,7 @@ class Browser(PageBrowser):
 
     def faults(self) -> list[str]:
         """Return what the page complained of, but that the command and its server have ended."""
-        return [one["message"] for one in self.complaints() if "WebSocket connection to" not in one["message"]]
+        return [one["message"] for one in self.log() if "WebSocket connection to" not in one["message"]]
 
     def overflow(self) -> object:
         """Return by how many pixels the page is wider than its window."""

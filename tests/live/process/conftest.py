@@ -94,9 +94,9 @@ class Client:
 class Run:
     """A bench of emulated devices, the scene on it, and clients that run on it, one at a time."""
 
-    def __init__(self, stack: ExitStack, scene: Any, harness: Harness, folder: Path, build: Path, adapter: Any) -> None:
+    def __init__(self, stack: ExitStack, scene: Any, harness: Harness, folder: Path, build: Path) -> None:
         self._stack, self._folder, self.build, self.scene = stack, folder, build, scene
-        self.bench, wired = on_bench(stack, scene, harness, folder, adapter=adapter)
+        self.bench, wired = on_bench(stack, scene, harness, folder)
         (folder / "glove.toml").write_text(harness_to_toml(wired))
 
     def start(self, *options: object, glove: Path | None = None, after: Path | None = None) -> Client:
@@ -146,10 +146,10 @@ def run(
         (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
     with ExitStack() as stack:
 
-        def make(inputs: str, *parts: str, adapter: str = "any", glove: str = "") -> Run:
+        def make(inputs: str, *parts: str, glove: str = "") -> Run:
             scene = make_scene(stage.truth(inputs), None)
             harness = harness_of(inputs, *parts, glove=glove)
-            made = Run(stack, scene, harness, tmp_path, stage.builds[inputs], adapter)
+            made = Run(stack, scene, harness, tmp_path, stage.builds[inputs])
             scene.show(0)
             return made
 

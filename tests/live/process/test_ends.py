@@ -1,13 +1,9 @@
 """How runs end, and what survives of them."""
 
-import json
-import os
-import resource
 import signal
-import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -78,93 +74,6 @@ def test_a_killed_run_leaves_its_recording_and_free_devices(run: MakeRun, tmp_pa
     scene.settled(12)
     assert again.end() == 0
     assert scene.check() > 0
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A disk of 64 KiB, where this user may mount one."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mounting = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(mounting, check=False, capture_output=True).returncode != 0:
-        pytest.skip("only root mounts a small disk")
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
-
-
-def test_a_disk_that_fills_up_loses_what_comes_and_nothing_else(run: MakeRun, small_disk: Path) -> None:
-    running, path = run("both", "glove", "board"), small_disk / "run.mcap"
-    full_at(running, path, running.start("--record", path), "No space left on device")
-
-
-def test_a_file_that_may_not_grow_loses_what_comes_and_nothing_else(run: MakeRun, tmp_path: Path) -> None:
-    """As a quota that is used up while recording."""
-    running, path = run("both", "glove", "board"), tmp_path / "run.mcap"
-    client = running.start("--record", path)
-    running.scene.settled(0)
-    resource.prlimit(client.process.pid, resource.RLIMIT_FSIZE, (path.stat().st_size + 5000,) * 2)
-    full_at(running, path, client, "File too large")
-
-
-def full_at(running: Any, path: Path, client: Any, reason: str) -> None:
-    scene = running.scene
-    scene.settled(0)
-    running.eventually(lambda: client.reports and client.reports[-1].outputs)
-    held = client.held
-    full_us = running.now_us()
-    for row in (6, 11):
-        scene.show(row)
-        scene.settled(row)
-    since = scene.grasps.since(full_us)
-    assert sum(grasp.health == "ok" for grasp in since) > 0.9 * len(since)
-    assert client.held == held
-    assert client.end() == 1  # not all that was asked for came about
-    size = path.stat().st_size
-    assert f"{path}: {reason}: nothing more is written after {size} bytes, all of them whole" in client.said
-    pairs = list(replayed(scene.truth.build, path, FRANK))
-    assert pairs
-    assert all(then == now for then, now in pairs)
-    assert scene.check() > 0
-
-
-def test_a_reader_that_hangs_loses_lines_and_holds_nobody_up(run: MakeRun, tmp_path: Path) -> None:
-    running = run("both", "glove", "board")
-    scene, path = running.scene, tmp_path / "grasps"
-    client = running.start("--sink", f"unix:{path}")
-    scene.settled(0)
-    with socket.socket(socket.AF_UNIX) as hanging, socket.socket(socket.AF_UNIX) as reading:
-        for each in (hanging, reading):
-            each.connect(str(path))
-        begun_us = running.now_us()
-        reading.settimeout(10.0)
-        lines = reading.makefile("rb")
-        numbers = [
-            line["number"] for line in map(json.loads, (lines.readline() for _ in range(800))) if "number" in line
-        ]
-        lines.close()
-        scene.show(8)
-        scene.settled(8)
-    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-    since = scene.grasps.since(begun_us)
-    assert [grasp.number for grasp in since] == list(range(since[0].number, since[0].number + len(since)))
-    assert sum(grasp.health == "ok" for grasp in since) > 0.9 * len(since)
-    assert client.end() == 0
-    assert "lost" in client.said
-    assert not path.exists()
-
-
-def test_a_stdout_that_nobody_reads_holds_nothing_up(run: MakeRun, tmp_path: Path) -> None:
-    running, path = run("both", "glove", "board"), tmp_path / "run.mcap"
-    glove = tmp_path / "glove.toml"
-    command = [sys.executable, "-m", "thenar.cli", "run", str(running.build), "--glove", str(glove)]
-    command += ["--record", str(path), "--frames", "1500", "--sink", "jsonl:-?every"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as client:
-        assert client.wait(60.0) == 0
-        assert client.stderr is not None
-        said = client.stderr.read().decode()
-    assert "1500 frames" in said
-    assert "lost" in said
-    assert len(list(replayed(running.scene.truth.build, path, FRANK))) == 1500
 
 
 def test_a_killed_emulator_is_missed_and_its_successor_found(run: MakeRun, stage: Any, tmp_path: Path) -> None:

@@ -82,26 +82,6 @@ def test_damaged_bytes_give_no_wrong_answer_and_cease_with_repair(
     assert running.damaged(line) > 0 or damage in (drop, flood)
 
 
-@pytest.mark.parametrize("line", [GLOVE, BOARD], ids=["glove", "board"])
-def test_a_flood_of_zeros_between_messages_holds_nothing_up(run: MakeRun, line: int) -> None:
-    running = run("both", "glove", "board")
-    scene, cable = running.scene, running.bench.lines[line]
-    for row in range(1, 4):
-        for _ in range(20):
-            cable.send(bytes(50))
-        scene.show(row)
-        scene.settled(row)
-    assert scene.check() > 0
-
-
-def test_a_run_opens_its_devices_through_noise(run: MakeRun) -> None:
-    running = run("both", "glove", "board", damage=Noise(flip, 20, 1))
-    for line in running.bench.lines:
-        line.damage = None
-    running.scene.show(3)
-    running.scene.settled(3)
-
-
 def test_a_glove_asked_for_too_much_runs_at_its_rate(run: MakeRun) -> None:
     """Its records end in 'es': they are measurements all the same, and none of them is taken for late."""
     running = run("both", "glove", "board", glove="rate_hz = 1000")

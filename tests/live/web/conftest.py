@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from importlib.resources import files
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -11,7 +10,6 @@ from typing import Any
 import pytest
 from selenium import webdriver
 from selenium.webdriver.common.by import By
-from selenium.webdriver.support.wait import WebDriverWait
 
 from thenar.runtime import Glove
 from thenar.runtime.frames import now_us
@@ -19,6 +17,7 @@ from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.policy import Policy
 from thenar.runtime.web.live import LivePage
 
+from ...browser import Browser as BareBrowser
 from ..conftest import on_bench
 
 PATIENCE_S = 30
@@ -26,26 +25,16 @@ PATIENCE_S = 30
 FRANK = Policy(lead=0.0, dwell_us=0)
 
 
-class Browser:
-    """A browser, with one page open."""
-
-    def __init__(self, driver: webdriver.Chrome) -> None:
-        self.driver = driver
+class Browser(BareBrowser):
+    """A browser, with one live page open."""
 
     def open(self, url: str, *, width: int = 1400, scheme: str = "light") -> None:
         """Open a page, in a window so wide, of a reader whose system is light or dark."""
-        self.complaints()
-        features = [{"name": "prefers-color-scheme", "value": scheme}]
-        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+        self.log()
+        self.scheme(scheme)
         metrics = {"width": width, "height": 1000, "deviceScaleFactor": 1, "mobile": width < 600}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         self.driver.get(url)
-
-    def script(self, text: str, *arguments: object) -> Any:
-        return self.driver.execute_script(text, *arguments)
-
-    def wait(self, until: Callable[[], object]) -> None:
-        WebDriverWait(self.driver, PATIENCE_S, poll_frequency=0.02).until(lambda _: until())
 
     def text(self, name: str) -> str:
         """Return the text of the element with this id, at one moment."""
@@ -59,25 +48,14 @@ class Browser:
     def click(self, name: str) -> None:
         self.driver.find_element(By.ID, name).click()
 
-    def complaints(self) -> list[dict[str, Any]]:
-        entries: list[dict[str, Any]] = self.driver.get_log("browser")  # type: ignore[no-untyped-call]
-        return entries
-
     def picture(self, name: str) -> None:
         """Keep a picture of the page where THENAR_PICTURES names a folder for them."""
         if folder := os.environ.get("THENAR_PICTURES"):
             self.driver.save_screenshot(f"{folder}/{name}.png")
 
-    def axe(self) -> list[str]:
+    def axe(self, *impacts: str) -> list[str]:
         """Return what axe-core finds of serious and critical faults: the rule, and where."""
-        self.script((files("axe_core_python") / "axe.min.js").read_text())
-        found = self.driver.execute_async_script(
-            "axe.run({resultTypes: ['violations']}).then(arguments[0], (wrong) => arguments[0](String(wrong)))"
-        )
-        assert isinstance(found, dict), found
-        assert found["passes"]
-        grave = [one for one in found["violations"] if one["impact"] in ("serious", "critical")]
-        return [f"{one['id']}: {node['html']}: {node['failureSummary']}" for one in grave for node in one["nodes"]]
+        return super().axe(*(impacts or ("serious", "critical")))
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +69,7 @@ def chromium(new_chromium: Callable[..., webdriver.Chrome]) -> Iterator[Browser]
 def browser(chromium: Browser) -> Iterator[Browser]:
     """Return the browser; the page may not have complained of anything when the test ends."""
     yield chromium
-    complaints = chromium.complaints()
+    complaints = chromium.log()
     chromium.driver.get("about:blank")
     assert complaints == []
 

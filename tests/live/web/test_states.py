@@ -99,7 +99,7 @@ def test_a_page_without_its_server_says_since_when_there_is_no_data(page: Callab
     assert browser.text("link").startswith("page: not connected since ")
     assert browser.text("glove-state") == "glove: not known"
     browser.wait(lambda: browser.text("health") == "no data")
-    browser.complaints()  # of the server that is gone
+    browser.log()  # of the server that is gone
 
 
 def test_a_slow_source_is_old_after_three_of_its_periods(page: Callable[..., Run], browser: Any) -> None:

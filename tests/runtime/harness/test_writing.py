@@ -34,6 +34,16 @@ def board_of(switches: tuple[str, ...]) -> BoardWiring:
     return BoardWiring(pins={name: f"A{number}" for number, name in enumerate(switches[1:])}, chips=(chip,))
 
 
+gloves = st.builds(
+    GloveWiring,
+    port=ports,
+    baud=st.just("auto") | st.integers(1, 10**6),
+    rate_hz=st.none() | st.floats(0.1, 900.0),
+    sensors=st.sampled_from([None, 18, 22]),
+    calibration=st.none() | st.just("/a/b.toml"),
+)
+
+
 @st.composite
 def harnesses(draw: st.DrawFn) -> Harness:
     """Sound harnesses: chips of any kind, each behind a channel of its own if behind any."""
@@ -44,8 +54,7 @@ def harnesses(draw: st.DrawFn) -> Harness:
         usable = [pin for pin in kind.pins if pin not in kind.not_inputs]
         pins = draw(st.lists(st.sampled_from(usable), max_size=5, unique=True))
         few = len(kind.addresses) < 8  # two of them may have one address
-        behind = st.builds(MuxChannel, address=st.just(0x73), channel=st.just(address))
-        mux = draw(behind if few else st.none() | behind)
+        mux = MuxChannel(address=0x73, channel=address) if few or draw(st.booleans()) else None
         chips.append(
             ChipWiring(
                 kind=kind.name,
@@ -56,18 +65,10 @@ def harnesses(draw: st.DrawFn) -> Harness:
             )
         )
     switches = tuple(next(left) for _ in range(draw(st.integers(1, 4))))
-    stream = StreamWiring(port="p", switches=switches, board=draw(st.none() | st.builds(board_of, st.just(switches))))
-    glove = st.builds(
-        GloveWiring,
-        port=ports,
-        baud=st.just("auto") | st.integers(1, 10**6),
-        rate_hz=st.none() | st.floats(0.1, 900.0),
-        sensors=st.sampled_from([None, 18, 22]),
-        calibration=st.none() | st.just("/a/b.toml"),
-    )
+    stream = StreamWiring(port="p", switches=switches, board=board_of(switches) if draw(st.booleans()) else None)
     return Harness(
         name=draw(names),
-        cyberglove=draw(st.none() | glove),
+        cyberglove=draw(st.none() | gloves),
         streams=(stream,),
         buses=(BusWiring(device="/dev/i2c-1", chips=tuple(chips)),),
         debounce=Debounce(enabled=draw(st.booleans()), release_ms=draw(st.floats(0.0, 1000.0))),

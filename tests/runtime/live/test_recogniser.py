@@ -40,16 +40,29 @@ def recognizer(build: Build, policy: Policy = AT_ONCE, sensor_names: tuple[str, 
     )
 
 
+SWITCHED = st.none() | st.tuples(delays, masks, st.just(0) | masks)
+WORN = st.none() | st.tuples(
+    delays,
+    st.binary(min_size=len(SENSORS), max_size=len(SENSORS)),
+    st.sampled_from([None, 0x81, 0x80, 0x87, 0x86]),
+)
+LATER = st.sampled_from([0, 1, 300, 700, 1000, 1400, 1401, 2000, 2001, 5000])
+
+
 @st.composite
 def schedules(draw: st.DrawFn) -> list[Arrival]:
     """Times that never fall, and what came in by then: frames of up to 300 us ago, or nothing."""
     now, found = 10_000, []
     for _ in range(draw(st.integers(1, 25))):
-        now += draw(st.sampled_from([0, 1, 300, 700, 1000, 1400, 1401, 2000, 2001, 5000]))
-        switches = draw(st.none() | st.builds(SwitchFrame, delays.map(now.__sub__), masks, st.just(0) | masks))
-        bytes_ = st.binary(min_size=len(SENSORS), max_size=len(SENSORS))
-        status = st.sampled_from([None, 0x81, 0x80, 0x87, 0x86])
-        found.append((now, switches, draw(st.none() | st.builds(GloveFrame, delays.map(now.__sub__), bytes_, status))))
+        now += draw(LATER)
+        switches, glove = draw(SWITCHED), draw(WORN)
+        found.append(
+            (
+                now,
+                switches and SwitchFrame(now - switches[0], *switches[1:]),
+                glove and GloveFrame(now - glove[0], *glove[1:]),
+            )
+        )
     return found
 
 

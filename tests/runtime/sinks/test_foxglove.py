@@ -12,8 +12,6 @@ from importlib.util import find_spec
 from math import exp
 from pathlib import Path
 from struct import unpack_from
-from threading import Event
-from time import monotonic
 from typing import Any
 
 import pytest
@@ -33,6 +31,7 @@ from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp
 from thenar.runtime.sinks import SinkError, open_sink
 
 from ...conftest import tool
+from ..conftest import eventually
 
 MakeGrasp = Callable[..., LiveGrasp]
 LAYOUT = Path(__file__).resolve().parents[3] / "examples" / "foxglove-layout.json"
@@ -58,13 +57,6 @@ class Client:
         kind, subscription, time_ns = unpack_from("<BIQ", data)
         assert kind == 1
         return self.topics[subscription - 100], time_ns, json.loads(data[13:])
-
-
-def eventually(condition: Callable[[], bool]) -> None:
-    end, never = monotonic() + LONG_S, Event()
-    while not condition():
-        assert monotonic() < end
-        never.wait(0.002)
 
 
 @pytest.fixture(autouse=True)

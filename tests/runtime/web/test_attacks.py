@@ -4,8 +4,6 @@ import hmac
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from threading import Event
-from time import monotonic
 from typing import Any
 
 import pytest
@@ -15,15 +13,10 @@ from thenar.drivers.errors import SettingError
 from thenar.runtime.web import guard, server
 from thenar.runtime.web.server import Server, message
 
+from ..conftest import eventually
+
 PATIENCE_S = 20.0
 EVIL = "evil.example"
-
-
-def eventually(condition: Callable[[], bool]) -> None:
-    end, never = monotonic() + PATIENCE_S, Event()
-    while not condition():
-        assert monotonic() < end
-        never.wait(0.005)
 
 
 def refused(client: Any, **options: Any) -> int:

@@ -1,10 +1,9 @@
 """Frames at even steps of the force of initial contact, and late ones."""
 
-import msgspec
 import numpy as np
 import pytest
 
-from thenar.simulator.effects.frame_jitter import MEMBER, prepare
+from thenar.simulator.effects.frame_jitter import prepare
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import SceneSetting, frame_times
@@ -68,9 +67,3 @@ def test_frames_stray_as_much_as_said() -> None:
     late = jittered(setting, 300.0, range(400)) - frame_times(setting)
     assert abs(late.mean()) < 10.0
     assert abs(late.std() - 300.0) < 10.0
-
-
-@pytest.mark.parametrize("sd_us", [0.0, -1.0, 2e6])
-def test_impossible_spreads_are_refused(sd_us: float) -> None:
-    with pytest.raises(msgspec.ValidationError, match="sd_us"):
-        msgspec.convert({"sd_us": sd_us}, MEMBER.parameters())

@@ -91,13 +91,3 @@ def test_a_bit_is_read_between_closing_and_opening_when_its_turn_comes(
     for row, frame, switch in np.ndindex(2, 4, 3):
         at = int(frames[row, frame]) + int(late[row, frame, switch])
         assert batch.bits[row, frame, switch] == (on[row, switch] <= at < off[row, switch])
-
-
-def test_the_read_row_is_held_the_last_frames_are_not() -> None:
-    batch, setting = make_batch(range(1)), make_setting(timed=True)
-    batch.forces_n = np.array([[0.5, 2.0]])
-    for name in ("glove.threshold", "glove.close", "glove.frames", "glove.sample"):
-        take(name, batch, setting)
-    times = frame_times(setting)
-    assert batch.bits[0, :, 1].tolist() == [0 <= at <= setting.hold_us for at in times.tolist()]
-    assert not batch.bits[0, :, 0].any()

@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.pipeline.batch import Batch
@@ -11,7 +11,7 @@ from thenar.simulator.pipeline.effect import EFFECTS, hold_frame
 from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import Recording, Scene
 
-from ..small import make_batch, make_condition, make_scene
+from ..small import make_batch, make_scene
 
 NAMES = tuple(EFFECTS)
 
@@ -137,27 +137,6 @@ def test_a_scene_without_contact_model_gets_the_gloves_default() -> None:
         ("hand.grip", False),
         ("contact.quasistatic", True),
     ]
-
-
-def outcome(batch: Batch, row: int) -> dict[str, bytes]:
-    names = ["posture_deg", "pose", "grip_n", "forces_n", "settled", "residual_n", "on_us", "off_us", "frame_us"]
-    found = {
-        name: np.asarray(getattr(batch, name)[row]).tobytes()
-        for name in [*names, "bits", "sensors_deg", "raw", "taxels"]
-    }
-    return found | ({} if batch.lost is None else {"lost": batch.lost[row].tobytes()})
-
-
-@settings(max_examples=4, deadline=None)
-@given(company=st.lists(st.integers(0, 50), min_size=2, max_size=5, unique=True))
-def test_repetitions_do_not_depend_on_their_batch(company: list[int]) -> None:
-    pipeline = compile_pipeline(make_scene([listed_with("contact.quasistatic", most_steps=12), *light()]))
-    row = len(company) // 2
-    alone, together = make_batch([company[row]]), make_batch(company)
-    beside = make_batch(company[1:], make_condition(grasp="Tip", grip_n=4.0))
-    pipeline.run([alone], Ledger())
-    pipeline.run([beside, together], Ledger())
-    assert outcome(alone, 0) == outcome(together, row)
 
 
 def test_lead_and_release_do_not_change_the_read_frame() -> None:

@@ -61,8 +61,6 @@ def test_other_tables_of_a_catalogue_are_not_its_business(tmp_path: Path) -> Non
     ("old", "new", "message"),
     [
         ('grasp = "Tip"', 'grasp = "Tipp"', "line 70: objects[11].grasp: 'Tipp' is not a grasp type of kamakura14"),
-        ("mass_g = 40", "mass_g = 0", "line 5: objects[0].mass_g: must be above 0, not 0"),
-        ("mass_g = 40", "mass_g = 5001", "line 5: objects[0].mass_g: must be at most 5000, not 5001"),
         ("mass_g = 40", "mass_kg = 0.04", "line 5: objects[0].mass_kg: masses are in grams: mass_g"),
         ("mass_g = 40", "", "line 2: objects[0]: the key mass_g is missing"),
         (

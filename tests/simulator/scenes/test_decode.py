@@ -84,18 +84,6 @@ def test_effects_come_by_their_rank_with_their_parameters(scene: Load) -> None:
     assert found[1].parameters == (("sd_deg", 3.0), ("trial_sd_deg", 0.0))
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "[effects]\njoint.noise.sd_deg = 3\n",
-        "[effects.joint]\nnoise = {sd_deg = 3}\n",
-        "[effects.joint.noise]\nsd_deg=3.0",
-    ],
-)
-def test_an_effect_may_be_spelled_in_every_way_of_toml(scene: Load, text: str) -> None:
-    assert scene(LEAST + text).effects == (("joint.noise", (("sd_deg", 3.0), ("trial_sd_deg", 0.0))),)
-
-
 def test_every_effect_may_be_listed_without_parameters(scene: Load) -> None:
     found = scene(LEAST + "".join(f"[effects.{name}]\n" for name in NAMES))
     assert [name for name, _ in found.effects] == sorted(NAMES, key=lambda name: EFFECTS[name].order)
@@ -136,10 +124,8 @@ def test_objects_of_ones_own_are_read_like_a_catalogue(scene: Load) -> None:
         ('my = "kamakura14"', 'my = "cutkosky16"', "line 3: objects: catalogue 'kamakura14' is for taxonomy"),
         ('ts = "kamakura14"', 'ts = "kamakura"', "line 3: objects: no catalogue of objects is called 'kamakura'"),
         ('ts = "kamakura14"', "ts = 3", "line 3: objects: must be a list of tables, not 3"),
-        ("length_mm = 188", "length_mm = 18.8", "line 7: subjects[0].hand_length_mm: must be at least 130, not 18.8"),
         ("length_mm = 188", "length_cm = 18", "line 7: subjects[0].hand_length_cm: lengths are in millimetres: hand_l"),
         ("length_mm = 188", "length_mm = inf", "line 7: subjects[0].hand_length_mm: must be a finite number, not inf"),
-        ("breadth_mm = 84", "breadth_mm = 116", "line 8: subjects[0].hand_breadth_mm: must be at most 115, not 116"),
         ("hand_breadth_mm = 84", "", "line 5: subjects[0]: the key hand_breadth_mm is missing"),
         ('name = "A"', 'name = "?"', "line 6: subjects[0].name: '?' means a missing value in every table"),
     ],
@@ -157,10 +143,7 @@ def test_a_wrong_key_is_named_with_its_line(complaint: Callable[[str], str], old
         ("[[subjects]]\nname='A'\nhand_length_mm=190\nhand_breadth_mm=85", "line 10: subjects[1].name: 'A' is taken"),
         ("[population]\nsurvey = 'ansur2'\ncount = 3", "line 9: population: and [[subjects]] are both there"),
         ("[glove]\nlayout = 'murakami16'", "line 10: glove.layout: 'murakami16' is not among its values (did you"),
-        ("[glove]\nthreshold_n = 0", "line 10: glove.threshold_n: must be above 0, not 0"),
         ("[glove]\nthreshold_g = 100", "line 10: glove.threshold_g: forces are in newtons: threshold_n"),
-        ("[recording]\nrate_hz = 0.5", "line 10: recording.rate_hz: must be at least 1, not 0.5"),
-        ("[recording]\nrate_hz = 20000", "line 10: recording.rate_hz: must be at most 10000, not 20000"),
         ("[recording]\nhold_s = 1", "line 10: recording.hold_s: times are in milliseconds: hold_ms"),
         ("[recording]\nrows = 'every'", "line 10: recording.rows: 'every' is not among its values (there are: all"),
         ("[effects.joint.nois]", "line 9: effects.joint.nois: there is no effect 'joint.nois' (did you mean 'joint.n"),
@@ -172,7 +155,6 @@ def test_a_wrong_key_is_named_with_its_line(complaint: Callable[[str], str], old
         ),
         ("[effects]\njoint = 3", "line 10: effects.joint: must be a table, not 3"),
         ("[effects.joint.noise]\nsd_rad = 2", "line 10: effects.joint.noise.sd_rad: angles are in degrees: sd_deg"),
-        ("[effects.joint.noise]\nsd_deg = -2", "line 10: effects.joint.noise.sd_deg: must be at least 0, not -2"),
         ("[effects.port.dead]\nports = [1]\ncount = 1", "line 9: effects.port.dead: give `ports` or `count`, not both"),
         ("[effects.port.dead]\nports = 1", "line 10: effects.port.dead.ports: must be a list, not 1"),
         ("[effects.hand.grip]\nafter = ['hand.style']", "line 10: effects.hand.grip.after: this key is unknown"),

@@ -26,9 +26,7 @@ from ..conftest import make_tables
 pytestmark = pytest.mark.slow
 
 
-ARDUINO = Path("/usr/share/arduino/hardware")
-BUILDER = Path("/usr/share/arduino-builder")  # where Debian's package says where the IDE's tools are
-BOARDS = {"uno": ("atmega328p", "arduino:avr:uno"), "mega": ("atmega2560", "arduino:avr:mega:cpu=atmega2560")}
+BOARDS = {"uno": ("atmega328p", "uno"), "mega": ("atmega2560", "mega:cpu=atmega2560")}
 GLOVE = 'name = "glove"\n[[stream]]\nport = "/dev/ttyUSB0"\njoints = {{ {} }}\n'
 
 # As many as the board has pins for, but for simavr, in which inputs 12 to 14 of the larger part read full scale.
@@ -67,33 +65,14 @@ def library(tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def sketch(tmp_path: Path, cores: Path) -> Callable[..., Path]:
+def sketch(arduino: Callable[..., Path]) -> Callable[..., Path]:
     """Return what has Arduino's builder compile a library and its example for a board, without a warning about them."""
-    if not ARDUINO.is_dir():
-        tool("arduino-core-avr")
 
     def sketch(library: Path, board: str, given: str = "") -> Path:
-        out = tmp_path / "out"
-        out.mkdir(exist_ok=True)
-        hardware = [f"-hardware={folder}" for folder in (BUILDER, ARDUINO)]
-        # <float.h> of avr-g++ 5.4 lacks what the core asks for.
-        flags = f"-DDECIMAL_DIG=__DECIMAL_DIG__ {given}"
-        options = ["-tools=/usr/bin", f"-prefs=compiler.cpp.extra_flags={flags}", "-warnings=all"]
-        where = [f"-libraries={library.parent}", f"-build-path={out}", f"-build-cache={cores}"]
         example = library / "examples/Recognise/Recognise.ino"
-        command = [tool("arduino-builder"), *hardware, *options, *where, f"-fqbn={BOARDS[board][1]}", str(example)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
-        assert done.returncode == 0, done.stderr
-        assert "thenar" not in done.stderr
-        return out / "Recognise.ino.elf"
+        return arduino(example, "thenar", BOARDS[board][1], library.parent, given)
 
     return sketch
-
-
-@pytest.fixture(scope="session")
-def cores(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return where the builder keeps Arduino's cores, once compiled."""
-    return tmp_path_factory.mktemp("cores")
 
 
 Library = Callable[..., Path]

@@ -7,7 +7,6 @@ from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS, Target, kinds, timed
-from thenar.drivers.errors import SettingError
 
 from ....conftest import tool
 from ....tables import describe
@@ -32,11 +31,6 @@ def test_the_page_on_firmware_names_every_target() -> None:
 def test_what_is_verified_and_what_is_timed_is_read_off_the_targets() -> None:
     assert kinds() == ("host", "avr", "micropython")
     assert timed() == ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "rv32imac", "host", "pi")
-
-
-def test_a_target_that_is_none_is_refused_with_those_that_are() -> None:
-    with pytest.raises(SettingError, match="no firmware target 'attiny85': choose one of host, avr328p, avr2560"):
-        TARGETS.named("attiny85")
 
 
 def test_a_target_without_a_simulator_says_so() -> None:

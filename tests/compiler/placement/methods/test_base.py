@@ -6,7 +6,6 @@ import pytest
 from thenar.compiler.placement.methods.base import METHODS, Method, usual
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.samples import Samples, TrainingError
-from thenar.drivers.errors import SettingError
 
 OURS = [name for name, method in METHODS.items() if method.ours]
 BY_NUMBER = [name for name in OURS if METHODS[name].by_number]
@@ -73,11 +72,6 @@ def test_methods_that_heed_time_read_fewer_ports(name: str) -> None:
     read = [[len({column // 2 for column in choose(most)}) for most in range(2, 9)] for choose in (heeding, heedless)]
     assert all(with_cost <= without for with_cost, without in zip(*read, strict=True))
     assert sum(read[0]) < sum(read[1])
-
-
-def test_a_method_that_is_not_there_is_named_with_those_that_are() -> None:
-    with pytest.raises(SettingError, match=r"'id4'.*id3, id3-cost"):
-        METHODS.named("id4")
 
 
 def test_there_must_be_switches_and_ports_for_each() -> None:
