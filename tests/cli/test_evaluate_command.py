@@ -116,7 +116,7 @@ def test_confusion_matrices_are_printed_and_drawn_on_request(
     grasps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["--tables", "compositions", "--confusion", "--plot", str(tmp_path / "drawn")]
-    assert run(["evaluate", grasps, *QUICK, *arguments]) == 0
+    assert run(["evaluate", grasps, *QUICK, "--protocol", "both", *arguments]) == 0
     printed = capsys.readouterr().out
     assert "VII NoSel-Co, subject [b]Bob, nested protocol" in printed
     assert "pinch [tip]" in printed

@@ -12,7 +12,8 @@ from thenar.compiler import Samples, ScoreTables, TrainingError
 from thenar.compiler.trainers.base import Training
 from thenar.compiler.trainers.discriminant import fit_discriminant
 
-from .test_logit import SEEDS, grasps, numbers
+from ..conftest import grasps
+from .test_logit import SEEDS, numbers
 
 
 @given(SEEDS, st.sampled_from([None, 6]))
