@@ -200,17 +200,15 @@ class Described(click.Command):
 
 
 def _methods_by_number() -> "Sections":
-    """Return all placement methods, by the option that sets how many they keep, with remarks in brackets."""
+    """Return all placement methods, by the option that sets how many they keep."""
     from thenar.compiler.placement.methods.base import METHODS
 
     sections: Sections = {}
     for takes, by_number in (("--prune S", False), ("--keep M", True)):
         lines = sections[f"Placement methods that take {takes}"] = list[tuple[str, str]]()
         for name, method in METHODS.items():
-            remarks = [] if method.ours else ["baseline"]
-            remarks += [f"pip install {method.install}"] if method.install else []
             if method.by_number == by_number:
-                lines.append((name, f"{method.help} ({'; '.join(remarks)})." if remarks else f"{method.help}."))
+                lines.append((name, f"{method.help}." if method.ours else f"{method.help} (baseline)."))
     return sections
 
 

@@ -147,7 +147,6 @@ WORKSTATION_ONLY = {
     "python_calamine",
     "pyarrow",
     "h5py",
-    "pysensors",
 }
 
 

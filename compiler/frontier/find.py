@@ -21,7 +21,7 @@ from thenar.runtime.published import NONE
 from thenar.runtime.recipe import Recipe
 
 from ..evaluation.rates import Rate
-from ..placement.methods.base import METHODS, usual
+from ..placement.methods.base import usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
 from ..recogniser import check_inputs
@@ -140,9 +140,6 @@ def find_frontier(
     samples = _samples(grasp_set.without_none())
     # Levels of one taxel share its conversion.
     search = search or Search(methods=usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns)))
-    missing = [name for name in search.baselines if not METHODS[name].installed]
-    lacking = [f"{name} was left out: it needs {METHODS[name].install}, which is not installed" for name in missing]
-    search = replace(search, baselines=tuple(name for name in search.baselines if name not in missing))
     cuts = Cuts.of(samples, search)
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     created = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
@@ -153,13 +150,12 @@ def find_frontier(
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
             replay = _replay(survey, stream)
             marks = () if build is None else (own_build(build, survey),)
-        if equipment.records.how == "unknown":
-            lacking.insert(0, _UNTIMED.format(list_names(grasp_set.joint_names)))
+        untimed = [_UNTIMED.format(list_names(grasp_set.joint_names))] if equipment.records.how == "unknown" else []
         frontier = _found(survey, replay)
         frontier = changed_to(
             frontier,
             marks=(*frontier.marks, *marks),
-            skipped=(*lacking, *frontier.skipped),
+            skipped=(*untimed, *frontier.skipped),
             picked=_picked(frontier, budget_us, rate),
             wanted=_in_words(budget_us, rate),
         )

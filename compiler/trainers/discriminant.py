@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from thenar.runtime.model.tables import ScoreTables
 
 from ..elementary import Floats, exact_sum, log, on_one_grid, softmax_and_loss
-from ..evaluation.folds import trial_folds
 from ..samples import TrainingError
 from ..workers import check_memory
 from .base import MAX_BINS, Report, Setting, Trainer, check_rows
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
     from ..samples import Samples
 
 BINS, MOST_BINS = 16, 64  # more take minutes, and are no better
-FOLDS, SEED = 4, 1
+FOLDS = 4
 # Factors of the scores: octaves, since half octaves change the log-loss by a percent; one for a single trial.
 _FACTORS, _UNKNOWN = tuple(2.0**exponent for exponent in range(-9, 2)), 0.25
 # The units of bits, which deviate no further, and of edges; the least one of lines, of which a column spans one or two.
@@ -148,16 +147,18 @@ def _solved(matrix: Floats, right: Floats) -> Floats:
 
 def _factor(inputs: Floats, unit: Floats, labels: NDArray[np.intp], trials: NDArray[np.intp], n_classes: int) -> float:
     """Return the factor of the scores with the least log-loss of trials that are left out."""
-    n_trials = len(np.unique(trials))
-    if n_trials < 2:
+    _, first, number = np.unique(trials, return_index=True, return_inverse=True)
+    if len(first) == 1:
         return _UNKNOWN
+    # The trials of a class take turns.
+    part = np.argsort(np.argsort(labels[first], kind="stable"))[number] % FOLDS
     scores = np.empty((n_classes, len(labels)))
-    for fold in trial_folds(labels, trials, min(FOLDS, n_trials), SEED):
-        learnt = fold.train
+    for fold in np.unique(part).tolist():
+        learnt, left = part != fold, part == fold
         bias, weights = _discriminant(inputs[learnt], unit, labels[learnt], trials[learnt], n_classes)
         # The products of marks with numbers on a grid are exact as well.
         weights = on_one_grid(weights, _MARKS * len(weights))
-        scores[:, fold.test] = (inputs[fold.test] @ weights + bias).T
+        scores[:, left] = (inputs[left] @ weights + bias).T
     share = 1.0 / np.bincount(trials)[trials]
     losses = [softmax_and_loss(factor * scores, labels, share)[1] for factor in _FACTORS]
     return _FACTORS[int(np.argmin(losses))]

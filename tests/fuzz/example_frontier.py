@@ -82,12 +82,6 @@ _CURVES: tuple[tuple[str, str, bool, tuple[float, ...]], ...] = (
         (0.18, 0.30, 0.548, 0.752, 0.858, 0.925, 0.935, 0.936, 0.936),
     ),
     (
-        "forest",
-        "Importance in a forest",
-        False,
-        (0.19, 0.28, 0.505, 0.708, 0.851, 0.922, 0.934, 0.935, 0.936),
-    ),
-    (
         "mrmr",
         "Most relevance, least redundance",
         False,
@@ -99,8 +93,6 @@ _CURVES: tuple[tuple[str, str, bool, tuple[float, ...]], ...] = (
         False,
         (0.19, 0.25, 0.381, 0.518, 0.651, 0.802, 0.905, 0.929, 0.936),
     ),
-    ("qr", "PySensors' QR, no labels", False, (0.11, 0.19, 0.362, 0.581, 0.773, 0.881, 0.924, 0.933, 0.936)),
-    ("sspoc", "PySensors' SSPOC", False, (0.12, 0.21, 0.334, 0.492, 0.644, 0.771, 0.881, 0.922, 0.936)),
     ("random", "Drawn at random", False, (0.10, 0.15, 0.243, 0.389, 0.542, 0.714, 0.862, 0.917, 0.936)),
 )  # fmt: skip
 

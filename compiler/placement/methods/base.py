@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from importlib.util import find_spec
 from itertools import islice
 from typing import Literal
 
@@ -58,8 +57,6 @@ class Method:
         Whether a frontier also tries to keep all switches.
     tried : {"always", "wired", "unwired", "never"}
         When a frontier tries it by default: "wired" if the glove's actual wiring is known.
-    imports, install : str
-        The package that it requires, and its name for pip; "" if scikit-learn suffices.
     label : str
         Its name in the tables of `evaluate`; "" for `name`.
     rank : int
@@ -82,19 +79,12 @@ class Method:
     nested: bool = False
     try_all_switches: bool = False
     tried: Literal["always", "wired", "unwired", "never"] = "never"
-    imports: str = ""
-    install: str = ""
     label: str = ""
     rank: int = 0
 
     def __post_init__(self) -> None:
         if self.parameter not in ("switches", "S"):
             raise TrainingError(f"method {self.name!r}: its parameter is 'switches' or 'S', not {self.parameter!r}")
-
-    @property
-    def installed(self) -> bool:
-        """Whether the package that it requires is installed."""
-        return not self.imports or find_spec(self.imports) is not None
 
     @property
     def title(self) -> str:
@@ -125,11 +115,9 @@ class Method:
         """Do the expensive work, and return the kept switches as a function of the parameter.
 
         Numbers of switches are rounded down. Without `ports` all switches cost the same. Raises TrainingError if
-        there are no switches, if `ports` are those of other switches, if the required package is missing, or if the
+        there are no switches, if `ports` are those of other switches, or if the
         method chooses a column twice or one that there is not.
         """
-        if not self.installed:
-            raise TrainingError(f"{self.name} needs {self.imports}, which is missing: pip install {self.install}")
         if not samples.n_switches:
             raise TrainingError("there are no switches to choose from: the set holds joints only")
         if ports is not None and len(ports.port_of) != samples.n_switches:

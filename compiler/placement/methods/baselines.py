@@ -1,4 +1,4 @@
-"""Baselines: by information about the grasp type, by scikit-learn, by PySensors' sparse sensing, or at random.
+"""Baselines: by information about the grasp type, by scikit-learn's elimination, or at random.
 
 Ties of information, exactly compared, go to the lowest number.
 """
@@ -14,12 +14,9 @@ from ..gain import Cooccurrence, n_log_n
 from .base import Bits, Labels, Method, ranked
 
 _SEED = 0
-_TREES = 300
 # With scikit-learn's default of 100 some fits end with a convergence warning. With its default tolerance, a tenth of
 # this one, elimination takes twice as long and the remaining switches are no more accurate.
 _ITERATIONS, _TOLERANCE = 2000, 1e-3
-# With PySensors' defaults (no modes, penalty 0.1) SSPOC was 4 to 34 points less accurate on simulated grasps.
-_MODES, _PENALTY = 20, 0.01
 
 
 def random_placement(n_inputs: int, m: int, seed: int) -> Columns:
@@ -116,43 +113,6 @@ def _elimination_by_regression(bits: Bits, labels: Labels) -> Columns:
     return tuple(np.argsort(elimination.ranking_, kind="stable").tolist())
 
 
-def _forest_importance(bits: Bits, labels: Labels) -> Columns:
-    """Return the switches by their mean decrease of impurity in a random forest."""
-    from sklearn.ensemble import RandomForestClassifier
-
-    forest = RandomForestClassifier(_TREES, random_state=_SEED, n_jobs=1).fit(bits, labels)
-    return tuple(np.argsort(-forest.feature_importances_, kind="stable").tolist())
-
-
-def sspoc_order(bits: Bits, labels: Labels) -> Columns:
-    """Return the inputs of bits (n, d) by their SSPOC weights, in the space of the first 20 modes.
-
-    Brunton, Brunton, Proctor, Kutz, SIAM J. Appl. Math. 76 (2016). Inputs of weight 0 come last, by their numbers.
-    """
-    from pysensors.basis import SVD
-    from pysensors.classification import SSPOC
-
-    modes = min(_MODES, *bits.shape)
-    centred = bits - bits.mean(axis=0)
-    model = SSPOC(basis=SVD(n_basis_modes=modes, random_state=_SEED), l1_penalty=_PENALTY)
-    model.fit(centred, labels, quiet=True, refit=False)
-    # SSPOC's weights are (inputs, classes); for two classes it has one column, without an axis.
-    weights = np.abs(np.asarray(model.sensor_coef_, np.float64).reshape(bits.shape[1], -1)).max(axis=1)
-    return tuple(np.argsort(-weights, kind="stable").tolist())
-
-
-def qr_order(bits: Bits, _: Labels) -> Columns:
-    """Return the inputs of bits (n, d) in the order of QR's pivots; the labels are ignored.
-
-    Manohar, Brunton, Kutz, Brunton, IEEE Control Systems 38 (2018).
-    """
-    from pysensors.reconstruction import SSPOR
-
-    model = SSPOR()
-    model.fit(bits.astype(np.float64), quiet=True, seed=_SEED, mode="economic")
-    return tuple(int(column) for column in model.get_all_sensors())
-
-
 MEMBER = (
     Method(
         name="rfe",
@@ -161,14 +121,6 @@ MEMBER = (
         nested=True,
         tried="always",
         rank=20,
-    ),
-    Method(
-        name="forest",
-        help=f"Importance in a random forest of {_TREES} trees (scikit-learn)",
-        learn=ranked(_forest_importance),
-        nested=True,
-        tried="always",
-        rank=21,
     ),
     Method(
         name="mrmr",
@@ -202,25 +154,5 @@ MEMBER = (
         nested=True,
         tried="always",
         rank=25,
-    ),
-    Method(
-        name="sspoc",
-        help="Sparse sensors for classification (PySensors' SSPOC)",
-        learn=ranked(sspoc_order),
-        nested=True,
-        tried="always",
-        imports="pysensors",
-        install="python-sensors",
-        rank=26,
-    ),
-    Method(
-        name="qr",
-        help="Sensors for reconstruction by pivoted QR (PySensors), without labels",
-        learn=ranked(qr_order),
-        nested=True,
-        tried="always",
-        imports="pysensors",
-        install="python-sensors",
-        rank=27,
     ),
 )
