@@ -53,9 +53,14 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
         if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
             yield "gives a joint two points that make no line"
     proof = manifest.proof
-    if proof.width != manifest.options.width or max(proof.covered, proof.changed) > manifest.source.rows:
+    if proof.width != manifest.options.width or max(proof.covered, proof.changed) > manifest.proved_rows:
         yield "proves something of other tables than it describes"
     yield from _wrong_counts(manifest)
+    wearing, adapted, joints = manifest.wearing, manifest.adapted, len(manifest.joints)
+    if wearing is not None and len(wearing.related) not in (0, joints * (joints - 1) // 2):
+        yield "relates other joints than it has"
+    if adapted is not None and len(adapted.counts) != len(manifest.grasps):
+        yield "was adapted to trials of other grasp types than it has"
 
 
 def _wrong_inputs(manifest: Manifest, taxels: Iterable[Calibration]) -> Iterator[str]:
@@ -96,6 +101,8 @@ def _wrong_counts(manifest: Manifest) -> Iterator[str]:
     shares = [rate for each in manifest.detection for rate in (each.held, each.none) if rate is not None]
     counted = [(rate.correct, rate.total) for rate in (*manifest.rates, *shares)]
     counted += [(each.correct, each.total) for each in fit.compared]
+    tried = [each for each in (manifest.wearing, manifest.adapted) if each is not None]
+    counted += [(count, each.total) for each in tried for count in (each.before, each.after)]
     if faults is not None:
         counted += [(count, faults.total) for count in (faults.correct, *(each.correct for each in faults.worst))]
     if any(correct > total for correct, total in counted) or manifest.stopped_after > fit.number("rounds"):

@@ -25,6 +25,7 @@ from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
 from ..hand import HandShape, drawn_hand
+from ..model.collapse import collapse
 from ..model.compare import compare
 from ..model.faults import count_faults, groups_of, worst_faults
 from ..placement.constraints import Limits
@@ -51,6 +52,7 @@ from .training import (
     stored_digests,
 )
 from .verify_firmware import made_firmware
+from .wearers import related_joints, wearing_of
 
 # Without a harness a build has no scan map; a build too large for every microcontroller has no firmware; one without a
 # report has no spec.
@@ -308,6 +310,7 @@ class BuildAssembly:
         elements = recogniser.elements
         switches = zip(elements, names_of(grasp_set, elements), recogniser.selection.gains, strict=True)
         shares = kept.switches.mean(axis=0).tolist()
+        related = related_joints(collapse(recogniser.model, kept.n_switches), kept)
         return Manifest(
             schema=SCHEMA,
             checksum="",
@@ -355,6 +358,7 @@ class BuildAssembly:
             detection=detection if tested is None else (*detection, *tested.detection),
             rejection=recogniser.rejection,
             segments=segments_for(grasp_set, samples, None if tested is None else tested.scores, self.integers.scale),
+            wearing=wearing_of(() if tested is None else tested.adapted, related),
         )
 
     def _switch(self, element: Element, name: str, gain: float) -> Switch:
