@@ -46,7 +46,7 @@ TABLES = (*_USUAL, "joints")
 
 
 def _numbers(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, ...]:
-    """Return the comma-separated whole numbers in `value`, each once, in the order given; none where it is not given."""
+    """Return the comma-separated whole numbers in `value`, each once, in the order given; none if not given."""
     if value is None:
         return ()
     parts = comma_separated(value)
