@@ -7,6 +7,7 @@ from statistics import fmean
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Wearing
 from thenar.runtime.model.tables import ScoreTables, winners
@@ -26,9 +27,10 @@ from ..workers import in_workers
 Try = tuple[int, float]
 # The correct trials of a person after each try, and their number.
 Hits = tuple[tuple[int, ...], int]
+Counts = NDArray[np.intp]
 _OWN = 2
 TRIES: tuple[Try, ...] = (*((_OWN, strength) for strength in STRENGTHS), (0, inf))
-_LEAST_PEOPLE = 3
+_LEAST_PEOPLE, _LEAST_GAIN = 3, 100
 
 
 def related_joints(tables: ScoreTables, learnt: Samples) -> tuple[int, ...]:
@@ -68,15 +70,24 @@ def hits_of(recogniser: Recogniser, samples: Samples, tries: Sequence[Try] = TRI
 
 
 def wearing_of(hits: Sequence[Hits], related: tuple[int, ...]) -> Wearing | None:
-    """Return the strength that recognised most trials of the people left out, of equal ones the largest; None where
-    there is nothing to store.
+    """Return the strength for the people left out; None where there is nothing to store.
+
+    It is the usual one, unless another recognised a hundredth of the trials more: less is chance, with a few people.
     """
     if len(hits) < _LEAST_PEOPLE:
         return Wearing(STRENGTH, related) if related else None
     *after, before = np.sum([correct for correct, _ in hits], axis=0).tolist()
-    best = max(range(len(after)), key=lambda number: (after[number], number))
     total = sum(tested for _, tested in hits)
+    best = int(_best(np.array(after), total))
     return Wearing(STRENGTHS[best], related, len(hits), _OWN, before, after[best], total)
+
+
+def _best(after: Counts, total: int | Counts) -> Counts:
+    """Return the number (...) of the strength for correct trials (..., strengths) of `total` (...)."""
+    usual = STRENGTHS.index(STRENGTH)
+    gains = after.max(axis=-1) - after[..., usual]
+    best: Counts = np.where(_LEAST_GAIN * gains > total, after.argmax(axis=-1), usual)
+    return best
 
 
 class AdaptedRow(msgspec.Struct, frozen=True):
@@ -150,8 +161,7 @@ def study_wearers(
     for number, own in enumerate(numbers):
         part = counts[:, number * len(STRENGTHS) : (number + 1) * len(STRENGTHS)]
         others = part.sum(axis=0) - part
-        # Of equal strengths the largest: argmax returns the first.
-        best = len(STRENGTHS) - 1 - others[:, ::-1].argmax(axis=1)
+        best = _best(others, totals.sum() - totals)
         rows.append(_row(own, (part[np.arange(len(people)), best] / totals).tolist()))
     return WearerStudy(
         fingerprint=grasp_set.fingerprint(),
@@ -163,7 +173,7 @@ def study_wearers(
 
 
 def _left_out(
-    samples: Samples, subjects: np.ndarray[tuple[int], np.dtype[np.str_]], recipe: Recipe, tries: list[Try], fold: Fold
+    samples: Samples, subjects: NDArray[np.str_], recipe: Recipe, tries: list[Try], fold: Fold
 ) -> tuple[str, list[Hits]]:
     groups = subjects if len(np.unique(subjects[fold.train])) > 1 else None
     recogniser = Recogniser.fit(samples, recipe, fold.train, groups=groups)

@@ -27,35 +27,27 @@ sys.exit(run(sys.argv[1:]))
 """
 
 
-def person(name: str, seed: int, trials: int = 30) -> GraspSet:
-    """Return trials of one person, whose hand moves what each type closes, and where the joints are."""
-    hand, labels = np.random.default_rng(seed), np.arange(trials) % 3
-    random = np.random.default_rng([seed, 1])
-    centres = np.array([[60, 90], [120, 70], [100, 160]]) + hand.integers(-35, 36, (3, 2))
-    closed = np.array([[0, 0, 1, 1, 0, 1], [0, 1, 0, 1, 1, 0], [1, 0, 0, 1, 1, 1]], bool) ^ (hand.random((3, 6)) < 0.2)
-    return grasp_set_of(
-        TYPES,
-        labels,
-        switches=closed[labels] ^ (random.random((trials, 6)) < 0.12),
-        codes=np.clip(centres[labels] + random.integers(-15, 16, (trials, 2)), 0, 255),
-        subjects=np.full(trials, name),
-    )
+def recorded(people: dict[str, int], trials: int = 30) -> GraspSet:
+    """Return trials of people, each with a seed: a hand moves what each type closes, and where the joints are."""
+    labels, switches, codes = np.arange(trials) % 3, [], []
+    for seed in people.values():
+        hand, random = np.random.default_rng(seed), np.random.default_rng([seed, 1])
+        centres = np.array([[60, 90], [120, 70], [100, 160]]) + hand.integers(-35, 36, (3, 2))
+        closed = np.array([[0, 0, 1, 1, 0, 1], [0, 1, 0, 1, 1, 0], [1, 0, 0, 1, 1, 1]], bool)
+        closed ^= hand.random((3, 6)) < 0.2
+        switches.append(closed[labels] ^ (random.random((trials, 6)) < 0.12))
+        codes.append(np.clip(centres[labels] + random.integers(-15, 16, (trials, 2)), 0, 255))
+    columns = {"switches": np.vstack(switches), "codes": np.vstack(codes), "subjects": np.repeat([*people], trials)}
+    return grasp_set_of(TYPES, np.tile(labels, len(people)), **columns)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("wearer")
-    people = [person(f"P{seed}", seed) for seed in range(5)]
-    columns = ("switches", "codes", "grasps", "subjects", "objects", "trials")
-    crowd = people[0].__class__(
-        **{name: np.concatenate([getattr(one, name) for one in people]) for name in columns},
-        switch_names=people[0].switch_names,
-        joints=people[0].joints,
-        taxonomy=people[0].taxonomy,
-    )
+    crowd = recorded({f"P{seed}": seed for seed in range(5)})
     crowd.save(place / "crowd.grasps")
     compile_build(crowd, place / "build", trainer="logit", max_bins=8, folds=5, jobs=1)
-    mine = person("me", 77, 126)
+    mine = recorded({"me": 77}, 126)
     mine.rows(np.arange(6)).save(place / "mine.grasps")
     mine.rows(np.arange(6, 126)).save(place / "later.grasps")
     assert thenar("adapt", place / "build", place / "mine.grasps", "-o", place / "mine").returncode == 0
