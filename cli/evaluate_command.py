@@ -246,7 +246,7 @@ def _evaluate_wearers(
         grasp_set = GraspSet.load(grasps).without_none()
         if subjects:
             grasp_set = grasp_set.rows(np.isin(grasp_set.subjects, subjects))
-        study = study_wearers(grasp_set, recipe, numbers, jobs, report)
+        study = study_wearers(grasp_set, recipe, (0, *numbers), jobs, report)
     if output is not None:
         write_json(output, study)
     show(study, _print_wearers)
@@ -257,9 +257,9 @@ def _print_wearers(study: "WearerStudy") -> None:
     grid = table(("", *numbers), numbers)
     for row in study.rows:
         interval = "" if row.low is None else f" [{100 * max(0.0, row.low):.1f}, {100 * min(1.0, row.high or 1.0):.1f}]"
-        grid.add_row(row.title, f"{100 * row.mean:.1f}{interval}", f"{100 * row.worst:.1f}")
+        grid.add_row(row.title, f"{100 * row.mean:.1f}{interval}", f"{100 * min(row.people):.1f}")
     _print_grid(str(study.recipe), grid)
-    people = counted(len(study.subjects), "person", "people")
+    people = counted(len(study.rows[0].people), "person", "people")
     out().print(f"{counted(study.trials, 'trial')} of {people}; accuracies in %, means over people with 95 % intervals")
 
 

@@ -99,11 +99,8 @@ def _accuracy(manifest: Manifest) -> Iterator[Fact]:
     for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
         yield Fact("accuracy", f"accuracy, {rate.title}", str(rate).removeprefix(f"{rate.title}: "))
     if manifest.adapted is not None:
-        types = sum(count > 0 for count in manifest.adapted.counts)
-        what = f"to {counted(manifest.adapted.total, 'trial')} of {counted(types, 'type')}"
-        yield Fact("accuracy", "adapted", f"{what}, from build {manifest.adapted.build[:8]}")
-    elif manifest.wearing is not None and manifest.wearing.total:
-        yield Fact("accuracy", "accuracy, new subject, adapted", str(manifest.wearing))
+        counts = [count for count in manifest.adapted.counts if count]
+        yield Fact("accuracy", "adapted", f"to {counted(sum(counts), 'trial')} of {counted(len(counts), 'type')}")
     if manifest.grasps[-1] == NONE:
         yield Fact("accuracy", "nothing held", "a class of the tables")
     elif manifest.rejection is not None:

@@ -96,8 +96,10 @@ class Adaptation:
 
     def __post_init__(self) -> None:
         names, trial = np.unique(self.trials, return_inverse=True)
-        if not 0 < len(names) <= _MOST:
-            raise AdaptationError(f"{len(names)} trials of one person: adapt to 1 to {_MOST}, or compile a build")
+        if not len(names):
+            raise AdaptationError("there are no trials to adapt to: record some of each type")
+        if len(names) > _MOST:
+            raise AdaptationError(f"{len(names)} trials of one person: adapt to at most {_MOST}, or compile a build")
         if not self.strength > 0:
             raise AdaptationError(f"a strength of {self.strength}: it must be above 0")
         frames = np.bincount(trial)

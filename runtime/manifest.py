@@ -15,7 +15,7 @@ from .segmenting.model import SegmentModel
 
 SCHEMA = 1
 
-Of = Literal["pooled", "within subject", "new subject", "new object", "new session"]
+Of = Literal["pooled", "within subject", "new subject", "new subject after adaptation", "new object", "new session"]
 Protocol = Literal["training", "nested"]
 Unit = Literal["trials", "frames"]
 Code = Annotated[int, Meta(ge=0, le=65535)]
@@ -304,55 +304,25 @@ class Faults(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
 
 class Wearing(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """How the build is adapted to a person (`thenar adapt`), and what that brought to people left out.
+    """How the build is adapted to a person: see compiler/wearer.py.
 
-    strength  the pull towards the build, chosen on the people left out
+    strength  the pull towards the build, chosen on people left out
     related   correlations of the joints in the training rows, in thousandths, row by row below the diagonal; left out
               where no joint adds in proportion to its code
-    people    those left out; own: the number of their own trials of each type; before, after: correct trials of the
-              others, of `total`; 0 if nobody was left out
     """
 
     strength: Annotated[float, Meta(gt=0.0)]
     related: tuple[Annotated[int, Meta(ge=-1000, le=1000)], ...] = ()
-    people: Count = 0
-    own: Count = 0
-    before: Count = 0
-    after: Count = 0
-    total: Count = 0
-
-    def __str__(self) -> str:
-        """Return "83.1 % without own trials, 87.4 % after 2 of each type; 1,234 trials of 20 people left out"."""
-        before, after = (100 * count / max(1, self.total) for count in (self.before, self.after))
-        return (
-            f"{before:.1f} % without own trials, {after:.1f} % after {self.own} of each type; "
-            f"{self.total:,} trials of {self.people} people left out"
-        )
 
 
 class Adapted(Struct, frozen=True, forbid_unknown_fields=True):
-    """Of which build this one is an adaptation, and to which trials of its wearer.
-
-    build            checksum of the other build's build.json
-    fingerprint      SHA-256 of the wearer's recordings, of `rows` rows; digests: as in `Origin`, "" if unknown
-    counts           the number of trials of each grasp type
-    strength         the pull towards the other build
-    before, after    trials that the other build recognises, and that it recognises when adapted to the rest
+    """The checksum of the build that this one is an adaptation of, and its wearer's recordings, with the number of
+    trials of each grasp type.
     """
 
     build: Digest
-    fingerprint: Digest
-    rows: Count
-    digests: Annotated[str, Meta(pattern="^([0-9a-f]{8})*$")]
+    source: Origin
     counts: tuple[Count, ...]
-    strength: Annotated[float, Meta(gt=0.0)]
-    before: Count
-    after: Count
-
-    @property
-    def total(self) -> int:
-        """The number of trials."""
-        return sum(self.counts)
 
 
 class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
@@ -399,7 +369,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     @property
     def proved_rows(self) -> int:
         """The number of rows on which the integers were compared with the model."""
-        return self.source.rows if self.adapted is None else self.adapted.rows
+        return self.source.rows if self.adapted is None else self.adapted.source.rows
 
     @property
     def knows_none(self) -> bool:

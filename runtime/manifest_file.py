@@ -101,8 +101,6 @@ def _wrong_counts(manifest: Manifest) -> Iterator[str]:
     shares = [rate for each in manifest.detection for rate in (each.held, each.none) if rate is not None]
     counted = [(rate.correct, rate.total) for rate in (*manifest.rates, *shares)]
     counted += [(each.correct, each.total) for each in fit.compared]
-    tried = [each for each in (manifest.wearing, manifest.adapted) if each is not None]
-    counted += [(count, each.total) for each in tried for count in (each.before, each.after)]
     if faults is not None:
         counted += [(count, faults.total) for count in (faults.correct, *(each.correct for each in faults.worst))]
     if any(correct > total for correct, total in counted) or manifest.stopped_after > fit.number("rounds"):

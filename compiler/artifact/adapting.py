@@ -1,6 +1,5 @@
 """`adapt`: a build of the same elements and form for one person, from a build and a few of the person's own trials."""
 
-import hashlib
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -9,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build, read_member
 from thenar.runtime.hand import HAND_NAME
-from thenar.runtime.manifest import Adapted, Manifest, Proof, Recognised, Rejection
+from thenar.runtime.manifest import Adapted, Manifest, Of, Recognised, Rejection, Wearing
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import LIMIT, MAX_BYTES, IntegerTables, tables_to_bytes
 from thenar.runtime.model.quantise import quantise
-from thenar.runtime.model.tables import ScoreTables, winners
-from thenar.runtime.model.terms.base import HIGHEST_CODE
+from thenar.runtime.model.tables import winners
 from thenar.runtime.names import list_names, nearest
 from thenar.runtime.segmenting.model import STEPS, SegmentModel, gain_of
 
@@ -26,12 +24,11 @@ from ..model.collapse import collapse
 from ..model.compare import compare
 from ..recogniser import predicted_classes
 from ..recordings.graspset import GraspSet
-from ..samples import decided
+from ..samples import decided, select_inputs
 from ..wearer import STRENGTH, Adaptation, AdaptationError
-from .compile import check_target, publish
+from .compile import check_target, origin_of, proof_of, publish, sha256
 from .documents import SPEC_FOLDER
 from .ensemble import ensemble_to_bytes
-from .training import stored_digests
 from .verify import load_ensemble
 from .verify_firmware import made_firmware
 
@@ -45,9 +42,9 @@ class AdaptedBuild:
     folder : Path
         Its folder.
     manifest : Manifest
-        The content of `build.json`; `adapted` counts the trials, and those recognised before and after.
-    model, tables : ScoreTables and IntegerTables
-        The scores, and the integers made of them.
+        The content of `build.json`.
+    before, after : int
+        The person's trials that the other build recognises, and those that it recognises adapted to all others.
     warnings : tuple of str
         Sentences on trials that contradict each other, and on types without trials.
     firmware : str
@@ -56,22 +53,13 @@ class AdaptedBuild:
 
     folder: Path
     manifest: Manifest
-    model: ScoreTables
-    tables: IntegerTables
+    before: int
+    after: int
     warnings: tuple[str, ...]
     firmware: str
 
 
-def adapt(
-    build: str | Path,
-    X: ArrayLike,
-    y: ArrayLike,
-    output: str | Path,
-    *,
-    trials: ArrayLike | None = None,
-    strength: float | None = None,
-    recordings: GraspSet | None = None,
-) -> AdaptedBuild:
+def adapt(folder: str | Path, recordings: GraspSet, output: str | Path) -> AdaptedBuild:
     """Write a build for one person: the same elements, thresholds and kinds of terms, with scores for this person.
 
     The base dependencies suffice; without the extra `compiler` the build has no firmware. The same input gives the same
@@ -79,20 +67,12 @@ def adapt(
 
     Parameters
     ----------
-    build : path
+    folder : path
         The build of everybody.
-    X : array of int, shape (n, s + j)
-        The person's frames: the build's switches, 0 or 1, then the codes of its joints, in the build's order.
-    y : array of str, shape (n,)
-        The grasp type of each frame. Types may be missing.
+    recordings : GraspSet
+        The person's trials. Types may be missing.
     output : path
         The folder to write: new, empty, or a build, which is replaced.
-    trials : array of int, shape (n,), optional
-        The trial of each frame. None: each is one.
-    strength : float, optional
-        The pull towards the build. None: the one that it stores, or 1.
-    recordings : GraspSet, optional
-        Where the frames are from, so that `verify` knows trials that were adapted to.
 
     Returns
     -------
@@ -103,76 +83,64 @@ def adapt(
     ------
     AdaptationError
         If there are no trials, or of a type that the build does not know.
-    BuildError, FormatError, CompileError
-        If there is no build, or `output` is not a folder for one.
+    CompileError
+        If the recordings lack inputs of the build, or `output` is not a folder for one.
+    BuildError, FormatError
+        If there is no build.
 
     Examples
     --------
-    >>> from thenar.compiler import GraspSet, Samples, adapt, compile_build
-    >>> others = GraspSet.load("set.grasps")
-    >>> report = compile_build(others, "build", rounds=5, folds=0, prune=0, inputs="joints")
-    >>> mine = adapt("build", others.codes[:6], others.grasps[:6], "mine")
-    >>> mine.manifest.adapted.total
-    6
+    >>> import numpy as np
+    >>> from thenar.compiler import GraspSet, adapt, compile_build
+    >>> grasp_set = GraspSet.load("set.grasps")
+    >>> report = compile_build(grasp_set, "build", rounds=5, folds=0)
+    >>> adapt("build", grasp_set.rows(np.arange(6)), "mine").manifest.adapted.counts
+    (2, 2, 2)
     """
-    target, folder = check_target(Path(output)), Path(build)
-    if target == folder.resolve():
-        raise AdaptationError(f"{folder} is the build to adapt: name another folder to write")
-    crowd = Build.load(folder)
-    manifest, old = crowd.manifest, crowd.tables
-    if manifest.adapted is not None:
-        raise AdaptationError(f"{folder} is adapted to a person already: adapt the build that it was made of")
-    bits, codes, labels = _frames(manifest, X, y)
-    trial = np.arange(len(labels)) if trials is None else np.unique(np.asarray(trials), return_inverse=True)[1]
-    wearing = manifest.wearing
-    if strength is None:
-        strength = STRENGTH if wearing is None else wearing.strength
-    before = collapse(load_ensemble(folder, crowd), old.n_switches)
-    adaptation = Adaptation(before, bits, codes, labels, trial, strength, () if wearing is None else wearing.related)
-    model = adaptation.adapted
-    made = quantise(model, bits, codes, manifest.options.width, manifest.options.table_bits)
+    target, source = check_target(Path(output)), Path(folder)
+    crowd = Build.load(source)
+    manifest, old, wearing = crowd.manifest, crowd.tables, crowd.manifest.wearing or Wearing(STRENGTH)
+    if target == source.resolve() or manifest.adapted is not None:
+        raise AdaptationError(f"{source} must be the build of everybody, and the folder to write another one")
+    if not manifest.knows_none:
+        recordings = recordings.without_none()
+    grasps = np.array(manifest.grasps)
+    if unknown := sorted({*recordings.grasps.tolist()} - {*manifest.grasps}):
+        raise AdaptationError(
+            f"the build does not know {list_names(unknown)}{nearest(unknown[0], manifest.grasps)}: leave these trials "
+            "out, or compile a build with trials of others"
+        )
+    bits, codes = select_inputs(recordings, manifest)
+    labels = (recordings.grasps[:, np.newaxis] == grasps).argmax(axis=1)
+    before = collapse(load_ensemble(source, crowd), old.n_switches)
+    trials = recordings.trial_ids
+    adaptation = Adaptation(before, bits, codes, labels, trials, wearing.strength, wearing.related)
+    made = quantise(adaptation.adapted, bits, codes, manifest.options.width, manifest.options.table_bits)
     tables = _with_substitutes(made, old, bits, codes)
     rejection = _wider(manifest.rejection, old, tables, bits, codes, labels)
-    comparison = compare(model, tables, bits, codes)
     guesses = [labels, winners(before.scores(bits, codes)), winners(adaptation.left_out)]
-    truth, *rows = decided(np.stack([*guesses, predicted_classes(tables, rejection, bits, codes)]), trial)
+    guesses.append(predicted_classes(tables, rejection, bits, codes))
+    truth, *rows = decided(np.stack(guesses), np.unique(trials, return_inverse=True)[1])
     unadapted, left_out, learnt = (int(np.count_nonzero(row == truth)) for row in rows)
-    counts = tuple(np.bincount(truth, minlength=len(manifest.grasps)).tolist())
-    files = {TABLES_NAME: tables_to_bytes(tables), ENSEMBLE_NAME: ensemble_to_bytes(model)}
-    seed = manifest.options.seed
+    counts, seed = np.bincount(truth, minlength=len(grasps)).tolist(), manifest.options.seed
+    of: Of = "within subject"
+    files = {TABLES_NAME: tables_to_bytes(tables), ENSEMBLE_NAME: ensemble_to_bytes(adaptation.adapted)}
     described = manifest_to_bytes(
         structs.replace(
             manifest,
             thenar=version("thenar"),
-            tables_sha256=_sha256(files[TABLES_NAME]),
-            ensemble_sha256=_sha256(files[ENSEMBLE_NAME]),
-            proof=Proof(
-                width=manifest.options.width,
-                scale=tables.scale,
-                bound=tables.bound,
-                error=comparison.integer_bound,
-                safe_margin=comparison.safe_margin,
-                covered=int(np.count_nonzero(comparison.covered)),
-                changed=len(comparison.changed),
-            ),
+            tables_sha256=sha256(files[TABLES_NAME]),
+            ensemble_sha256=sha256(files[ENSEMBLE_NAME]),
+            proof=proof_of(tables, compare(adaptation.adapted, tables, bits, codes), manifest.options.width),
             rates=(
-                Recognised("training", 0, seed, learnt, len(truth), "within subject", "trials"),
-                Recognised("nested", len(truth), seed, left_out, len(truth), "within subject", "trials"),
+                Recognised("training", 0, seed, learnt, len(truth), of, "trials"),
+                Recognised("nested", len(truth), seed, left_out, len(truth), of, "trials"),
             ),
             faults=None,
             detection=(),
             rejection=rejection,
             segments=_rescaled(manifest.segments, old.scale / tables.scale),
-            adapted=Adapted(
-                build=manifest.checksum,
-                fingerprint=_fingerprint(bits, codes, labels) if recordings is None else recordings.fingerprint(),
-                rows=len(labels),
-                digests="" if recordings is None else stored_digests(recordings),
-                counts=counts,
-                strength=strength,
-                before=unadapted,
-                after=left_out,
-            ),
+            adapted=Adapted(manifest.checksum, origin_of(recordings), tuple(counts)),
         )
     )
     personal = manifest_from_bytes(described)
@@ -180,30 +148,9 @@ def adapt(
         firmware, note = made_firmware(personal, tables)
     except ModuleNotFoundError:
         firmware, note = {}, ""
-    files |= {path: text.encode() for path, text in firmware.items()} | _carried(folder, manifest)
+    files |= {path: text.encode() for path, text in firmware.items()} | _carried(source, manifest)
     publish(files | {MANIFEST_NAME: described}, target)
-    return AdaptedBuild(target, personal, model, tables, tuple(_warnings(manifest, adaptation, counts)), note)
-
-
-def _frames(
-    manifest: Manifest, X: ArrayLike, y: ArrayLike
-) -> tuple[NDArray[np.bool_], NDArray[np.uint16], NDArray[np.intp]]:
-    """Return the frames' switches, codes and classes. Raises AdaptationError."""
-    frames, names, s, grasps = np.asarray(X), np.asarray(y), len(manifest.switches), list(manifest.grasps)
-    width = s + len(manifest.joints)
-    if not names.size:
-        raise AdaptationError("there are no trials to adapt to: record some of each type")
-    if frames.shape != (names.size, width) or names.ndim != 1:
-        raise AdaptationError(f"frames {frames.shape} of types {names.shape} must be (n, {width}) and (n,)")
-    if unknown := sorted({*names.tolist()} - {*grasps}):
-        raise AdaptationError(
-            f"the build does not know {list_names(unknown)}{nearest(str(unknown[0]), grasps)}: leave these trials out, "
-            "or compile a build with trials of others"
-        )
-    if frames.min() < 0 or frames.max() > HIGHEST_CODE:
-        raise AdaptationError(f"frames hold {frames.min()} to {frames.max()}: codes are 0 to {HIGHEST_CODE}")
-    labels = np.array([grasps.index(name) for name in names.tolist()], np.intp)
-    return frames[:, :s].astype(np.bool_), frames[:, s:].astype(np.uint16), labels
+    return AdaptedBuild(target, personal, unadapted, left_out, tuple(_warnings(manifest, adaptation, counts)), note)
 
 
 def _with_substitutes(
@@ -276,11 +223,3 @@ def _warnings(manifest: Manifest, adaptation: Adaptation, counts: Sequence[int])
         yield f"a frame is the same for {names}: if one of these trials was labelled wrongly, leave it out"
     if missing := [name for name, count in zip(manifest.grasps, counts, strict=True) if not count]:
         yield f"no trials of {list_names(missing)}: changed as the other types are on average"
-
-
-def _fingerprint(bits: NDArray[np.bool_], codes: NDArray[np.uint16], labels: NDArray[np.intp]) -> str:
-    return _sha256(np.column_stack([bits, codes, labels]).astype("<i8").tobytes())
-
-
-def _sha256(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()

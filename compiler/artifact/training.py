@@ -30,7 +30,7 @@ from ..trainers.base import Report, Training
 from ..workers import check_memory, in_workers, little
 from . import CompileError
 from .ensemble import MAX_STUMPS
-from .wearers import Hits, hits_of
+from .wearers import Hits, chosen_strength, hits_of
 
 USUAL_ROUNDS = 100  # assumed amount of work where the fit is still to be chosen
 # The scores of a fold's test rows, and what adapting to people left out brings.
@@ -110,14 +110,14 @@ class Tested:
 
     The rates, the headline first; the confusion matrix (K, K) of frames in the headline folds, with a row for each true
     class; the scores of all rows (n, K), from the first folds that all learn from rows of nothing held, if any do; and
-    what adapting to people left out brings.
+    the strength with which the build is adapted to a person.
     """
 
     rates: tuple[Recognised, ...]
     detection: tuple[Detected, ...]
     confusion: NDArray[np.intp]
     scores: Scores
-    adapted: Sequence[Hits] = ()
+    strength: float
 
 
 def scores_of(
@@ -170,7 +170,8 @@ def cross_validated(
     for cut, predicted in zip(cuts, classes, strict=True):
         rates += rates_of("nested", samples, predicted, options.seed, cut)
         detection += detection_of("nested", samples, predicted, options.seed, cut)
-    return Tested(tuple(rates), tuple(detection), confusion, scores, adapted)
+    strength, adapted_rates = chosen_strength(adapted, len(cuts[0].folds), options.seed)
+    return Tested((*rates, *adapted_rates), tuple(detection), confusion, scores, strength)
 
 
 def fold_results(
@@ -319,6 +320,6 @@ def trained_on(manifest: Manifest, grasp_set: GraspSet) -> NDArray[np.bool_]:
     source, digests = manifest.source, _digests(grasp_set)
     if grasp_set.fingerprint() == source.fingerprint:
         return np.ones(len(digests), bool)
-    trials = source.trials + ("" if manifest.adapted is None else manifest.adapted.digests)
+    trials = source.trials + ("" if manifest.adapted is None else manifest.adapted.source.trials)
     stored = {trials[at : at + _DIGITS] for at in range(0, len(trials), _DIGITS)}
     return np.array([digest in stored for digest in digests], bool)

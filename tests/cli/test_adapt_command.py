@@ -67,13 +67,12 @@ def test_the_adapted_build_reads_what_the_other_does(folder: Path) -> None:
     one, other = Build.load(folder / "build"), Build.load(folder / "mine")
     assert other.manifest.switches == one.manifest.switches
     assert other.manifest.joints == one.manifest.joints
-    adapted, wearing = other.manifest.adapted, one.manifest.wearing
+    adapted = other.manifest.adapted
     assert adapted is not None
-    assert wearing is not None
-    assert (adapted.build, adapted.counts, adapted.rows) == (one.manifest.checksum, (2, 2, 2), 6)
-    assert adapted.strength == wearing.strength
-    assert (wearing.people, wearing.own) == (5, 2)
-    assert wearing.after > wearing.before
+    assert (adapted.build, adapted.counts, adapted.source.rows) == (one.manifest.checksum, (2, 2, 2), 6)
+    left_out = {rate.of: rate for rate in one.manifest.rates if rate.protocol == "nested"}
+    assert left_out["new subject after adaptation"].total == 120
+    assert left_out["new subject after adaptation"].rate > left_out["new subject"].rate
     core = {path.name: path.read_bytes() for path in (folder / "build" / "firmware").iterdir()}
     changed = {name for name, data in core.items() if (folder / "mine" / "firmware" / name).read_bytes() != data}
     assert changed == {"thenar_glove.h", "thenar_glove.c"}
@@ -90,17 +89,14 @@ def test_the_wearers_frames_are_not_refused(folder: Path) -> None:
     assert ((mine.codes >= low) & (mine.codes <= high) & (high <= HIGHEST_CODE)).all()
 
 
-def test_what_is_printed_and_stored(folder: Path, tmp_path: Path) -> None:
+def test_what_is_printed(folder: Path, tmp_path: Path) -> None:
     said = thenar("adapt", folder / "build", folder / "mine.grasps", "-o", tmp_path / "mine")
-    adapted = json.loads((tmp_path / "mine" / "build.json").read_text())["adapted"]
-    assert said.stdout.splitlines()[:2] == [
-        f"{tmp_path}/mine: adapted to 6 trials of 3 types, with strength {adapted['strength']:g}",
-        f"recognised of these trials: {adapted['before'] / 0.06:.1f} % before, {adapted['after'] / 0.06:.1f} % after, "
-        "each by a build adapted to all others",
-    ]
-    assert thenar("adapt", folder / "mine", folder / "mine.grasps", "-o", tmp_path / "new").stderr.endswith(
-        "is adapted to a person already: adapt the build that it was made of\n"
-    )
+    lines = said.stdout.splitlines()
+    assert lines[0] == f"{tmp_path}/mine: adapted to 6 trials of 3 types"
+    after = Build.load(tmp_path / "mine").manifest.headline
+    assert after is not None
+    assert f"{100 * after.rate:.1f} % after, each by a build adapted to all others" in lines[1]
+    assert "must be the build of everybody" in thenar(*said.args[:1], folder / "mine", *said.args[2:]).stderr
 
 
 def test_the_base_dependencies_suffice_and_give_the_same_bytes(folder: Path, tmp_path: Path) -> None:
