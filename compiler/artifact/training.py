@@ -124,7 +124,7 @@ def scores_of(
     samples: Samples, options: Recipe, ports: PortCosts | None, groups: Groups, limits: Limits | None, fold: Fold
 ) -> tuple[Scores, list[Hits]]:
     """Fit a recogniser on the fold's training rows only; return its scores of the test rows: see `Recogniser.scores`,
-    and what adapting it brings, if all test rows are of people left out.
+    and what adapting it to people left out brings.
 
     Raises CompileError, which names the fold.
     """
@@ -133,8 +133,7 @@ def scores_of(
     except CompileError as wrong:
         raise CompileError(f"in fold {fold.name}: {wrong}, or compile without folds (0)") from None
     tested = samples.rows(fold.test)
-    known = np.isin(tested.subjects, samples.subjects[fold.train]).any()
-    return recogniser.scores(tested), [] if known else hits_of(recogniser, tested)
+    return recogniser.scores(tested), hits_of(recogniser, tested)
 
 
 def cross_validated(

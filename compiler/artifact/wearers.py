@@ -36,7 +36,7 @@ def related_joints(tables: ScoreTables, learnt: Samples) -> tuple[int, ...]:
 
 
 def hits_of(recogniser: Recogniser, samples: Samples, tries: Sequence[Try] = TRIES) -> list[Hits]:
-    """Return what each try brings to each person in `samples`, with all inputs, of whom the recogniser saw nothing.
+    """Return what each try brings to each person in `samples`, with all inputs, whom the recogniser has not seen.
 
     A person's first trials of each type adapt; those that no try needs are tested. A person without such is left out.
     """
@@ -44,7 +44,7 @@ def hits_of(recogniser: Recogniser, samples: Samples, tries: Sequence[Try] = TRI
     tables = collapse(recogniser.model, read.n_switches)
     related = related_joints(tables, recogniser.read(recogniser.samples))
     most, found = max(own for own, _ in tries), []
-    for person in np.unique(read.subjects):
+    for person in np.setdiff1d(read.subjects, recogniser.samples.subjects):
         rows = read.rows(read.subjects == person)
         _, first, trial = np.unique(rows.trials, return_index=True, return_inverse=True)
         truth, place = rows.labels[first], np.empty(len(first), np.intp)
