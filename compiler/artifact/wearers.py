@@ -36,7 +36,7 @@ def related_joints(tables: ScoreTables, learnt: Samples) -> tuple[int, ...]:
 
 
 def hits_of(recogniser: Recogniser, samples: Samples, tries: Sequence[Try] = TRIES) -> list[Hits]:
-    """Return what each try brings to each person in `samples`, with all inputs, whom the recogniser has not seen.
+    """Return the effect of each try on each person in `samples`, with all inputs, whom the recogniser has not seen.
 
     A person's first trials of each type adapt; those that no try needs are tested. A person without such is left out.
     """
