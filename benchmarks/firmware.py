@@ -21,8 +21,7 @@ from typing import Any
 
 import numpy as np
 from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split
-from firmwarelogit import fitted, pruned
-from firmwarepeers import SHARES, peers
+from firmwarepeers import peers
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
@@ -41,10 +40,6 @@ from thenar.compiler.model.collapse import collapse
 from thenar.compiler.trainers.base import Model
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import quantise
-from thenar.runtime.model.tables import ScoreTables
-from thenar.runtime.model.terms.bins import Bins
-from thenar.runtime.model.terms.bit import Bit
-from thenar.runtime.model.terms.line import Line
 
 AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
 CORES = ("cortex-m4", "cortex-m0plus")
@@ -92,31 +87,24 @@ Frames = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Ours:
-    """A trainer with `settings`, with entries of `bits`, and with or without joints; or, with a `share` of the weights
-    of joints, the pruned logistic regression of the peers by thenar's terms, integers and firmware.
-    """
+    """A trainer with `settings`, with entries of `bits`, and with or without joints."""
 
     trainer: str
     bits: int
     settings: tuple[tuple[str, Any], ...] = ()
     joints: bool = True
-    share: float = 1.0
 
     @property
     def name(self) -> str:
         """The name in the table."""
-        given = "".join(f", {name} {value}" for name, value in self.settings if name in ("max_bins", "linear"))
+        given = "".join(f", {name} {value}" for name, value in self.settings if name in ("max_bins", "sparsity"))
         alone = "" if self.joints else ", switches only"
-        alone += f", {self.share:.0%} of the joints' weights" if self.share < 1 else ""
         return f"thenar, {self.trainer}{given}, {self.bits} bit{alone}"
 
     def integers(self, fold: Fold) -> IntegerTables:
         """Return the integer tables of a fold."""
         samples = fold.samples(joints=self.joints)
-        if self.share < 1:
-            tables = _pruned(fold, self.share)
-        else:
-            tables = collapse(_trained(self.trainer, self.settings, fold, self.joints), SWITCHES)
+        tables = collapse(_trained(self.trainer, self.settings, fold, self.joints), SWITCHES)
         return quantise(tables, samples.switches, samples.codes, 16, self.bits)
 
     def predictor(self, fold: Fold) -> Predictor:
@@ -127,13 +115,13 @@ class Ours:
 
 BINS = ("max_bins", 8)
 # The pull of a line is that of scikit-learn's logistic regression with C = 1, which the peers take.
-FEW, LINE = (("max_bins", 4),), (("linear", 1), ("penalty", 0.5))
+FEW, LINE = (("max_bins", 4),), (("penalty", 0.5),)
 OURS = (
     Ours("logitboost", 16, (("rounds", 100), BINS)),
     Ours("logit", 16, (BINS,)),
     Ours("logit", 16, FEW),
-    Ours("logit", 8, LINE),
-    *(Ours("logit", 8, LINE, share=share) for share in SHARES[1:]),
+    Ours("linear", 8, LINE),
+    *(Ours("linear", 8, (*LINE, ("sparsity", sparsity))) for sparsity in (0.5, 0.6)),
     Ours("logit", 16, (BINS,), joints=False),
 )
 
@@ -142,18 +130,6 @@ OURS = (
 def _trained(trainer: str, settings: tuple[tuple[str, Any], ...], fold: Fold, joints: bool) -> Model:
     member = TRAINERS.named(trainer)
     return member.train(fold.samples(joints=joints), member.candidates(dict(settings))[0] | dict(settings))
-
-
-def _pruned(fold: Fold, share: float) -> ScoreTables:
-    """Return the peers' pruned logistic regression: a bit for each switch, a line for each joint."""
-    bias, switches, standardised = (np.pad(each, [(0, 0)] * (each.ndim - 1) + [(0, 1)]) for each in pruned(fold, share))
-    _, mean, deviation = fitted(fold)
-    codes = fold.samples(joints=True).codes.astype(np.int64)
-    low, high, rows = codes.min(axis=0), codes.max(axis=0), standardised / deviation[:, np.newaxis]
-    constant = np.zeros((1, len(bias)))
-    lines = [Line(joint, int(low[joint]), int(high[joint]), row) for joint, row in enumerate(rows)]
-    bins = [Bins(joint, np.zeros(0, np.uint16), constant) for joint in range(JOINTS)]
-    return ScoreTables(bias - (mean - low) @ rows, (*(Bit(n, row) for n, row in enumerate(switches)), *bins, *lines))
 
 
 @dataclass(frozen=True, slots=True)

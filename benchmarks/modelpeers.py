@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from modelsets import Cut
 from numpy.typing import NDArray
+from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.ensemble import ExtraTreesClassifier, HistGradientBoostingClassifier, RandomForestClassifier
 from sklearn.linear_model import LogisticRegression
 from sklearn.neighbors import KNeighborsClassifier
@@ -154,6 +155,8 @@ OURS = tuple(
     Model(name, how, _trained(name), additive=True, ours=True, needs="thenar")
     for name, how in (
         ("logitboost", "100 rounds, the paper's"),
+        ("linear", "default settings"),
+        ("discriminant", "joints as lines"),
         ("logit", "default settings"),
         ("pairs", "default settings"),
         (AUTO, "chosen by inner folds"),
@@ -165,6 +168,12 @@ PEERS = (
         "C of 4",
         _fitted(LogisticRegression, scaled=True, max_iter=2000),
         _grid(C=[1, 0.1, 10, 100]),
+        additive=True,
+    ),
+    Model(
+        "discriminant analysis",
+        "shrunk as in Ledoit-Wolf",
+        _fitted(LinearDiscriminantAnalysis, solver="lsqr", shrinkage="auto"),
         additive=True,
     ),
     Model(

@@ -1,7 +1,6 @@
 """Additive models compared with the best alternatives, on the same folds.
 
     python benchmarks/models.py [--sets aml icub ...] [--models logit "RBF SVM" ...] [--data FOLDER]
-    python benchmarks/models.py --learning-curve
 
 Folds separate trials, or subjects; the switches (the first 33 of ID3, or all if there are fewer) are placed inside each
 fold, and settings are chosen inside as well. Predictions are kept in --store, so an interrupted run can be resumed.
@@ -20,7 +19,7 @@ from time import process_time
 import msgspec
 import numpy as np
 from modelpeers import OURS, PEERS, Model, recognised
-from modelsets import CURVE, CURVE_SCENE, SETS, Cut, curve, cuts, load
+from modelsets import SETS, Cut, cuts, load
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -32,16 +31,6 @@ from thenar.compiler.workers import in_workers
 from thenar.runtime.manifest import Of
 
 CONSOLE = Console(width=150)
-CURVE_MODELS = (
-    "logitboost",
-    "logit",
-    "pairs",
-    "auto",
-    "logistic regression",
-    "random forest",
-    "extra trees",
-    "RBF SVM",
-)
 # The lead allowed to a baseline.
 WITHIN = 0.5
 
@@ -211,20 +200,6 @@ def summary(every: dict[tuple[str, Of], list[Line]], name: str) -> Table:
     return table
 
 
-def learnt(work: Cuts, models: Sequence[Model], store: Store) -> Table:
-    """Return the learning curve: the mean over training sets, for each number of repetitions."""
-    table = Table("repetitions of a type by a person", *map(str, CURVE), title=f"{CURVE_SCENE}, on fresh grasps, %")
-    table.add_row("training sets", *map(str, CURVE.values()), end_section=True)
-    for model in models:
-        cells = []
-        for name, found in work.items():
-            each = [line for cut in found for line in lines(name, [cut], [model], store)]
-            rates = [100 * line.rate.mean for line in each]
-            cells.append(f"{np.mean(rates):.2f}" if len(each) == len(found) else "-")
-        table.add_row(model.name, *cells)
-    return table
-
-
 def asked() -> argparse.Namespace:
     """Return the command line options."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -232,18 +207,13 @@ def asked() -> argparse.Namespace:
     parser.add_argument("--models", nargs="+", help="of " + ", ".join(model.name for model in OURS + PEERS))
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the real recordings")
     parser.add_argument("--store", type=Path, default=Path("build/models.jsonl"))
-    parser.add_argument("--learning-curve", action="store_true")
     parser.add_argument("--jobs", type=int, default=1)
     return parser.parse_args()
 
 
 def worked(options: argparse.Namespace) -> Cuts:
-    """Return the folds of each available set, or those of the learning curve."""
+    """Return the folds of each available set."""
     work: Cuts = {}
-    if options.learning_curve:
-        for repetitions, cut in curve():
-            work.setdefault(f"{CURVE_SCENE}, {repetitions} repetitions", []).append(cut)
-        return work
     for name in options.sets:
         try:
             work[name] = list(cuts(load(name, options.data)))
@@ -254,9 +224,8 @@ def worked(options: argparse.Namespace) -> Cuts:
 
 def wanted(options: argparse.Namespace) -> Iterator[Model]:
     """Yield the requested models that are available."""
-    names = options.models or (CURVE_MODELS if options.learning_curve else None)
     for model in OURS + PEERS:
-        if names is not None and model.name not in names:
+        if options.models is not None and model.name not in options.models:
             continue
         if model.there:
             yield model
@@ -270,9 +239,6 @@ def main() -> None:
     models, work = list(wanted(options)), worked(options)
     store = stored(options.store)
     fill(store, options.store, work, models, options.jobs)
-    if options.learning_curve:
-        CONSOLE.print(learnt(work, models, store))
-        return
     every = {}
     for name, found in work.items():
         for of in dict.fromkeys(cut.of for cut in found):

@@ -31,9 +31,6 @@ SWITCHES, FOLDS, INNER, SEED = 33, 4, 3, 1
 MOST_SUBJECTS = 10
 # Of trials with several frames, each third frame is used: neighbours add little.
 EACH = 3
-# Repetitions of each type by each subject, and the number of training sets of this size in the mean.
-CURVE = {2: 6, 4: 6, 8: 4, 16: 2, 100: 1}
-CURVE_SCENE, FRESH = "kamakura", 96
 
 Rows = NDArray[np.intp]
 
@@ -91,24 +88,10 @@ def cuts(samples: Samples) -> Iterator[Cut]:
 def _placed(of: Of, samples: Samples, fold: Fold) -> Cut:
     train, test = samples.rows(np.sort(fold.train)), samples.rows(np.sort(fold.test))
     groups = train.subjects if of == "new subject" and np.ptp(train.subjects) else train.trials
-    return _with_switches(of, fold.name, train, test, groups)
+    return with_switches(of, fold.name, train, test, groups)
 
 
-def _with_switches(of: Of, name: str, train: Samples, test: Samples, groups: Rows) -> Cut:
+def with_switches(of: Of, name: str, train: Samples, test: Samples, groups: Rows) -> Cut:
+    """Return the fold with the switches that the training rows choose."""
     columns = choose(train)[0][:SWITCHES] if train.n_switches else ()
     return Cut(of, name, train.keeping(columns), test.keeping(columns), groups)
-
-
-def curve() -> Iterator[tuple[int, Cut]]:
-    """Yield, for each number of repetitions, training sets of consecutive ones, tested on fresh grasps of the hands."""
-    recorded = simulate(load_scene(CURVE_SCENE)).grasp_set
-    fresh = Samples.of(simulate(load_scene(CURVE_SCENE).varied(None, None, more=FRESH)).grasp_set)
-    samples = Samples.of(recorded)
-    kind = samples.subjects * samples.n_classes + samples.labels
-    order = np.lexsort([recorded.trials, kind])
-    place = np.empty(len(order), np.intp)
-    place[order] = np.concatenate([np.arange(count) for count in np.bincount(kind)])
-    for repetitions, draws in CURVE.items():
-        for draw in range(draws):
-            train = samples.rows(place // repetitions == draw)
-            yield repetitions, _with_switches("pooled", f"draw {draw + 1}", train, fresh, train.trials)

@@ -203,7 +203,8 @@ class Recogniser:
         deviations = []
         for fold in folds or inner_folds(samples, recipe.seed, groups):
             learnt = samples.rows(fold.train)
-            tables = collapse(self.training.train(learnt), learnt.n_switches)
+            # The drafts by which the fit was chosen.
+            tables = collapse(self.training.draft(learnt), learnt.n_switches)
             integers = quantise(tables, learnt.switches, learnt.codes, recipe.width, recipe.table_bits)
             deviations.append(_Limits(learnt, integers).deviations(samples.rows(fold.test)))
         if not deviations:

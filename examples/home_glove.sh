@@ -16,11 +16,11 @@ thenar import "$TABLE" -o set.grasps --yes --overwrite
 # How many grasps of whom, what the pads read, and how well they can tell the grasps apart.
 thenar info set.grasps --plot set.png --overwrite
 # Rates for people whom nothing was learnt from, placement inside the folds.
-thenar evaluate set.grasps --by subject --protocol nested --tables compositions --trainer logit -o rates.json --overwrite
+thenar evaluate set.grasps --by subject --tables compositions --trainer linear -o rates.json --overwrite
 # Which pads and levels are worth keeping.
 thenar place set.grasps --method elimination --keep 16 -o kept.json --overwrite
 # The build: integer tables with their proof, report and spec.
-thenar compile set.grasps -o build --method elimination --keep 16 --trainer logit --folds 0
+thenar compile set.grasps -o build --method elimination --keep 16 --trainer linear --folds 0
 # Every row through floats and integers: they must agree.
 thenar verify build set.grasps
 # The grasps of the recordings, as a live glove would announce them.

@@ -45,7 +45,7 @@ print(len(grasp_set), "frames of", grasp_set.trial_ids.max() + 1, "trials; peopl
 # training rows as well.
 
 # %%
-study = evaluate(grasp_set, scheme="subject", protocols=("nested",), tables=("compositions",), trainer="logit")
+study = evaluate(grasp_set, scheme="subject", protocols=("nested",), tables=("compositions",), trainer="linear")
 # I: all pads and flex sensors; II, III: selected pads, other pads; IV: flex sensors; V to VII: pads alone.
 for row in study.tables[0].rows:
     print(f"{row.name:24} {row.rate.mean:6.1%}")
@@ -57,7 +57,7 @@ for row in study.tables[0].rows:
 
 # %%
 folder = Path(tempfile.mkdtemp()) / "build"
-report = compile_build(grasp_set, folder, prune=100, trainer="logit", folds=0)
+report = compile_build(grasp_set, folder, prune=100, trainer="linear", folds=0)
 print(report.tables_bytes, "bytes of tables;", report.firmware)
 
 # %% [markdown]

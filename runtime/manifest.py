@@ -50,7 +50,7 @@ class Compared(Struct, frozen=True, forbid_unknown_fields=True):
 
     correct  trials predicted correctly, of `total` tested ones
     error    the accuracy's standard error
-    loss     mean of -ln P(true type) over the trials
+    loss     mean of -ln P(true type) over the trials, of scores times their best factor
     behind   difference from the best accuracy; behind_error: the standard error of that difference
     rows     rows of its score tables, on average
     """

@@ -41,13 +41,13 @@ NOT_RUN = {
     "thenar doctor --line /dev/ttyUSB0 --propose glove.toml": "needs a glove",
     "thenar run build/ --glove glove.toml --sink ros:/thenar": "needs a glove",
     "thenar simulate crowd --subjects 20 --repetitions 6 -o hands.grasps": "is for the rates below",
-    "thenar evaluate hands.grasps --by subject --protocol nested --tables compositions --prune 30 --trainer logit": (
+    "thenar evaluate hands.grasps --by subject --tables compositions --prune 30 --trainer logit": (
         "is for the rates below, too"
     ),
 }
 # Commands that take too long for `make test`: there a page runs up to the first of them.
 SLOW = {
-    "thenar evaluate set.grasps --tables compositions --protocol nested --baselines none --repeats 1",
+    "thenar evaluate set.grasps --tables compositions --baselines none",
     "thenar compile set.grasps -o build/",
 }
 

@@ -261,7 +261,8 @@ def _placed_by(estimator: Any, options: Recipe) -> tuple[Recipe, tuple[float, ..
 def _trained_by(classifier: Any, options: Recipe) -> Recipe:
     if isinstance(classifier, AdditiveLogitClassifier):
         settings = {"penalty": float(classifier.penalty), "smoothness": float(classifier.smoothness)}
-        settings |= {"linear": 1.0} if classifier.linear else {}
+        if classifier.linear:
+            return structs.replace(options, trainer="linear", settings=settings)
         bins = classifier.max_bins or HIGHEST_CODE + 1
         return structs.replace(options, trainer="logit", max_bins=bins, settings=settings)
     if not isinstance(classifier, LogitBoostClassifier):

@@ -1,10 +1,11 @@
 """What is chosen inside the training rows: elements and joints, and by inner folds the trainer and its settings.
 
 Inner folds split no movement; if the fit is to generalise to new subjects (objects, sessions), they also leave subjects
-out. Each candidate is scored by its accuracy on trials, ties by log-loss. Candidates within one standard error of the
-difference to the best are considered equal; of these, those with small tables are cheap to deploy, and the one with the
-lowest log-loss among them is taken. Rows in which nothing is held count only in the log-loss. For trials of many
-frames, a subset of the frames suffices for the comparison.
+out. Each candidate is scored by its accuracy on trials, ties by log-loss: that of its scores times the best factor, as
+trainers differ in how sure they are. Candidates within one standard error of the difference to the best are considered
+equal; of these, those with small tables are cheap to deploy, and the one with the lowest log-loss among them is taken.
+Rows in which nothing is held count only in the log-loss. For trials of many frames, a subset of the frames suffices for
+the comparison.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -42,6 +43,8 @@ _LEAST_GROUPS = 3
 # Tables of eight kilobytes, at a byte per entry, fit the smallest microcontrollers; larger ones are small up to a
 # quarter above the smallest.
 _SMALL, _LARGER = 8192, 1.25
+# Factors of scores, of which each candidate has the best.
+_FACTORS = tuple(2.0**exponent for exponent in range(-6, 4))
 # Frames of a trial resemble their neighbours: of more rows than this, evenly spaced ones suffice to compare fits, at
 # least this many per trial.
 _COMPARED, _FRAMES = 2048, 8
@@ -244,24 +247,29 @@ def _alike(training: Training) -> tuple[object, ...]:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Test:
     """The result for the trials of a fold: the first rows (T,) of trials with a grasp, and whether each was recognised;
-    the number of trials including those without a grasp, the sum of their losses, and the rows of its tables.
+    the number of trials including those without a grasp, the sums of their losses with each factor, and the rows of its
+    tables.
     """
 
     first: Rows
     hits: NDArray[np.bool_]
     trials: int
-    loss: float
+    losses: tuple[float, ...]
     rows: float
+
+    @property
+    def loss(self) -> float:
+        """The mean loss with the best factor."""
+        return round(min(self.losses) / self.trials, 6)
 
 
 def _joined(tests: list[_Test]) -> _Test:
-    """Return the result over all inner folds: the mean loss, and the mean number of rows."""
-    trials = sum(test.trials for test in tests)
+    """Return the result over all inner folds, with the mean number of rows."""
     return _Test(
         np.concatenate([test.first for test in tests]),
         np.concatenate([test.hits for test in tests]),
-        trials,
-        round(fsum(test.loss for test in tests) / trials, 6),
+        sum(test.trials for test in tests),
+        tuple(map(fsum, zip(*(test.losses for test in tests), strict=True))),
         sum(test.rows for test in tests) / len(tests),
     )
 
@@ -278,15 +286,15 @@ def _tested(task: tuple[Samples, Fold, list[Training], list[int]]) -> tuple[str,
         models = trainings[int(np.argmax(rounds))].stages(learning, rounds)
     tests = []
     for model in models:
-        scores = model.scores(test.switches, test.codes)
-        predicted = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
-        loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
+        scores = np.ascontiguousarray(model.scores(test.switches, test.codes).T)
+        predicted = decided(scores.argmax(axis=0)[np.newaxis], trial)[0]
+        losses = (softmax_and_loss(factor * scores, test.labels, weights)[1] for factor in _FACTORS)
         tests.append(
             _Test(
                 fold.test[first[held]],
                 (predicted == test.labels[first])[held],
                 len(first),
-                loss,
+                tuple(loss * len(first) for loss in losses),
                 # The scores of the inputs in use: of each switch, bin, cell of a grid, and line.
                 sum(term.n_rows for term in collapse(model, samples.n_switches).core_terms if term.largest > 0),
             )

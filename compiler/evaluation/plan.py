@@ -34,7 +34,7 @@ def learners() -> tuple[str, ...]:
     """Return the methods in the table of trainers: REFERENCE, the other trainers that can be chosen automatically, and
     CLASSIFIERS.
     """
-    return tuple(dict.fromkeys([REFERENCE, *(name for name in TRAINERS if TRAINERS[name].tried), *CLASSIFIERS]))
+    return tuple(dict.fromkeys([REFERENCE, *(name for name in TRAINERS if TRAINERS[name].automatic), *CLASSIFIERS]))
 
 
 def candidates_of(recipe: Recipe) -> Candidates:
@@ -87,7 +87,7 @@ def predictions(
     if fit.learner:
         fitting = choose_training(learning, candidates[fit.learner], groups=None if groups is None else groups[rows])
         training = Training.chosen(fitting, masked=training.masked)
-    return grasps[winners(training.train(learning).scores(test.switches, test.codes))]
+    return grasps[winners(training.draft(learning).scores(test.switches, test.codes))]
 
 
 def _classified(name: str, learning: Samples, test: Samples) -> Labels:

@@ -159,7 +159,7 @@ def _fit(target: Target, tables: IntegerTables, group: int, allowed: int) -> Par
     if target.avr and rows > _LARGEST_ARRAY and straight(layout) is None:
         raise FirmwareError(
             f"the rows need {rows} bytes, but an array of an AVR has at most {_LARGEST_ARRAY}: compile with "
-            "``linear`` 0 ``max_bins`` 16, or with fewer ``rounds``"
+            "trainer ``logit`` and ``max_bins`` 16, or with fewer ``rounds``"
         )
     cost = estimate(target.formula, layout, avr=target.avr)
     if cost.flash > allowed or cost.ram > target.ram:

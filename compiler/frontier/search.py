@@ -109,8 +109,10 @@ class Search:
         """The trainers, the paper's first; the other properties describe the first: see `alone`."""
         if self.trainer != AUTO:
             return (self.trainer,)
-        names = dict.fromkeys(training.trainer for training in Training.candidates(self._recipe(AUTO)))
-        return tuple(sorted(names, key=lambda name: name != PAPERS_TRAINER))
+        recipe = self._recipe(AUTO)
+        # The first that takes the settings is the paper's, which is compared with those that are chosen automatically.
+        names = [training.trainer for training in (Training.of(recipe), *Training.candidates(recipe))]
+        return tuple(sorted(dict.fromkeys(names), key=lambda name: name != PAPERS_TRAINER))
 
     def alone(self, trainer: str) -> "Search":
         """Return the same search with one of its trainers."""

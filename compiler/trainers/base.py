@@ -76,6 +76,9 @@ class Setting:
         return self.kind(value)
 
 
+MAX_BINS = "Most bins per joint; fewer make smaller tables.  [default: no limit; logit: 16; discriminant: no bins]"
+
+
 class Trainer(ABC):
     """A method that fits an additive model: a sum over inputs, F_k(x) = b_k + `sum over i of T_i[x_i][k]`.
 
@@ -90,8 +93,10 @@ class Trainer(ABC):
     settings : tuple of Setting
         The hyperparameters. Trainers that share a name share its meaning.
     tried : tuple of mapping
-        Combinations of settings that are compared where trainer and settings are chosen automatically, the most regular
-        first; other settings have their defaults. Empty: the trainer is used only if named.
+        Combinations of settings that are compared where settings are chosen automatically, the most regular first;
+        other settings have their defaults. Empty: there is nothing to choose.
+    automatic : bool
+        Whether it is compared with others where the trainer is chosen automatically.
     staged : bool
         Whether `rounds` is a setting, and one training also gives the models of all smaller numbers of rounds.
     drafting : mapping
@@ -102,6 +107,7 @@ class Trainer(ABC):
     what: str
     settings: tuple[Setting, ...] = ()
     tried: tuple[Mapping[str, Number], ...] = ({},)
+    automatic: bool = True
     staged: bool = False
     drafting: Mapping[str, Number] = {}
 
@@ -204,7 +210,7 @@ class Training:
         """
         asked = _asked(options)
         if options.trainer == AUTO and len(asked) > 1:
-            asked = [(trainer, given) for trainer, given in asked if trainer.tried]
+            asked = [(trainer, given) for trainer, given in asked if trainer.automatic]
         return tuple(
             cls(trainer.name, values, options.robust)
             for trainer, given in asked
@@ -236,7 +242,8 @@ def _asked(options: Recipe) -> list[tuple[Trainer, dict[str, Number]]]:
     """Return the trainers that may be used, and the settings given to each.
 
     A given setting that some trainers lack applies to the simplest trainer that has it, the one with the fewest
-    settings: `rounds` means LogitBoost, not a trainer that boosts and does more.
+    settings: `rounds` means LogitBoost, not a trainer that boosts and does more. A trainer without bins keeps any limit
+    of bins.
     """
     shared = {name: value for name in SHARED if (value := getattr(options, name)) is not None}
     if options.trainer != AUTO:
@@ -245,7 +252,7 @@ def _asked(options: Recipe) -> list[tuple[Trainer, dict[str, Number]]]:
         return [(trainer, {name: value for name, value in shared.items() if name in own} | options.settings)]
     given: dict[str, Number] = shared | options.settings
     names = {trainer.name: {setting.name for setting in trainer.settings} for trainer in TRAINERS.values()}
-    takers = [name for name in names if names[name] >= given.keys()]
+    takers = [name for name in names if names[name] | {"max_bins"} >= given.keys()]
     if not takers:
         lacking = sorted(given.keys() - set().union(*names.values()))
         wrong = (
@@ -257,7 +264,7 @@ def _asked(options: Recipe) -> list[tuple[Trainer, dict[str, Number]]]:
     if len(takers) < len(names):
         size = {name: len(names[name]) for name in takers}
         takers = [name for at, name in enumerate(takers) if not any(size[one] < size[name] for one in takers[:at])]
-    return [(TRAINERS[name], given) for name in takers]
+    return [(TRAINERS[name], {key: given[key] for key in given if key in names[name]}) for name in takers]
 
 
 def check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int, weights: Floats | None) -> None:

@@ -15,7 +15,7 @@ from thenar.runtime.model.terms.line import Line
 from ..elementary import Floats, on_one_grid
 from ..samples import TrainingError
 from ..workers import check_memory
-from .base import Report, Setting, Trainer, check_rows
+from .base import MAX_BINS, Report, Setting, Trainer, check_rows
 from .newton import DRAFT, TOLERANCE, Column, Fit, Ruler, columns_of
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 BINS = 16
 PENALTY, SMOOTHNESS = 0.5, 2.0
 FINEST = 1e-12  # the least tolerance
+_FEWER = 3.0  # the pull on the weights that remain is smaller by this factor
 
 
 class Rise(NamedTuple):
@@ -93,6 +94,7 @@ def fit_logit(
     smoothness: float = SMOOTHNESS,
     max_bins: int | None = BINS,
     linear: bool = False,
+    sparsity: float = 0.0,
     tolerance: float = TOLERANCE,
     weights: Floats | None = None,
     counted: int = 0,
@@ -103,7 +105,8 @@ def fit_logit(
     `penalty` pulls rows towards zero, `smoothness` pulls those of neighbouring bins towards each other. Columns have at
     most `max_bins` bins (2 or more; None: one for each value) that hold frames as evenly as possible. With `linear` a
     column of more than two values adds scores in proportion to them, between minimum and maximum, and `smoothness`
-    pulls the contribution of one standard deviation. The number of set bits among the first `counted` columns adds
+    pulls the contribution of one standard deviation; a share of these weights, `sparsity`, is 0, relative to the last
+    class. The number of set bits among the first `counted` columns adds
     scores as well, with the weak pull of a bin, so that their common effect is learned at once. Frames in `held` (n,)
     are known not to be of the last class, which learns nothing from them. No derivative of the loss is larger at the
     solution than `tolerance` times the sum of weights. Raises TrainingError.
@@ -127,8 +130,30 @@ def fit_logit(
     columns = columns_of(X, max_bins, weights, heavy if linear else None)
     count = count_of(columns[:counted], heavy)
     pulls = penalty * scale, smoothness * scale
-    rows = Fit([*columns, *count], labels, n_classes, *pulls, weights, held).minimum(tolerance)
+    every = [*columns, *count]
+    rows = Fit(every, labels, n_classes, *pulls, weights, held).minimum(tolerance)
+    if sparsity and (free := _large(columns, rows, sparsity)) is not None:
+        weaker = pulls[0] / _FEWER, pulls[1] / _FEWER
+        rows = Fit(every, labels, n_classes, *weaker, weights, held, free).minimum(tolerance)
     return tables_of(columns, spread_out(columns, rows, count))
+
+
+def _large(columns: Sequence[Column], rows: Floats, sparsity: float) -> NDArray[np.bool_] | None:
+    """Return which of the rows (r, K) remain if a share of the lines' weights is 0 relative to the last class, as are
+    all of that class itself; None without lines.
+    """
+    starts = 1 + np.cumsum([0, *(column.n_rows for column in columns[:-1])])
+    lines = [(start, column.line) for start, column in zip(starts.tolist(), columns, strict=True) if column.line]
+    if not lines:
+        return None
+    places = [start for start, _ in lines]
+    deviations = np.sqrt([line.variance for _, line in lines])[:, np.newaxis]
+    sizes = (np.abs(rows[places, :-1] - rows[places, -1:]) * deviations).ravel()
+    small, kept = np.argsort(sizes, kind="stable")[: round(sparsity * sizes.size)], np.ones(sizes.size, np.bool_)
+    kept[small] = False
+    free = np.ones(rows.shape, np.bool_)
+    free[places, -1], free[places, :-1] = False, kept.reshape(len(places), -1)
+    return free
 
 
 def count_of(columns: Sequence[Column], weights: Floats) -> list[Column]:
@@ -174,14 +199,16 @@ class Logit(Trainer):
     name = "logit"
     what = "multinomial logistic regression on a table for each input"
     settings = (
-        Setting("penalty", "Pull of scores towards zero (logit).", float, PENALTY, 1e-6, 1e6),
+        Setting("penalty", "Pull of scores towards zero.", float, PENALTY, 1e-6, 1e6),
         Setting(
-            "smoothness", "Pull of a joint's neighbouring bins towards each other (logit).", float, SMOOTHNESS, 0.0, 1e6
+            "smoothness",
+            "Pull of a joint's neighbouring bins towards each other, and of its line towards zero.",
+            float,
+            SMOOTHNESS,
+            0.0,
+            1e6,
         ),
-        Setting(
-            "max_bins", "Most bins per joint; fewer make smaller tables.  [default: no limit; logit: 16]", int, BINS, 2
-        ),
-        Setting("linear", "1: joints add scores in proportion to their codes, without bins (logit).", int, 0, 0, 1),
+        Setting("max_bins", MAX_BINS, int, BINS, 2),
     )
 
     # The best smoothness grows with the number of bins: more bins mean smaller steps between them.
@@ -189,15 +216,12 @@ class Logit(Trainer):
     tried = (
         {"penalty": 1.0, "smoothness": 4.0, "max_bins": 16},
         {"penalty": 3.0, "smoothness": 24.0, "max_bins": 32},
-        {"penalty": 1.0, "smoothness": 8.0, "max_bins": 32},
         {"penalty": 0.3, "smoothness": 1.5, "max_bins": 32},
-        {"penalty": 1.0, "smoothness": 1.0, "linear": 1},
-        {"penalty": 0.3, "smoothness": 1.0, "linear": 1},
     )
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> ScoreTables:
         """Return the tables. Raises TrainingError for settings that make no sense."""
-        given = {**settings, "max_bins": settings["max_bins"] or BINS, "linear": bool(settings["linear"])}
+        given = {**settings, "max_bins": settings["max_bins"] or BINS}
         tables = fit_logit(samples.inputs, samples.labels, samples.n_classes, **given, **of_none(samples))
         return tables.score_tables(samples.n_switches)
 

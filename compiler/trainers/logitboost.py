@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..elementary import Floats, add_exactly, softmax, softmax_and_loss
 from ..samples import TrainingError
 from ..workers import check_memory
-from .base import Number, Report, Setting, Trainer, check_rows
+from .base import MAX_BINS, Number, Report, Setting, Trainer, check_rows
 from .binning import bin_columns
 from .stumps import Stumps, Targets, centred, fit_stumps
 
@@ -141,18 +141,17 @@ class LogitBoost(Trainer):
     name = "logitboost"
     what = "LogitBoost on decision stumps, as in the paper"
     rank = -1
+    automatic = False  # in no set that we know is it better than the others
     staged = True
     tried = (
         {"rounds": 30, "max_bins": 16, "ties": "least-used"},
         {"rounds": 100, "max_bins": 16, "ties": "least-used"},
-        {"rounds": 100, "max_bins": 16, "ties": "least-used", "shrinkage": 0.3},
-        {"rounds": 100},
     )
     settings = (
         Setting("rounds", "Rounds of LogitBoost.", int, 100, 1),
         Setting("shrinkage", "Factor on the contribution of each round.", float, 1.0, SMALLEST_SHRINKAGE, 1.0),
         Setting("tolerance", "Stop after a round that changes the mean loss by less than this.", float, None, 0),
-        Setting("max_bins", "Most bins per joint; fewer make smaller tables.  [default: no limit]", int, None, 2),
+        Setting("max_bins", MAX_BINS, int, None, 2),
         Setting("ties", "Between equal stumps, take the first or the least used input.", str, "first", names=TIES),
     )
 

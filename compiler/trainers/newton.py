@@ -148,7 +148,7 @@ class _Point:
 class Fit:
     """The loss of rows W (r, K), and its minimum. Sums over frames, and all that decide a branch, are exact.
 
-    The rows are the bias, then those of each column.
+    The rows are the bias, then those of each column. Entries that are not `free` (r, K) stay 0; None: all are free.
     """
 
     def __init__(
@@ -160,11 +160,12 @@ class Fit:
         smoothness: float,
         weights: Floats | None,
         held: NDArray[np.bool_] | None = None,
+        free: NDArray[np.bool_] | None = None,
     ) -> None:
         n, self._labels, self._weights, self._known = len(labels), labels, weights, held
         self._member = (labels[:, np.newaxis] == np.arange(n_classes)).astype(np.float64)
         self._total = float(n if weights is None else weights.sum())
-        self._grids: list[tuple[int, int, tuple[int, int], float]] = []
+        self._free, self._grids = free, list[tuple[int, int, tuple[int, int], float]]()
         pull, joined, start = [np.array([BIAS_SHARE * penalty])], [np.zeros(0, np.intp)], 1
         for column in columns:
             pull.append(column.pulls(penalty, smoothness))
@@ -195,7 +196,7 @@ class Fit:
         """
         design = [part for each in (self._cells, self._shared) for part in (each.data, each.indices, each.indptr)]
         targets = self._labels, self._member.shape, self._weights, self._known
-        given = self._pull, self._joint, self._grids, tolerance, near
+        given = self._pull, self._joint, self._grids, self._free, tolerance, near
         asked = blake2b(dumps((design, targets, given))).digest()
         if asked in MINIMA:
             return MINIMA[asked]
@@ -226,6 +227,8 @@ class Fit:
         shares, mean = softmax_and_loss(np.ascontiguousarray(scores.T), self._labels, self._weights)
         probability, held = np.ascontiguousarray(shares.T), self._held(rows)
         gradient = self._over_frames(probability - self._member) + held
+        if self._free is not None:
+            gradient *= self._free
         return _Point(rows, probability, mean * self._total + 0.5 * dot(rows, held), gradient)
 
     def _held(self, rows: Floats) -> Floats:
@@ -261,7 +264,10 @@ class Fit:
         moved = on_one_grid(moved, moved.shape[1])
         # Exact, and three times as fast as sum().
         moved -= probability * np.einsum("ij->i", moved)[:, np.newaxis]
-        return self._over_frames(moved) + self._held(rows)
+        bent = self._over_frames(moved) + self._held(rows)
+        if self._free is not None:
+            bent *= self._free
+        return bent
 
     def _direction(self, point: _Point, unsolved: float) -> Floats:
         """Return V with H V = -gradient up to `unsolved`, by conjugate gradients preconditioned with H's diagonal."""

@@ -117,7 +117,7 @@ class Pairs(Trainer):
     what = "the logit, with tables for pairs of joints"
     rank = 2
     settings = (
-        *(setting for setting in LOGIT.settings if setting.name != "linear"),
+        *LOGIT.settings,
         Setting("pairs", "Use at most this many pairs of joints; each joint is in one pair at most.", int, PAIRS, 1),
         Setting("pair_bins", "Give a joint at most this many bins in a pair.", int, PAIR_BINS, 2, MOST_PAIR_BINS),
         Setting(
@@ -131,7 +131,7 @@ class Pairs(Trainer):
     )
     drafting = DRAFT
     tried = (
-        {"penalty": 1.0, "smoothness": 8.0, "max_bins": 32, "pair_smoothness": 1.0},
+        {"penalty": 3.0, "smoothness": 24.0, "max_bins": 32, "pair_smoothness": 10.0},
         {"penalty": 0.3, "smoothness": 2.0, "max_bins": 32, "pair_smoothness": 0.3},
     )
 

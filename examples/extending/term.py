@@ -42,7 +42,7 @@ class LogitWithCorner(Trainer):
 
     def train(self, samples, settings, report=None):
         """Return the tables of the logit, and the corner."""
-        tables = TRAINERS["logit"].train(samples, {"penalty": 1.0, "smoothness": 4.0, "max_bins": 4, "linear": 0})
+        tables = TRAINERS["logit"].train(samples, {"penalty": 1.0, "smoothness": 4.0, "max_bins": 4})
         if samples.codes.shape[1] < 2:
             return tables
         members = samples.labels == np.arange(samples.n_classes)[:, None]

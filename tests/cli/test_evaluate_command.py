@@ -45,7 +45,7 @@ def grasps(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_the_papers_tables_are_printed_with_both_protocols_explained(
     grasps: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["evaluate", grasps, *QUICK]) == 0
+    assert run(["evaluate", grasps, *QUICK, "--protocol", "both"]) == 0
     printed, complaints = capsys.readouterr()
     for text in (
         "Protocol paper: The placement is chosen once, from all rows",

@@ -98,7 +98,7 @@ def grasp_set() -> GraspSet:
 def build_files(linear: bool = False) -> dict[str, bytes]:
     """Return name -> content of the files that a build of the grasps is loaded from; its joints may be linear."""
     with TemporaryDirectory() as folder:
-        logit: dict[str, Any] = {"trainer": "logit", "linear": 1, "penalty": 1.0, "smoothness": 1.0, "max_bins": 8}
+        logit: dict[str, Any] = {"trainer": "linear", "penalty": 1.0, "smoothness": 1.0}
         options = logit if linear else {"rounds": 4}
         compile_build(grasp_set(), Path(folder) / "build", folds=0, harness=harness(), **options)
         return {path.name: path.read_bytes() for path in sorted(Path(folder, "build").iterdir()) if path.is_file()}

@@ -188,3 +188,21 @@ def test_a_remembered_minimum_is_that_of_the_same_fit(change: dict[str, Any]) ->
     MINIMA.clear()
     assert numbers(fit_logit(X, labels, 3, max_bins=None, **change)) == changed != plain
     assert not any(rows.flags.writeable for rows in MINIMA.values())
+
+
+@given(SEEDS, st.sampled_from([0.3, 0.8, 1.0]))
+@settings(max_examples=10, deadline=None)
+def test_sparse_lines_are_the_best_of_all_with_these_weights_zero(seed: int, sparsity: float) -> None:
+    X, labels = grasps(seed, joints=5)
+    own: dict[str, Any] = {"penalty": 1.0, "smoothness": 1.0, "linear": True, "tolerance": 1e-10}
+    tables, dense = fit_logit(X, labels, 3, **own, sparsity=sparsity), fit_logit(X, labels, 3, **own)
+    found, whole = (np.stack([each.lines[6 + joint].row for joint in range(5)]) for each in (tables, dense))
+    assert not found[:, -1].any()
+    assert np.count_nonzero(found == 0) == 5 + round(sparsity * 10)
+    sizes = np.abs(whole[:, :-1] - whole[:, -1:]) * X[:, 6:].std(axis=0)[:, np.newaxis]
+    assert sizes[found[:, :-1] == 0].max() <= sizes[found[:, :-1] != 0].min(initial=np.inf)
+    # No derivative is left: the gradient of the loss, of the penalty, and nothing else, at each weight that is not 0.
+    over = softmax(np.ascontiguousarray(tables.scores(X).T)).T - (labels[:, np.newaxis] == np.arange(3))
+    pull = (1 + BIN_SHARE) / 3  # of the weights that remain, a third of the others'
+    slopes = (X[:, 6:] - X[:, 6:].mean(axis=0)).T @ over + pull * X[:, 6:].var(axis=0)[:, np.newaxis] * found
+    np.testing.assert_allclose(slopes[found != 0], 0, atol=0.02 * np.abs(X[:, 6:]).max())

@@ -121,7 +121,7 @@ def test_frames_that_are_numbered_as_trials_are_refused_before_any_work(tmp_path
     assert compile_build(numbered, tmp_path / "build", rounds=1, folds=0).manifest.headline is None
 
 
-OPEN: dict[str, Any] = {"trainer": "logit", "penalty": 1.0, "max_bins": 4, "linear": 0}  # the smoothness is chosen
+OPEN: dict[str, Any] = {"trainer": "logit", "penalty": 1.0, "max_bins": 4}  # the smoothness is chosen
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_a_choice_is_recorded_and_made_again_from_the_recorded_options(grasp_set
     fit, options = manifest.fit, manifest.options
     smoothness = {tried["smoothness"] for tried in TRAINERS["logit"].tried}
     assert manifest.fitting == fit
-    assert (options.trainer, options.settings, options.max_bins) == ("logit", {"penalty": 1.0, "linear": 0.0}, 4)
+    assert (options.trainer, options.settings, options.max_bins) == ("logit", {"penalty": 1.0}, 4)
     assert (fit.trainer, fit.tried, fit.of) == ("logit", len(smoothness), "within subject")
     assert fit.settings["smoothness"] in smoothness
     assert {each.settings["smoothness"] for each in fit.compared} >= {fit.settings["smoothness"]}

@@ -28,7 +28,8 @@ TRAINERS: tuple[dict[str, Any], ...] = (
     {"trainer": "logit", **LOGIT},
     {"trainer": "logitboost", "rounds": 4},
     {"trainer": "pairs", "pairs": 2, "pair_bins": 4, **LOGIT},
-    {"trainer": "logit", "linear": 1, **LOGIT},
+    {"trainer": "discriminant", "max_bins": 8},
+    {"trainer": "linear", "penalty": 0.5, "smoothness": 1.0, "sparsity": 0.5},
 )
 SEEDS = dict(enumerate(islice(cycle(KINDS), 68)))
 

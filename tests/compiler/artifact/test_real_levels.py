@@ -14,7 +14,7 @@ from thenar.compiler.recordings.table import read_table
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 # What inner folds choose; the choice itself takes most of the time.
-FIXED: dict[str, Any] = {"trainer": "logit", "penalty": 0.3, "smoothness": 1.5, "max_bins": 32, "linear": 0}
+FIXED: dict[str, Any] = {"trainer": "logit", "penalty": 0.3, "smoothness": 1.5, "max_bins": 32}
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.special import log_softmax
 
 from thenar.compiler import TRAINERS, GraspSet, Recipe, Samples, ScoreTables, Setting, Trainer
 from thenar.compiler.evaluation import choosing as module
@@ -87,9 +88,9 @@ def test_every_candidate_is_scored_as_if_it_were_trained_alone(by: str | None) -
     candidates = [Training.of(Recipe(trainer="logitboost", rounds=rounds)) for rounds in (2, 9)]
     candidates.append(Training.of(changed(Recipe(), {"trainer": "logit", "max_bins": 4})))
     folds = inner_folds(samples, 5, groups)
-    expected = []
+    factors, expected = 2.0 ** np.arange(-6, 4)[:, np.newaxis, np.newaxis], []
     for candidate in candidates:
-        hits, loss = 0, 0.0
+        hits, losses = 0, np.zeros(len(factors))
         for fold in folds:
             learning, test = samples.rows(fold.train), samples.rows(fold.test)
             scores = candidate.draft(learning).scores(test.switches, test.codes)
@@ -97,9 +98,8 @@ def test_every_candidate_is_scored_as_if_it_were_trained_alone(by: str | None) -
                 own = scores[test.trials == trial]
                 label = test.labels[test.trials == trial][0]
                 hits += np.bincount(own.argmax(axis=1)).argmax() == label
-                shares = np.exp(own) / np.exp(own).sum(axis=1, keepdims=True)
-                loss -= np.log(shares[:, label]).mean()
-        expected.append((hits, loss / 96))
+                losses -= log_softmax(factors * own, axis=2)[:, :, label].mean(axis=1)
+        expected.append((hits, losses.min() / 96))
     fitting = choose_training(samples, candidates, seed=5, groups=groups, of="new subject")
     assert (fitting.of, fitting.folds, fitting.tried) == ("new subject" if by else "pooled", len(folds), 3)
     shown = {each.name: (each.correct, each.loss) for each in fitting.compared}
@@ -114,7 +114,7 @@ def test_every_candidate_is_scored_as_if_it_were_trained_alone(by: str | None) -
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_any_number_of_workers_chooses_the_same(grasp_set: GraspSet, jobs: int) -> None:
     candidates = Training.candidates(Recipe(trainer="logitboost")) + Training.candidates(
-        changed(Recipe(), {"trainer": "logit", "max_bins": 4, "penalty": 1.0, "linear": 0})
+        changed(Recipe(), {"trainer": "logit", "max_bins": 4, "penalty": 1.0})
     )
     seen: list[tuple[int, int]] = []
     fitting = choose_training(Samples.of(grasp_set), candidates, jobs=jobs, report=lambda *done: seen.append(done))
@@ -172,11 +172,11 @@ def test_leads_within_one_subject_are_not_chosen_for_new_subjects(monkeypatch: p
 @pytest.mark.parametrize(
     ("changes", "trainers"),
     [
-        ({}, set(TRAINERS)),
-        ({"max_bins": 8}, set(TRAINERS)),
+        ({}, set(TRAINERS) - {"logitboost"}),
+        ({"max_bins": 8}, set(TRAINERS) - {"logitboost"}),
         ({"rounds": 3}, {"logitboost"}),
         ({"shrinkage": 0.5}, {"logitboost"}),
-        ({"penalty": 2.0}, {"logit"}),
+        ({"penalty": 2.0}, {"linear", "logit"}),
         ({"trainer": "logit"}, {"logit"}),
         ({"trainer": "logitboost"}, {"logitboost"}),
     ],
@@ -187,11 +187,11 @@ def test_given_settings_are_fixed_and_select_their_trainer(changes: dict[str, An
     assert len({repr(each) for each in candidates}) == len(candidates)
     for each in candidates:
         assert set(each.settings) == {setting.name for setting in TRAINERS[each.trainer].settings}
-        assert all(each.settings[name] == value for name, value in changes.items() if name != "trainer")
+        assert all(each.settings.get(name, value) == value for name, value in changes.items() if name != "trainer")
 
 
 @pytest.mark.parametrize(
-    "changes", [{"rounds": 3}, {"trainer": "logit", "penalty": 1.0, "smoothness": 2.0, "max_bins": 8, "linear": 0}]
+    "changes", [{"rounds": 3}, {"trainer": "logit", "penalty": 1.0, "smoothness": 2.0, "max_bins": 8}]
 )
 def test_where_all_that_is_compared_is_given_one_candidate_is_left(changes: dict[str, Any]) -> None:
     assert len(Training.candidates(changed(Recipe(), changes))) == 1

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from thenar.compiler.evaluation.folds import EvaluationError, Fold, Population, Scheme
-from thenar.compiler.evaluation.plan import CLASSIFIERS, REFERENCE, CellPlan, FoldFit, RowPlan, learners
+from thenar.compiler.evaluation.folds import PROTOCOLS, EvaluationError, Fold, Population, Scheme
+from thenar.compiler.evaluation.plan import CLASSIFIERS, REFERENCE, CellPlan, FoldFit, RowPlan, TableName, learners
 from thenar.compiler.evaluation.rates import Rate, RecipeWords
 from thenar.compiler.evaluation.study import TABLES, Study, StudyDesign, draw, evaluate
 from thenar.compiler.evaluation.tables import RateReader, RateRow, RateTable, draw_matrix
@@ -83,7 +83,10 @@ def test_a_row_counts_all_its_subjects_and_only_compositions_carry_confusions() 
     assert reader.table("compositions", "paper", (row,), recipe).rows[0].cells[0].confusion is not None
 
 
-QUICK = StudyDesign(Recipe(trainer="logitboost", rounds=5), repeats=2, prune_list=(0, 10))
+ALL: tuple[TableName, ...] = (*TABLES, "trainers")
+QUICK = StudyDesign(
+    Recipe(trainer="logitboost", rounds=5), repeats=2, prune_list=(0, 10), protocols=tuple(PROTOCOLS), tables=ALL
+)
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +105,7 @@ def row(table: RateTable, name: str) -> RateRow:
 
 
 def test_every_table_comes_under_both_protocols_in_the_papers_layout(study: Study) -> None:
-    both = [(name, p) for name in TABLES for p in ("paper", "nested") if (name, p) != ("trainers", "paper")]
+    both = [(name, p) for name in ALL for p in ("paper", "nested") if (name, p) != ("trainers", "paper")]
     assert [(t.name, t.protocol) for t in study.tables] == both
     for each in study.tables:
         assert each.columns == ("A", "B")
@@ -229,7 +232,7 @@ def test_a_set_without_rows_is_refused() -> None:
 
 
 def test_every_composition_and_protocol_has_its_picture(tmp_path: Path) -> None:
-    options = StudyDesign(Recipe(trainer="logitboost", rounds=2), repeats=1, tables=("compositions", "pruning"))
+    options = QUICK.changed(rounds=2, repeats=1, tables=("compositions", "pruning"))
     study = evaluate(make_grasps(n_joints=0), options, jobs=1)
     drawn = draw(study, tmp_path / "new" / "folder")
     names = [f"confusion-{protocol}-{name}.png" for protocol in ("paper", "nested") for name in ("V", "VI", "VII")]

@@ -139,7 +139,7 @@ def with_none_too() -> GraspSet:
 
 KINDS: dict[str, tuple[int, dict[str, Any]]] = {
     "plain": (PLAIN, {"trainer": "logitboost", "rounds": 8}),
-    "slopes": (SLOPED, {"trainer": "logit", "linear": 1}),
+    "slopes": (SLOPED, {"trainer": "linear"}),
     "pairs": (PAIRED, {"trainer": "pairs"}),
 }
 
