@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from rich.table import Table as Grid
 
     from thenar.compiler.artifact.stream_study import StreamStudy, SubjectMean
+    from thenar.compiler.artifact.wearers import WearerStudy
     from thenar.compiler.evaluation.study import Study
     from thenar.compiler.evaluation.tables import RateTable
     from thenar.runtime.recipe import Recipe
@@ -44,8 +45,10 @@ _USUAL = ("compositions", "generality", "pruning", "baselines")
 TABLES = (*_USUAL, "trainers", "joints")
 
 
-def _numbers(_: click.Context, __: click.Parameter, value: str) -> tuple[int, ...]:
-    """Return the comma-separated whole numbers in `value`, each once, in the order given."""
+def _numbers(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, ...]:
+    """Return the comma-separated whole numbers in `value`, each once, in the order given; none if not given."""
+    if value is None:
+        return ()
     parts = comma_separated(value)
     if not all(part.isascii() and part.isdigit() for part in parts):
         raise click.BadParameter(f"{value!r} is not a list of whole numbers such as 0,13,62")
@@ -130,6 +133,13 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     is_flag=True,
     help="Evaluate segmentation of whole movements instead, leaving out one subject at a time.",
 )
+@click.option(
+    "--adapt",
+    "numbers",
+    callback=_numbers,
+    metavar="N,N,...",
+    help="Evaluate adaptation to each subject, left out, by the first N trials of each type instead.",
+)
 @click.option("--confusion", is_flag=True, help="Print the confusion matrix of every composition and subject.")
 @click.option(
     "--plot",
@@ -148,6 +158,7 @@ def command(
     grasps: Path,
     jobs: int,
     streams: bool,
+    numbers: tuple[int, ...],
     confusion: bool,
     folder: Path | None,
     output: Path | None,
@@ -170,6 +181,9 @@ def command(
     whose streams are decoded, live and afterwards. The dwell rule, a sequential test and a plain hidden Markov model
     are decoded for comparison.
 
+    With --by subject --adapt, every subject is left out once, and what the others' model recognises of the subject's
+    last trials is compared before and after adapting it to the first ones, as `thenar adapt` does.
+
     \b
     Example:
         thenar evaluate set.grasps
@@ -177,6 +191,7 @@ def command(
         thenar evaluate set.grasps --by subject --permute 100
         thenar evaluate movements.grasps --streams --trainer logit
         thenar evaluate set.grasps --by subject --tables joints
+        thenar evaluate set.grasps --by subject --adapt 1,2,3
         thenar evaluate set.grasps --by subject --plot pictures/ -o result.json
     """
     from thenar.compiler.evaluation.study import StudyDesign, evaluate
@@ -187,11 +202,17 @@ def command(
     training = asked_settings(context, asked)
     chosen = {name: asked.pop(name) for name in (*CHOOSING, "folds", "seed")}
     recipe = changed(Recipe(), chosen | training)
-    if streams:
+    if streams or numbers:
+        kind = "streams" if streams else "adapt"
         given = {name: chosen[name] for name in LIMITS} | {"layout": layout, "glove": glove}
         if unused := next((name for name, value in given.items() if value), ""):
-            raise click.UsageError(f"--{unused.replace('_', '-')} is not for --streams: leave one of them out.")
-        _evaluate_streams(grasps, recipe, asked["subjects"], jobs, output)
+            raise click.UsageError(f"--{unused.replace('_', '-')} is not for --{kind}: leave one of them out.")
+        if streams:
+            _evaluate_streams(grasps, recipe, asked["subjects"], jobs, output)
+            return
+        if asked["scheme"] != "subject" or not all(numbers):
+            raise click.UsageError("--adapt leaves a subject out: give --by subject, and numbers of 1 or more trials.")
+        _evaluate_wearers(grasps, recipe, asked["subjects"], numbers, jobs, output)
         return
     asked["tables"] = tuple(name for name in TABLES if name in asked["tables"])
     design = StudyDesign(recipe, **asked)
@@ -209,6 +230,36 @@ def command(
     for sentence in study.warnings:
         warning(sentence)
     show(study, _print, confusion=confusion)
+
+
+def _evaluate_wearers(
+    grasps: Path, recipe: "Recipe", subjects: tuple[str, ...], numbers: tuple[int, ...], jobs: int, output: Path | None
+) -> None:
+    """Evaluate adaptation to each subject, left out in turn."""
+    import numpy as np
+
+    from thenar.compiler.artifact.wearers import study_wearers
+    from thenar.compiler.recordings.graspset import GraspSet
+
+    with progress("adapting to each subject") as report:
+        grasp_set = GraspSet.load(grasps).without_none()
+        if subjects:
+            grasp_set = grasp_set.rows(np.isin(grasp_set.subjects, subjects))
+        study = study_wearers(grasp_set, recipe, (0, *numbers), jobs, report)
+    if output is not None:
+        write_json(output, study)
+    show(study, _print_wearers)
+
+
+def _print_wearers(study: "WearerStudy") -> None:
+    numbers = ("mean", "worst")
+    grid = table(("", *numbers), numbers)
+    for row in study.rows:
+        interval = "" if row.low is None else f" [{100 * max(0.0, row.low):.1f}, {100 * min(1.0, row.high or 1.0):.1f}]"
+        grid.add_row(row.title, f"{100 * row.mean:.1f}{interval}", f"{100 * min(row.people):.1f}")
+    _print_grid(str(study.recipe), grid)
+    people = counted(len(study.rows[0].people), "person", "people")
+    out().print(f"{counted(study.trials, 'trial')} of {people}; accuracies in %, means over people with 95 % intervals")
 
 
 def _evaluate_streams(

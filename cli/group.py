@@ -25,7 +25,7 @@ from .printing import echo
 GROUPS = {
     "Data": ("import", "simulate", "info", "draw", "merge", "split", "export"),
     "Choose and measure": ("place", "evaluate", "frontier", "stability"),
-    "Build": ("compile", "verify", "spec", "firmware"),
+    "Build": ("compile", "adapt", "verify", "spec", "firmware"),
     "Live": ("doctor", "calibrate", "record", "run", "monitor", "segment", "teach", "emulate"),
 }
 COMMANDS = tuple(name for names in GROUPS.values() for name in names)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from thenar.runtime.recipe import Recipe
 
     from .artifact import CompileError
+    from .artifact.adapting import AdaptedBuild, adapt
     from .artifact.compile import compile_build
     from .artifact.documents import BuildReport, Documents
     from .artifact.estimator import compile, export_c  # noqa: A004
@@ -52,6 +53,7 @@ _HOMES = {
     "thenar.runtime.model.terms.grid": ("Grid",),
     "thenar.runtime.model.terms.line": ("Line",),
     "thenar.runtime.recipe": ("Recipe",),
+    ".artifact.adapting": ("AdaptedBuild", "adapt"),
     ".artifact.compile": ("compile_build",),
     ".artifact.documents": ("BuildReport", "Documents"),
     ".artifact": ("CompileError",),
@@ -81,6 +83,7 @@ __all__ = [
     "METHODS",
     "TARGETS",
     "TRAINERS",
+    "AdaptedBuild",
     "AdditiveLogitClassifier",
     "Bins",
     "Bit",
@@ -111,6 +114,7 @@ __all__ = [
     "Trainer",
     "TrainingError",
     "Verification",
+    "adapt",
     "compile",
     "compile_build",
     "evaluate",

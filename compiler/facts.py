@@ -98,6 +98,9 @@ def _fit(manifest: Manifest) -> Iterator[Fact]:
 def _accuracy(manifest: Manifest) -> Iterator[Fact]:
     for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
         yield Fact("accuracy", f"accuracy, {rate.title}", str(rate).removeprefix(f"{rate.title}: "))
+    if manifest.adapted is not None:
+        counts = [count for count in manifest.adapted.counts if count]
+        yield Fact("accuracy", "adapted", f"to {counted(sum(counts), 'trial')} of {counted(len(counts), 'type')}")
     if manifest.grasps[-1] == NONE:
         yield Fact("accuracy", "nothing held", "a class of the tables")
     elif manifest.rejection is not None:
@@ -142,7 +145,7 @@ def _cautions(manifest: Manifest, harness: Harness | None) -> Iterator[Fact]:
 
 
 def _integers(manifest: Manifest) -> Fact:
-    proof, rows = manifest.proof, manifest.source.rows
+    proof, rows = manifest.proof, manifest.proved_rows
     return Fact(
         "integers",
         "integers",

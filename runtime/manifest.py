@@ -15,7 +15,7 @@ from .segmenting.model import SegmentModel
 
 SCHEMA = 1
 
-Of = Literal["pooled", "within subject", "new subject", "new object", "new session"]
+Of = Literal["pooled", "within subject", "new subject", "new subject after adaptation", "new object", "new session"]
 Protocol = Literal["training", "nested"]
 Unit = Literal["trials", "frames"]
 Code = Annotated[int, Meta(ge=0, le=65535)]
@@ -303,6 +303,28 @@ class Faults(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
         )
 
 
+class Wearing(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """How the build is adapted to a person: see compiler/wearer.py.
+
+    strength  the pull towards the build, chosen on people left out
+    related   correlations of the joints in the training rows, in thousandths, row by row below the diagonal; left out
+              where no joint adds in proportion to its code
+    """
+
+    strength: Annotated[float, Meta(gt=0.0)]
+    related: tuple[Annotated[int, Meta(ge=-1000, le=1000)], ...] = ()
+
+
+class Adapted(Struct, frozen=True, forbid_unknown_fields=True):
+    """The checksum of the build that this one is an adaptation of, and its wearer's recordings, with the number of
+    trials of each grasp type.
+    """
+
+    build: Digest
+    source: Origin
+    counts: tuple[Count, ...]
+
+
 class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
     """The content of `build.json`.
 
@@ -316,6 +338,8 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     detection        how well the build detects whether something is held, on the training rows and on folds
     rejection        the rejection rules; None if NONE is one of the grasps, or nothing is refused
     segments         costs of segments learnt from streams; None: there were none to learn from
+    wearing          how it is adapted to a person; None: as people usually are
+    adapted          to whom it is adapted; None: to nobody. Then proof and rates are of the wearer's rows
     """
 
     schema: int
@@ -339,6 +363,13 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     rejection: Rejection | None = None
     segments: SegmentModel | None = None
     hand_sha256: Digest | None = None
+    wearing: Wearing | None = None
+    adapted: Adapted | None = None
+
+    @property
+    def proved_rows(self) -> int:
+        """The number of rows on which the integers were compared with the model."""
+        return self.source.rows if self.adapted is None else self.adapted.source.rows
 
     @property
     def knows_none(self) -> bool:

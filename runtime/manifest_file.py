@@ -53,9 +53,14 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
         if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
             yield "gives a joint two points that make no line"
     proof = manifest.proof
-    if proof.width != manifest.options.width or max(proof.covered, proof.changed) > manifest.source.rows:
+    if proof.width != manifest.options.width or max(proof.covered, proof.changed) > manifest.proved_rows:
         yield "proves something of other tables than it describes"
     yield from _wrong_counts(manifest)
+    wearing, adapted, joints = manifest.wearing, manifest.adapted, len(manifest.joints)
+    if wearing is not None and len(wearing.related) not in (0, joints * (joints - 1) // 2):
+        yield "relates other joints than it has"
+    if adapted is not None and len(adapted.counts) != len(manifest.grasps):
+        yield "was adapted to trials of other grasp types than it has"
 
 
 def _wrong_inputs(manifest: Manifest, taxels: Iterable[Calibration]) -> Iterator[str]:

@@ -25,7 +25,7 @@ import pytest
 from .conftest import tool
 
 ROOT = Path(__file__).resolve().parents[1]
-TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+TUTORIALS = [*sorted((ROOT / "docs" / "tutorials").glob("*.md")), ROOT / "docs" / "how-to" / "wearer.md"]
 LIMIT_S = 600
 
 # What a reader of a clone has, apart from thenar itself.

@@ -23,6 +23,7 @@ ALLOWED = {
     "compiler.pictures": ("runtime.errors",),
     "compiler.elementary": (),
     "compiler.text": (),
+    "compiler.wearer": ("runtime", "drivers.errors", "compiler.elementary"),
     "compiler.workers": ("drivers.errors",),
     "compiler.hand": ("drivers.errors", "runtime"),
     "compiler.publication": ("runtime.files", "drivers.errors"),
@@ -229,7 +230,7 @@ def test_modules_import_only_what_their_room_may() -> None:
 def test_the_boards_side_names_no_workstation_package_at_the_top() -> None:
     wrong = []
     for name in SOURCES:
-        if fits(name, ("runtime", "drivers", "cli", "compiler.recordings")):
+        if fits(name, ("runtime", "drivers", "cli", "compiler.recordings", "compiler.wearer")):
             top = [node for node in tree_of(name).body if isinstance(node, Import)]
             packages = WORKSTATION_ONLY & {imported.split(".")[0] for imported in imports(name, top)}
             wrong += [f"{name} imports {package}" for package in sorted(packages)]

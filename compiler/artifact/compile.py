@@ -15,9 +15,9 @@ from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES
 from thenar.runtime.hand import HAND_NAME, hand_from_bytes, hand_to_bytes
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.system import unread_joints
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch, Threshold
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch, Threshold, Wearing
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
-from thenar.runtime.model.integers import tables_to_bytes
+from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Recipe, TableBits, changed
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.scanmap import scanmap_to_bytes
@@ -25,7 +25,8 @@ from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
 from ..hand import HandShape, drawn_hand
-from ..model.compare import compare
+from ..model.collapse import collapse
+from ..model.compare import Comparison, compare
 from ..model.faults import count_faults, groups_of, worst_faults
 from ..placement.constraints import Limits
 from ..placement.elements import Element, names_of
@@ -36,6 +37,7 @@ from ..recogniser import Recogniser, predicted_classes
 from ..recordings.graspset import GraspSet, Joint
 from ..samples import Samples
 from ..trainers.base import SHARED, TRAINERS, Report, Training
+from ..wearer import STRENGTH
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, TRY_NAME, BuildReport, Documents
 from .ensemble import ensemble_to_bytes
@@ -51,6 +53,7 @@ from .training import (
     stored_digests,
 )
 from .verify_firmware import made_firmware
+from .wearers import related_joints
 
 # Without a harness a build has no scan map; a build too large for every microcontroller has no firmware; one without a
 # report has no spec.
@@ -265,7 +268,7 @@ class BuildAssembly:
         undrawn = self._manifest(tested, files)
         drawing = drawn_hand(undrawn, self.hand, names[:n_switches], names[n_switches:], kept.codes)
         files[HAND_NAME] = hand_to_bytes(drawing)
-        described = manifest_to_bytes(replace(undrawn, hand_sha256=_sha256(files[HAND_NAME])))
+        described = manifest_to_bytes(replace(undrawn, hand_sha256=sha256(files[HAND_NAME])))
         manifest = manifest_from_bytes(described)
         firmware, note = made_firmware(manifest, self.integers)
         hand = hand_from_bytes(files[HAND_NAME], manifest)
@@ -298,7 +301,7 @@ class BuildAssembly:
 
     def _manifest(self, tested: Tested | None, files: Mapping[str, bytes]) -> Manifest:
         """Return the content of `build.json`, not sealed yet; `files` maps the names of its neighbours to content."""
-        digests = {name: _sha256(data) for name, data in files.items()}
+        digests = {name: sha256(data) for name, data in files.items()}
         grasp_set, recogniser = self.grasp_set, self.recogniser
         options, samples, fitting = recogniser.recipe, recogniser.samples, recogniser.fitting
         kept, comparison = self.kept, self.comparison
@@ -308,23 +311,15 @@ class BuildAssembly:
         elements = recogniser.elements
         switches = zip(elements, names_of(grasp_set, elements), recogniser.selection.gains, strict=True)
         shares = kept.switches.mean(axis=0).tolist()
+        related = related_joints(collapse(recogniser.model, kept.n_switches), kept)
+        strength = STRENGTH if tested is None else tested.strength
         return Manifest(
             schema=SCHEMA,
             checksum="",
             thenar=version("thenar"),
             tables_sha256=digests[TABLES_NAME],
             ensemble_sha256=digests[ENSEMBLE_NAME],
-            source=Origin(
-                fingerprint=grasp_set.fingerprint(),
-                rows=len(grasp_set),
-                taxonomy=grasp_set.taxonomy.name,
-                switches=len(grasp_set.switch_names),
-                simulated=grasp_set.simulated,
-                independent=grasp_set.independent,
-                taxels=len(grasp_set.taxel_columns),
-                joints=len(grasp_set.joints),
-                trials=stored_digests(grasp_set),
-            ),
+            source=origin_of(grasp_set),
             options=options,
             grasps=samples.grasps,
             switches=tuple(
@@ -337,15 +332,7 @@ class BuildAssembly:
                 for each, least, most, share in zip(switches, *closed_shares(kept), shares, strict=True)
             ),
             joints=tuple(_calibration(column, grasp_set.joints[column]) for column in recogniser.selection.joints),
-            proof=Proof(
-                width=options.width,
-                scale=self.integers.scale,
-                bound=self.integers.bound,
-                error=comparison.integer_bound,
-                safe_margin=comparison.safe_margin,
-                covered=int(np.count_nonzero(comparison.covered)),
-                changed=len(comparison.changed),
-            ),
+            proof=proof_of(self.integers, comparison, options.width),
             rates=rates if tested is None else (*rates, *tested.rates),
             stopped_after=recogniser.stopped_after,
             zero_gain_nodes=recogniser.zero_gain_nodes,
@@ -355,6 +342,7 @@ class BuildAssembly:
             detection=detection if tested is None else (*detection, *tested.detection),
             rejection=recogniser.rejection,
             segments=segments_for(grasp_set, samples, None if tested is None else tested.scores, self.integers.scale),
+            wearing=Wearing(strength, related) if related or strength != STRENGTH else None,
         )
 
     def _switch(self, element: Element, name: str, gain: float) -> Switch:
@@ -365,7 +353,36 @@ class BuildAssembly:
         return Switch(column, name, gain, Threshold(code, float(joint.value(code + 0.5)), _calibration(taxel, joint)))
 
 
-def _sha256(data: bytes) -> str:
+def origin_of(grasp_set: GraspSet) -> Origin:
+    """Return the description of recordings."""
+    return Origin(
+        fingerprint=grasp_set.fingerprint(),
+        rows=len(grasp_set),
+        taxonomy=grasp_set.taxonomy.name,
+        switches=len(grasp_set.switch_names),
+        simulated=grasp_set.simulated,
+        independent=grasp_set.independent,
+        taxels=len(grasp_set.taxel_columns),
+        joints=len(grasp_set.joints),
+        trials=stored_digests(grasp_set),
+    )
+
+
+def proof_of(integers: IntegerTables, comparison: Comparison, width: int) -> Proof:
+    """Return the bounds of integer tables of `width` bits that were compared with their model."""
+    return Proof(
+        width=width,
+        scale=integers.scale,
+        bound=integers.bound,
+        error=comparison.integer_bound,
+        safe_margin=comparison.safe_margin,
+        covered=int(np.count_nonzero(comparison.covered)),
+        changed=len(comparison.changed),
+    )
+
+
+def sha256(data: bytes) -> str:
+    """Return the digest of a file."""
     return hashlib.sha256(data).hexdigest()
 
 

@@ -36,6 +36,7 @@ from .compile import BuildAssembly, Wired, check_target
 from .documents import BuildReport, Documents
 from .ensemble import model_fault
 from .training import cross_validated, cuts_of
+from .wearers import Hits, hits_of
 
 with optional():
     from sklearn.base import clone
@@ -276,12 +277,14 @@ def _trained_by(classifier: Any, options: Recipe) -> Recipe:
     )
 
 
-def _scores_of(estimator: Any, samples: Samples, options: Recipe, fold: Fold) -> Scores:
-    """Fit a clone on the fold's training rows only; return the scores (m, K) of its integers on the test rows."""
+def _scores_of(estimator: Any, samples: Samples, options: Recipe, fold: Fold) -> tuple[Scores, list[Hits]]:
+    """Fit a clone on the fold's training rows only; return the scores (m, K) of its integers on the test rows, and what
+    adapting it to people left out brings.
+    """
     learnt, classes = samples.rows(fold.train), estimator.classes_
     fitted = clone(estimator).fit(learnt.inputs, classes[learnt.labels])
     recogniser = Recogniser(options, learnt, *_learnt(fitted, learnt))
     scores = np.full((len(fold.test), len(classes)), _UNSEEN)
     known = (_classifier(fitted).classes_[:, np.newaxis] == classes).argmax(axis=1)
-    scores[:, known] = recogniser.scores(samples.rows(fold.test))
-    return scores
+    scores[:, known] = recogniser.scores(tested := samples.rows(fold.test))
+    return scores, hits_of(recogniser, tested) if len(known) == len(classes) else []

@@ -197,7 +197,7 @@ def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Recipe]) -> tuple[
     scores = np.zeros((len(others), samples.n_classes))
     for fold in _inner_folds(learning, others, options):
         thinned = Fold(np.intersect1d(fold.train, some), fold.test, fold.name)
-        scores[fold.test] = scores_of(learning, options, None, _groups(others), None, thinned)
+        scores[fold.test] = scores_of(learning, options, None, _groups(others), None, thinned)[0]
     model = segments_for(others, learning, scores, tables.scale)
     assert model is not None
     read = recogniser.read(samples)

@@ -30,9 +30,11 @@ from ..trainers.base import Report, Training
 from ..workers import check_memory, in_workers, little
 from . import CompileError
 from .ensemble import MAX_STUMPS
+from .wearers import Hits, chosen_strength, hits_of
 
 USUAL_ROUNDS = 100  # assumed amount of work where the fit is still to be chosen
-Test = Callable[[Fold], Scores]
+# The scores of a fold's test rows, and what adapting to people left out brings.
+Test = Callable[[Fold], tuple[Scores, list[Hits]]]
 _DIGITS = 8  # of a digest of a trial
 # More would make build.json too large to load.
 _MOST_DIGESTS = 1 << 20
@@ -107,19 +109,22 @@ class Tested:
     """The result of the folds.
 
     The rates, the headline first; the confusion matrix (K, K) of frames in the headline folds, with a row for each true
-    class; the scores of all rows (n, K), from the first folds that all learn from rows of nothing held, if any do.
+    class; the scores of all rows (n, K), from the first folds that all learn from rows of nothing held, if any do; and
+    the strength with which the build is adapted to a person.
     """
 
     rates: tuple[Recognised, ...]
     detection: tuple[Detected, ...]
     confusion: NDArray[np.intp]
     scores: Scores
+    strength: float
 
 
 def scores_of(
     samples: Samples, options: Recipe, ports: PortCosts | None, groups: Groups, limits: Limits | None, fold: Fold
-) -> Scores:
-    """Fit a recogniser on the fold's training rows only; return its scores of the test rows: see `Recogniser.scores`.
+) -> tuple[Scores, list[Hits]]:
+    """Fit a recogniser on the fold's training rows only; return its scores of the test rows: see `Recogniser.scores`,
+    and what adapting it to people left out brings.
 
     Raises CompileError, which names the fold.
     """
@@ -127,13 +132,14 @@ def scores_of(
         recogniser = Recogniser.fit(samples, options, fold.train, ports=ports, limits=limits, groups=groups)
     except CompileError as wrong:
         raise CompileError(f"in fold {fold.name}: {wrong}, or compile without folds (0)") from None
-    return recogniser.scores(samples.rows(fold.test))
+    tested = samples.rows(fold.test)
+    return recogniser.scores(tested), hits_of(recogniser, tested)
 
 
 def cross_validated(
     samples: Samples, cuts: Sequence[Cut], options: Recipe, test: Test, jobs: int, report: Report | None
 ) -> Tested | None:
-    """Return the result of the folds, None without folds; `test` returns the scores of a fold's test rows.
+    """Return the result of the folds, None without folds; `test` tests a fold.
 
     jobs  worker processes that call `test`; report: called with (done, total) after each fold
     """
@@ -146,10 +152,12 @@ def cross_validated(
     # Segments are learned from folds that know rows in which nothing is held, if there are any.
     scored = next((place for place, rows in enumerate(knows) if rows.all()), 0)
     tasks = ((place, fold, test) for place, fold in folds)
-    for done, (place, fold, fold_scores) in enumerate(
+    adapted = list[Hits]()
+    for done, (place, fold, (fold_scores, hits)) in enumerate(
         in_workers(_done, tasks, little(len(folds) * len(samples.labels) * (options.rounds or USUAL_ROUNDS), jobs)), 1
     ):
         classes[place, fold.test] = fold_scores.argmax(axis=1)
+        adapted += hits
         if place == scored:
             scores[fold.test] = fold_scores[:, : samples.n_classes]
         if report is not None:
@@ -161,7 +169,8 @@ def cross_validated(
     for cut, predicted in zip(cuts, classes, strict=True):
         rates += rates_of("nested", samples, predicted, options.seed, cut)
         detection += detection_of("nested", samples, predicted, options.seed, cut)
-    return Tested(tuple(rates), tuple(detection), confusion, scores)
+    strength, adapted_rates = chosen_strength(adapted, len(cuts[0].folds), options.seed)
+    return Tested((*rates, *adapted_rates), tuple(detection), confusion, scores, strength)
 
 
 def fold_results(
@@ -195,7 +204,7 @@ def trained_with_rest(samples: Samples, cut: "Cut") -> NDArray[np.bool_]:
     return mask
 
 
-def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, Scores]:
+def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, tuple[Scores, list[Hits]]]:
     place, fold, test = task
     return place, fold, test(fold)
 
@@ -310,5 +319,6 @@ def trained_on(manifest: Manifest, grasp_set: GraspSet) -> NDArray[np.bool_]:
     source, digests = manifest.source, _digests(grasp_set)
     if grasp_set.fingerprint() == source.fingerprint:
         return np.ones(len(digests), bool)
-    stored = {source.trials[at : at + _DIGITS] for at in range(0, len(source.trials), _DIGITS)}
+    trials = source.trials + ("" if manifest.adapted is None else manifest.adapted.source.trials)
+    stored = {trials[at : at + _DIGITS] for at in range(0, len(trials), _DIGITS)}
     return np.array([digest in stored for digest in digests], bool)

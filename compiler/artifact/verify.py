@@ -137,7 +137,7 @@ def verify(
     True
     """
     build = _build_for(folder, grasp_set)
-    model = _load_ensemble(Path(folder), build)
+    model = load_ensemble(Path(folder), build)
     bits, codes = select_inputs(grasp_set, build.manifest)
     comparison = compare(model, build.tables, bits, codes, progress)
     names = [switch.name for switch in build.manifest.switches]
@@ -262,7 +262,8 @@ def _labels(grasps: NDArray[np.str_], grasp_set: GraspSet) -> NDArray[np.intp]:
     return np.asarray(known.argmax(axis=1))
 
 
-def _load_ensemble(folder: Path, build: Build) -> Model:
+def load_ensemble(folder: Path, build: Build) -> Model:
+    """Return the model of the build in `folder`. Raises BuildError or FormatError."""
     path = folder / ENSEMBLE_NAME
     model = ensemble_from_bytes(read_member(path, MAX_BYTES, build.manifest.ensemble_sha256), str(path))
     tables, fit = build.tables, build.manifest.fit

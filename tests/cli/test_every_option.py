@@ -37,6 +37,7 @@ LINES: dict[str, tuple[str, str]] = {
         "-o new --methods elimination --baselines none --rounds 2 --repeats 1 --finalists 1 --jobs 1",
     ),
     "compile": ("set.grasps", "-o new --rounds 2 --folds 0 --no-report"),
+    "adapt": ("build set.grasps", "-o new"),
     "verify": ("build set.grasps", ""),
     "firmware": ("build", "--target host -o new"),
     "spec": ("build", "-o new"),

@@ -117,7 +117,7 @@ def test_a_pipeline_and_compile_build_make_the_same_papers_recipe(tmp_path: Path
     assert made.options == same.options
     assert made.rates == same.rates
     assert [rate.of for rate in made.rates if rate.unit == "trials"][1:] == (
-        ["within subject"] if subjects == 1 else ["new subject", "pooled"]
+        ["within subject"] if subjects == 1 else ["new subject", "pooled", "new subject after adaptation"]
     )
     assert sorted(made.switches, key=lambda switch: switch.column) == sorted(
         same.switches, key=lambda switch: switch.column

@@ -51,6 +51,7 @@ def test_the_headline_of_several_subjects_is_the_new_subject_rate(tmp_path: Path
         ("training", "rows trained on", "trials", 0, 96),
         ("nested", "new subject", "trials", 3, 96),
         ("nested", "pooled", "trials", 4, 96),
+        ("nested", "new subject after adaptation", "trials", 3, 72),
     ]
     assert report.manifest.headline == rates[1]
     assert all(rate.low is not None and rate.low <= rate.rate <= (rate.high or 0) for rate in rates)
@@ -139,7 +140,7 @@ def test_the_rates_are_those_of_builds_of_each_folds_training_rows(tmp_path: Pat
     manifest = compile_build(whole, tmp_path / "build", **options).manifest
     assert bool(manifest.fitting) == ("rounds" not in options)
     (counted,) = verify(tmp_path / "build", whole).recognised
-    training, *rates = manifest.rates
+    training, *rates, _ = manifest.rates
     assert training.correct == counted.integers
     for rate, cut in zip(rates, cuts_of(whole, Recipe()), strict=True):
         correct = 0

@@ -64,7 +64,9 @@ def test_none_is_the_last_class_and_placed_on_grasps_alone(moved: GraspSet, tmp_
     assert [each.name for each in made.manifest.switches] == [each.name for each in without.manifest.switches]
     assert made.manifest.rejection is None
     assert Build.load(tmp_path / "build").none == 3
-    assert all(rate.total in (180, 720) for rate in made.manifest.rates)
+    *rates, adapted = made.manifest.rates
+    assert all(rate.total in (180, 720) for rate in rates)
+    assert (adapted.of, adapted.total) == ("new subject after adaptation", 162)
     found = made.manifest.detected
     assert found is not None
     assert found.none is not None

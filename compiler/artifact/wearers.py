@@ -1,0 +1,153 @@
+"""What adapting to people left out brings: for the strength that `compile` stores, and `evaluate --adapt`."""
+
+from collections.abc import Sequence
+from functools import partial
+from statistics import fmean
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.manifest import Of, Recognised
+from thenar.runtime.model.tables import ScoreTables, winners
+from thenar.runtime.recipe import Recipe
+
+from ..evaluation.folds import EvaluationError, Fold, leave_one_out
+from ..evaluation.rates import RecipeWords, clustered, student
+from ..model.collapse import collapse
+from ..recogniser import Recogniser
+from ..recordings.graspset import GraspSet
+from ..samples import Samples, decided
+from ..trainers.base import Report
+from ..wearer import STRENGTH, STRENGTHS, Adaptation, correlations
+from ..workers import in_workers
+
+# The number of trials of each type that a person left out is adapted to, and the strength.
+Try = tuple[int, float]
+# The correct trials of a person after each try, and the number of those tested.
+Hits = tuple[tuple[int, ...], int]
+TRIES: tuple[Try, ...] = tuple((2, strength) for strength in STRENGTHS)
+_LEAST_PEOPLE, _LEAST_GAIN = 3, 100
+
+
+def related_joints(tables: ScoreTables, learnt: Samples) -> tuple[int, ...]:
+    """Return the correlations of the joints in the training rows, where tables have lines; else none are needed."""
+    return correlations(learnt.codes) if tables.lines else ()
+
+
+def hits_of(recogniser: Recogniser, samples: Samples, tries: Sequence[Try] = TRIES) -> list[Hits]:
+    """Return the effect of each try on each person in `samples`, with all inputs, whom the recogniser has not seen.
+
+    A person's first trials of each type adapt; those that no try needs are tested. A person without such is left out.
+    """
+    read = recogniser.read(samples).without_none()
+    tables = collapse(recogniser.model, read.n_switches)
+    related = related_joints(tables, recogniser.read(recogniser.samples))
+    most, found = max(own for own, _ in tries), []
+    for person in np.setdiff1d(read.subjects, recogniser.samples.subjects):
+        rows = read.rows(read.subjects == person)
+        _, first, trial = np.unique(rows.trials, return_index=True, return_inverse=True)
+        truth, place = rows.labels[first], np.empty(len(first), np.intp)
+        for label in np.unique(truth):
+            place[truth == label] = np.arange(np.count_nonzero(truth == label))
+        tested, correct = place >= most, []
+        for own, strength in tries if tested.any() else ():
+            some, adapted = rows.rows((place < own)[trial]) if own else None, tables
+            if some is not None:
+                columns = some.switches, some.codes, some.labels, some.trials
+                adapted = Adaptation(tables, *columns, strength, related).adapted
+            predicted = winners(adapted.scores(rows.switches, rows.codes))
+            hits = decided(predicted[np.newaxis], trial)[0] == truth
+            correct.append(int(np.count_nonzero(hits & tested)))
+        found += [(tuple(correct), int(np.count_nonzero(tested)))] if correct else []
+    return found
+
+
+def chosen_strength(hits: Sequence[Hits], folds: int, seed: int) -> tuple[float, list[Recognised]]:
+    """Return the strength for the people left out in folds, and the accuracy that it gives; none of too few people.
+
+    It is the usual one, unless another recognises a hundredth of the trials more: less is chance, with a few people.
+    """
+    if len(hits) < _LEAST_PEOPLE:
+        return STRENGTH, []
+    counts, totals = np.array([correct for correct, _ in hits]), [total for _, total in hits]
+    best, usual = int(counts.sum(axis=0).argmax()), STRENGTHS.index(STRENGTH)
+    if _LEAST_GAIN * int((counts[:, best] - counts[:, usual]).sum()) <= sum(totals):
+        best = usual
+    correct = counts[:, best].tolist()
+    low, high = (round(end, 6) for end in clustered(correct, totals, "trials"))
+    of: Of = "new subject after adaptation"
+    return STRENGTHS[best], [Recognised("nested", folds, seed, sum(correct), sum(totals), of, "trials", low, high)]
+
+
+class AdaptedRow(msgspec.Struct, frozen=True):
+    """The accuracy of people left out, 0..1, after `own` trials a type of theirs: the mean over people with its 95 %
+    interval (Student's t; None with one person), and each person.
+    """
+
+    own: int
+    mean: float
+    low: float | None
+    high: float | None
+    people: tuple[float, ...]
+
+    @property
+    def title(self) -> str:
+        """What the accuracy is of."""
+        return f"new subject, after {self.own} own trials a type" if self.own else "new subject"
+
+
+class WearerStudy(msgspec.Struct, frozen=True):
+    """The result: what was trained, the number of trials that were tested, and the rows."""
+
+    recipe: RecipeWords
+    trials: int
+    rows: tuple[AdaptedRow, ...]
+
+
+def study_wearers(
+    grasp_set: GraspSet, recipe: Recipe, numbers: Sequence[int], jobs: int = -1, progress: Report | None = None
+) -> WearerStudy:
+    """Evaluate adaptation on people left out: the first trials of each of their types adapt, the rest are tested.
+
+    Parameters
+    ----------
+    grasp_set : GraspSet
+        Recordings of two or more subjects.
+    recipe : Recipe
+        How to place and train.
+    numbers : sequence of int
+        The numbers of own trials of each type; 0: the model of the others as it is.
+    jobs : int
+        Worker processes; the result does not depend on their number.
+    progress : callable, optional
+        Called with (done, total) after each subject.
+
+    Raises
+    ------
+    EvaluationError
+        If there is only one subject, or nobody has more trials than the largest number.
+    """
+    samples, folds = Samples.of(grasp_set, recipe.inputs), leave_one_out(grasp_set.subjects, "subject")
+    groups = grasp_set.subjects if len(folds) > 2 else None
+    hits: dict[str, list[Hits]] = {}
+    for name, found in in_workers(partial(_left_out, samples, groups, recipe, numbers), folds, jobs):
+        hits[name] = found
+        if progress is not None:
+            progress(len(hits), len(folds))
+    people = [person for fold in folds for person in hits[fold.name]]
+    if not people:
+        raise EvaluationError(f"nobody has more than {max(numbers)} trials of a type: adapt to fewer")
+    rows = []
+    for number, own in enumerate(numbers):
+        rates = [correct[number] / total for correct, total in people]
+        low, high = student(rates) if len(rates) > 1 else (None, None)
+        rows.append(AdaptedRow(own, fmean(rates), low, high, tuple(rates)))
+    return WearerStudy(RecipeWords.of(recipe), sum(total for _, total in people), tuple(rows))
+
+
+def _left_out(
+    samples: Samples, groups: NDArray[np.str_] | None, recipe: Recipe, numbers: Sequence[int], fold: Fold
+) -> tuple[str, list[Hits]]:
+    recogniser = Recogniser.fit(samples, recipe, fold.train, groups=groups)
+    return fold.name, hits_of(recogniser, samples.rows(fold.test), [(own, STRENGTH) for own in numbers])

@@ -1,0 +1,142 @@
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from thenar.compiler.wearer import Adaptation, AdaptationError, correlations
+from thenar.runtime.model.tables import ScoreTables
+from thenar.runtime.model.terms.grid import Grid
+from thenar.runtime.model.terms.line import Line
+
+KINDS = ("bits", "bins", "lines", "grid")
+Floats = NDArray[np.float64]
+
+
+def tables_of(kind: str, random: np.random.Generator, K: int = 4) -> ScoreTables:
+    steps = (np.array([60, 120, 180], np.uint16), np.array([100], np.uint16))
+    plain, none = (np.zeros((1, K)), np.zeros((1, K))), (np.zeros(0, np.uint16),) * 2
+    bias, switches = random.normal(size=K), random.normal(size=(5, K))
+    if kind == "bits":
+        return ScoreTables.of(bias, switches, none, plain)
+    if kind == "bins":
+        return ScoreTables.of(bias, switches, steps, tuple(random.normal(size=(len(each) + 1, K)) for each in steps))
+    if kind == "grid":
+        return ScoreTables.of(bias, switches, none, plain, [Grid((0, 1), steps, random.normal(size=(4, 2, K)))])
+    lines = [Line(joint, 20, 220, random.normal(size=K) / 100) for joint in range(2)]
+    return ScoreTables.of(bias, switches, none, plain, lines)
+
+
+def adaptation(kind: str, seed: int = 0, trials: int = 12, frames: int = 2, strength: float = 1.0) -> Adaptation:
+    random = np.random.default_rng(seed)
+    n = trials * frames
+    codes = random.integers(0, 256, (n, 2)).astype(np.uint16)
+    labels = np.repeat(np.arange(trials) % 4, frames)
+    tables = tables_of(kind, random)
+    return Adaptation(tables, random.random((n, 5)) < 0.5, codes, labels, np.arange(n) // frames, strength, (400,))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_without_a_limit_to_the_pull_nothing_changes(kind: str) -> None:
+    mine = adaptation(kind, strength=1e9)
+    near, far = (tables.scores(mine.bits, mine.codes) for tables in (mine.adapted, mine.tables))
+    assert near == pytest.approx(far, abs=1e-6)
+    assert adaptation(kind, strength=inf).adapted.scores(mine.bits, mine.codes).tolist() == far.tolist()
+
+
+def loss(weights: Floats, mine: Adaptation) -> tuple[float, Floats]:
+    """The penalised loss of a sum of kernels with these weights, and its gradient, on the frames in their order."""
+    rows, root, kernel = mine._rows, mine._roots, mine._kernel
+    n, K = len(rows), mine.tables.n_classes
+    change = kernel @ weights.reshape(n, K)
+    scores = mine.tables.scores(mine.bits[rows], mine.codes[rows]) + change
+    top = scores.max(axis=1, keepdims=True)
+    log_sum = top[:, 0] + np.log(np.exp(scores - top).sum(axis=1))
+    losses = root[:, 0] ** 2 * (log_sum - scores[np.arange(n), mine.labels[rows]])
+    off = root**2 * (np.exp(scores - log_sum[:, np.newaxis]) - np.eye(K)[mine.labels[rows]])
+    pull = mine.strength * weights.reshape(n, K)
+    return float(losses.sum() + 0.5 * (pull * change).sum()), (kernel @ (off + pull)).ravel()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("strength", [0.1, 1.0, 10.0])
+def test_the_change_is_the_minimum_of_the_penalised_loss(kind: str, strength: float) -> None:
+    mine = adaptation(kind, strength=strength)
+    n, K = len(mine._rows), mine.tables.n_classes
+    best = minimize(loss, np.zeros(n * K), args=(mine,), jac=True, method="L-BFGS-B", options={"maxiter": 5000})
+    weights = mine._weights(mine._fitted, np.ones(n, bool))
+    assert loss(weights.ravel(), mine)[0] == pytest.approx(best.fun, abs=1e-4)
+    assert np.abs(loss(weights.ravel(), mine)[1]).max() < 1e-3
+    # The tables say the same as the kernels.
+    rows = mine._rows
+    by_kernels = mine.tables.scores(mine.bits[rows], mine.codes[rows]) + mine._kernel @ weights
+    assert mine.adapted.scores(mine.bits[rows], mine.codes[rows]) == pytest.approx(by_kernels, abs=1e-4)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_neither_the_order_of_rows_nor_the_names_of_trials_matter(kind: str) -> None:
+    mine = adaptation(kind)
+    order = np.random.default_rng(1).permutation(len(mine.labels))
+    columns = {name: getattr(mine, name)[order] for name in ("bits", "codes", "labels")}
+    mixed = replace(mine, **columns, trials=99 - mine.trials[order])
+    one, other = mine.adapted, mixed.adapted
+    assert one.bias.tobytes() == other.bias.tobytes()
+    assert one.switch_rows.tobytes() == other.switch_rows.tobytes()
+    every = mine.bits, mine.codes
+    assert one.scores(*every).tobytes() == other.scores(*every).tobytes()
+
+
+def test_a_trial_counts_once_however_many_frames_it_has() -> None:
+    mine = adaptation("bins", frames=1)
+    rows = np.repeat(np.arange(12), [30] + 11 * [1])
+    columns = {name: getattr(mine, name)[rows] for name in ("bits", "codes", "labels", "trials")}
+    long = replace(mine, **columns).adapted
+    assert long.scores(mine.bits, mine.codes) == pytest.approx(mine.adapted.scores(mine.bits, mine.codes), abs=1e-3)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_type_without_trials_changes_as_the_others_do_on_average(kind: str) -> None:
+    mine = adaptation(kind)
+    some = mine.labels != 3
+    columns = {name: getattr(mine, name)[some] for name in ("bits", "codes", "labels", "trials")}
+    fewer = replace(mine, **columns)
+    change = fewer.adapted.scores(mine.bits, mine.codes) - mine.tables.scores(mine.bits, mine.codes)
+    assert np.abs(change).max() > 0.05
+    assert change[:, 3] == pytest.approx(change[:, :3].mean(axis=1), abs=1e-4)
+    one = replace(mine, **{name: getattr(mine, name)[mine.labels == 0] for name in columns})
+    assert one.adapted.scores(mine.bits, mine.codes) == pytest.approx(mine.tables.scores(mine.bits, mine.codes))
+
+
+def test_each_trial_is_left_out_once() -> None:
+    mine = adaptation("lines", frames=1)
+    kept = mine.trials != 5
+    columns = {name: getattr(mine, name)[kept] for name in ("bits", "codes", "labels", "trials")}
+    alone = replace(mine, **columns).adapted.scores(mine.bits[~kept], mine.codes[~kept])
+    assert mine.left_out[~kept] == pytest.approx(alone, abs=0.02)
+
+
+def test_frames_of_two_types_are_named() -> None:
+    mine = adaptation("bits", frames=1)
+    bits, codes = mine.bits.copy(), mine.codes.copy()
+    bits[1], codes[1] = bits[0], codes[0]
+    assert replace(mine, bits=bits, codes=codes).contradictions == [(0, 1)]
+    assert mine.contradictions == []
+
+
+def test_correlations_are_those_of_numpy() -> None:
+    random = np.random.default_rng(0)
+    codes = (random.normal(size=(50, 3)) @ random.normal(size=(3, 3)) * 50 + 30_000).astype(np.uint16)
+    expected = np.corrcoef(codes.T)[np.tril_indices(3, -1)] * 1000
+    assert correlations(codes) == pytest.approx(expected, abs=1)
+    assert correlations(np.full((4, 2), 7, np.uint16)) == (0,)
+
+
+def test_no_trials_and_too_many_are_refused() -> None:
+    mine = adaptation("bits")
+    none = {name: getattr(mine, name)[:0] for name in ("bits", "codes", "labels", "trials")}
+    with pytest.raises(AdaptationError, match="no trials"):
+        replace(mine, **none)
+    with pytest.raises(AdaptationError, match="above 0"):
+        replace(mine, strength=0.0)
