@@ -160,7 +160,7 @@ def papers(data: Data) -> tuple[bool, Point]:
 def measured(alone: Data, with_joints: Data, paper: dict[bool, Point], jobs: int) -> list[Line]:
     """Return every method's line, switches only first. Joints do not matter to baselines."""
     ours = [name for name, method in METHODS.items() if method.ours]
-    baselines = [name for name, method in METHODS.items() if not method.ours and method.installed]
+    baselines = [name for name, method in METHODS.items() if not method.ours]
     wanted = {joints: point.rate - WITHIN for joints, point in paper.items()}
     # The longest tasks start first.
     tasks: list[tuple[Data, str, float | None]] = [

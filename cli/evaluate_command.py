@@ -116,19 +116,6 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     help="Tables to print, or none; trainers, which takes longer; joints: the best 1, 2, ... of them.",
 )
 @click.option(
-    "--permute",
-    type=click.IntRange(min=0, max=100_000),
-    default=0,
-    metavar="M",
-    help="Permutation test: evaluate M times with shuffled labels, for the chance level and a p-value.",
-)
-@click.option(
-    "--learning-curve",
-    "learning",
-    is_flag=True,
-    help="Learning curves: accuracy after 2, 4, 8, ... repetitions, with an extrapolation.",
-)
-@click.option(
     "--streams",
     is_flag=True,
     help="Evaluate segmentation of whole movements instead, leaving out one subject at a time.",
@@ -146,7 +133,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     "folder",
     type=OutputFolder(fresh=True),
     metavar="FOLDER",
-    help="Draw the confusion matrices and learning curves into this folder.",
+    help="Draw the confusion matrices into this folder.",
 )
 @click.option("-o", "--output", type=OutputFile(".json"), metavar="FILE", help="Write the whole result as JSON.")
 @overwrite_flag
@@ -187,8 +174,7 @@ def command(
     \b
     Example:
         thenar evaluate set.grasps
-        thenar evaluate set.grasps --tables none --learning-curve --plot pictures/
-        thenar evaluate set.grasps --by subject --permute 100
+        thenar evaluate set.grasps --by subject
         thenar evaluate movements.grasps --streams --trainer logit
         thenar evaluate set.grasps --by subject --tables joints
         thenar evaluate set.grasps --by subject --adapt 1,2,3
@@ -216,7 +202,7 @@ def command(
         return
     asked["tables"] = tuple(name for name in TABLES if name in asked["tables"])
     design = StudyDesign(recipe, **asked)
-    if (confusion or (folder is not None and not design.learning)) and "compositions" not in design.tables:
+    if (confusion or folder is not None) and "compositions" not in design.tables:
         raise click.UsageError("--confusion and --plot show the compositions: name one of them in --tables")
     with progress("evaluating") as report:
         grasp_set = GraspSet.load(grasps)
@@ -319,7 +305,6 @@ def _print_grid(title: str, grid: "Grid", note: str = "") -> None:
 def _print(study: "Study", *, confusion: bool) -> None:
     """Print all tables, laid out as in the paper, and the confusion matrices if requested."""
     from thenar.compiler.evaluation.folds import PROTOCOLS
-    from thenar.compiler.evaluation.rates import interval
 
     console = out()
     for protocol, meaning in PROTOCOLS.items():
@@ -331,16 +316,6 @@ def _print(study: "Study", *, confusion: bool) -> None:
     for missing in study.left_out:
         console.print(f"no table of {missing.name}: {missing.reason}")
     console.print(str(study))
-    if study.permuted is not None:
-        console.print(str(study.permuted))
-    if study.learning is not None:
-        learning = study.learning
-        numbers = [*map(str, learning.repetitions), *(f"{n} expected" for n in learning.further)]
-        grid = table(("", *numbers), numbers)
-        for curve in learning.curves:
-            grid.add_row(curve.learner, *map(interval, curve.rates), *map(interval, curve.expected))
-        note = learning.note or "Expected: a power law fitted to the points, so an extrapolation."
-        _print_grid(learning.title, grid, note)
     if confusion:
         _print_confusions(study)
 

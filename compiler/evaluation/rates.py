@@ -192,17 +192,7 @@ class Rate:
         return f"{interval(self)} % {self.what}"
 
 
-@dataclass(frozen=True, slots=True)
-class ExpectedAccuracy:
-    """The accuracy expected after `repetitions` repetitions, from a fitted law, with its 95 % interval."""
-
-    repetitions: int
-    mean: float
-    low: float
-    high: float
-
-
-def interval(rate: Rate | ExpectedAccuracy | None) -> str:
+def interval(rate: Rate | None) -> str:
     """Return "96.3 [95.1, 97.2]", in percent; a dash for no rate."""
     return DASH if rate is None else f"{100 * rate.mean:.1f} [{100 * rate.low:.1f}, {100 * rate.high:.1f}]"
 

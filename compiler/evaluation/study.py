@@ -1,15 +1,11 @@
-"""An evaluation: the paper's tables for the user's recordings, with each distinct fit run once; learning curves; and a
-permutation test.
-"""
+"""An evaluation: the paper's tables for the user's recordings, with each distinct fit run once."""
 
 from dataclasses import dataclass, fields, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
-from thenar.runtime.manifest import Of, Unit
 from thenar.runtime.recipe import PAPERS_TRAINER, Recipe, changed
 
 from ..pictures import painting
@@ -20,7 +16,7 @@ from ..recordings.graspset import GraspSet
 from ..recordings.summary import check_trials
 from ..samples import Samples, check_types
 from ..text import counted
-from ..workers import check_memory, in_workers
+from ..workers import check_memory
 from .choosing import InputChoices
 from .folds import (
     OF,
@@ -33,14 +29,12 @@ from .folds import (
     groups_of,
     populations_of,
 )
-from .learning import Learning, plan_learning
 from .plan import (
     BASELINES,
     Planner,
     Progress,
     TableName,
     candidates_of,
-    predictions,
     run_fits,
 )
 from .rates import RecipeWords
@@ -54,7 +48,6 @@ _NESTED: tuple[TableName, ...] = ("trainers", "joints")
 _OF_ALL_SWITCHES: tuple[TableName, ...] = ("compositions", "pruning")
 _FEWEST_FOLDS = 2
 PAPERS_RECIPE = Recipe(trainer=PAPERS_TRAINER)
-LEARNING_NAME = "learning-curve.svg"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,15 +55,13 @@ class StudyDesign:
     """What to evaluate, and how.
 
     recipe      of every classifier: its placement, which the tables vary, its trainer, and folds and seed. In the table
-                of trainers and the learning curve, the settings that are not given are chosen from the training rows
+                of trainers, the settings that are not given are chosen from the training rows
     subjects    whose rows to use; empty: everybody's
     scheme      what is kept together in a fold: trials (stratified as in Weka), blocks of trial numbers, or subjects,
                 objects or sessions, each left out in turn
     repeats     for `trial`, with seeds seed, seed + 1, ...
     prune_list  each S of the table of pooled and pruned placements
     baselines   methods to compare with the recipe's, in addition to random placements
-    learning    whether to compute learning curves
-    permute     number of evaluations with shuffled labels, for the chance level; 0: none
     """
 
     recipe: Recipe = PAPERS_RECIPE
@@ -81,8 +72,6 @@ class StudyDesign:
     protocols: tuple[ProtocolName, ...] = ("nested",)
     tables: tuple[TableName, ...] = TABLES
     baselines: tuple[str, ...] = BASELINES
-    permute: int = 0
-    learning: bool = False
 
     def __post_init__(self) -> None:
         if self.recipe.folds < _FEWEST_FOLDS:
@@ -108,45 +97,11 @@ class LeftOut:
 
 
 @dataclass(frozen=True, slots=True)
-class Permuted:
-    """The accuracy of one composition under the nested protocol, one repeat, compared with shuffled labels.
-
-    Labels are shuffled among the trials of each subject, keeping frames of a trial together; then folds are cut,
-    placements chosen and classifiers trained as with the true labels.
-
-    composition   its name and inputs             of, unit  what the accuracy is of
-    rate          with the true labels            chance    mean accuracy of the permutations
-    permutations  their number, m                 highest   their highest accuracy
-    p             (b + 1) / (m + 1), where b permutations reach the accuracy: the probability of it by chance
-    """
-
-    composition: str
-    recipe: RecipeWords
-    of: Of
-    unit: Unit
-    rate: float
-    permutations: int
-    chance: float
-    highest: float
-    p: float
-
-    def __str__(self) -> str:
-        """Return accuracy, chance level and p-value in a sentence."""
-        return (
-            f"Permutation test of {self.composition}, {self.of}, {self.unit}, nested ({self.recipe}): "
-            f"{100 * self.rate:.1f} %; chance "
-            f"{100 * self.chance:.1f} % (mean of {self.permutations} shuffles of labels within subjects, highest "
-            f"{100 * self.highest:.1f} %); p = {self.p:.2g}"
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class Study:
     """The result: the design and the set, the grasp types that occur, warnings, and the tables.
 
-    left_out names requested tables that have no meaning here, with the reason; permuted is the permutation test,
-    learning the learning curves; each is None if not requested. rests is the number of trials in which nothing is held;
-    they are left out.
+    left_out names requested tables that have no meaning here, with the reason. rests is the number of trials in which
+    nothing is held; they are left out.
     """
 
     fingerprint: str
@@ -157,8 +112,6 @@ class Study:
     warnings: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
     tables: tuple[RateTable, ...]
-    permuted: Permuted | None = None
-    learning: Learning | None = None
     rests: int = 0
 
     def __str__(self) -> str:
@@ -242,24 +195,10 @@ def evaluate(
         for protocol in PROTOCOLS
         if protocol in design.protocols and (protocol == "nested" or name not in _NESTED)
     }
-    curves = plan_learning(planner, chosen.subjects, scheme, design.repeats) if design.learning else None
-    cells = [cell for rows in plans.values() for row in rows for cell in row.cells]
-    cells += [cell for row in curves.cells.values() for cell in row] if curves else []
-    fits = dict.fromkeys(fit for cell in cells for fit in cell.fits)
-
-    def report(before: int, done: int, _: int) -> None:
-        if progress is not None:
-            progress(before + done, len(fits) + design.permute)
-
+    fits = (fit for rows in plans.values() for row in rows for cell in row.cells for fit in cell.fits)
     groups, candidates = groups_of(chosen, scheme), candidates_of(recipe)
-    predicted = run_fits(samples, fits, candidates, groups, jobs=jobs, progress=partial(report, 0))
-    test, learning = None, None
-    if design.permute:
-        words = _recipe_of("compositions", recipe)
-        test = _permuted(chosen, planner, scheme, words, design.permute, jobs, partial(report, len(fits)))
+    predicted = run_fits(samples, fits, candidates, groups, jobs=jobs, progress=progress)
     reader = RateReader(samples, predicted, OF[scheme], groups)
-    if curves is not None:
-        learning = curves.read(reader, recipe.seed, _recipe_of("trainers", recipe))
     empty = grasp_set.is_none & np.isin(grasp_set.subjects, np.unique(chosen.subjects))
     return Study(
         fingerprint=grasp_set.fingerprint(),
@@ -272,91 +211,20 @@ def evaluate(
         tables=tuple(
             reader.table(name, protocol, rows, _recipe_of(name, recipe)) for (name, protocol), rows in plans.items()
         ),
-        permuted=test,
-        learning=learning,
         rests=len(np.unique(grasp_set.trial_ids[empty])),
     )
 
 
 def draw(study: Study, folder: Path) -> list[Path]:
-    """Write a picture for each composition and protocol, subjects side by side, and one of learning curves, if present.
+    """Write a picture for each composition and protocol, subjects side by side.
 
-    Return the files: `confusion-PROTOCOL-COMPOSITION.png` and LEARNING_NAME in `folder`, which is created if necessary.
-    Raises OSError from the system.
+    Return the files: `confusion-PROTOCOL-COMPOSITION.png` in `folder`, which is created if necessary. Raises OSError
+    from the system.
     """
     folder.mkdir(parents=True, exist_ok=True)
     compositions = [table for table in study.tables if table.name == "compositions"]
     with painting(font_size=10):
-        curves = [] if study.learning is None else [study.learning.draw(folder / LEARNING_NAME)]
-        return curves + [
-            draw_confusions(study.grasps, table, row, folder) for table in compositions for row in table.rows
-        ]
-
-
-def _permuted(
-    grasp_set: GraspSet,
-    planner: Planner,
-    scheme: Scheme,
-    words: RecipeWords,
-    m: int,
-    jobs: int,
-    progress: Progress,
-) -> Permuted:
-    """Return the test of an evaluation, of m > 0 permutations, with selected switches and joints as far as the set has
-    them; `planner` is that of the true labels.
-    """
-    # Without what it chose for the true labels: it goes to the workers.
-    fresh = replace(planner, choices=replace(planner.choices))
-    tasks = [(grasp_set, fresh, scheme, number) for number in range(m + 1)]
-    correct, total = _recognised(tasks[0])
-    shuffled: list[int] = []
-    for recognised, _ in in_workers(_recognised, tasks[1:], jobs):
-        shuffled += [recognised]
-        progress(len(shuffled), m)
-    return Permuted(
-        composition=str(planner.kinds[0]),
-        recipe=words,
-        of=OF[scheme],
-        unit="trials",
-        rate=correct / total,
-        permutations=m,
-        chance=sum(shuffled) / m / total,
-        highest=max(shuffled) / total,
-        p=(sum(count >= correct for count in shuffled) + 1) / (m + 1),
-    )
-
-
-def _recognised(task: tuple[GraspSet, Planner, Scheme, int]) -> tuple[int, int]:
-    """Return the number of trials that a permutation (0: the true labels) predicts correctly, and the total."""
-    grasp_set, planner, scheme, number = task
-    recipe = planner.recipe
-    if number:
-        grasp_set = shuffled_labels(grasp_set, (recipe.seed, number))
-    samples, populations = Samples.of(grasp_set), planner.populations
-    if scheme == "trial":
-        populations = populations_of(grasp_set, scheme, recipe.folds, 1, recipe.seed)
-    planner = replace(planner, populations=populations, choices=replace(planner.choices, samples=samples))
-    plans = [
-        planner.cell(population, planner.kinds[0], partial(planner.placement, "nested")) for population in populations
-    ]
-    plans = [replace(plan, runs=plan.runs[:1]) for plan in plans]
-    candidates = candidates_of(recipe)
-    predicted = {fit: predictions(samples, fit, candidates) for plan in plans for fit in plan.fits}
-    rate, _ = RateReader(samples, predicted, OF[scheme], groups_of(grasp_set, scheme)).rates(plans)
-    return rate.correct[0], rate.total
-
-
-def shuffled_labels(grasp_set: GraspSet, seed: tuple[int, ...]) -> GraspSet:
-    """Return the set with its grasp types shuffled among the trials of each subject; trials stay whole."""
-    random = np.random.default_rng(seed)
-    trial = grasp_set.trial_ids
-    _, first = np.unique(trial, return_index=True)
-    subjects, grasps = grasp_set.subjects[first], grasp_set.grasps[first]
-    for subject in np.unique(subjects):
-        rows = np.flatnonzero(subjects == subject)
-        grasps[rows] = grasps[random.permutation(rows)]
-    # The trial number keeps two trials apart that get the same label.
-    return replace(grasp_set, grasps=grasps[trial], trials=trial)
+        return [draw_confusions(study.grasps, table, row, folder) for table in compositions for row in table.rows]
 
 
 def _recipe_of(name: TableName, recipe: Recipe) -> RecipeWords:

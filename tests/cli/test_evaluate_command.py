@@ -176,22 +176,6 @@ def test_a_users_mistake_ends_with_2_and_a_sentence(
     assert "Traceback" not in complaints
 
 
-def test_learning_curves_are_printed_drawn_and_told_to_machines(
-    grasps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    asked = ["evaluate", grasps, *QUICK, "--tables", "none", "--learning-curve"]
-    assert run([*asked, "--plot", str(tmp_path / "drawn"), "-o", str(tmp_path / "result.json")]) == 0
-    printed = capsys.readouterr().out
-    assert "Learning curves, II Angle + Sel-Co, nested: pooled, trials, by repetitions" in printed
-    assert "is not extrapolated from fewer than 4 points: record more." in printed
-    assert [path.name for path in (tmp_path / "drawn").iterdir()] == ["learning-curve.svg"]
-    learning = json.loads((tmp_path / "result.json").read_text())["learning"]
-    assert learning["repetitions"] == [2, 4, 6]
-    for curve in learning["curves"]:
-        assert curve["learner"] in printed
-        assert len(curve["rates"]) == 3
-
-
 def test_trainers_are_compared_in_a_table(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["evaluate", grasps, *QUICK, "--tables", "trainers", "--protocol", "nested"]) == 0
     printed = capsys.readouterr().out

@@ -9,10 +9,6 @@ ones the likeliest is dropped.
 With the times of ports, a rise in loss is weighed against the time of the port, split among its remaining switches: the
 last one of a port pays for all of it.
 
-`elimination-boosted` does the same on boosted tables: LogitBoost is trained on all remaining switches and the joints;
-its stumps collapse to one row of scores per switch. The cheapest are dropped, BOOSTED_SHARE of them at once while many
-are left; then boosting starts again. Of equally cheap ones the lowest number is dropped first.
-
 The joints' codes, if any, are always kept here. Of many rows, a sample is used. Joints, each of which takes time to
 digitise and to send, are dropped in the same way, one at a time, after the switches are chosen.
 """
@@ -22,10 +18,8 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...elementary import LN_2, SUM_BITS, Floats, add_up, dot, exact_sum, exp, log, softmax, softmax_and_loss
-from ...model.collapse import collapse
+from ...elementary import LN_2, SUM_BITS, Floats, add_up, dot, exact_sum, exp, log, softmax_and_loss
 from ...samples import Columns, Samples
-from ...trainers.logitboost import boost
 from ..ports import PortCosts
 from .base import BEST, FINE, Method, first_of
 
@@ -41,7 +35,6 @@ MOST_ROWS = 8192
 # Of the joints.
 JOINT_ROWS, JOINT_CANDIDATES = 2048, 4
 BINS = 8
-BOOSTED_ROUNDS, BOOSTED_SHARE = 40, 0.12
 # Number of factors in 0.5 .. 1 that are multiplied before their exponents are extracted: 2^-512 is no underflow.
 _FACTORS = 512
 RIDGE = 1.0
@@ -179,23 +172,6 @@ def elimination_order(samples: Samples, ports: PortCosts | None = None) -> Colum
     return tuple(left + gone[::-1])
 
 
-def boosted_elimination_order(samples: Samples) -> Columns:
-    """Return the varying switches, most important first, after some 35 trainings for 160 switches."""
-    rows = sampled(samples)
-    left = np.flatnonzero((rows.switches != rows.switches[0]).any(axis=0))
-    gone: list[int] = []
-    while len(left) > 1:
-        kept = rows.keeping(tuple(left.tolist()))
-        stumps, _ = boost(kept.inputs, kept.labels, kept.n_classes, rounds=BOOSTED_ROUNDS, max_bins=BINS)
-        probability = softmax(np.ascontiguousarray(stumps.scores(kept.inputs).T))
-        bits, scores = np.ascontiguousarray(kept.switches.T), collapse(stumps, len(left)).switch_rows
-        rises = removal_rises(probability, bits, scores, kept.labels)
-        cheapest = np.argsort(rises, kind="stable")[: max(1, int(BOOSTED_SHARE * len(left)))]
-        gone += left[cheapest].tolist()
-        left = np.delete(left, cheapest)
-    return tuple(left.tolist() + gone[::-1])
-
-
 def sampled(samples: Samples, most: int = MOST_ROWS) -> Samples:
     """Return at most `most` rows, spread evenly over each class's rows, in order: classes keep their shares."""
     if len(samples.labels) <= most:
@@ -316,16 +292,5 @@ MEMBER = (
         try_all_switches=True,
         tried="wired",
         rank=2,
-    ),
-    Method(
-        name="elimination-boosted",
-        help="The same on boosted tables: LogitBoost is retrained after the cheapest switches are dropped",
-        learn=lambda samples, _: first_of(boosted_elimination_order(samples)),
-        nested=True,
-        ours=True,
-        uses_joints=True,
-        sizes=FINE,
-        try_all_switches=True,
-        rank=3,
     ),
 )

@@ -11,7 +11,6 @@ from sklearn.pipeline import make_pipeline
 
 from thenar.compiler import GraspSet, LogitBoostClassifier, SwitchSelector, evaluate
 from thenar.compiler.evaluation.folds import EvaluationError
-from thenar.compiler.evaluation.study import shuffled_labels
 from thenar.compiler.text import INDEPENDENT
 
 from .conftest import make_grasps
@@ -77,35 +76,3 @@ def test_frames_that_count_as_trials_are_refused() -> None:
         evaluate(wrong, **NESTED)
     claimed = evaluate(replace(wrong, independent=True), folds=2, **NESTED)
     assert claimed.warnings[0] == INDEPENDENT
-
-
-def test_shuffled_labels_stay_with_their_subject_and_trials_stay_whole() -> None:
-    grasp_set = framed()
-    made = shuffled_labels(grasp_set, (1, 1))
-    assert made.trial_ids.tolist() == grasp_set.trial_ids.tolist()
-    assert (made.grasps != grasp_set.grasps).any()
-    for subject in "ABC":
-        mine = grasp_set.subjects == subject
-        assert Counter(made.grasps[mine].tolist()) == Counter(grasp_set.grasps[mine].tolist())
-
-
-def test_a_permutation_test_knows_chance_and_does_not_depend_on_workers() -> None:
-    asked = {**NESTED, "tables": (), "permute": 19, "folds": 2, "rounds": 3}
-    told = evaluate(framed(), **asked).permuted
-    assert told is not None
-    assert (told.permutations, told.p, told.composition) == (19, 0.05, "II Angle + Sel-Co")
-    assert told.chance == pytest.approx(0.25, abs=0.07)
-    assert told.rate > told.highest >= told.chance
-    assert evaluate(framed(), **(asked | {"jobs": 2})).permuted == told
-
-
-@pytest.mark.slow
-def test_where_labels_say_nothing_p_values_are_spread_evenly() -> None:
-    asked = {**NESTED, "tables": (), "permute": 9, "folds": 2, "rounds": 2}
-    small = [make_grasps(n_switches=5, n_joints=0, subjects="A", per_type=6, noise=0.5, seed=s) for s in range(25)]
-    found = [study.permuted for study in (evaluate(one, **asked) for one in small)]
-    p = np.array([each.p for each in found if each is not None])
-    assert len(p) == 25
-    assert p.min() >= 0.1
-    assert 0.4 <= p.mean() <= 0.75
-    assert np.mean(p <= 0.2) <= 0.35

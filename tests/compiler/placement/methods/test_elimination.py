@@ -6,19 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.methods import elimination
 from thenar.compiler.placement.methods.elimination import (
     BINS,
-    boosted_elimination_order,
     elimination_order,
     removal_rises,
     sampled,
     thermometer,
 )
 from thenar.compiler.placement.ports import PortCosts
-from thenar.compiler.samples import Columns, Samples
-from thenar.compiler.trainers.logitboost import boost
+from thenar.compiler.samples import Samples
 
 Bits = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float64]
@@ -101,56 +98,6 @@ def noisy(seed: int, joints: int, switches: int = 11) -> Samples:
     bits = (random.random((5, switches)) < 0.4)[labels] ^ (random.random((160, switches)) < 0.15)
     codes = (50 * labels[:, np.newaxis] + random.integers(0, 200, (160, joints))).astype(np.uint16)
     return learning_of(bits, labels, codes)
-
-
-def plain_loss(scores: Floats, labels: npt.NDArray[np.intp]) -> float:
-    shares = np.exp(scores) / np.exp(scores).sum(axis=1, keepdims=True)
-    return float(-np.log(shares[np.arange(len(labels)), labels]).sum())
-
-
-def plainly(learning: Samples) -> Columns:
-    """Return the order found by scoring every row anew without each switch, one after the other."""
-    left = list(range(learning.n_switches))
-    gone: list[int] = []
-    while len(left) > 1:
-        bits = learning.switches[:, left]
-        X = np.hstack([bits.astype(np.uint16), learning.codes])
-        stumps, _ = boost(X, learning.labels, learning.n_classes, rounds=40, max_bins=8)
-        tables = collapse(stumps, len(left))
-        losses = []
-        for place in range(len(left)):
-            rows = tables.switch_rows.copy()
-            rows[place] = 0.0
-            scores = stumps.scores(X) - bits @ (tables.switch_rows - rows)
-            losses.append(plain_loss(scores + bits[:, place].mean() * tables.switch_rows[place], learning.labels))
-        cheapest = sorted(range(len(left)), key=lambda place: losses[place])[: max(1, int(0.12 * len(left)))]
-        gone += [left[place] for place in cheapest]
-        left = [column for column in left if column not in gone]
-    return tuple(left + gone[::-1])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("seed", "joints", "switches"), [(0, 0, 9), (1, 0, 9), (2, 2, 9), (3, 1, 25)])
-def test_elimination_removes_the_switch_whose_mean_raises_loss_least(seed: int, joints: int, switches: int) -> None:
-    learning = noisy(seed, joints, switches)
-    assert boosted_elimination_order(learning) == plainly(learning)
-
-
-def test_switches_that_boosting_never_asks_for_go_by_their_numbers() -> None:
-    labels = np.arange(120) % 4
-    low, high = (labels & 1).astype(bool), (labels >> 1).astype(bool)
-    copies = learning_of(np.stack([low, high, low, high, low], axis=1), labels)
-    assert boosted_elimination_order(copies)[2:] == (4, 3, 2)
-
-
-def test_boosted_what_the_joints_tell_no_switch_needs_to() -> None:
-    random = np.random.default_rng(3)
-    labels = np.arange(240) % 4
-    low, high = (labels & 1).astype(bool), (labels >> 1).astype(bool)
-    codes = np.where(random.random(240) < 0.03, 200, np.where(low, 300, 100)).astype(np.uint16)[:, np.newaxis]
-    switches = np.stack([low ^ (random.random(240) < 0.05), high ^ (random.random(240) < 0.1)], axis=1)
-    assert boosted_elimination_order(learning_of(switches, labels)) == (0, 1)
-    assert boosted_elimination_order(learning_of(switches, labels, codes)) == (1, 0)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 9))
