@@ -6,12 +6,8 @@ import pytest
 from thenar.compiler import GraspSet
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.interim import (
-    _CONSTANT,
-    _PENALTY,
-    _inputs,
     interim_accuracy,
     interim_accuracy_of,
-    left_out_scores,
 )
 from thenar.compiler.recordings.graspset import Joint
 from thenar.runtime.frames import GloveFrame, SwitchFrame
@@ -19,30 +15,6 @@ from thenar.runtime.recording.session import Collection, CollectionTask, Label, 
 from thenar.runtime.recording.writer import Recorder
 
 from ...sets import grasp_set_of
-
-
-def trained(inputs: np.ndarray, label: np.ndarray, weight: np.ndarray, penalty: float, constant: float) -> np.ndarray:
-    """The same model from its normal equations: weights (p + 1, K), the constant last."""
-    design = np.hstack([inputs, np.ones((len(inputs), 1))])
-    wanted = 2.0 * np.eye(3)[label] - 1.0
-    penalties = np.diag([penalty] * inputs.shape[1] + [penalty / constant])
-    return np.linalg.solve(design.T @ (design * weight[:, None]) + penalties, design.T @ (wanted * weight[:, None]))
-
-
-def test_leaving_a_trial_out_is_training_without_its_rows() -> None:
-    random = np.random.default_rng(7)
-    trial = np.repeat(np.arange(9), [1, 3, 1, 2, 1, 1, 4, 1, 2])
-    label = (np.arange(9) % 3)[trial]
-    inputs = random.normal(size=(len(trial), 6)) + label[:, None]
-    scores = left_out_scores(inputs, label, trial)
-    mean = (inputs**2).sum() / len(inputs)
-    for one in range(9):
-        rest = trial != one
-        weight = 1.0 / np.bincount(trial)[trial]
-        # The constant's column is worth _CONSTANT times the mean of the others.
-        model = trained(inputs[rest], label[rest], weight[rest], _PENALTY * mean, _CONSTANT * mean)
-        alone = np.hstack([inputs[~rest], np.ones(((~rest).sum(), 1))]) @ model
-        np.testing.assert_allclose(scores[~rest], alone, rtol=1e-5, atol=1e-6)
 
 
 def grasps(repetitions: int, *, noise: float, seed: int = 3) -> GraspSet:
@@ -94,12 +66,11 @@ def test_a_type_with_one_trial_has_no_accuracy_and_does_not_count() -> None:
     assert (first.total, first.correct, first.low, first.high) == (0, 0, 0.0, 1.0)
 
 
-def test_rows_of_a_trial_count_once_and_constant_inputs_never() -> None:
+def test_rows_of_a_trial_count_once() -> None:
     whole = grasps(6, noise=3)
     thrice = whole.rows(np.repeat(np.arange(len(whole)), 3))
     one, three = interim_accuracy(whole), interim_accuracy(thrice)
     assert three.total == one.total == 18
-    assert (_inputs(whole)[:, 2] == 0).all()
 
 
 def test_one_type_alone_is_taken_for_nothing_else() -> None:
