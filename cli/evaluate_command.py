@@ -66,10 +66,10 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
 @click.option(
     "--by",
     "scheme",
-    type=click.Choice(("trial", "subject", "object", "session", "block")),
+    type=click.Choice(("trial", "subject", "object", "session")),
     default="trial",
     show_default=True,
-    help="What a fold tests: trials at random or by number (block), or a left-out subject, object or session.",
+    help="What a fold tests: trials at random, or a left-out subject, object or session.",
 )
 @click.option(
     "--repeats",

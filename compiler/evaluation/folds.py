@@ -18,7 +18,7 @@ from ..text import INDEPENDENT
 
 
 class EvaluationError(ThenarError, ValueError):
-    """The set cannot be split or compared as requested: too few rows, subjects or blocks, or an unknown name."""
+    """The set cannot be split or compared as requested: too few rows or subjects, or an unknown name."""
 
 
 _MULTIPLIER = 0x5DEECE66D
@@ -169,29 +169,11 @@ def leave_groups_out(groups: NDArray[np.generic], by: str, n_folds: int = _MOST_
     return leave_one_out(groups.astype(np.str_), by)
 
 
-def block_folds(trials: NDArray[np.int64], n_folds: int) -> list[Fold]:
-    """Return folds by recording block: the trial numbers (n,), in order, split into `n_folds` contiguous ranges.
-
-    Neighbouring trials resemble each other (the glove has not moved on the hand); this split never trains on one and
-    tests on the other, except at the borders. Raises EvaluationError if there are fewer trial numbers than folds.
-    """
-    numbers = np.unique(trials)
-    if len(numbers) < 2:
-        raise EvaluationError(
-            f"all {len(trials)} rows have trial number {', '.join(map(str, numbers))}: blocks need trial numbers "
-            "(name their column in columns.toml)"
-        )
-    check_cut(len(numbers), n_folds, "trial numbers")
-    blocks = np.array_split(numbers, n_folds)
-    names = [f"trials {block[0]}-{block[-1]}" if len(block) > 1 else f"trial {block[0]}" for block in blocks]
-    return [_fold(np.isin(trials, block), name) for block, name in zip(blocks, names, strict=True)]
-
-
 def _fold(tested: NDArray[np.bool_], name: str) -> Fold:
     return Fold(np.flatnonzero(~tested), np.flatnonzero(tested), name)
 
 
-Scheme = Literal["trial", "subject", "object", "session", "block"]
+Scheme = Literal["trial", "subject", "object", "session"]
 
 # What the accuracies of each scheme are of.
 OF: dict[Scheme, Of] = {
@@ -199,7 +181,6 @@ OF: dict[Scheme, Of] = {
     "subject": "new subject",
     "object": "new object",
     "session": "new session",
-    "block": "within subject",
 }
 
 
@@ -229,7 +210,7 @@ def populations_of(
 ) -> tuple[Population, ...]:
     """Return one population per subject.
 
-    trial, block, object, session: only the subject's own rows are trained on, and all are tested once per repeat.
+    trial, object, session: only the subject's own rows are trained on, and all are tested once per repeat.
     subject: the rows of all others are trained on. Only `trial` has a seed, and so repeats (seed, seed + 1, ...). No
     scheme has rows of one trial on both sides of a fold. Raises EvaluationError naming a subject that cannot be split.
     """
@@ -244,8 +225,6 @@ def populations_of(
         if scheme in ("object", "session"):
             groups = grasp_set.objects if scheme == "object" else grasp_set.sessions
             return [leave_one_out(groups[rows], scheme)]
-        if scheme == "block":
-            return [block_folds(grasp_set.trials[rows], n_folds)]
         labels, trials = samples.labels[rows], samples.trials[rows]
         return [trial_folds(labels, trials, n_folds, seed + repeat) for repeat in range(repeats)]
 

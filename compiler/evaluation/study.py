@@ -57,8 +57,8 @@ class StudyDesign:
     recipe      of every classifier: its placement, which the tables vary, its trainer, and folds and seed. In the table
                 of trainers, the settings that are not given are chosen from the training rows
     subjects    whose rows to use; empty: everybody's
-    scheme      what is kept together in a fold: trials (stratified as in Weka), blocks of trial numbers, or subjects,
-                objects or sessions, each left out in turn
+    scheme      what is kept together in a fold: trials (stratified as in Weka), or subjects, objects or sessions,
+                each left out in turn
     repeats     for `trial`, with seeds seed, seed + 1, ...
     prune_list  each S of the table of pooled and pruned placements
     baselines   methods to compare with the recipe's, in addition to random placements
@@ -123,7 +123,6 @@ class Study:
             "subject": "one subject left out at a time (the column), all others trained on",
             "object": "one object left out at a time",
             "session": "one session left out at a time",
-            "block": f"{recipe.folds} blocks of trials",
         }[design.scheme]
         grasps = counted(len(self.grasps), "grasp type")
         frames = f" of {self.rows:,} frames" if self.rows > self.trials else ""

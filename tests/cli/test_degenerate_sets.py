@@ -76,7 +76,7 @@ def test_place_chooses_or_says_why_not(name: str, path: Path, capsys: pytest.Cap
         assert "one grasp type" in out or "agree in every switch" in out
 
 
-CUTS = (["--by", "subject"], ["--by", "object"], ["--by", "block", "--folds", "2"])
+CUTS = (["--by", "subject"], ["--by", "object"])
 QUICK = ["--tables", "compositions", "--trainer", "logitboost"]
 
 

@@ -88,7 +88,7 @@ def completed(*words: str) -> list[str]:
         (("emulate", "qu"), ["quick"]),
         (("place", "set.grasps", "--method", ""), [*METHODS]),
         (("frontier", "--methods", "id3,cm"), ["id3,cmim"]),
-        (("evaluate", "--baselines", "mr"), ["mrmr"]),
+        (("evaluate", "--baselines", "cm"), ["cmim"]),
         (("compile", "--trainer", ""), ["auto", *TRAINERS]),
         (("compile", "--preset", "f"), ["fastest"]),
         (("compile", "--meth"), ["--method"]),

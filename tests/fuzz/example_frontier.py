@@ -82,12 +82,6 @@ _CURVES: tuple[tuple[str, str, bool, tuple[float, ...]], ...] = (
         (0.18, 0.30, 0.548, 0.752, 0.858, 0.925, 0.935, 0.936, 0.936),
     ),
     (
-        "mrmr",
-        "Most relevance, least redundance",
-        False,
-        (0.19, 0.29, 0.503, 0.671, 0.802, 0.893, 0.926, 0.934, 0.936),
-    ),
-    (
         "mutual-information",
         "The greatest mutual information, one by one",
         False,

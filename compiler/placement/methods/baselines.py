@@ -8,9 +8,9 @@ from functools import cache, cmp_to_key
 
 import numpy as np
 
-from ...elementary import Floats, add_up, log
+from ...elementary import Floats
 from ...samples import Columns, TrainingError
-from ..gain import Cooccurrence, n_log_n
+from ..gain import Cooccurrence
 from .base import Bits, Labels, Method, ranked
 
 _SEED = 0
@@ -64,41 +64,10 @@ def cmim(bits: Bits, labels: Labels) -> Iterator[int]:
                 scores[a], given[a] = conditional[a], best
 
 
-def mrmr(bits: Bits, labels: Labels) -> Iterator[int]:
-    """Yield all inputs of bits (n, d) by minimum redundancy and maximum relevance to labels (n,).
-
-    Peng, Long, Ding, "Feature selection based on mutual information", IEEE PAMI 27 (2005), equation 6 (the difference):
-    each time the input a of maximum  I(y; a) - mean over the chosen b of I(a; b).  Counts are integers and logarithms
-    are those of `elementary`, so every machine makes the same choice.
-    """
-    relevance = _information(bits, labels[:, None] == np.unique(labels))
-    left = list(range(bits.shape[1]))
-    chosen = 0
-    redundancy = np.zeros(bits.shape[1])
-    while left:
-        scores = relevance - redundancy / max(chosen, 1)
-        best = left[int(scores[left].argmax())]
-        left.remove(best)
-        chosen += 1
-        yield best
-        redundancy += _information(bits, np.stack([bits[:, best], ~bits[:, best]], axis=1))
-
-
 def _sign(counts: Cooccurrence, scores: Floats, one: tuple[int, int | None], other: tuple[int, int | None]) -> int:
     """Return the sign of I(class; a | b) of pair `one` minus that of pair `other`; `scores` are approximate values."""
     apart = scores[0] - scores[1]
     return counts.sign(one, other) if abs(apart) <= 2 * counts.error_bound else int(np.sign(apart))
-
-
-def _information(bits: Bits, member: Bits) -> Floats:
-    """Return n * I(a; class) in nats for every column a of bits (n, d), with class membership in member (n, k)."""
-    n = len(bits)
-    ones = member.T.astype(np.float64) @ bits.astype(np.float64)  # integers: exact in any order
-    sizes = member.sum(axis=0, dtype=np.float64)[:, None]
-    total = ones.sum(axis=0)
-    joint = add_up(np.concatenate([n_log_n(ones, log), n_log_n(sizes - ones, log)]))
-    apart: Floats = joint - n_log_n(total, log) - n_log_n(n - total, log) - add_up(n_log_n(sizes, log))
-    return apart + n_log_n(np.array([n]), log)
 
 
 def _elimination_by_regression(bits: Bits, labels: Labels) -> Columns:
@@ -121,14 +90,6 @@ MEMBER = (
         nested=True,
         tried="always",
         rank=20,
-    ),
-    Method(
-        name="mrmr",
-        help="Greedy: most relevant to the grasp type, least redundant (mRMR)",
-        learn=ranked(mrmr),
-        nested=True,
-        tried="always",
-        rank=22,
     ),
     Method(
         name="cmim",

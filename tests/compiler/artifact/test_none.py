@@ -58,8 +58,8 @@ def moved() -> GraspSet:
 
 
 def test_none_is_the_last_class_and_placed_on_grasps_alone(moved: GraspSet, tmp_path: Path) -> None:
-    made = compile_build(moved, tmp_path / "build", rounds=20, folds=3, keep=4, placement="mrmr", jobs=1)
-    without = compile_build(moved.without_none(), tmp_path / "without", rounds=20, folds=0, keep=4, placement="mrmr")
+    made = compile_build(moved, tmp_path / "build", rounds=20, folds=3, keep=4, placement="cmim", jobs=1)
+    without = compile_build(moved.without_none(), tmp_path / "without", rounds=20, folds=0, keep=4, placement="cmim")
     assert made.manifest.grasps == (*sorted(TYPES, key=TYPES.index), "none")
     assert [each.name for each in made.manifest.switches] == [each.name for each in without.manifest.switches]
     assert made.manifest.rejection is None
@@ -180,7 +180,7 @@ def mixed(moved: GraspSet) -> GraspSet:
 
 def test_static_grasps_teach_types_and_not_whether_something_is_held(mixed: GraspSet, tmp_path: Path) -> None:
     samples = Samples.of(mixed)
-    options = Recipe(trainer="logit", keep=6, placement="mrmr", folds=3, settings={"penalty": 1.0, "smoothness": 2.0})
+    options = Recipe(trainer="logit", keep=6, placement="cmim", folds=3, settings={"penalty": 1.0, "smoothness": 2.0})
     assert (samples.silent == (mixed.subjects != "S0")).all()
     assert not Samples.of(mixed.rows(mixed.subjects == "S0")).silent.any()
     assert samples.rows(~samples.is_none).given_held is None

@@ -1,4 +1,3 @@
-import itertools
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ from thenar.compiler.evaluation.folds import (
     EvaluationError,
     Fold,
     JavaRandom,
-    block_folds,
     leave_one_out,
     trial_folds,
     weka_folds,
@@ -116,29 +114,3 @@ def test_each_fold_tests_exactly_one_group(names: list[str]) -> None:
     for fold in folds:
         assert set(groups[fold.test]) == {fold.name}
         assert fold.name not in groups[fold.train]
-
-
-@given(trial_numbers, st.data())
-def test_blocks_are_contiguous_in_trial_number_and_never_split_one(trials: list[int], data: st.DataObject) -> None:
-    numbers = np.array(trials)
-    distinct = len(np.unique(numbers))
-    if distinct < 2:
-        return
-    folds = block_folds(numbers, data.draw(st.integers(2, distinct)))
-    assert covers_once(folds, len(trials))
-    for earlier, later in itertools.pairwise(folds):
-        assert numbers[earlier.test].max() < numbers[later.test].min()
-
-
-def test_a_block_is_named_by_its_trials() -> None:
-    assert [fold.name for fold in block_folds(np.array([1, 2, 3, 1]), 2)] == ["trials 1-2", "trial 3"]
-
-
-def test_rows_of_one_trial_number_have_no_blocks() -> None:
-    with pytest.raises(EvaluationError, match="all 5 rows have trial number 7"):
-        block_folds(np.full(5, 7), 2)
-
-
-def test_fewer_trial_numbers_than_folds_are_refused() -> None:
-    with pytest.raises(EvaluationError, match="3 trial numbers cannot be cut into 4 folds"):
-        block_folds(np.array([1, 2, 3, 3, 3]), 4)

@@ -17,7 +17,7 @@ from thenar.compiler.recordings.graspset import GraspSet
 from .conftest import make_grasps
 
 
-@pytest.mark.parametrize("scheme", ["trial", "object", "block"])
+@pytest.mark.parametrize("scheme", ["trial", "object"])
 def test_a_subject_is_trained_and_tested_on_own_rows_alone(scheme: Scheme) -> None:
     grasps = make_grasps()
     populations = populations_of(grasps, scheme, n_folds=4, repeats=2, seed=1)
@@ -38,7 +38,7 @@ def test_leaving_a_subject_out_trains_on_all_others() -> None:
         assert len(population.rows) == len(grasps)
 
 
-@pytest.mark.parametrize("scheme", ["trial", "subject", "object", "block"])
+@pytest.mark.parametrize("scheme", ["trial", "subject", "object"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_no_scheme_parts_the_frames_of_a_trial(scheme: Scheme, seed: int) -> None:
     """Each row comes three times, as frames of its trial do, and all rows are in another order."""
@@ -60,7 +60,7 @@ def test_repeats_are_wekas_folds_of_the_following_seeds() -> None:
             assert np.array_equal(fold.test, weka.test)
 
 
-@pytest.mark.parametrize("scheme", ["subject", "object", "block"])
+@pytest.mark.parametrize("scheme", ["subject", "object"])
 def test_a_cut_without_chance_is_not_repeated(scheme: Scheme) -> None:
     assert all(len(population.repeats) == 1 for population in populations_of(make_grasps(), scheme, 4, 3, 1))
 
@@ -82,7 +82,7 @@ def test_a_subject_who_cannot_be_cut_is_named() -> None:
 def test_the_paper_lets_test_rows_choose_and_honesty_does_not() -> None:
     grasps = make_grasps()
     everyone = np.arange(len(grasps))
-    for scheme in ("trial", "object", "block"):
+    for scheme in ("trial", "object"):
         for population in populations_of(grasps, scheme, 4, 2, 1):
             for fold in population.folds:
                 assert set(may_choose("paper", population, fold)) == set(population.rows)

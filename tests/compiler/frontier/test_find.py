@@ -61,7 +61,7 @@ def asked(folder: Path, grasp_set: GraspSet, **changes: Any) -> Request:
     """Return arguments of find_frontier; `changes` are of its search or of itself."""
     search: dict[str, Any] = {
         "methods": ("elimination", "id3"),
-        "baselines": ("mrmr",),
+        "baselines": ("cmim",),
         "rounds": 6,
         "trainer": "logitboost",
     }

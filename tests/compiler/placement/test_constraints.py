@@ -81,7 +81,6 @@ def test_every_method_obeys(found: tuple[Limits, Bound], seed: int, m: int) -> N
         "id3-ccp",
         "elimination-cost",
         "cmim",
-        "mrmr",
         "mutual-information",
         "random",
     ):

@@ -1,7 +1,6 @@
 """The baselines: what each ranks first, and what all of them keep to."""
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from thenar.compiler.placement.methods.base import METHODS
@@ -27,7 +26,7 @@ def learning() -> Samples:
     return told_by_three()
 
 
-@pytest.mark.parametrize("name", ["rfe", "mrmr", "cmim", "mutual-information"])
+@pytest.mark.parametrize("name", ["rfe", "cmim", "mutual-information"])
 def test_who_looks_at_labels_finds_the_switches_that_tell_the_types(name: str, learning: Samples) -> None:
     assert set(METHODS[name].chooser(learning)(3)) == set(TELLING)
 
@@ -46,31 +45,6 @@ def test_where_nothing_varies_or_one_type_is_left_nothing_is_chosen(name: str, l
     still = Samples(np.ones((6, 3), bool), np.zeros((6, 0), np.uint16), np.arange(6) % 2, tuple("01"))
     alike = Samples(learning.switches, learning.codes, np.zeros(len(learning.labels), np.intp), tuple("01"))
     assert METHODS[name].chooser(still)(2) == METHODS[name].chooser(alike)(2) == ()
-
-
-def information(a: npt.NDArray[np.intp], b: npt.NDArray[np.intp]) -> float:
-    joint = np.histogram2d(a, b, bins=(int(a.max()) + 1, int(b.max()) + 1))[0] / len(a)
-    apart = np.outer(joint.sum(axis=1), joint.sum(axis=0))
-    seen = joint > 0
-    return float((joint[seen] * np.log(joint[seen] / apart[seen])).sum())
-
-
-def test_mrmr_is_pengs_definition() -> None:
-    random = np.random.default_rng(8)
-    labels = random.integers(0, 4, 150)
-    bits = (random.random((150, 9)) < 0.4) ^ (labels[:, None] > np.arange(9) % 4)
-    numbers = bits.astype(np.intp)
-    chosen: list[int] = []
-    while len(chosen) < 9:
-        scores = {
-            a: information(numbers[:, a], labels)
-            - sum(information(numbers[:, a], numbers[:, b]) for b in chosen) / max(len(chosen), 1)
-            for a in range(9)
-            if a not in chosen
-        }
-        chosen.append(max(scores, key=lambda a: scores[a]))
-    learning = Samples(bits, np.zeros((150, 0), np.uint16), labels, tuple("0123"))
-    assert METHODS["mrmr"].chooser(learning)(9) == tuple(chosen)
 
 
 def test_recursive_elimination_drops_the_copy_that_importance_alone_keeps() -> None:
