@@ -127,7 +127,6 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     metavar="N,N,...",
     help="Evaluate adaptation to each subject, left out, by the first N trials of each type instead.",
 )
-@click.option("--confusion", is_flag=True, help="Print the confusion matrix of every composition and subject.")
 @click.option(
     "--plot",
     "folder",
@@ -146,7 +145,6 @@ def command(
     jobs: int,
     streams: bool,
     numbers: tuple[int, ...],
-    confusion: bool,
     folder: Path | None,
     output: Path | None,
     layout: Path | None,
@@ -202,8 +200,8 @@ def command(
         return
     asked["tables"] = tuple(name for name in TABLES if name in asked["tables"])
     design = StudyDesign(recipe, **asked)
-    if (confusion or folder is not None) and "compositions" not in design.tables:
-        raise click.UsageError("--confusion and --plot show the compositions: name one of them in --tables")
+    if folder is not None and "compositions" not in design.tables:
+        raise click.UsageError("--plot shows the compositions: name them in --tables")
     with progress("evaluating") as report:
         grasp_set = GraspSet.load(grasps)
         study = evaluate(grasp_set, design, jobs, report, **terms_of(recipe, grasp_set, layout, glove))
@@ -215,7 +213,7 @@ def command(
         write_json(output, study)
     for sentence in study.warnings:
         warning(sentence)
-    show(study, _print, confusion=confusion)
+    show(study, _print)
 
 
 def _evaluate_wearers(
@@ -302,8 +300,8 @@ def _print_grid(title: str, grid: "Grid", note: str = "") -> None:
         console.print(note)
 
 
-def _print(study: "Study", *, confusion: bool) -> None:
-    """Print all tables, laid out as in the paper, and the confusion matrices if requested."""
+def _print(study: "Study") -> None:
+    """Print all tables, laid out as in the paper."""
     from thenar.compiler.evaluation.folds import PROTOCOLS
 
     console = out()
@@ -316,20 +314,6 @@ def _print(study: "Study", *, confusion: bool) -> None:
     for missing in study.left_out:
         console.print(f"no table of {missing.name}: {missing.reason}")
     console.print(str(study))
-    if confusion:
-        _print_confusions(study)
-
-
-def _print_confusions(study: "Study") -> None:
-    columns = ("true \\ predicted", *study.grasps)
-    for rated in study.tables:
-        for row in rated.rows if rated.name == "compositions" else ():
-            for name, cell in zip(rated.columns, row.cells, strict=True):
-                grid = table(columns, columns)
-                for grasp, counts in zip(study.grasps, cell.confusion or (), strict=True):
-                    grid.add_row(grasp, *(str(count) if count else "." for count in counts))
-                title = f"{row.name} {row.what}, subject {name}, {rated.protocol} protocol, {cell.rate.what}"
-                _print_grid(title, grid)
 
 
 def _rates(rated: "RateTable") -> "Grid":

@@ -30,7 +30,7 @@ def place(small_set: GraspSet, build_folder: Path, tmp_path: Path, monkeypatch: 
         "info set.grasps",
         "place set.grasps",
         "place set.grasps --method cmim --keep 3",
-        "evaluate set.grasps --repeats 1 --folds 2 --rounds 3 --jobs 1 --confusion",
+        "evaluate set.grasps --repeats 1 --folds 2 --rounds 3 --jobs 1",
         "compile set.grasps -o new --rounds 3 --folds 2 --no-report --glove glove.toml",
         "spec build",
         "doctor glove.toml",
