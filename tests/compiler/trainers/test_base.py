@@ -57,7 +57,10 @@ def test_options_give_a_trainer_all_its_settings(constant: Constant) -> None:
 @pytest.mark.parametrize(
     ("changes", "because"),
     [
-        ({"trainer": "oracle"}, "there is no trainer 'oracle': choose one of logitboost, logit, pairs, constant"),
+        (
+            {"trainer": "oracle"},
+            "there is no trainer 'oracle': choose one of logitboost, linear, logit, discriminant, pairs, constant",
+        ),
         ({"round": 3}, "no trainer has the setting 'round'"),
         ({"rounds": 0}, "rounds=0 must be at least 1"),
         ({"shrinkage": SMALLEST_SHRINKAGE / 2}, "shrinkage=5e-07 must be at least 1e-06"),
