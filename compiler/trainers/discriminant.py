@@ -107,7 +107,9 @@ def _discriminant(
     # Nowhere is a class without rows the most probable: the scores' mean over all rows' classes is no less than this.
     bias[~seen] = bias[seen].min() - 1.0
     weights /= unit[:, np.newaxis]
-    return bias - _sums(weights.T * centre), weights
+    bias -= _sums(weights.T * centre)
+    # What all classes have in common is no score.
+    return bias - _sums(bias[np.newaxis]) / n_classes, weights - _sums(weights)[:, np.newaxis] / n_classes
 
 
 def _shrunk(covariance: Floats, rest: Floats, n_trials: int) -> Floats:

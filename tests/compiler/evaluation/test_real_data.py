@@ -23,7 +23,7 @@ def icub(icub_table: Path) -> GraspSet:
 
 @pytest.fixture(scope="module")
 def icub_study(icub: GraspSet) -> Study:
-    return evaluate(icub, tables=("compositions", "baselines"))
+    return evaluate(icub, tables=("compositions", "baselines"), protocols=("paper", "nested"), repeats=3)
 
 
 @pytest.fixture(scope="module")
