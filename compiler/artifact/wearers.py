@@ -18,6 +18,7 @@ from ..model.collapse import collapse
 from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
 from ..samples import Samples, decided
+from ..text import counted
 from ..trainers.base import Report
 from ..wearer import STRENGTH, STRENGTHS, Adaptation, correlations
 from ..workers import in_workers
@@ -94,7 +95,7 @@ class AdaptedRow(msgspec.Struct, frozen=True):
     @property
     def title(self) -> str:
         """What the accuracy is of."""
-        return f"new subject, after {self.own} own trials a type" if self.own else "new subject"
+        return f"new subject, after {counted(self.own, 'own trial')} a type" if self.own else "new subject"
 
 
 class WearerStudy(msgspec.Struct, frozen=True):
