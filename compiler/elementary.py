@@ -244,6 +244,37 @@ def dot(a: Floats, b: Floats) -> float:
     return exact_sum(a * b)
 
 
+def cholesky(matrix: Floats) -> Floats:
+    """Return the lower triangular L with L L^T = matrix (n, n), which is positive definite; see `forward`."""
+    left, lower = matrix.copy(), np.zeros_like(matrix)
+    for column in range(len(matrix)):
+        below = left[column:, column] / math.sqrt(left[column, column])
+        lower[column:, column] = below
+        left[column:, column:] -= below[:, np.newaxis] * below
+    return lower
+
+
+def forward(lower: Floats, right: Floats) -> Floats:
+    """Return x (n, k) with L x = right, for a lower triangular L (n, n).
+
+    Like `cholesky` and `backward` it takes one order of operations, not that of a machine's LAPACK.
+    """
+    solved = right.copy()
+    for row in range(len(lower)):
+        solved[row] /= lower[row, row]
+        solved[row + 1 :] -= lower[row + 1 :, row, np.newaxis] * solved[row]
+    return solved
+
+
+def backward(lower: Floats, right: Floats) -> Floats:
+    """Return x (n, k) with L^T x = right, for a lower triangular L (n, n); see `forward`."""
+    solved = right.copy()
+    for row in reversed(range(len(lower))):
+        solved[row] /= lower[row, row]
+        solved[:row] -= lower[row, :row, np.newaxis] * solved[row]
+    return solved
+
+
 def _scaled(values: Floats, exponents: NDArray[np.int32]) -> Floats:
     """Return each row of `values` (K, n) times a power of two, several times faster than ldexp."""
     if exponents.max(initial=0) > _LARGEST_POWER:

@@ -37,7 +37,7 @@ from thenar.runtime.model.terms.base import Tabulated
 from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Line
 
-from .elementary import Floats, add_up, dot, exp, softmax
+from .elementary import Floats, add_up, backward, cholesky, dot, exp, forward, softmax
 
 # The strength where no people were left out to choose it, and those to choose from.
 STRENGTH, STRENGTHS = 1.0, (0.3, 1.0, 3.0, 10.0)
@@ -163,19 +163,16 @@ class Adaptation:
         if len(self.related):
             correlations[np.tril_indices(self.tables.n_joints, -1)] = np.array(self.related) / 1000
         joints = [line.joint for line in self._lines]
-        return _cholesky(correlations[np.ix_(joints, joints)] + IDLE * np.eye(len(joints)))
+        return cholesky(correlations[np.ix_(joints, joints)] + IDLE * np.eye(len(joints)))
 
     @cached_property
     def _steep(self) -> Floats:
         """The features (n, l) of the lines: the dot product of two frames' is their kernel."""
-        found = np.zeros((len(self._rows), len(self._lines)))
+        places = np.zeros((len(self._lines), len(self._rows)))
         for number, line in enumerate(self._lines):
             above = line.parts(self.codes[self._rows, line.joint])[1][:, 0]
-            place = (above / (line.high - line.low) - 0.5) * _FIFTHS * math.sqrt(STEEP)
-            for before in range(number):
-                place = place - self._triangle[number, before] * found[:, before]
-            found[:, number] = place / self._triangle[number, number]
-        return found
+            places[number] = (above / (line.high - line.low) - 0.5) * _FIFTHS * math.sqrt(STEEP)
+        return forward(self._triangle, places).T
 
     @cached_property
     def _kernel(self) -> Floats:
@@ -196,13 +193,9 @@ class Adaptation:
     @cached_property
     def _inverse(self) -> Floats:
         """The inverse (n, n) of the bound on the curvature."""
-        n = len(self._rows)
-        lower = _cholesky(0.5 * self._kernel * self._roots * self._roots.T + self.strength * np.eye(n))
-        solved = np.eye(n)
-        for row in range(n):
-            solved[row] /= lower[row, row]
-            solved[row + 1 :] -= np.outer(lower[row + 1 :, row], solved[row])
-        return _product(solved.T, solved)
+        one = np.eye(len(self._rows))
+        lower = cholesky(0.5 * self._kernel * self._roots * self._roots.T + self.strength * one)
+        return backward(lower, forward(lower, one))
 
     @cached_property
     def _fitted(self) -> Floats:
@@ -244,12 +237,7 @@ class Adaptation:
         bias = tables.bias + _product(ones, weights)[0]
         switch_rows = tables.switch_rows + _product(self.bits[self._rows].T.astype(np.float64), weights)
         rows = {term: term.rows + _product(near, weights).reshape(term.rows.shape) for term, near, _ in self._near}
-        slopes = _product(self._steep.T, weights)
-        for number in reversed(range(len(slopes))):
-            for after in range(number + 1, len(slopes)):
-                slopes[number] -= self._triangle[after, number] * slopes[after]
-            slopes[number] /= self._triangle[number, number]
-        slopes *= math.sqrt(STEEP) * _FIFTHS
+        slopes = backward(self._triangle, _product(self._steep.T, weights)) * math.sqrt(STEEP) * _FIFTHS
         further = []
         for line, slope in zip(self._lines, slopes.reshape(-1, K), strict=True):
             bias = bias - slope / 2
@@ -268,16 +256,6 @@ def correlations(codes: NDArray[np.uint16]) -> tuple[int, ...]:
     spread = np.sqrt(np.maximum(np.diagonal(sums), 1.0))
     thousandths = np.rint(1000 * (sums / spread) / spread[:, np.newaxis])
     return tuple(thousandths[np.tril_indices(len(sums), -1)].astype(int).tolist())
-
-
-def _cholesky(matrix: Floats) -> Floats:
-    """Return the lower triangular L with L L^T = matrix (n, n), which is positive definite."""
-    left, lower = matrix.copy(), np.zeros_like(matrix)
-    for column in range(len(matrix)):
-        below = left[column:, column] / math.sqrt(left[column, column])
-        lower[column:, column] = below
-        left[column:, column:] -= np.outer(below, below)
-    return lower
 
 
 def _mean(columns: Floats) -> Floats:

@@ -65,20 +65,26 @@ def hits_of(recogniser: Recogniser, samples: Samples, tries: Sequence[Try] = TRI
 
 
 def chosen_strength(hits: Sequence[Hits], folds: int, seed: int) -> tuple[float, list[Recognised]]:
-    """Return the strength for the people left out in folds, and the accuracy that it gives; none of too few people.
-
-    It is the usual one, unless another recognises a hundredth of the trials more: less is chance, with a few people.
+    """Return the strength for the people left out in folds, and the accuracy of each with the strength that suits the
+    others; none of too few people.
     """
     if len(hits) < _LEAST_PEOPLE:
         return STRENGTH, []
-    counts, totals = np.array([correct for correct, _ in hits]), [total for _, total in hits]
-    best, usual = int(counts.sum(axis=0).argmax()), STRENGTHS.index(STRENGTH)
-    if _LEAST_GAIN * int((counts[:, best] - counts[:, usual]).sum()) <= sum(totals):
-        best = usual
-    correct = counts[:, best].tolist()
+    totals = [total for _, total in hits]
+    correct = [own[_best([*hits[:person], *hits[person + 1 :]])] for person, (own, _) in enumerate(hits)]
     low, high = (round(end, 6) for end in clustered(correct, totals, "trials"))
     of: Of = "new subject after adaptation"
-    return STRENGTHS[best], [Recognised("nested", folds, seed, sum(correct), sum(totals), of, "trials", low, high)]
+    rate = Recognised("nested", folds, seed, sum(correct), sum(totals), of, "trials", low, high)
+    return STRENGTHS[_best(hits)], [rate]
+
+
+def _best(hits: Sequence[Hits]) -> int:
+    """Return the number of the strength for these people: the usual one, unless another recognises a hundredth of the
+    trials more. Less is chance, with a few people.
+    """
+    counts, usual = np.sum([correct for correct, _ in hits], axis=0), STRENGTHS.index(STRENGTH)
+    best = int(counts.argmax())
+    return best if _LEAST_GAIN * (counts[best] - counts[usual]) > sum(total for _, total in hits) else usual
 
 
 class AdaptedRow(msgspec.Struct, frozen=True):

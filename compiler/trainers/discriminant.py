@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.model.tables import ScoreTables
 
-from ..elementary import Floats, exact_sum, log, on_one_grid, softmax_and_loss
+from ..elementary import Floats, backward, cholesky, exact_sum, forward, log, on_one_grid, softmax_and_loss
 from ..samples import TrainingError
 from ..workers import check_memory
 from .base import MAX_BINS, Report, Setting, Trainer, check_rows
@@ -102,7 +102,8 @@ def _discriminant(
     covariance = products / n / (unit[:, np.newaxis] * unit)
     shrunk = _shrunk(covariance, (inputs - means[labels]) / unit, len(np.unique(trials)))
     moved = np.where(seen[:, np.newaxis], (means - centre) / unit, 0.0)
-    weights = _solved(shrunk, moved.T)
+    lower = cholesky(shrunk)
+    weights = backward(lower, forward(lower, moved.T))
     bias = log(np.maximum(counts, 1.0) / n) - 0.5 * _sums(weights.T * moved)
     # Nowhere is a class without rows the most probable: the scores' mean over all rows' classes is no less than this.
     bias[~seen] = bias[seen].min() - 1.0
@@ -132,19 +133,6 @@ def _sums(values: Floats) -> Floats:
     """Return the sum of each row of `values` (m, d), the same on every machine."""
     total: Floats = on_one_grid(values, values.shape[1]).sum(axis=1)
     return total
-
-
-def _solved(matrix: Floats, right: Floats) -> Floats:
-    """Return the solution (d, K) of equations with a positive definite matrix (d, d), by elimination in order."""
-    left, right = matrix.copy(), right.copy()
-    for pivot in range(len(left)):
-        factors = left[pivot + 1 :, pivot] / left[pivot, pivot]
-        left[pivot + 1 :, pivot + 1 :] -= factors[:, np.newaxis] * left[pivot, pivot + 1 :]
-        right[pivot + 1 :] -= factors[:, np.newaxis] * right[pivot]
-    for pivot in reversed(range(len(left))):
-        right[pivot] /= left[pivot, pivot]
-        right[:pivot] -= left[:pivot, pivot, np.newaxis] * right[pivot]
-    return right
 
 
 def _factor(inputs: Floats, unit: Floats, labels: NDArray[np.intp], trials: NDArray[np.intp], n_classes: int) -> float:

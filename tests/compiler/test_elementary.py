@@ -14,8 +14,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.linalg import solve_triangular
 
-from thenar.compiler.elementary import _log_of_one_and, add_up, exp, log, sincos, softmax_and_loss
+from thenar.compiler.elementary import (
+    _log_of_one_and,
+    add_up,
+    backward,
+    cholesky,
+    exp,
+    forward,
+    log,
+    sincos,
+    softmax_and_loss,
+)
 from thenar.stability.reference import boosting as logistic
 from thenar.stability.reference import numbers as linear
 from thenar.stability.reference.numbers import exact, precisely, ulps
@@ -132,3 +143,14 @@ def test_sine_and_cosine_are_elementwise_and_sine_is_odd(x: np.ndarray) -> None:
     turned = sincos(-x)
     np.testing.assert_array_equal(turned[0], -sine)
     np.testing.assert_array_equal(turned[1], cosine)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 20), st.integers(1, 3))
+def test_equations_are_solved_as_by_lapack(seed: int, n: int, columns: int) -> None:
+    random = np.random.default_rng(seed)
+    root, right = random.normal(size=(n, n)), random.normal(size=(n, columns))
+    matrix = root @ root.T + np.eye(n)
+    lower = cholesky(matrix)
+    np.testing.assert_allclose(lower, np.linalg.cholesky(matrix), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(forward(lower, right), solve_triangular(lower, right, lower=True), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(backward(lower, right), np.linalg.solve(lower.T, right), rtol=1e-9, atol=1e-9)

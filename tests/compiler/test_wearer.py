@@ -6,7 +6,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from thenar.compiler.wearer import Adaptation, AdaptationError, correlations
+from thenar.compiler.artifact.wearers import chosen_strength
+from thenar.compiler.wearer import STRENGTH, STRENGTHS, Adaptation, AdaptationError, correlations
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Line
@@ -140,3 +141,13 @@ def test_no_trials_and_too_many_are_refused() -> None:
         replace(mine, **none)
     with pytest.raises(AdaptationError, match="above 0"):
         replace(mine, strength=0.0)
+
+
+def test_a_persons_rate_is_with_the_strength_that_suits_the_others() -> None:
+    alone = [((9, 5, 5, 5), 10), ((5, 5, 5, 5), 10), ((5, 5, 5, 5), 10)]
+    strength, (rate,) = chosen_strength(alone, 3, 1)
+    assert (strength, rate.correct, rate.total) == (STRENGTHS[0], 15, 30)
+    strength, (rate,) = chosen_strength([((5, 5, 7, 5), 10)] * 3, 3, 1)
+    assert (strength, rate.correct) == (STRENGTHS[2], 21)
+    assert chosen_strength([((50, 50, 51, 50), 100)] * 3, 3, 1)[0] == STRENGTH
+    assert chosen_strength(alone[:2], 2, 1) == (STRENGTH, [])
