@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, compile_build, verify
+from thenar.compiler.samples import select_inputs
 from thenar.runtime.build import Build
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 
@@ -112,6 +113,22 @@ def test_types_may_be_missing_and_contradictions_are_named(folder: Path, tmp_pat
     assert said.returncode == 0
     assert "a frame is the same for cup, pen" in said.stderr
     assert "no trials of rod" in said.stderr
+    # Even a frame that looks like another type is within the limits of its own.
+    build = Build.load(tmp_path / "new")
+    limits = build.manifest.rejection
+    assert limits is not None
+    scores = build.tables.scores(*select_inputs(both, build.manifest))
+    assert (scores[[0, 1], [0, 1]] >= limits.least_scores[:2]).all()
+
+
+def test_a_lost_inputs_substitute_moves_with_its_mean_contribution(folder: Path) -> None:
+    one, other = (Build.load(folder / name).tables for name in ("build", "mine"))
+    bits = select_inputs(GraspSet.load(folder / "mine.grasps"), Build.load(folder / "mine").manifest)[0]
+    share, rows = bits.mean(axis=0)[:, np.newaxis], other.switch_rows
+    apart = [(each.switch_means - share * each.switch_rows) / each.scale for each in (one, other)]
+    inside = (other.switch_means > np.minimum(rows, 0)) & (other.switch_means < np.maximum(rows, 0))
+    assert inside.any()
+    np.testing.assert_allclose(apart[1][inside], apart[0][inside], atol=1 / other.scale)
 
 
 def test_unsuitable_recordings_are_refused(folder: Path, tmp_path: Path) -> None:

@@ -199,3 +199,5 @@ def test_sparse_lines_are_the_best_of_all_with_these_weights_zero(seed: int, spa
     pull = (1 + BIN_SHARE) / 3  # of the weights that remain, a third of the others'
     slopes = (X[:, 6:] - X[:, 6:].mean(axis=0)).T @ over + pull * X[:, 6:].var(axis=0)[:, np.newaxis] * found
     np.testing.assert_allclose(slopes[found != 0], 0, atol=0.02 * np.abs(X[:, 6:]).max())
+    bits = np.stack([rows[-1] - rows[0] for rows in tables.rows[:6]])
+    np.testing.assert_allclose(X[:, :6].T @ over + bits / 3, 0, atol=1e-4)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from thenar.compiler import Build, GraspSet, compile_build, verify
+from thenar.compiler import Build, GraspSet, adapt, compile_build, verify
 from thenar.compiler.artifact import CompileError
 from thenar.compiler.artifact.training import cuts_of, samples_of
 from thenar.compiler.evaluation.choosing import inner_folds
@@ -185,7 +185,18 @@ def test_static_grasps_teach_types_and_not_whether_something_is_held(mixed: Gras
     assert not Samples.of(mixed.rows(mixed.subjects == "S0")).silent.any()
     assert samples.rows(~samples.is_none).given_held is None
     report = compile_build(mixed, tmp_path / "build", options, jobs=1)
-    assert report.manifest.segments is not None
+    crowd = report.manifest.segments
+    assert crowd is not None
+    # The wearer's evidence weighs as much, whatever a step of the new tables is worth.
+    adapt(tmp_path / "build", mixed.rows(mixed.subjects == "S1"), tmp_path / "mine")
+    mine = Build.load(tmp_path / "mine")
+    assert mine.manifest.segments is not None
+    assert mine.tables.scale != report.tables.scale
+    weights = [
+        each.gain / 2.0**each.shift * scale
+        for each, scale in ((crowd, report.tables.scale), (mine.manifest.segments, mine.tables.scale))
+    ]
+    assert weights[1] == pytest.approx(weights[0], rel=0.01)
     # Who is tested on the only subject with movements has not learnt what an empty hand is like: that is not counted.
     new, pooled = (
         next(each for each in report.manifest.detection if each.held.of == of and each.held.protocol == "nested")

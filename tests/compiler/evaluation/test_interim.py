@@ -73,6 +73,12 @@ def test_rows_of_a_trial_count_once() -> None:
     assert three.total == one.total == 18
 
 
+def test_a_trial_takes_no_part_in_its_own_prediction() -> None:
+    random = np.random.default_rng(1)
+    noise = grasp_set_of(["cup", "pen"], np.arange(40) % 2, switches=random.random((40, 60)) < 0.5)
+    assert interim_accuracy(noise).correct < 30
+
+
 def test_one_type_alone_is_taken_for_nothing_else() -> None:
     whole = grasps(4, noise=1)
     with pytest.raises(EvaluationError, match="all trials are of one grasp type"):
