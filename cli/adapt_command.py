@@ -22,10 +22,10 @@ def command(build: Path, mine: Path, output: Path) -> None:
     """Adapt BUILD to one person, from a few trials in MINE.grasps: two of each type are enough to help.
 
     The result is a build with the same switches, joints and thresholds, and other scores. Types may be missing: they
-    are changed as the others are on average. Recordings of other people are not needed.
+    change as the others do on average. Recordings of other people are not needed.
 
-    It needs no more than `pip install thenar`, and a second or two on a single-board computer; only the firmware needs
-    thenar[compiler]. The same input gives the same bytes.
+    It needs no more than `pip install thenar`; only the firmware needs thenar[compiler]. The same input gives the same
+    bytes.
 
     \b
     Example:

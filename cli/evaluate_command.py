@@ -166,8 +166,8 @@ def command(
     whose streams are decoded, live and afterwards. The dwell rule, a sequential test and a plain hidden Markov model
     are decoded for comparison.
 
-    With --by subject --adapt, every subject is left out once, and what the others' model recognises of the subject's
-    last trials is compared before and after adapting it to the first ones, as `thenar adapt` does.
+    --by subject --adapt leaves out each subject. It adapts the others' model to the subject's first trials, as `thenar
+    adapt` does, and tests it on the rest, before and after.
 
     \b
     Example:
@@ -239,7 +239,7 @@ def _print_wearers(study: "WearerStudy") -> None:
     numbers = ("mean", "worst")
     grid = table(("", *numbers), numbers)
     for row in study.rows:
-        interval = "" if row.low is None else f" [{100 * max(0.0, row.low):.1f}, {100 * min(1.0, row.high or 1.0):.1f}]"
+        interval = "" if row.low is None or row.high is None else f" [{100 * row.low:.1f}, {100 * row.high:.1f}]"
         grid.add_row(row.title, f"{100 * row.mean:.1f}{interval}", f"{100 * min(row.people):.1f}")
     _print_grid(str(study.recipe), grid)
     people = counted(len(study.rows[0].people), "person", "people")

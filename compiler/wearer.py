@@ -11,7 +11,7 @@ where |.| is the norm of a space of functions of a frame, one for each grasp typ
     bins    ROUGH * exp(-(distance of the bins / NEAR)^2 / 2), with a joint's bins evenly spread over SPAN; the product
             over both joints for a grid
     lines   STEEP * z (R + IDLE * I)^-1 z' over all lines together, z a code in fifths of its range from the middle, R
-            the correlations of the joints in the training rows: what joints do together, people do alike
+            the correlations of the joints in the training rows: people differ least in what joints do together
 
 So a change of a bin spreads to its neighbours, and a change of a line is large where the training rows varied least.
 The minimum is a sum of kernels at the person's frames, with a weight for each frame and type: the unknowns are as many

@@ -338,8 +338,8 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     detection        how well the build detects whether something is held, on the training rows and on folds
     rejection        the rejection rules; None if NONE is one of the grasps, or nothing is refused
     segments         costs of segments learnt from streams; None: there were none to learn from
-    wearing          how it is adapted to a person; None: as people usually are
-    adapted          to whom it is adapted; None: to nobody. Then proof and rates are of the wearer's rows
+    wearing          how it is adapted to a person; None: with the usual strength
+    adapted          the wearer's trials, of which proof and rates are; None: it is not adapted
     """
 
     schema: int

@@ -222,4 +222,4 @@ def _warnings(manifest: Manifest, adaptation: Adaptation, counts: Sequence[int])
         names = list_names([manifest.grasps[number] for number in classes])
         yield f"a frame is the same for {names}: if one of these trials was labelled wrongly, leave it out"
     if missing := [name for name, count in zip(manifest.grasps, counts, strict=True) if not count]:
-        yield f"no trials of {list_names(missing)}: changed as the other types are on average"
+        yield f"no trials of {list_names(missing)}: they change as the other types do on average"

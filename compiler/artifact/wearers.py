@@ -1,4 +1,4 @@
-"""What adapting to people left out brings: for the strength that `compile` stores, and `evaluate --adapt`."""
+"""Accuracy after adaptation to people left out: `compile` chooses the strength by it, `evaluate` prints it."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -148,7 +148,7 @@ def study_wearers(
     rows = []
     for number, own in enumerate(numbers):
         rates = [correct[number] / total for correct, total in people]
-        low, high = student(rates) if len(rates) > 1 else (None, None)
+        low, high = (min(1.0, max(0.0, end)) for end in student(rates)) if len(rates) > 1 else (None, None)
         rows.append(AdaptedRow(own, fmean(rates), low, high, tuple(rates)))
     return WearerStudy(RecipeWords.of(recipe), sum(total for _, total in people), tuple(rows))
 

@@ -2,13 +2,13 @@
 
 Inputs are the bits of switches, the codes of joints, and for each joint, if so asked, the bits "the code is above this
 edge" of a few edges. Codes are measured in their deviation within a class. Bits keep their unit, so that one which is
-rarely set gets a small weight; those of edges have a larger unit, and so only bend what the codes say. The covariance
-within classes is shrunk towards independent inputs of equal variance, by as much as its uncertainty asks for: O. Ledoit
-and M. Wolf, J. Multivariate Anal. 88 (2004), with trials, not frames, as the pieces of evidence. So it needs neither a
-penalty nor a search, and is the most accurate where trials are few.
+rarely set gets a small weight. Those of edges have a larger unit: they only bend what the codes say. The covariance
+within classes is shrunk towards independent inputs of equal variance, as far as its uncertainty asks for: O. Ledoit and
+M. Wolf, J. Multivariate Anal. 88 (2004). Trials are the pieces of evidence, not frames. So there is neither a penalty
+nor a search.
 
-The posterior probabilities of a discriminant are too sure of themselves, the more so the fewer the rows. All scores are
-therefore multiplied by one factor, with which folds that leave out trials have the least log-loss.
+The posterior probabilities of a discriminant are overconfident, the more so the fewer the rows. All scores are
+therefore multiplied by one factor: the one with the least log-loss in folds that leave out trials.
 
 All sums are exact, and the equations are solved in one order of operations: equal rows give equal bytes.
 """
