@@ -8,20 +8,31 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .parameters import Number, OutputFile, check_devices, existing_file, keep_apart, seed_range, web_options
+from .parameters import (
+    Number,
+    OutputFile,
+    check_devices,
+    existing_file,
+    existing_folder,
+    keep_apart,
+    seed_range,
+    web_options,
+)
 from .printing import echo, progress, warning
 
 if TYPE_CHECKING:
+    from thenar.runtime.build import Build
     from thenar.runtime.recording.guide import Journal
     from thenar.runtime.recording.session import Collection
 
 
 @click.command("record")
 @click.option("--glove", type=existing_file, required=True, help="The harness, a glove.toml.")
-@click.option("--taxonomy", default="kamakura14", show_default=True, help="kamakura14, cutkosky16, feix33 or own.")
+@click.option("--for", "build", metavar="BUILD", type=existing_folder, help="Record what this build recognises.")
+@click.option("--taxonomy", help="kamakura14, cutkosky16, feix33 or own.  [default: kamakura14, or the build's]")
 @click.option("--subject", required=True, help="Name of the subject.")
 @click.option("--objects", type=existing_file, help="objects.toml: the objects for each grasp type.")
-@click.option("--repetitions", type=click.IntRange(1), default=100, show_default=True, help="Trials per grasp type.")
+@click.option("--repetitions", type=click.IntRange(1), help="Trials per grasp type.  [default: 100, or 2 for a build]")
 @click.option(
     "--countdown",
     type=Number(0, 3600),
@@ -32,7 +43,7 @@ if TYPE_CHECKING:
 @click.option(
     "--none/--no-none",
     default=None,
-    help="Also record the empty hand: open, approaching, releasing, moving idly.  [default: none]",
+    help="Also record the empty hand: open, approaching, releasing, moving idly.  [default: none, or as the build]",
 )
 @click.option("--seed", type=seed_range, help="Seed of the trial order.  [default: random]")
 @web_options
@@ -41,10 +52,11 @@ if TYPE_CHECKING:
 )
 def command(
     glove: Path,
-    taxonomy: str,
+    build: Path | None,
+    taxonomy: str | None,
     subject: str,
     objects: Path | None,
-    repetitions: int,
+    repetitions: int | None,
     countdown: float,
     none: bool | None,
     seed: int | None,
@@ -55,7 +67,8 @@ def command(
     """Record labelled grasps: the command shows which grasp to take, in random order, with a countdown.
 
     The empty hand is recorded as often as each grasp type, moving for two seconds, so that a build learns when nothing
-    is held; --no-none omits this.
+    is held; --no-none omits this. With --for, the trials are those that `thenar adapt` takes: the build's grasp types,
+    twice each, with codes as the build gets them live.
 
     All device data goes into OUTPUT with the ending .mcap. However the collection ends, the same command continues it;
     each time it ends, all trials accepted so far are in OUTPUT.
@@ -64,10 +77,13 @@ def command(
     Example:
         thenar record --glove glove.toml --subject A --objects objects.toml -o anna.grasps
         thenar record --glove glove.toml --subject A -o anna.grasps --web
+        thenar record --glove glove.toml --subject me --for build/ -o mine.grasps
     """
     from thenar.compiler.recordings import check_names
-    from thenar.compiler.recordings.taxonomy import collected
+    from thenar.compiler.recordings.taxonomy import collected, known_to
+    from thenar.runtime.build import Build
     from thenar.runtime.harness.loading import load_harness
+    from thenar.runtime.live.system import LiveSystem
     from thenar.runtime.recording.guide import planned, read_journal
     from thenar.runtime.recording.session import Collection
 
@@ -77,23 +93,31 @@ def command(
     keep_apart(glove, objects, output, recording)
     if output.exists() and not recording.exists():
         raise click.UsageError(f"{output} exists, but its recording {recording.name} does not: name another --output")
+    if build is not None and (taxonomy is not None or objects is not None or none is not None):
+        raise click.UsageError("--for takes grasp types from the build: leave out --taxonomy, --objects and --none")
     if taxonomy == "own" and objects is None:
         raise click.UsageError("--taxonomy own takes its grasp types from an objects.toml: name it with --objects")
     harness = load_harness(glove)
     check_devices(harness, glove)
     check_names("subject", [subject])
+    loaded = None if build is None else Build.load(build)
+    if loaded is not None:
+        LiveSystem.of(loaded, harness).recognizer()  # refuses a glove that does not fit the build
     journal = None
     if recording.exists():
         with progress(f"reading {recording.name}"):
             journal = read_journal(recording)
-    types, tasks = collected(taxonomy, objects, _with_none(journal) if none is None else none)
+    if loaded is not None:
+        types, tasks = known_to(loaded.manifest)
+    else:
+        types, tasks = collected(taxonomy or "kamakura14", objects, _with_none(journal) if none is None else none)
     drawn = secrets.randbits(32) if seed is None else seed
-    wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
+    wanted = Collection(subject, types.name, types.types, tasks, repetitions or (100 if build is None else 2), drawn)
     if journal is not None:
         wanted = _resumed(journal, wanted, seed)
     trials = planned(wanted)
     accepted = 0 if journal is None else len(journal.accepted)
-    write = partial(_write, recording, output, len(trials))
+    write = partial(_write, recording, output, len(trials), loaded)
     if accepted < len(trials):
         page = None
         if web is not None:
@@ -133,7 +157,7 @@ def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Col
     return wanted
 
 
-def _write(recording: Path, output: Path, planned: int, accepted: int) -> Sequence[str]:
+def _write(recording: Path, output: Path, planned: int, build: "Build | None", accepted: int) -> Sequence[str]:
     """Write the set of all accepted trials, say so, and return the warnings."""
     from thenar.compiler.recordings.mcap_recording import import_recordings
 
@@ -141,7 +165,7 @@ def _write(recording: Path, output: Path, planned: int, accepted: int) -> Sequen
         echo(f"no trial was accepted: {output} is not written; run the same command to continue")
         return ()
     with progress(f"importing {recording.name}"):
-        grasp_set, report = import_recordings([recording])
+        grasp_set, report = import_recordings([recording], coded=None if build is None else build.manifest.codings)
     grasp_set.save(output)
     warnings = [finding.message for finding in report.warnings]
     for message in warnings:

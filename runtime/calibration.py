@@ -26,7 +26,7 @@ from .published import JointAngles
 
 _BYTES = 256
 # The unit of recorded bytes that are not calibrated.
-_RAW = "raw"
+RAW = "raw"
 # A CyberGlove never sends 0, which ends a record.
 _RAW_CODES = range(1, _BYTES)
 
@@ -184,7 +184,7 @@ def place_of(joint: str, sensor_names: Sequence[str]) -> int:
 
 def codes_of_bytes(joint: Calibration, calibration: Meaning) -> tuple[int, ...]:
     """Return the code of each byte, 0 to 255, of the sensor of `joint`. Raises SettingError if there is none."""
-    if calibration is None or (isinstance(calibration, tuple) and joint.unit == _RAW):
+    if calibration is None or (isinstance(calibration, tuple) and joint.unit == RAW):
         return _raw(joint)
     if isinstance(calibration, GloveCalibration) and calibration.unit != joint.unit:
         raise SettingError(

@@ -382,6 +382,12 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
         return self.grasps if self.rejection is None else (*self.grasps, NONE)
 
     @property
+    def codings(self) -> dict[str, Calibration]:
+        """The joints and taxels that are read, by name."""
+        taxels = (switch.threshold.taxel for switch in self.switches if switch.threshold is not None)
+        return {coded.name: coded for coded in (*self.joints, *taxels)}
+
+    @property
     def segmenting(self) -> SegmentModel:
         """The costs of segments: the learnt ones, or the usual ones."""
         has_none = self.grasps[-1] == NONE

@@ -10,7 +10,7 @@ was not calibrated, otherwise half degrees on one scale for all subjects. Taxels
 drift of their baselines; if they were calibrated, all counts are converted to the first calibration.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,9 +18,10 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from thenar.runtime.calibration import codes_of_bytes
+from thenar.runtime.calibration import RAW, Meaning, codes_of_bytes, numbers_of
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.harness.wiring import StreamWiring
 from thenar.runtime.manifest import Calibration as BuildCalibration
 from thenar.runtime.names import SHOWN, shortened
 from thenar.runtime.published import NONE
@@ -111,11 +112,14 @@ def import_files(
     return import_file(paths[0], columns, progress)
 
 
-def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[GraspSet, ImportReport]:
+def import_recordings(
+    paths: Sequence[Path], stream: bool = False, coded: Mapping[str, BuildCalibration] | None = None
+) -> tuple[GraspSet, ImportReport]:
     """Import the accepted trials of recordings of one glove and one taxonomy; subjects may differ.
 
-    As a `stream` they have a row every 10 ms, and every restart is a separate session. Raises FormatError, TableError
-    or RecordingError naming the file, and OSError.
+    As a `stream` they have a row every 10 ms, and every restart is a separate session. `coded` are joints and taxels
+    by name whose codes have this meaning, such as a build's: then they are the codes that it would get live. Raises
+    FormatError, TableError or RecordingError naming the file, SettingError if a reading has no such code, and OSError.
     """
     parts: list[_Part] = []
     findings: list[Oddity] = []
@@ -138,7 +142,7 @@ def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[Gras
         raise TableError(f"{what}: no trial was accepted; `thenar record` makes recordings with labelled trials")
     # A row of a stream takes as much memory as any other.
     check_made(f"{what}: its trials", _bytes_of(grasps) // (4 if stream else 1), size)
-    grasp_set, costs = _joined(grasps, stream)
+    grasp_set, costs = _joined(grasps, stream, coded or {})
     return grasp_set, report_of(what, grasp_set, costs, (*findings, *find_oddities(grasp_set, grasp_set.trials)))
 
 
@@ -346,7 +350,7 @@ def _taxonomy(part: _Part) -> Taxonomy:
 
 
 def _unit(session: Session) -> str:
-    return "raw" if session.calibration is None else session.calibration.unit
+    return RAW if session.calibration is None else session.calibration.unit
 
 
 def _taxel_unit(session: Session) -> str:
@@ -360,15 +364,18 @@ def _bytes_of(grasps: Sequence[tuple[_Part, _Grasp]]) -> int:
     return len(grasps) * (len(session.switches) + 2 * len(session.sensors) + 2 * len(session.taxels) + 4 * letters)
 
 
-def _joined(grasps: Sequence[tuple[_Part, _Grasp]], stream: bool) -> tuple[GraspSet, tuple[CodingCost, ...]]:
+def _joined(
+    grasps: Sequence[tuple[_Part, _Grasp]], stream: bool, coded: Mapping[str, BuildCalibration]
+) -> tuple[GraspSet, tuple[CodingCost, ...]]:
     first = grasps[0][0]
     began = {id(part): grasp.time_us for part, grasp in reversed(grasps)}
     session = {part: str(number) for number, part in enumerate(dict.fromkeys(id(part) for part, _ in grasps), start=1)}
     trials = np.array([grasp.label.trial for _, grasp in grasps], np.int64)
-    joints = [_joint(name, grasps, trials) for name in first.session.sensors if name not in WRIST]
+    names = [name for name in first.session.sensors if name not in WRIST]
+    joints = [_joint(name, grasps, trials, coded.get(name)) for name in names]
     labels = [grasp.label for _, grasp in grasps]
     closed = [0 if grasp.switches is None else grasp.switches.closed for _, grasp in grasps]
-    taxels = [_taxel(place, grasps) for place in range(len(first.session.taxels))]
+    taxels = [_taxel(place, grasps, coded) for place in range(len(first.session.taxels))]
     grasp_set = GraspSet(
         switches=switch_matrix(closed, len(first.session.switches)),
         switch_names=first.session.switches,
@@ -388,34 +395,58 @@ def _joined(grasps: Sequence[tuple[_Part, _Grasp]], stream: bool) -> tuple[Grasp
 
 
 def _joint(
-    name: str, grasps: Sequence[tuple[_Part, _Grasp]], trials: NDArray[np.int64]
+    name: str, grasps: Sequence[tuple[_Part, _Grasp]], trials: NDArray[np.int64], target: BuildCalibration | None
 ) -> tuple[NDArray[np.uint16], Joint, CodingCost]:
-    unit = _unit(grasps[0][0].session)
-    calibrated = grasps[0][0].session.calibration is not None
-    values = np.array([_value(name, part, grasp) for part, grasp in grasps], np.float64)
-    scale = _HALF_DEGREES if calibrated else _BYTES
-    columns = JointColumns((name,), unit, codes=not calibrated, calibration=scale)
-    codes, joint, cost = code_joint(name, columns, values, trials)
-    if calibrated:  # coded like live bytes, including halves between two codes
-        coded = _coded(joint)
-        parts = {id(part): part for part, _ in grasps}
-        tables = {key: codes_of_bytes(coded, part.session.calibration) for key, part in parts.items()}
-        codes = np.array([tables[id(part)][_raw(name, part, grasp)] for part, grasp in grasps], np.uint16)
-    return codes, joint, cost
+    """Return the codes of a joint, of a given meaning if there is a `target`."""
+    session = grasps[0][0].session
+    points, unit = _BYTES if session.calibration is None else _HALF_DEGREES, _unit(session)
+    if target is not None:
+        points, unit = _points(target), target.unit
+    coded = BuildCalibration(0, name, unit, *structs.astuple(points))
+    tables = {id(part): _of_bytes(coded, part) for part, _ in grasps}
+    read = [(tables[id(part)], _raw(name, part, grasp)) for part, grasp in grasps]
+    values = np.array([values[byte] for (_, values), byte in read], np.float64)
+    if target is not None:  # what is beyond its codes gets the nearest, as it does live
+        values = np.clip(values, *sorted(Joint(name, unit, *structs.astuple(points)).value([0, CODES - 1])))
+    columns = JointColumns((name,), unit, codes=unit == RAW, calibration=points)
+    _, joint, cost = code_joint(name, columns, values, trials)
+    return np.array([codes[byte] for (codes, _), byte in read], np.uint16), joint, cost
 
 
-def _taxel(place: int, grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[list[int], Joint]:
-    """Return the codes of a taxel: its counts, converted to the first calibration if another one was used."""
+def _of_bytes(coded: BuildCalibration, part: _Part) -> tuple[Sequence[int], Sequence[float]]:
+    """Return the code and the value of each byte of a joint, as they would be live."""
+    meaning: Meaning = part.session.calibration
+    if meaning is None and coded.unit != RAW:
+        device = parse_harness(part.session.harness, part.what).joint_device
+        meaning = numbers_of(device.joints) if isinstance(device, StreamWiring) else None
+    if meaning is None:
+        return codes_of_bytes(coded, None), range(256)
+    sensors = meaning if isinstance(meaning, tuple) else meaning.sensors
+    line = next((line for line in sensors if line.name == coded.name), None)
+    if line is None:
+        raise TableError(
+            f"{part.what}: its calibration has no sensor {shortened(repr(coded.name))}: `thenar calibrate` makes a "
+            "whole one"
+        )
+    return codes_of_bytes(coded, meaning), [line.value(byte) for byte in range(256)]
+
+
+def _taxel(
+    place: int, grasps: Sequence[tuple[_Part, _Grasp]], targets: Mapping[str, BuildCalibration]
+) -> tuple[list[int], Joint]:
+    """Return the codes of a taxel: its counts, converted to the first calibration, or to that of its target."""
     first = grasps[0][0].session
     name, line = first.taxels[place], _line(first, place)
     taxel = Joint(name, "counts", 0, 0.0, 1, 1.0)
-    if line is not None:
+    if (target := targets.get(name)) is not None:
+        taxel, line = Joint(name, target.unit, *structs.astuple(_points(target))), None
+    elif line is not None:
         taxel = Joint(name, _taxel_unit(first), line.rest, 0.0, line.press, line.value)
     codes = []
     for part, grasp in grasps:
         count, own = grasp.counts[place], _line(part.session, place)
         assert count is not None
-        code = count if own is None or own == line else own.codes(_coded(taxel)).code(count)
+        code = count if own is None or own == line or taxel.unit == "counts" else own.codes(_coded(taxel)).code(count)
         codes.append(min(max(code, 0), CODES - 1))
     return codes, taxel
 
@@ -434,14 +465,5 @@ def _raw(name: str, part: _Part, grasp: _Grasp) -> int:
     return grasp.glove.sensors[part.session.sensors.index(name)]
 
 
-def _value(name: str, part: _Part, grasp: _Grasp) -> float:
-    raw = _raw(name, part, grasp)
-    calibration = part.session.calibration
-    if calibration is None:
-        return raw
-    line = next((line for line in calibration.sensors if line.name == name), None)
-    if line is None:
-        raise TableError(
-            f"{part.what}: its calibration has no sensor {shortened(repr(name))}: `thenar calibrate` makes a whole one"
-        )
-    return line.value(raw)
+def _points(target: BuildCalibration) -> CalibrationPoints:
+    return CalibrationPoints(target.code_a, target.value_a, target.code_b, target.value_b)

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from unicodedata import decimal
 
+from thenar.runtime.manifest import Manifest
 from thenar.runtime.names import LONGEST_SHOWN, MOST_COMPARED, shortened
 from thenar.runtime.published import NONE
 from thenar.runtime.recording.session import CollectionTask
@@ -211,6 +212,14 @@ def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[
             raise source.error((key,), f"is {grasp}, which is listed already: list it once")
         tasks[grasp] = CollectionTask(grasp, _objects(source, key, value))
     return types, (*tasks.values(), *(CollectionTask(NONE, movements),) * none)
+
+
+def known_to(manifest: Manifest) -> tuple[Taxonomy, tuple[CollectionTask, ...]]:
+    """Return the taxonomy of a build, and the tasks to collect for it: its types, and nothing held if it knows that."""
+    name, grasps = manifest.source.taxonomy, manifest.grasps
+    types = published(name) if name in _PUBLISHED else Taxonomy(name, tuple(grasp for grasp in grasps if grasp != NONE))
+    tasks = (CollectionTask(grasp, tuple(MOVEMENTS) if grasp == NONE else (ANY,)) for grasp in grasps)
+    return types, tuple(tasks)
 
 
 def _objects(source: TomlText, key: str, value: object) -> tuple[str, ...]:

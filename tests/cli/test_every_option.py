@@ -46,6 +46,7 @@ LINES: dict[str, tuple[str, str]] = {
     "teach": ("movements.grasps", "-b build -o new.json"),
     "calibrate": ("missing/port", "-o new.toml"),
     "record": ("", "--glove glove.toml --subject A --objects objects.toml --taxonomy own -o new.grasps"),
+    "wear": ("build", "--glove glove.toml -o new"),
     "emulate": ("set.grasps", "--glove glove.toml --dir new --period-ms 1"),
     "doctor": ("glove.toml", ""),
     "stability": ("elementary", "--jobs 1"),

@@ -1,6 +1,7 @@
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from hypothesis import example, given
@@ -12,7 +13,7 @@ from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.mcap_recording import _Grasp, _Part, _taxel, import_recordings
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.runtime.calibration import CodeTables
+from thenar.runtime.calibration import CodeTables, Meaning, numbers_of
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.manifest import Calibration, Threshold
 from thenar.runtime.recording.guide import read_journal
@@ -325,8 +326,38 @@ def test_codes_of_another_calibration_are_those_that_the_live_recogniser_gives_i
             (own, _Grasp(Label(0, "captured", 1, "PoS", "A", "jar"), None, None, (raw,))),
         )
     ]
-    codes, _ = _taxel(0, grasps)
+    codes, _ = _taxel(0, grasps, {})
     assert (codes[1] > code) == bool(closed)
+
+
+@given(
+    st.tuples(st.integers(1, 255), st.integers(1, 255)).filter(lambda ends: ends[0] != ends[1]),
+    st.tuples(*(st.integers(0, 65535),) * 2).filter(lambda ends: ends[0] != ends[1]),
+    st.sampled_from([(-250.0, 250.0), (-20.0, 80.5), (100.0, 0.0)]),
+    st.booleans(),
+)
+def test_a_recording_for_a_build_has_the_codes_that_it_gets_live(
+    ends: tuple[int, int], codes: tuple[int, int], values: tuple[float, float], calibrated: bool
+) -> None:
+    coded = Calibration(0, "index_mpj", "deg", codes[0], values[0], codes[1], values[1])
+    line = SensorCalibration("index_mpj", ends[0], 5.0, ends[1], 70.0)
+    meaning: Meaning = GloveCalibration(sensors=(line,))
+    harness = ""
+    if not calibrated:
+        harness = '[[stream]]\nport = "udp://127.0.0.1:9"\njoints = { index_mpj = [5.0, 70.0] }\n'
+        meaning = numbers_of({"index_mpj": (5.0, 70.0)})
+    session = replace(
+        SESSION, switches=(), sensors=("index_mpj",), harness=harness, calibration=meaning if calibrated else None
+    )
+    with TemporaryDirectory() as folder:
+        with Recorder(Path(folder, "a.mcap"), session) as recorder:
+            for trial in range(1, 256):
+                do(recorder, trial, "captured", trial, sensors=bytes((trial,)))
+                do(recorder, trial, "accepted", trial)
+        grasp_set, _ = import_recordings([recorder.path], coded={"index_mpj": coded})
+    live = CodeTables([coded], ["index_mpj"], meaning)
+    assert grasp_set.codes.ravel().tolist() == [live.codes(bytes((byte,)))[0] for byte in range(1, 256)]
+    assert grasp_set.joints == (Joint("index_mpj", "deg", codes[0], values[0], codes[1], values[1]),)
 
 
 def test_baselines_are_taken_off_as_they_are_live(tmp_path: Path) -> None:
