@@ -88,8 +88,6 @@ def _sinks_help() -> str:
     help="Maximum age of a late CyberGlove record.  [default: four periods, at least 60]",
 )
 @click.option("--no-quarantine", is_flag=True, help="Use inputs even if they are stuck, chatter or drift.")
-@click.option("--error-rate", type=Number(0, 1), help="Decide by a sequential test with this error rate instead.")
-@click.option("--spacing-ms", type=Number(0, 10_000), help="Minimum spacing of frames in the sequential test.")
 @click.option(
     "--lag-ms", type=Number(0, 10_000), help="Time after which the state of a segment is final.  [default: 150]"
 )
@@ -154,7 +152,7 @@ def command(
 
 _WEB = ("web_token", "recordings")
 _LIVE = ("record", "web", *_WEB, "status")
-_POLICY = ("lead", "dwell_ms", "max_lost", "grace_ms", "no_quarantine", "error_rate", "spacing_ms", "lag_ms")
+_POLICY = ("lead", "dwell_ms", "max_lost", "grace_ms", "no_quarantine", "lag_ms")
 
 
 def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
@@ -170,10 +168,6 @@ def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
     else:
         alone = "for a set of grasps, each row of which is classified alone"
         _refuse(alone, "change_while_held", *_LIVE, *_POLICY)
-    if click.get_current_context().params["error_rate"] is not None:
-        _refuse("with --error-rate, whose test decides alone", "lead", "dwell_ms")
-    else:
-        _refuse("without --error-rate", "spacing_ms")
 
 
 def _refuse(where: str, *names: str) -> None:

@@ -17,14 +17,14 @@ class LiveGrasp(msgspec.Struct, frozen=True, omit_defaults=False):
 
     time_us       host's monotonic clock when this was calculated; unix_us: the same moment in Unix time
     number        counts the frames of this run from 0
-    grasp         the decided grasp type, "unknown" while too little can be read and before a sequential test ends
+    grasp         the decided grasp type, "unknown" while too little can be read
     candidate     the best grasp type of this frame alone
     probability   of `grasp` in this frame (softmax of the scores); 0 when unknown
     margin        lead of the candidate over the second best, in integer steps
     health        "ok": everything is read, `grasp` was decided on whole frames, and the candidate does not lead it by
                   the lead that a change takes (policy.py) or more. "changing": everything is read, but the candidate
-                  leads `grasp` by that much, and the dwell time has not passed; or no sequential test has ended yet.
-                  "degraded": means replace lost inputs, or the glove's record is late. "unknown": too much is lost
+                  leads `grasp` by that much, and the dwell time has not passed. "degraded": means replace lost inputs,
+                  or the glove's record is late. "unknown": too much is lost
     switch_age_us, glove_age_us   how old the newest frames are; None before the first, or without such a device
     latency_us    from the newer of both frames to this moment
     lost          names of the switches and joints that are missing
