@@ -44,7 +44,7 @@ def command(
 
     With --line, listen to a board or program that sends lines of numbers (CSV, JSON, name:value), and show each column:
     meanwhile press every switch and pad, and bend every finger. PORT is a serial port, tcp://HOST:PORT,
-    udp://HOST:PORT, unix:PATH, ws://HOST:PORT/PATH, - (stdin), lsl:NAME or ros:/TOPIC.
+    udp://HOST:PORT, - (stdin), lsl:NAME or ros:/TOPIC.
 
     Exit code 1 if something is missing; with --build, also if the glove's calibration does not fit the build.
 

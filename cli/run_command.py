@@ -117,7 +117,7 @@ def command(
     \b
     Example:
         thenar run build/ --glove glove.toml --status
-        thenar run build/ --glove glove.toml --sink unix:/run/grasps --preshape barrett_bh8 --record run.mcap
+        thenar run build/ --glove glove.toml --sink tcp:7777 --preshape barrett_bh8 --record run.mcap
         thenar run build/ --glove glove.toml --web
         thenar run build/ --replay run.mcap | head -3
         thenar run build/ --replay set.grasps --sink jsonl:grasps.jsonl --preshape parallel_gripper

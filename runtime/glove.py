@@ -50,7 +50,7 @@ class Glove:
         Whether the preshape may change while something is held. Otherwise it changes only after nothing was held, if
         the build was trained with such rows.
     sinks : sequence of str or Sink
-        Further receivers of each moment: "unix:/run/grasps", as `thenar run --sink` spells them.
+        Further receivers of each moment: "tcp:7777", as `thenar run --sink` spells them.
     record : str or path, optional
         A new .mcap file for the raw frames and the predictions.
     recordable : bool

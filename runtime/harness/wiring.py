@@ -152,8 +152,6 @@ Range = tuple[float, float]
 class StreamWiring(_Table, frozen=True):
     """Rows of numbers sent by a board or a program: lines (`thenar.drivers.transports`), LSL, a ROS topic.
 
-    sender       (`from`) the address of the only sender of datagrams that counts, with or without its port; None: the
-                 first one
     columns      the columns in order, "" for unused ones; (): the sender names them
     time         the column with the sender's clock, in `time_unit`
     rate_hz      rows per second
@@ -167,7 +165,6 @@ class StreamWiring(_Table, frozen=True):
 
     port: Text
     baud: Baud = 115_200
-    sender: Text | None = field(name="from", default=None)
     columns: Annotated[tuple[str, ...], Meta(max_length=MOST_COLUMNS)] = ()
     time: Text | None = None
     time_unit: Literal["s", "ms", "us"] = "ms"

@@ -2,12 +2,11 @@
 
 from ..published import JointAngles
 from .base import SINKS, Fanout, Sink, SinkError, SinkKind, SinkPlace, SinkReport, open_sink
-from .jsonl import DetailLine, GraspLine, HeaderLine, HealthLine, JsonLines, Line
+from .jsonl import GraspLine, HeaderLine, HealthLine, JsonLines, Line
 from .sockets import SocketLines
 
 __all__ = [
     "SINKS",
-    "DetailLine",
     "Fanout",
     "GraspLine",
     "HeaderLine",

@@ -126,8 +126,8 @@ class Bench(Closing):
 
     def _stream(self, number: int, wiring: StreamWiring, stack: ExitStack) -> tuple[LineSender, str]:
         """Return the sender of a stream's rows, and its port; LSL and ROS streams are also sent as lines."""
-        if "://" in wiring.port or wiring.port.startswith(("-", "unix:", "lsl:", "ros:")):
-            way = lines_like(wiring.port, self._folder / f"stream{number}")
+        if "://" in wiring.port or wiring.port.startswith(("-", "lsl:", "ros:")):
+            way = lines_like(wiring.port)
             stack.callback(way.close)
             send, port = way.send, way.port
         else:
@@ -214,7 +214,6 @@ def _moved(harness: Harness, folder: Path, ports: Sequence[str]) -> Harness:
         harness,
         cyberglove=None if glove is None else msgspec.structs.replace(glove, port=str(folder / "cyberglove")),
         streams=tuple(
-            msgspec.structs.replace(wiring, port=port, sender=None)
-            for wiring, port in zip(harness.streams, ports, strict=True)
+            msgspec.structs.replace(wiring, port=port) for wiring, port in zip(harness.streams, ports, strict=True)
         ),
     )

@@ -84,14 +84,6 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
             (f"[[stream]]\nport = '{port}'", f"line 2: stream[0].port: '{port}' is not a supported port")
             for port in ("spy:///dev/null?file=a", "alt://a?class=b", "loop://", "hwgrep://a")
         ),
-        (
-            "[[stream]]\nport = 'udp://0.0.0.0:5'\nfrom = 'glove.local'\nswitches = ['a']",
-            "line 3: stream[0].from: 'glove.local' is not the address of a sender, such as 192.168.4.7",
-        ),
-        (
-            "[[stream]]\nport = '/dev/ttyUSB0'\nfrom = '192.168.4.7'\nswitches = ['a']",
-            "line 3: stream[0].from: is for udp:// ports",
-        ),
         ("[[bus]]\ndevice = 'spy://a'", "line 2: bus[0].device: 'spy://a' is not the path of a device, such as"),
         ("[[bus]]\ndevice = 'a\\u001bb'".replace("'", '"'), "bus[0].device: 'a\\x1bb' is not the path of a device"),
         ("[cyberglove]\nport = 'x'\nbaud = 'fast'", "line 3: cyberglove.baud: 'fast' is not among its values (did"),
