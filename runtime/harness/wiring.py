@@ -36,7 +36,6 @@ class GloveWiring(_Table, frozen=True):
     baud         "auto" tries the usual ones
     rate_hz      None: as fast as it can
     filter       whether the box's digital filter is on; None: as set on the box
-    record_us    measured time of a record of all sensors (`thenar doctor --write`); None: by the formula
     mask         whether a run omits sensors from the records that no joint of the build uses
     sensors      None: as the glove reports
     calibration  path of its calibration; relative paths in a file count from that file's folder
@@ -47,7 +46,6 @@ class GloveWiring(_Table, frozen=True):
     baud: Baud | Literal["auto"] = 115_200
     rate_hz: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
     filter: bool | None = None
-    record_us: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
     mask: bool = True
     sensors: Literal[18, 22] | None = None
     calibration: Text | None = None
@@ -196,7 +194,8 @@ class StreamWiring(_Table, frozen=True):
 
 # A hand changes some ten times a second; a press is seen within 5 ms.
 SCANS_HZ = 200.0
-ScanRate = Annotated[float, Meta(ge=0.1, le=10_000.0)]
+FASTEST_HZ = 10_000.0
+ScanRate = Annotated[float, Meta(ge=0.1, le=FASTEST_HZ)]
 
 
 class BusWiring(_Table, frozen=True):

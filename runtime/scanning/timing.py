@@ -181,16 +181,14 @@ def selections(ports: Iterable[Port], harness: Harness) -> tuple[tuple[int, ...]
 def glove_us(glove: GloveWiring, sensors: int) -> float:
     """Return the shortest period of a CyberGlove's records of `sensors` sensors, in microseconds.
 
-    It is the vendor's formula (`shortest_us`), scaled by the ratio of the measured `record_us` for all sensors to it;
-    and no less than the requested period. An unknown rate counts as 115200 baud.
+    It is the vendor's formula (`shortest_us`), and no less than the requested period. An unknown rate counts as 115200
+    baud.
     """
     from thenar.drivers.cyberglove_protocol import shortest_us  # for gloves with one
 
     baud = _BAUD if glove.baud == "auto" else glove.baud
     filtered = bool(glove.filter)
     us = shortest_us(sensors, baud, status=True, filtered=filtered)
-    if glove.record_us is not None:
-        us *= glove.record_us / shortest_us(glove.all_sensors, baud, status=True, filtered=filtered)
     return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
 
 

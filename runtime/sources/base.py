@@ -13,12 +13,16 @@ from thenar.drivers.members import Members
 
 from ..frames import GloveFrame, Mask, SwitchFrame
 from ..harness.wiring import Debounce, Harness
+from ..names import list_names
 from ..published import Count
 from ..scanning.scanmap import ScanMap
+from ..taxels import Taxels
 
 # A device is expected back at least this often, however fast it is: a shorter limit would mistake a busy computer, or
 # the 16 ms for which a USB serial adapter may buffer bytes, for a cut cable.
 SHORTEST_US = 10_000
+# Counts that say nothing of faults.
+_USUAL = {"transfers", "rows", "rows a second", "records"}
 
 
 class Pace:
@@ -53,12 +57,21 @@ class Source(ABC):
         The expected time from frame to frame. It may change with `open`.
     longest_us : int
         How long a frame is current, from its reading time: usually two periods, PERIODS * period_us.
+    taxels : sequence of Taxels
+        The taxels that it reads, one in each.
+    part : str
+        What the device says it is, once it is open; "" if it says nothing.
+    notes : sequence of str
+        Oddities of an open device that are no faults, in sentences.
     """
 
     name: str
     period_us: int
     longest_us: int
     owned: Mask = 0
+    taxels: Sequence[Taxels] = ()
+    part: str = ""
+    notes: Sequence[str] = ()
 
     @abstractmethod
     def open(self) -> None:
@@ -79,9 +92,25 @@ class Source(ABC):
         """Return the counts of frames and faults, for health reports."""
         return ()
 
+    @property
+    def wire_us(self) -> float:
+        """The least time from frame to frame, by the arithmetic of its wire."""
+        return self.period_us
+
+    def faults(self) -> str:
+        """Return the counts of what did not work, or lacked something: "late 3, gaps 1"."""
+        wrong = (count for count in self.counts() if count.value and count.name not in _USUAL)
+        return ", ".join(f"{count.name} {count.value}" for count in wrong)
+
     def fault_message(self) -> str:
         """Return the fault of an open device; "" if there is none."""
         return ""
+
+    def taxel_faults(self) -> str:
+        """Return a sentence on the taxels with faults, "" without any; silent ones are reported with their device."""
+        found = ((each.names[0], each.faults[0]) for each in self.taxels)
+        faulty = [f"{name}: {fault}" for name, fault in found if fault not in ("", "silent")]
+        return f"taxels with faults: {list_names(faulty)}" if faulty else ""
 
     def read_only(self, sensors: Sequence[str]) -> None:  # noqa: B027
         """Allow the source to leave other joints' sensors than these out of its frames, as 0, and taxels without

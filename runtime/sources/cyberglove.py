@@ -9,6 +9,7 @@ from ..frames import PERIODS, GloveFrame
 from ..harness.wiring import GloveWiring, Harness
 from ..published import Count
 from ..scanning.scanmap import ScanMap
+from ..scanning.timing import glove_us
 from .base import SHORTEST_US, Source, SourceKind, counted
 
 _SLOWEST_BAUD = 9_600
@@ -27,7 +28,7 @@ class GloveDevice(Source):
         self.longest_us = PERIODS * self.period_us
         self._wiring, self._unplugged = wiring, False
         self.info: GloveInfo | None = None
-        self.driver = self._driver(None)
+        self.driver, self._read = self._driver(None), self.sensors
 
     def _driver(self, only: tuple[int, ...] | None) -> CyberGlove:
         wiring = self._wiring
@@ -42,13 +43,18 @@ class GloveDevice(Source):
 
     def read_only(self, sensors: Sequence[str]) -> None:
         """Request only these sensors from the box: the others are 0 in the frames, which no sensor value is."""
-        self.driver = self._driver(
-            tuple(place for place, name in enumerate(self._wiring.sensor_names) if name in sensors)
-        )
+        places = tuple(place for place, name in enumerate(self._wiring.sensor_names) if name in sensors)
+        self.driver, self._read = self._driver(places), len(places) or self.sensors
+
+    @property
+    def wire_us(self) -> float:
+        """The time of a record, by the vendor's formula."""
+        return glove_us(self._wiring, self._read)
 
     def open(self) -> None:
         """Open the glove."""
         self.info = self.driver.open()
+        self.part, self.notes = self.info.text, self.info.notes
 
     def read(self, timeout_s: float) -> GloveFrame | None:
         """Return the next record that holds a measurement."""

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
+from msgspec.structs import replace
+
 from thenar.drivers.i2c.bus import I2cBus, PlacedPort, Scan
 from thenar.drivers.i2c.chips import Conversion, Converter
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
@@ -9,7 +11,6 @@ from thenar.drivers.spi.chips import SpiChip
 
 from ..frames import PERIODS, BitRemap, Mask, SwitchFrame, now_us
 from ..harness.wiring import Debounce, Harness
-from ..names import list_names
 from ..published import Count
 from ..scanning.scanmap import Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
@@ -45,8 +46,8 @@ class PortLevels:
         channel = [reading.name for reading in wired.chip.readings].index(port.reading)
         self.name = wired.numbered_pins[channel]
         self.place = harness.taxel_names.index(self.name)
-        self.highest = wired.chip.highest if isinstance(wired.chip, Converter | SpiChip) else None
-        self.taxels = Taxels([self.name], [port.levels], calibration, harness.taxel_settings, self.highest)
+        highest = wired.chip.highest if isinstance(wired.chip, Converter | SpiChip) else None
+        self.taxels = Taxels([self.name], [port.levels], calibration, harness.taxel_settings, highest)
         self.targets = self.taxels.owned
 
     def states(self, reply: int | None) -> tuple[Mask, Mask]:
@@ -74,31 +75,33 @@ class I2cDevice(Source):
             PortSwitches(port, harness.debounce) if port.switches else PortLevels(port, harness, calibration)
             for port in ports
         ]
-        self._taxels = len(harness.taxel_names)
+        self._everything = len(harness.taxel_names)
         self.owned: Mask = sum(port.targets for port in self._ports)
         chips = sorted({port.chip for port in ports})
         placed = {chip: _placed(harness, number, chip, ports) for chip in chips}
         self.bus = I2cBus(wiring.device, tuple(placed.values()))
+        self.taxels = tuple(port.taxels for port in self._ports if isinstance(port, PortLevels))
+        self._wire_us = scan_us(replace(scan, ports=tuple(ports)), harness).us
         self._reads = [PlacedPort(placed[port.chip], reading_of(port, harness)) for port in ports]
         self._scan: Scan | None = None
         self._groups: list[list[int]] = []
         self._pace, self._held_up = Pace(wiring.rate_hz), 0
 
     @property
-    def taxels(self) -> tuple[PortLevels, ...]:
-        """The taxels that are read."""
-        return tuple(port for port in self._ports if isinstance(port, PortLevels))
+    def wire_us(self) -> float:
+        """The time of a scan."""
+        return self._wire_us
+
+    @property
+    def part(self) -> str:  # type: ignore[override]
+        """How reads are batched."""
+        return f"reads {self.bus.way}"
 
     def open(self) -> None:
         """Open the bus and set up its chips."""
         self.bus.open()
         self._groups = self._grouped(range(len(self._reads)))
         self._scan = self.bus.prepare([[self._reads[port] for port in group] for group in self._groups])
-
-    def scan(self, chip: PlacedChip | None = None) -> Scan:
-        """Return a reader of all ports, or of those of this chip of the bus."""
-        ports = [port for port, read in enumerate(self._reads) if chip is None or read.member is chip]
-        return self.bus.prepare([[self._reads[port] for port in group] for group in self._grouped(ports)])
 
     def _grouped(self, ports: Sequence[int]) -> list[list[int]]:
         """Return the ports that are read together: all but slow conversions."""
@@ -121,7 +124,7 @@ class I2cDevice(Source):
     def _scanned(self) -> SwitchFrame:
         assert self._scan is not None
         closed = lost = 0
-        codes: list[int | None] = [None] * self._taxels
+        codes: list[int | None] = [None] * self._everything
         for group, replies in zip(self._groups, self._scan, strict=False):
             for number, reply in zip(group, replies, strict=True):
                 port = self._ports[number]
@@ -142,17 +145,11 @@ class I2cDevice(Source):
     def fault_message(self) -> str:
         """Return the fault of the bus, or the absent chips; "" if there is none."""
         absent = (chip.last_error for chip in self.bus.chips if not chip.present)
-        return self.bus.fault_message or "; ".join((*absent, *taxel_faults(self.taxels)))
+        return self.bus.fault_message or "; ".join(filter(None, (*absent, self.taxel_faults())))
 
     def close(self) -> None:
         """Close the bus."""
         self.bus.close()
-
-
-def taxel_faults(taxels: Sequence[PortLevels]) -> list[str]:
-    """Return a sentence on the taxels with faults, if any; lost ones are reported with their chip."""
-    faulty = [f"{each.name}: {fault}" for each in taxels if (fault := each.taxels.faults[0]) not in ("", "silent")]
-    return [f"taxels with faults: {list_names(faulty)}"] if faulty else []
 
 
 def _takes_time(read: PlacedPort) -> bool:

@@ -2,16 +2,18 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
+from msgspec.structs import replace
+
 from thenar.drivers.spi.device import SpiDevice
 
 from ..frames import PERIODS, Mask, SwitchFrame, now_us
 from ..harness.wiring import Harness
 from ..published import Count
 from ..scanning.scanmap import ScanMap
-from ..scanning.timing import reading_of
+from ..scanning.timing import reading_of, scan_us
 from ..taxels import calibration_of
 from .base import Pace, Source, SourceKind, paced_us
-from .i2c import PortLevels, taxel_faults
+from .i2c import PortLevels
 
 
 class SpiConverter(Source):
@@ -25,15 +27,23 @@ class SpiConverter(Source):
         ports = [port for port in scan.ports if port.bus == len(harness.buses) + number]
         calibration = calibration_of(harness.taxel_settings)
         self.name = f"spi at {wiring.device}"
-        self.taxels = tuple(PortLevels(port, harness, calibration) for port in ports)
-        self.owned: Mask = sum(port.targets for port in self.taxels)
+        self._ports = tuple(PortLevels(port, harness, calibration) for port in ports)
+        self.taxels = tuple(port.taxels for port in self._ports)
+        self.owned: Mask = sum(port.targets for port in self._ports)
+        self._wire_us = scan_us(replace(scan, ports=tuple(ports)), harness).us
         self.period_us = paced_us(wiring.rate_hz)
         self.longest_us = PERIODS * self.period_us
+        self.part = wiring.kind
         self.device = SpiDevice(wiring.device, wiring.chip, wiring.clock_hz)
         self.run: Callable[[], list[int | None]] = self.device.prepare([reading_of(port, harness) for port in ports])
         self._everything = len(harness.taxel_names)
         self._pace = Pace(wiring.rate_hz)
         self.silent = False
+
+    @property
+    def wire_us(self) -> float:
+        """The time of all conversions."""
+        return self._wire_us
 
     def open(self) -> None:
         """Open the device."""
@@ -47,7 +57,7 @@ class SpiConverter(Source):
         self.silent = None in replies
         closed = lost = 0
         codes: list[int | None] = [None] * self._everything
-        for taxel, reply in zip(self.taxels, replies, strict=True):
+        for taxel, reply in zip(self._ports, replies, strict=True):
             shut, silent = taxel.states(reply)
             closed, lost = closed | shut, lost | silent
             codes[taxel.place] = reply
@@ -59,8 +69,8 @@ class SpiConverter(Source):
 
     def fault_message(self) -> str:
         """Return the fault of the converter or its taxels; "" if there is none."""
-        silent = [f"{self.device.chip.name} does not reply: check its supply, its wires and its chip select"]
-        return "; ".join(silent if self.silent else taxel_faults(self.taxels))
+        silent = f"{self.device.chip.name} does not reply: check its supply, its wires and its chip select"
+        return silent if self.silent else self.taxel_faults()
 
     def close(self) -> None:
         """Close the device."""
