@@ -53,8 +53,6 @@ class Glove:
         Further receivers of each moment: "tcp:7777", as `thenar run --sink` spells them.
     record : str or path, optional
         A new .mcap file for the raw frames and the predictions.
-    recordable : bool
-        Whether recordings may begin later (`new_recording`): all sensors are read, as for `record`.
     status : bool
         Whether sinks get a report of the glove's health once a second, and whenever a device comes or goes.
     stop : threading.Event, optional
@@ -109,7 +107,6 @@ class Glove:
         change_while_held: bool = False,
         sinks: Sequence[str | Sink] = (),
         record: str | PathLike[str] | None = None,
-        recordable: bool = False,
         status: bool = False,
         stop: Event | None = None,
         feed: Callable[[], Snapshot] | None = None,
@@ -125,7 +122,7 @@ class Glove:
         self.health: HealthReport | None = None
         self.recorder: LiveRecorder | None = None
         # A recording is for training: it holds all sensors.
-        whole = recordable or record is not None
+        whole = record is not None
         devices = system.sources(all_sensors=whole)
         self._recognizer, self.sources = system.recognizer(), devices
         self.feed = feed
@@ -159,7 +156,9 @@ class Glove:
             opening.callback(self._fanout.close)
             self._fanout.begin(self.system.build)
             if self._record is not None:
-                self.recorder = opening.enter_context(self.new_recording(Path(self._record)))
+                from .recording.writer import LiveRecorder
+
+                self.recorder = opening.enter_context(LiveRecorder(Path(self._record), self._session()))
             if self.feed is None:
                 opening.enter_context(self.sources)
             self._open = opening.pop_all()
@@ -196,16 +195,6 @@ class Glove:
             self._look(now)
         self.frames += 1
         return moment
-
-    def new_recording(self, path: Path) -> "LiveRecorder":
-        """Return a running recording of this glove. Only the thread that iterates may set it as `recorder`, or remove
-        it; its creator closes it.
-
-        Raises SettingError if the file exists, OSError as the operating system gives it.
-        """
-        from .recording.writer import LiveRecorder
-
-        return LiveRecorder(path, self._session())
 
     @property
     def has_preshapes(self) -> bool:

@@ -24,7 +24,7 @@ from ..harness.wiring import Harness
 from ..live.replay import Stepper, periods_us
 from ..published import LiveGrasp
 from ..recording.reader import Index
-from ..recording.session import Label, Mark, Session
+from ..recording.session import Label, Session
 from .live import PAST_US, FrameText, build_message
 from .server import Server, message
 
@@ -35,14 +35,13 @@ LEAD_US = 1_500_000
 _SAMPLE_US, _MOST_CHANGES = 20_000, 100_000
 _FRAME_S, _IDLE_S, _TOLD_S = 0.02, 0.2, 0.5
 _PERIODS_OF = 20_000
-_MOST_MARKS = 10_000
 
 
 Change = tuple[int, str, str, str, str, int, str, int | None]
 
 
 class Overview:
-    """The overview of a whole recording: changes of the prediction, labelled spans, marks.
+    """The overview of a whole recording: changes of the prediction, and labelled spans.
 
     A trial's span lasts from its beginning to its judgement; a repeated trial has none.
     """
@@ -50,7 +49,6 @@ class Overview:
     def __init__(self) -> None:
         self.changes: list[Change] = []
         self.truth: list[tuple[int, int, str]] = []
-        self.marks: list[tuple[int, str]] = []
         self._begun: tuple[int, str] | None = None
 
     def take(self, unix_us: int, entry: object) -> None:
@@ -59,8 +57,6 @@ class Overview:
             self._change(entry)
         elif isinstance(entry, Label):
             self._label(unix_us, entry)
-        elif isinstance(entry, Mark) and len(self.marks) < _MOST_MARKS:
-            self.marks.append((unix_us, entry.text))
         elif isinstance(entry, Session):
             self._begun = None
 
@@ -76,12 +72,12 @@ class Overview:
         return message("past", changes=self.changes[first:last], until_us=unix_us)
 
     def text(self) -> bytes:
-        """Return the overview's message: spans of predictions, spans of labels, and marks."""
+        """Return the overview's message: spans of predictions, and spans of labels."""
         spans: list[tuple[int, str]] = []
         for unix_us, _, grasp, *_ in self.changes:
             if not spans or spans[-1][1] != grasp:
                 spans.append((unix_us, grasp))
-        return message("overview", predictions=spans, truth=self.truth, marks=self.marks)
+        return message("overview", predictions=spans, truth=self.truth)
 
     def _change(self, grasp: LiveGrasp) -> None:
         entry = grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type
@@ -189,7 +185,7 @@ class ReplayPage(Closing):
         self._scanned.set()
 
     def _predicted(self) -> Iterator[tuple[int, object]]:
-        """Yield labels, marks and predictions; those of the build if the recording is not its own."""
+        """Yield labels and predictions; those of the build if the recording is not its own."""
         if self._build is None or self._own:
             for unix_us, entry in self._index.scan(_SAMPLE_US):
                 clock_us = unix_us - entry.time_us if isinstance(entry, LiveGrasp) else 0

@@ -16,7 +16,7 @@ from selenium.webdriver.common.keys import Keys
 from thenar.runtime.frames import SwitchFrame, now_us
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Label, Mark
+from thenar.runtime.recording.session import Label
 from thenar.runtime.web.replay import ReplayPage
 
 pytestmark = pytest.mark.slow
@@ -45,12 +45,11 @@ class Recorded:
 
 
 @pytest.fixture
-def recording(run: Callable[[], Any], tmp_path: Path) -> tuple[Path, dict[int, tuple[int, int]]]:
+def recording(run: Callable[..., Any], tmp_path: Path) -> tuple[Path, dict[int, tuple[int, int]]]:
     """Return a recording of several rows, each labelled as a trial, and when each was settled, by the host's clock."""
-    running, path, spans = run(), tmp_path / "run.mcap", dict[int, tuple[int, int]]()
-    scene = running.scene
-    recorder = running.glove.new_recording(path)
-    running.glove.recorder = recorder
+    path, spans = tmp_path / "run.mcap", dict[int, tuple[int, int]]()
+    running = run(path)
+    scene, recorder = running.scene, running.glove.recorder
     for number, row in enumerate(ROWS, 1):
         scene.show(row)
         answer = scene.settled(row).candidate
@@ -61,7 +60,6 @@ def recording(run: Callable[[], Any], tmp_path: Path) -> tuple[Path, dict[int, t
             label = Label(time_us, event, number, answer, "A", "thing")  # type: ignore[arg-type]
             # A run writes no labels itself: in its thread, as the next moment comes at any time.
             recorder._thread.put(partial(recorder._recorder.label, label))
-        recorder.mark(Mark(now_us(), f"row {row}"))
     running.end()
     recorder.close()
     return path, spans
