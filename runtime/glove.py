@@ -13,7 +13,7 @@ from .build import Build
 from .calibration import AngleReader
 from .frames import GloveFrame, SwitchFrame, now_us
 from .harness.wiring import Harness
-from .live.quarantine import CHATTERING, STUCK_CLOSED, STUCK_OPEN, Quarantine
+from .live.quarantine import Quarantine
 from .live.recogniser import Moment
 from .live.sources import Snapshot
 from .live.system import LiveSystem
@@ -277,13 +277,9 @@ class GloveHealth:
         outputs: tuple[OutputTrouble, ...] = (),
     ) -> HealthReport:
         """Return the current health."""
-        quarantine, published = self._quarantine, self._published
+        published = self._published
         return HealthReport(
             time_us=now_us,
-            stuck_open=quarantine.names(STUCK_OPEN),
-            stuck_closed=quarantine.names(STUCK_CLOSED),
-            chattering=quarantine.names(CHATTERING),
-            drifting=quarantine.drifts(),
             switch_hz=self._switches.hz(now_us),
             glove_hz=self._glove.hz(now_us),
             frames=published.total(),
@@ -292,7 +288,7 @@ class GloveHealth:
             unknown=published["unknown"],
             overflowed=overflowed,
             devices=tuple(devices),
-            quarantined=quarantine.found,
+            quarantined=self._quarantine.found,
             outputs=outputs,
         )
 

@@ -78,13 +78,6 @@ class DeviceHealth(msgspec.Struct, frozen=True):
     counts: tuple[Count, ...] = ()
 
 
-class Drift(msgspec.Struct, frozen=True):
-    """The number of codes by which a joint has drifted."""
-
-    joint: str
-    codes: int
-
-
 class Quarantined(msgspec.Struct, frozen=True):
     """An input that is read but wrong, why ("stuck closed", "stuck open", "chattering", "drifting"), and whether it is
     still `used`: because too much would be lost without it, or because the policy says so.
@@ -110,20 +103,15 @@ class OutputTrouble(msgspec.Struct, frozen=True):
 class HealthReport(msgspec.Struct, frozen=True):
     """State at `time_us` of the host's monotonic clock.
 
-    stuck_open, stuck_closed, chattering, drifting  inputs with these faults, as the quarantine finds them
     switch_hz, glove_hz        frames per second over the last whole second
     frames, changing, degraded, unknown  numbers of grasps published so far, in all and with that health
     overflowed                 frames that arrived but were not taken in time: a recording lacks them
     devices                    as reported by their drivers
-    quarantined                inputs treated as lost, because they are read but wrong
+    quarantined                inputs that are read but wrong
     outputs                    the recording and the sinks, as long as they take nothing
     """
 
     time_us: int
-    stuck_open: tuple[str, ...]
-    stuck_closed: tuple[str, ...]
-    chattering: tuple[str, ...]
-    drifting: tuple[Drift, ...]
     switch_hz: float
     glove_hz: float
     frames: int

@@ -210,15 +210,28 @@ class Debouncer:
 
         Switches that were not read keep their state, and their timers run on. A time that goes back is ignored.
         """
-        now = self._advance(time_us, known)
-        free = known & ~self._locked(now) if self._locks else known
-        pressed = closed & free & ~self._closed
-        opened = ~closed & free & self._closed
+        if self._time is None:
+            self._time = time_us
+        interval = max(0, time_us - self._time)
+        if interval > self._pause_us or known != self._known:
+            self._forget_after_pauses(self._time, interval, known)
+        self._time = now = self._time + interval
+        # The shortest recent period is the earliest time of the next reading.
+        if self._period is None or interval <= self._period:
+            self._period = interval or self._period
+        else:
+            self._period = min(interval, self._period + (self._period >> 2) + 1)
+        free = known
+        if self._locks:
+            self._locks = [lock for lock in self._locks if lock[0] > now]
+            for _, mask in self._locks:
+                free &= ~mask
+        pressed, opened = closed & free & ~self._closed, ~closed & free & self._closed
         if opened or self._openings:
             self._closed &= ~self._released(now, opened, closed & free)
         if pressed:
             self._closed |= pressed
-            self._lock(now, now + self.press_lockout_us, pressed)
+            self._locks.append((now + self.press_lockout_us, pressed))
         return self._closed
 
     def _forget_after_pauses(self, last_us: int, interval: int, known: Mask) -> None:
@@ -232,56 +245,22 @@ class Debouncer:
             [(time, mask & ~over) for time, mask in timers if mask & ~over] for timers in (self._locks, self._openings)
         )
 
-    def _advance(self, time_us: int, known: Mask) -> int:
-        """Store the time, and the shortest recent period as the earliest time of the next reading; forget the switches
-        that are read after a pause.
-        """
-        if self._time is None:
-            self._time = time_us
-        interval = max(0, time_us - self._time)
-        if interval > self._pause_us or known != self._known:
-            self._forget_after_pauses(self._time, interval, known)
-        self._time += interval
-        if self._period is None or interval <= self._period:
-            self._period = interval or self._period
-        else:
-            self._period = min(interval, self._period + (self._period >> 2) + 1)
-        return self._time
-
-    def _locked(self, now: int) -> Mask:
-        self._locks = [lock for lock in self._locks if lock[0] > now]
-        locked = 0
-        for _, mask in self._locks:
-            locked |= mask
-        return locked
-
-    def _lock(self, now: int, until: int, mask: Mask) -> None:
-        if until > now:
-            self._locks.append((until, mask))
-
     def _released(self, now: int, opened: Mask, closed: Mask) -> Mask:
-        """Return the open switches whose release time is over; their bounce is locked out."""
-        released, begun, openings = 0, opened, []
-        for since, group in self._openings:
-            begun &= ~group
-            going = self._go(now, since, group & opened)
-            released |= going
-            if rest := group & ~closed & ~going:
+        """Return the open switches whose release time is over, or would be before the next reading; their bounce is
+        locked out.
+        """
+        fresh, released, openings = opened, 0, list[tuple[int, Mask]]()
+        for _, group in self._openings:
+            fresh &= ~group
+        for since, group in (*self._openings, (now, fresh)):
+            going = group & opened
+            if going and now + (self._period or 0) >= since + self.release_us:
+                self._locks.append((since + self.release_us, going))
+                released |= going
+            if rest := group & ~closed & ~released:
                 openings.append((since, rest))
-        if begun:
-            going = self._go(now, now, begun)
-            released |= going
-            if rest := begun & ~going:
-                openings.append((now, rest))
         self._openings = openings
         return released
-
-    def _go(self, now: int, since: int, group: Mask) -> Mask:
-        """Return `group` if the next reading would come too late for its release, else 0."""
-        if not group or now + (self._period or 0) < since + self.release_us:
-            return 0
-        self._lock(now, since + self.release_us, group)
-        return group
 
 
 def debouncer_of(debounce: Debounce) -> Debouncer | None:

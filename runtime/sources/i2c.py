@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from msgspec.structs import replace
 
 from thenar.drivers.i2c.bus import I2cBus, PlacedPort, Scan
-from thenar.drivers.i2c.chips import Conversion, Converter
+from thenar.drivers.i2c.chips import Converter
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.drivers.spi.chips import SpiChip
 
@@ -70,21 +70,22 @@ class I2cDevice(Source):
         self.name = f"i2c at {wiring.device}"
         self.period_us = _bus_period_us(harness, number, scan)
         self.longest_us = PERIODS * self.period_us
-        calibration = calibration_of(harness.taxel_settings)
-        self._ports = [
-            PortSwitches(port, harness.debounce) if port.switches else PortLevels(port, harness, calibration)
-            for port in ports
-        ]
-        self._everything = len(harness.taxel_names)
-        self.owned: Mask = sum(port.targets for port in self._ports)
         chips = sorted({port.chip for port in ports})
         placed = {chip: _placed(harness, number, chip, ports) for chip in chips}
         self.bus = I2cBus(wiring.device, tuple(placed.values()))
+        # Conversions that are waited for come last: what is read together stays together.
+        read = [(PlacedPort(placed[port.chip], reading_of(port, harness)), port) for port in ports]
+        read.sort(key=lambda each: each[0].slow)
+        self._reads, calibration = [each for each, _ in read], calibration_of(harness.taxel_settings)
+        self._ports = [
+            PortSwitches(port, harness.debounce) if port.switches else PortLevels(port, harness, calibration)
+            for _, port in read
+        ]
+        self._everything = len(harness.taxel_names)
+        self.owned: Mask = sum(port.targets for port in self._ports)
         self.taxels = tuple(port.taxels for port in self._ports if isinstance(port, PortLevels))
         self._wire_us = scan_us(replace(scan, ports=tuple(ports)), harness).us
-        self._reads = [PlacedPort(placed[port.chip], reading_of(port, harness)) for port in ports]
         self._scan: Scan | None = None
-        self._groups: list[list[int]] = []
         self._pace, self._held_up = Pace(wiring.rate_hz), 0
 
     @property
@@ -100,14 +101,7 @@ class I2cDevice(Source):
     def open(self) -> None:
         """Open the bus and set up its chips."""
         self.bus.open()
-        self._groups = self._grouped(range(len(self._reads)))
-        self._scan = self.bus.prepare([[self._reads[port] for port in group] for group in self._groups])
-
-    def _grouped(self, ports: Sequence[int]) -> list[list[int]]:
-        """Return the ports that are read together: all but slow conversions."""
-        slow = [port for port in ports if _takes_time(self._reads[port])]
-        together = [port for port in ports if port not in slow]
-        return [*([together] if together else []), *([port] for port in slow)]
+        self._scan = self.bus.prepare(self._reads)
 
     def read(self, timeout_s: float) -> SwitchFrame | None:
         """Scan once, when it is due."""
@@ -125,13 +119,11 @@ class I2cDevice(Source):
         assert self._scan is not None
         closed = lost = 0
         codes: list[int | None] = [None] * self._everything
-        for group, replies in zip(self._groups, self._scan, strict=False):
-            for number, reply in zip(group, replies, strict=True):
-                port = self._ports[number]
-                shut, silent = port.states(reply)
-                closed, lost = closed | shut, lost | silent
-                if isinstance(port, PortLevels):
-                    codes[port.place] = reply
+        for port, reply in zip(self._ports, self._scan.read(), strict=True):
+            shut, silent = port.states(reply)
+            closed, lost = closed | shut, lost | silent
+            if isinstance(port, PortLevels):
+                codes[port.place] = reply
         taxels = tuple(codes) if any(code is not None for code in codes) else None
         return SwitchFrame(now_us(), closed, lost, taxels=taxels)
 
@@ -150,10 +142,6 @@ class I2cDevice(Source):
     def close(self) -> None:
         """Close the bus."""
         self.bus.close()
-
-
-def _takes_time(read: PlacedPort) -> bool:
-    return isinstance(read.reading, Conversion) and bool(read.reading.start)
 
 
 def _placed(harness: Harness, bus: int, number: int, ports: list[Port]) -> PlacedChip:

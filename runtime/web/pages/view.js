@@ -96,12 +96,6 @@ export class View {
     this.quarantined = report.quarantined.map(({ name, reason, used }) =>
       `${name}: ${reason}, ${used ? "still used" : "treated as lost"}`,
     );
-    this.suspects = [
-      ...report.stuck_open.map((name) => `${name}: stuck open`),
-      ...report.stuck_closed.map((name) => `${name}: stuck closed`),
-      ...report.chattering.map((name) => `${name}: chatters`),
-      ...report.drifting.map(({ joint, codes }) => `${joint}: has drifted by ${codes} codes`),
-    ];
     this.rates = `${report.switch_hz.toFixed(0)}/s switches, ${report.glove_hz.toFixed(0)}/s glove`;
     this.#wrong();
   }
@@ -222,7 +216,7 @@ export class View {
   #wrong() {
     const named = new Set(this.quarantined.map((text) => text.split(": ")[0]));
     const lost = (this.frame?.lost ?? []).filter((name) => !named.has(name)).map((name) => `${name}: lost`);
-    const all = [...this.quarantined, ...lost, ...(this.suspects ?? [])];
+    const all = [...this.quarantined, ...lost];
     list($("wrong"), all.length ? all : ["nothing"]);
   }
 

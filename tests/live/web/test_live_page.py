@@ -204,10 +204,6 @@ def test_names_are_text_wherever_they_are_shown(browser: Any) -> None:
     }
     report = {
         **{
-            "stuck_open": [image],
-            "stuck_closed": [],
-            "chattering": [],
-            "drifting": [],
             "switch_hz": 1.0,
             "glove_hz": 0.0,
         },

@@ -53,7 +53,7 @@ class Run:
         told: Sequence[Mapping[str, object]] = [
             {"name": name, "connected": connected, "error": "", "counts": []} for name, connected in devices
         ]
-        empty = dict.fromkeys(("stuck_open", "stuck_closed", "chattering", "drifting", "quarantined"), ())
+        empty = {"quarantined": ()}
         self.server.publish("health", message("health", empty, switch_hz=0.0, glove_hz=0.0, devices=told))
 
     @property
