@@ -33,7 +33,6 @@ class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit
 class GloveWiring(_Table, frozen=True):
     """The CyberGlove: its port (a device or socket://), and how it is read.
 
-    baud         "auto" tries the usual ones
     rate_hz      None: as fast as it can
     filter       whether the box's digital filter is on; None: as set on the box
     mask         whether a run omits sensors from the records that no joint of the build uses
@@ -43,7 +42,7 @@ class GloveWiring(_Table, frozen=True):
     """
 
     port: Text
-    baud: Baud | Literal["auto"] = 115_200
+    baud: Baud = 115_200
     rate_hz: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
     filter: bool | None = None
     mask: bool = True

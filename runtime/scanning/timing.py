@@ -21,7 +21,6 @@ from .scanmap import Port, ScanMap
 
 _FREE_US = ((100_000, 4.7), (400_000, 1.3))
 _FREE_FASTEST_US = 0.5
-_BAUD = 115_200
 
 
 class ChipTime(Struct, frozen=True):
@@ -119,14 +118,11 @@ def selections(ports: Iterable[Port], harness: Harness) -> tuple[tuple[int, ...]
 def glove_us(glove: GloveWiring, sensors: int) -> float:
     """Return the shortest period of a CyberGlove's records of `sensors` sensors, in microseconds.
 
-    It is the vendor's formula (`shortest_us`), and no less than the requested period. An unknown rate counts as 115200
-    baud.
+    It is the vendor's formula (`shortest_us`), and no less than the requested period.
     """
     from thenar.drivers.cyberglove_protocol import shortest_us  # for gloves with one
 
-    baud = _BAUD if glove.baud == "auto" else glove.baud
-    filtered = bool(glove.filter)
-    us = shortest_us(sensors, baud, status=True, filtered=filtered)
+    us = shortest_us(sensors, glove.baud, status=True, filtered=bool(glove.filter))
     return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
 
 

@@ -12,8 +12,6 @@ from ..scanning.scanmap import ScanMap
 from ..scanning.timing import glove_us
 from .base import SHORTEST_US, Source, SourceKind, counted
 
-_SLOWEST_BAUD = 9_600
-
 
 class GloveDevice(Source):
     """A CyberGlove. A record of an unplugged glove is not a frame: it holds no measurement.
@@ -34,7 +32,7 @@ class GloveDevice(Source):
         wiring = self._wiring
         return CyberGlove(
             wiring.port,
-            baud=None if wiring.baud == "auto" else wiring.baud,
+            baud=wiring.baud,
             rate_hz=wiring.rate_hz,
             sensors=self.sensors,
             only=only,
@@ -90,12 +88,11 @@ class GloveDevice(Source):
 
 
 def glove_period_us(wiring: GloveWiring) -> int:
-    """Return the longest expected period of a CyberGlove with this wiring; the slowest possible one if it is open.
+    """Return the longest expected period of a CyberGlove with this wiring.
 
     A glove that cannot reach the requested rate sends as fast as box and line allow.
     """
-    baud = _SLOWEST_BAUD if wiring.baud == "auto" else wiring.baud
-    shortest = round(shortest_us(wiring.all_sensors, baud, status=True, filtered=True))
+    shortest = round(shortest_us(wiring.all_sensors, wiring.baud, status=True, filtered=True))
     return max(SHORTEST_US, shortest, round(1e6 / wiring.rate_hz) if wiring.rate_hz else 0)
 
 

@@ -67,9 +67,6 @@ def cable_of(scene: Scene, line: int) -> Cable | None:
     return cable
 
 
-_USUAL_BAUD = 115_200
-
-
 class Bench(Closing):
     """Emulated devices for every device of `harness`, their serial ports linked in `folder`.
 
@@ -100,8 +97,7 @@ class Bench(Closing):
         with ExitStack() as stack:
             self.glove: EmulatedCyberGlove | None = None
             if harness.cyberglove is not None:
-                baud = harness.cyberglove.baud
-                line = self._line("cyberglove", _USUAL_BAUD if baud == "auto" else baud, stack)
+                line = self._line("cyberglove", harness.cyberglove.baud, stack)
                 self.glove = stack.enter_context(EmulatedCyberGlove(line, sensors=harness.cyberglove.all_sensors))
             self.i2c: EmulatedI2c | None = None
             if harness.buses or harness.spi:
