@@ -3,7 +3,6 @@
 from ..published import JointAngles
 from .base import SINKS, Fanout, Sink, SinkError, SinkKind, SinkPlace, SinkReport, open_sink
 from .jsonl import GraspLine, HeaderLine, HealthLine, JsonLines, Line
-from .sockets import SocketLines
 
 __all__ = [
     "SINKS",
@@ -19,6 +18,5 @@ __all__ = [
     "SinkKind",
     "SinkPlace",
     "SinkReport",
-    "SocketLines",
     "open_sink",
 ]

@@ -78,7 +78,7 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ),
         (
             "[[stream]]\nport = 'socket://a:1?x'\nswitches = ['a']",
-            "port: 'socket://a:1?x' has the option 'x', which it does not support",
+            "port: 'socket://a:1?x' is not the address of a line",
         ),
         *(
             (f"[[stream]]\nport = '{port}'", f"line 2: stream[0].port: '{port}' is not a supported port")

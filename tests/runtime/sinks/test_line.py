@@ -13,9 +13,9 @@ from msgspec.structs import asdict, replace
 
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import HealthReport, LiveGrasp
-from thenar.runtime.sinks import GraspLine, HeaderLine, HealthLine, JointAngles, JsonLines, SocketLines
+from thenar.runtime.sinks import GraspLine, HeaderLine, HealthLine, JointAngles, JsonLines
 from thenar.runtime.sinks.jsonl import encode, encode_health
-from thenar.runtime.sinks.sockets import open_tcp
+from thenar.runtime.sinks.sockets import SocketLines, open_tcp
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 names = st.text(st.characters(codec="utf-8"))

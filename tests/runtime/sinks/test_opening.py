@@ -11,8 +11,9 @@ from msgspec.structs import replace
 from thenar.drivers.errors import SettingError
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import Health, HealthReport, LiveGrasp
-from thenar.runtime.sinks import Fanout, JsonLines, SocketLines, open_sink
+from thenar.runtime.sinks import Fanout, JsonLines, open_sink
 from thenar.runtime.sinks.base import PublishPace
+from thenar.runtime.sinks.sockets import SocketLines
 
 
 def test_every_kind_is_opened_by_its_name(tmp_path: Path) -> None:

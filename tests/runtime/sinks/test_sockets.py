@@ -8,8 +8,8 @@ import pytest
 from msgspec import json
 
 from thenar.runtime.published import HealthReport, LiveGrasp
-from thenar.runtime.sinks import GraspLine, HealthLine, SocketLines
-from thenar.runtime.sinks.sockets import HANGING_S, MAX_OF_ONE, MAX_READERS, open_tcp
+from thenar.runtime.sinks import GraspLine, HealthLine
+from thenar.runtime.sinks.sockets import HANGING_S, MAX_OF_ONE, MAX_READERS, SocketLines, open_tcp
 
 MakeGrasp = Callable[..., LiveGrasp]
 
