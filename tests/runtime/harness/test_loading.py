@@ -89,7 +89,10 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ("[cyberglove]\nport = 'x'\nbaud = 'fast'", "line 3: cyberglove.baud: must be a whole number, not 'fast'"),
         ("[cyberglove]\nport = 'x'\nbaud = 0", "line 3: cyberglove.baud: must be at least 1, not 0"),
         ("[cyberglove]\nport = 'x'\nsensors = 20", "line 3: cyberglove.sensors: 20 is not among its values"),
-        ("[cyberglove]\nport = 'x'\nrate_khz = 1", "line 3: cyberglove.rate_khz: rates are in hertz: rate_hz"),
+        (
+            "[cyberglove]\nport = 'x'\nrate_khz = 1",
+            "line 3: cyberglove.rate_khz: this key is unknown (did you mean 'rate_hz",
+        ),
         ("[cyberglove]\nport = 'x'\nrate_hz = nan", "line 3: cyberglove.rate_hz: must be a finite number"),
         (
             "[cyberglove]\nport = 'x'\njoints = ['a']",
