@@ -222,15 +222,13 @@ def test_words_are_shown_and_rows_ending_in_carriage_returns_read(cases: Path, w
         assert json.loads(done.stdout)["stream"]["columns"] == ["c1", "c2", "c3", "c4", "c5", "c6"]
 
 
-def test_doctor_reports_two_senders_and_late_rows(tmp_path: Path) -> None:
+def test_doctor_reports_two_senders(tmp_path: Path) -> None:
     path = tmp_path / "glove.toml"
     with DatagramLines() as first, DatagramLines() as second:
         second.to = first.to
 
         def send(n: int) -> None:
             first.send(b"%d,%d,%d" % (10 * n, n % 2, 40 * (n % 9)))
-            if n % 20 == 0:
-                first.send(b"%d,0,0" % (10 * n - 15))
             second.send(b"%d,1,7" % (10 * n))
 
         asked = ("--baud", "9600", "--seconds", "2", "--propose", path, "--json")
@@ -241,7 +239,6 @@ def test_doctor_reports_two_senders_and_late_rows(tmp_path: Path) -> None:
     for said in (
         r"127.0.0.1:\d+ sends, too, and its lines are left out",
         r"\d+ rows of another sender",
-        r"counted: .*late \d",
     ):
         assert re.search(said, remarks), remarks
     assert load_harness(path).streams[0].baud == 115_200
