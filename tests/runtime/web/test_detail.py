@@ -7,11 +7,11 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.runtime.build import Build
-from thenar.runtime.detail import Details
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.live.recogniser import Moment
 from thenar.runtime.manifest import Calibration, Rejection
 from thenar.runtime.published import LiveGrasp
+from thenar.runtime.web.live import Details
 
 MakeBuild = Callable[..., Build]
 MakeGrasp = Callable[..., LiveGrasp]
