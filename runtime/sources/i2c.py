@@ -1,8 +1,7 @@
 """I2C buses of a harness, their ports read in the order of a scan map."""
 
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-
-from msgspec.structs import replace
 
 from thenar.drivers.i2c.bus import I2cBus, PlacedPort, Scan
 from thenar.drivers.i2c.chips import Converter
@@ -12,7 +11,7 @@ from thenar.drivers.spi.chips import SpiChip
 from ..frames import PERIODS, BitRemap, Mask, SwitchFrame, now_us
 from ..harness.wiring import Debounce, Harness
 from ..published import Count
-from ..scanning.scanmap import Port, ScanMap
+from ..scanning.scanmap import SCHEMA, Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
 from ..taxels import TaxelCalibration, Taxels, calibration_of
 from .base import Pace, Source, SourceKind, debouncer_of, paced_us
@@ -59,7 +58,51 @@ class PortLevels:
         return self._debouncer.update(time_us, closed, self.targets & ~lost) & ~lost, lost
 
 
-class I2cDevice(Source):
+class PortScanner(Source):
+    """A device whose ports are read in a scan: those of `ports`, bus number `bus` of a scan map."""
+
+    def __init__(self, harness: Harness, bus: int, ports: Sequence[Port]) -> None:
+        calibration, wiring = calibration_of(harness.taxel_settings), harness.line_of(bus)
+        self._ports = [
+            PortSwitches(port, harness.debounce) if port.switches else PortLevels(port, harness, calibration)
+            for port in ports
+        ]
+        self.owned: Mask = sum(port.targets for port in self._ports)
+        self.taxels = tuple(port.taxels for port in self._ports if isinstance(port, PortLevels))
+        self._wire_us = scan_us(ScanMap(SCHEMA, harness.fingerprint, tuple(ports)), harness).us
+        self._everything = len(harness.taxel_names)
+        self._pace, self._held_up = Pace(wiring.rate_hz), 0
+
+    @property
+    def wire_us(self) -> float:
+        """The time of a scan."""
+        return self._wire_us
+
+    @abstractmethod
+    def replies(self) -> Sequence[int | None]:
+        """Read all ports; return the reply of each, None for those that gave none."""
+
+    def read(self, timeout_s: float) -> SwitchFrame | None:
+        """Scan once, when it is due."""
+        if not self._pace.wait(timeout_s):
+            return None
+        began_us, closed, lost = now_us(), 0, 0
+        codes: list[int | None] = [None] * self._everything
+        for port, reply in zip(self._ports, self.replies(), strict=True):
+            shut, silent = port.states(reply)
+            closed, lost = closed | shut, lost | silent
+            if isinstance(port, PortLevels):
+                codes[port.place] = reply
+        time_us = now_us()
+        if time_us - began_us > self.longest_us:
+            # A chip held the bus: the readings before that are out of date.
+            self._held_up += 1
+            return SwitchFrame(time_us, 0, self.owned)
+        taxels = tuple(codes) if any(code is not None for code in codes) else None
+        return SwitchFrame(time_us, closed, lost, taxels=taxels)
+
+
+class I2cDevice(PortScanner):
     """Bus number `number` of a harness, scanned as in `scan`, whose levels are limits in counts; only its chips are
     accessed.
     """
@@ -74,24 +117,11 @@ class I2cDevice(Source):
         placed = {chip: _placed(harness, number, chip, ports) for chip in chips}
         self.bus = I2cBus(wiring.device, tuple(placed.values()))
         # Conversions that are waited for come last: what is read together stays together.
-        read = [(PlacedPort(placed[port.chip], reading_of(port, harness)), port) for port in ports]
-        read.sort(key=lambda each: each[0].slow)
-        self._reads, calibration = [each for each, _ in read], calibration_of(harness.taxel_settings)
-        self._ports = [
-            PortSwitches(port, harness.debounce) if port.switches else PortLevels(port, harness, calibration)
-            for _, port in read
-        ]
-        self._everything = len(harness.taxel_names)
-        self.owned: Mask = sum(port.targets for port in self._ports)
-        self.taxels = tuple(port.taxels for port in self._ports if isinstance(port, PortLevels))
-        self._wire_us = scan_us(replace(scan, ports=tuple(ports)), harness).us
+        reads = [(PlacedPort(placed[port.chip], reading_of(port, harness)), port) for port in ports]
+        reads.sort(key=lambda each: each[0].slow)
+        self._reads = [each for each, _ in reads]
         self._scan: Scan | None = None
-        self._pace, self._held_up = Pace(wiring.rate_hz), 0
-
-    @property
-    def wire_us(self) -> float:
-        """The time of a scan."""
-        return self._wire_us
+        super().__init__(harness, number, [port for _, port in reads])
 
     @property
     def part(self) -> str:  # type: ignore[override]
@@ -103,29 +133,10 @@ class I2cDevice(Source):
         self.bus.open()
         self._scan = self.bus.prepare(self._reads)
 
-    def read(self, timeout_s: float) -> SwitchFrame | None:
-        """Scan once, when it is due."""
-        if not self._pace.wait(timeout_s):
-            return None
-        began_us = now_us()
-        frame = self._scanned()
-        if frame.time_us - began_us > self.longest_us:
-            # A chip held the bus: the readings before that are out of date.
-            frame = SwitchFrame(frame.time_us, 0, self.owned)
-            self._held_up += 1
-        return frame
-
-    def _scanned(self) -> SwitchFrame:
+    def replies(self) -> Sequence[int | None]:
+        """Read all ports."""
         assert self._scan is not None
-        closed = lost = 0
-        codes: list[int | None] = [None] * self._everything
-        for port, reply in zip(self._ports, self._scan.read(), strict=True):
-            shut, silent = port.states(reply)
-            closed, lost = closed | shut, lost | silent
-            if isinstance(port, PortLevels):
-                codes[port.place] = reply
-        taxels = tuple(codes) if any(code is not None for code in codes) else None
-        return SwitchFrame(now_us(), closed, lost, taxels=taxels)
+        return self._scan.read()
 
     def counts(self) -> tuple[Count, ...]:
         """Return the numbers of transfers, of scans too slow to count, and of each chip's failures."""
