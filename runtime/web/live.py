@@ -95,19 +95,17 @@ class LivePage(Closing):
         return (*self._first, message("past", changes=changes, until_us=until_us))
 
 
-def build_message(folder: Path | None, manifest: Manifest | None, name: str, **shows: bool) -> bytes:
-    """Return the message on the build of a page called `name`: which one it is, None where it is not known; its types,
-    switches and joints; whether it knows an empty hand; and what else the page `shows`: "preshapes" or a "replay".
+def build_message(folder: Path, manifest: Manifest, name: str, **shows: bool) -> bytes:
+    """Return the message on the build of a page called `name`: which one it is; its types, switches and joints; whether
+    it knows an empty hand; and what else the page `shows`: "preshapes" or a "replay".
     """
-    known: dict[str, object] = {"grasps": (), "switches": (), "joints": (), "partial": True}
-    if folder is not None and manifest is not None:
-        known = {
-            "build": f"{folder.resolve().name} {manifest.checksum[:8]}",
-            "grasps": manifest.classes,
-            "switches": [switch.name for switch in manifest.switches],
-            "joints": [joint.name for joint in manifest.joints],
-            "empty_hand": manifest.knows_none,
-        }
+    known = {
+        "build": f"{folder.resolve().name} {manifest.checksum[:8]}",
+        "grasps": manifest.classes,
+        "switches": [switch.name for switch in manifest.switches],
+        "joints": [joint.name for joint in manifest.joints],
+        "empty_hand": manifest.knows_none,
+    }
     return message("build", known, name=name, **{"preshapes": False, "replay": False} | shows)
 
 

@@ -294,7 +294,7 @@ class _Page:
         self._may, self._spoke_s = MOST_AT_ONCE, now_s
 
     async def send(self, new: Mapping[str, bytes]) -> None:
-        """Send the newest of each topic, unless the page is behind; one that hangs answers no ping."""
+        """Send the newest of each topic, unless the page is behind; one that hangs does not reply to a ping."""
         self._waiting.update(new)
         if self.transport.get_write_buffer_size():
             return

@@ -181,7 +181,7 @@ def test_a_recording_is_shown_from_any_moment_of_it(
 def test_what_is_no_recording_is_refused(build_folder: Path, recording: Path, tmp_path: Path) -> None:
     (tmp_path / "text.mcap").write_text("no")
     for name, said in (("none.mcap", "does not exist"), ("text.mcap", "does not begin like an MCAP file")):
-        done = thenar("monitor", tmp_path / name)
+        done = thenar("monitor", tmp_path / name, "--build", build_folder)
         assert done.returncode == 2, done.stderr
         assert said in " ".join(done.stderr.split())
         assert "Traceback" not in done.stderr

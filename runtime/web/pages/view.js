@@ -50,9 +50,8 @@ export class View {
     $("types").replaceChildren();
     for (const grasp of build.grasps) this.#row(grasp);
     $("preshape").hidden = !build.preshapes;
-    $("hand-panel").hidden = Boolean(build.partial);
-    say($("build-state"), `build: ${build.build || "not named"}`);
-    $("empty-hand").hidden = build.empty_hand ?? true;
+    say($("build-state"), `build: ${build.build}`);
+    $("empty-hand").hidden = build.empty_hand;
     this.classes = build.grasps;
   }
 
@@ -135,8 +134,6 @@ export class View {
     const news = this.shown?.grasp !== frame.grasp;
     this.shown = frame;
     this.#now(frame);
-    // Without a build, the switches and the probabilities of the other types are not known.
-    $("types-say").hidden = frame.closed !== undefined;
     this.#hand(frame);
     this.timeline.draw();
     if (news || now - this.words >= WORDS_MS) {
@@ -161,7 +158,7 @@ export class View {
   }
 
   #hand(frame) {
-    if (!this.drawing || frame.closed === undefined) return;
+    if (!this.drawing) return;
     const lost = new Set(frame.lost), gone = [];
     for (const [name, bit] of this.bits) {
       gone[bit] = lost.has(name);

@@ -70,7 +70,7 @@ def show(browser: Any) -> Iterator[Callable[..., Any]]:
     """Return what opens the page of a recording in the browser."""
     with ExitStack() as stack:
 
-        def opened(path: Path, build: Path | None, **how: Any) -> ReplayPage:
+        def opened(path: Path, build: Path, **how: Any) -> ReplayPage:
             page = stack.enter_context(ReplayPage(path, "127.0.0.1:0", token=None, build=build))
             stop = Event()
             thread = Thread(target=page.run, args=(stop,))
@@ -169,14 +169,3 @@ def test_a_recording_that_is_cut_shows_what_there_is_and_says_so(
     browser.wait(lambda: browser.text("grasp") == left.grasps[-1].grasp)
     assert browser.script("return document.documentElement.scrollWidth") <= 400
     assert browser.axe() == []
-
-
-def test_without_its_build_a_recording_shows_answers_and_labels(
-    recording: tuple[Path, dict[int, tuple[int, int]]], browser: Any, show: Callable[..., Any]
-) -> None:
-    recorded = Recorded(recording[0])
-    show(recording[0], None)
-    browser.script(_SEEK, recorded.seconds / 2)
-    browser.wait(lambda: browser.text("grasp") == recorded.at(recorded.seconds / 2).grasp)
-    assert "name one with --build, the one that ran" in browser.text("faults")
-    assert not browser.driver.find_element("id", "hand-panel").is_displayed()
