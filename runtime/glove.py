@@ -1,6 +1,6 @@
 """`Glove`: a glove that recognises grasps, as an iterator of published moments."""
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from os import PathLike
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from .recording.writer import LiveRecorder
 
 _REPORT_US = 1_000_000
+# More than come in a second.
+_MOST_FRAMES = 20_000
 
 
 class Glove:
@@ -294,32 +296,18 @@ class GloveHealth:
 
 
 class FrameRate:
-    """Frames per second over the last second."""
+    """The number of frames in the last second."""
 
     def __init__(self) -> None:
-        self._began_us: int | None = None
-        self._last_us = -1
-        self._frames = 0
-        self._hz = 0.0
+        self._times_us = deque[int](maxlen=_MOST_FRAMES)
 
     def frame(self, time_us: int) -> None:
         """Count a frame, unless it is no newer than the last one."""
-        if time_us <= self._last_us:
-            return
-        self._last_us = time_us
-        if self._began_us is None:
-            self._began_us = time_us
-            return
-        self._frames += 1
-        if time_us - self._began_us >= _REPORT_US:
-            self._hz = self._over(time_us)
-            self._began_us, self._frames = time_us, 0
+        if not self._times_us or time_us > self._times_us[-1]:
+            self._times_us.append(time_us)
 
     def hz(self, now_us: int) -> float:
-        """Return the rate of the last whole second, or of the time since the last frames, if none come."""
-        if self._began_us is not None and now_us - self._began_us > 2 * _REPORT_US:
-            return self._over(now_us)
-        return self._hz
-
-    def _over(self, now_us: int) -> float:
-        return self._frames * 1e6 / (now_us - (self._began_us or 0))
+        """Return the rate."""
+        while self._times_us and self._times_us[0] <= now_us - _REPORT_US:
+            self._times_us.popleft()
+        return float(len(self._times_us))
