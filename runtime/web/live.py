@@ -24,8 +24,10 @@ from ..published import HealthReport, LiveGrasp
 from ..taxels import calibration_of
 from .server import Server, message
 
-# Length and resolution of the past that a newly opened page gets.
-PAST_US, _STEP_US = 30_000_000, 10_000
+# Length of the past that a page shows, and more changes of the prediction than usually come in it.
+PAST_US, _MOST_CHANGES = 30_000_000, 6_000
+# A prediction's time, candidate, grasp, health, state, and its segment's number, type and beginning.
+Change = tuple[int, str, str, str, str, int, str, int | None]
 _encode = msgspec.json.Encoder().encode
 _FRAME = b'{"topic":"frame",'
 
@@ -58,8 +60,8 @@ class LivePage(Closing):
     def __init__(self, glove: Glove, folder: Path, address: str, *, token: str | None) -> None:
         self._glove, self._frames = glove, FrameText(glove.system.build, glove.system.harness)
         self._health: HealthReport | None = None
-        # The latest predictions, for pages opened later.
-        self._past = deque[LiveGrasp](maxlen=PAST_US // _STEP_US)
+        # The latest changes of the prediction, for pages opened later.
+        self._past, self._until_us = deque[Change](maxlen=_MOST_CHANGES), 0
         manifest, name = glove.system.build.manifest, glove.system.harness.name
         self._first = (
             build_message(folder, manifest, name, preshapes=glove.has_preshapes),
@@ -71,8 +73,9 @@ class LivePage(Closing):
         """Show the moment that the glove has just published. For the thread of the run."""
         grasp, glove = moment.grasp, self._glove
         self.server.publish("frame", partial(self._frames, moment))
-        if not self._past or grasp.time_us >= self._past[-1].time_us + _STEP_US:
-            self._past.append(grasp)
+        self._until_us, change = grasp.time_us, change_of(grasp)
+        if not self._past or change[1:] != self._past[-1][1:]:
+            self._past.append(change)
         if glove.health is not self._health and glove.health is not None:
             self._health = glove.health
             self.server.publish("health", partial(message, "health", self._health))
@@ -82,17 +85,13 @@ class LivePage(Closing):
         self.server.close()
 
     def _hello(self) -> Sequence[bytes]:
-        changes: list[tuple[object, ...]] = []
-        past = self._past.copy()
-        for grasp in past:
-            entry = (
-                *(grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment),
-                *(grasp.segment_type, grasp.segment_us),
-            )
-            if not changes or entry != changes[-1][1:]:
-                changes.append((grasp.time_us, *entry))
-        until_us = past[-1].time_us if past else 0
-        return (*self._first, message("past", changes=changes, until_us=until_us))
+        return (*self._first, message("past", changes=list(self._past.copy()), until_us=self._until_us))
+
+
+def change_of(grasp: LiveGrasp) -> Change:
+    """Return a prediction as pages keep it, its time first: they show where the rest changes."""
+    now = grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type
+    return (grasp.time_us, *now, grasp.segment_us)
 
 
 def build_message(folder: Path, manifest: Manifest, name: str, **shows: bool) -> bytes:

@@ -25,7 +25,7 @@ from ..live.replay import Stepper, periods_us
 from ..published import LiveGrasp
 from ..recording.reader import Index
 from ..recording.session import Label, Session
-from .live import PAST_US, FrameText, build_message
+from .live import PAST_US, Change, FrameText, build_message, change_of
 from .server import Server, message
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -35,9 +35,6 @@ LEAD_US = 1_500_000
 _SAMPLE_US, _MOST_CHANGES = 20_000, 100_000
 _FRAME_S, _IDLE_S, _TOLD_S = 0.02, 0.2, 0.5
 _PERIODS_OF = 20_000
-
-
-Change = tuple[int, str, str, str, str, int, str, int | None]
 
 
 class Overview:
@@ -80,8 +77,7 @@ class Overview:
         return message("overview", predictions=spans, truth=self.truth)
 
     def _change(self, grasp: LiveGrasp) -> None:
-        entry = grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type
-        change = (grasp.time_us, *entry, grasp.segment_us)
+        change = change_of(grasp)
         last = self.changes[-1] if self.changes else None
         if last is not None and grasp.time_us < last[0]:  # clocks of two overlapping sessions
             return
