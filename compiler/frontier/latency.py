@@ -55,7 +55,7 @@ POLICIES: Mapping[DecisionKind, Policy | None] = MappingProxyType(
 )
 
 
-@stored(9)
+@stored(10)
 def latencies(
     samples: Samples,
     rows: Rows,
