@@ -105,7 +105,7 @@ def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[C
             recognizer.step(now_us(), time.time_ns() // 1000, taken.switches, taken.glove)
 
         return step, feed
-    sinks = ["jsonl:/dev/null?every", f"unix:{own}/socket"] if stage >= 4 else ["jsonl:/dev/null"]
+    sinks = ["jsonl:/dev/null?every", "tcp:0"] if stage >= 4 else ["jsonl:/dev/null"]
     record = own / "run.mcap" if stage >= 2 else None
     run = Glove(
         scene.build,
@@ -176,7 +176,7 @@ def peak_mib(scene: Played, folder: Path, seconds: float) -> float:
     with Bench(harness, scene.performance.switch_names, folder) as bench:
         file = folder / "glove.toml"
         file.write_text(harness_to_toml(with_glove(bench.harness, glove(scene, str(folder / "cyberglove")))))
-        options = ["--sink", f"unix:{folder}/socket", "--preshape", "barrett_bh8", "--record", folder / "peak.mcap"]
+        options = ["--sink", "tcp:0", "--preshape", "barrett_bh8", "--record", folder / "peak.mcap"]
         run = [sys.executable, "-m", "thenar.cli", "run", scene.folder, "--glove", file, "--status", *options]
         run += ["--frames", str(int(400 * seconds))]
         command = [sys.executable, "-c", PEAK, *map(str, run)]

@@ -82,7 +82,7 @@ def rate(build: str, glove: str, seconds: float) -> Rate:
             build,
             glove,
             preshapes="barrett_bh8",
-            sinks=[f"jsonl:{folder}/lines?every", f"unix:{folder}/socket"],
+            sinks=[f"jsonl:{folder}/lines?every", "tcp:0"],
             record=folder / "run.mcap",
             status=True,
         )

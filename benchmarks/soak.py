@@ -98,7 +98,7 @@ def glove_of_all(scene: Played) -> Harness:
 def started(scene: Played, bench: Bench, folder: Path) -> "subprocess.Popen[bytes]":
     """Start the run."""
     (folder / "glove.toml").write_text(harness_to_toml(bench.harness))
-    sinks = ["--sink", f"unix:{folder}/socket", "--sink", "jsonl:/dev/null", "--preshape", "barrett_bh8", "--status"]
+    sinks = ["--sink", "tcp:0", "--sink", "jsonl:/dev/null", "--preshape", "barrett_bh8", "--status"]
     run = [sys.executable, "-m", "thenar.cli", "run", scene.folder, "--glove", folder / "glove.toml", *sinks]
     limited = [sys.executable, "-c", LIMITED, MOST_FILE, *run, "--record", folder / "soak.mcap"]
     return subprocess.Popen(list(map(str, limited)), env=os.environ | bench.environment)

@@ -80,11 +80,11 @@ def measured(cases: Sequence[Case], frames: list[tuple[int, bytes]]) -> None:
 def run_of(scene: Played, folder: Path, what: str, stack: ExitStack, *, page: bool) -> tuple[Case, LivePage | None]:
     """Return a run with a sink, and its page."""
     harness, feed = with_glove(board(scene), glove(scene)), Memory(len(scene.kept))
-    run = Glove(scene.build, harness, sinks=["jsonl:/dev/null?every"], status=True, feed=feed.take, recordable=page)
+    run = Glove(scene.build, harness, sinks=["jsonl:/dev/null?every"], status=True, feed=feed.take)
     if not page:
         stack.enter_context(run)
         return Case(what, lambda: next(run), feed), None
-    shown = stack.enter_context(LivePage(run, scene.folder, "127.0.0.1:0", token=None, recordings=folder))
+    shown = stack.enter_context(LivePage(run, scene.folder, "127.0.0.1:0", token=None))
     stack.enter_context(run)
     return Case(what, lambda: shown.show(next(run)), feed), shown
 

@@ -37,15 +37,6 @@ _PATIENCE_S = 5.0
 _MOST_FRAMES = 1_000_000
 
 
-def _rate(_context: click.Context, _option: click.Parameter, text: str) -> int | None:
-    """Return the baud rate, or None for auto."""
-    if text == "auto":
-        return None
-    if not text.isdecimal() or not 0 < int(text) < 10**8:
-        raise click.BadParameter(f"'{text}' is neither a baud rate nor auto")
-    return int(text)
-
-
 def _device(context: click.Context, argument: click.Parameter, text: str) -> str:
     """Return the port, or the path of a glove.toml, which --taxels always expects."""
     if context.params.get("taxels") or text.endswith(".toml"):
@@ -60,7 +51,7 @@ def _device(context: click.Context, argument: click.Parameter, text: str) -> str
 @click.option("-o", "--output", type=OutputFile(".toml"), required=True, help="The .toml file to write.")
 @overwrite_flag
 @click.option("--subject", help="Name of the subject.  [default: the file's name]")
-@click.option("--baud", callback=_rate, default="115200", show_default=True, help="Baud rate, or auto to detect it.")
+@click.option("--baud", type=click.IntRange(1, 12_000_000), default=115_200, show_default=True, help="Baud rate.")
 @click.option("--sensors", type=click.Choice(["18", "22"]), help="Expected sensor count.  [default: as reported]")
 @click.option("--taxels", is_flag=True, is_eager=True, help="Calibrate the taxels of a glove.toml, not a CyberGlove.")
 @click.option("--newtons", type=Number(0.001, 1000), help="Force of the presses, if known; with --taxels.")
@@ -70,7 +61,7 @@ def command(
     port: str,
     output: Path,
     subject: str | None,
-    baud: int | None,
+    baud: int,
     sensors: str | None,
     taxels: bool,
     newtons: float | None,
@@ -183,7 +174,7 @@ def _await(sources: "Sources", read: Callable[[], Any], what: str) -> None:
 
 @contextmanager
 def _posing(
-    port: str, baud: int | None, sensors: str | None, hold_s: float, web: str | None
+    port: str, baud: int, sensors: str | None, hold_s: float, web: str | None
 ) -> "Iterator[tuple[PoseGuide, Callable[[], None]]]":
     """Yield a guide through the poses of a CyberGlove, or of the stream of a glove.toml, and a function that waits for
     the next bytes and passes them to it.

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 @click.option("--propose", metavar="FILE.toml", type=OutputFile(".toml"), help="Write the proposal here; with --line.")
 @overwrite_flag
 @click.option("--build", metavar="BUILD", type=existing_folder, help="Check only the devices that this build reads.")
-@click.option("--write", is_flag=True, help="Write the CyberGlove's measured record time into glove.toml.")
 @json_flag
 def command(
     glove: Path | None,
@@ -35,16 +34,12 @@ def command(
     names: str | None,
     propose: Path | None,
     build: Path | None,
-    write: bool,
 ) -> None:
     """Open every device of glove.toml and report whether it is there, its speed, and the speed that its wire allows.
 
-    For a CyberGlove, measure a record of all sensors, and one of the sensors that the build reads (or half of all), and
-    compare both with the vendor's formula. With --write, `thenar frontier --glove glove.toml` uses the measured time.
-
     With --line, listen to a board or program that sends lines of numbers (CSV, JSON, name:value), and show each column:
     meanwhile press every switch and pad, and bend every finger. PORT is a serial port, tcp://HOST:PORT,
-    udp://HOST:PORT, unix:PATH, ws://HOST:PORT/PATH, - (stdin), lsl:NAME or ros:/TOPIC.
+    udp://HOST:PORT, - (stdin), lsl:NAME or ros:/TOPIC.
 
     Exit code 1 if something is missing; with --build, also if the glove's calibration does not fit the build.
 
@@ -56,8 +51,8 @@ def command(
     if (glove is None) == (line is None):
         raise click.UsageError("nothing to check: name a glove.toml, or a port to listen to with --line")
     if line is not None:
-        if build is not None or write:
-            raise click.UsageError("--build and --write need a glove.toml: leave out --line and name one")
+        if build is not None:
+            raise click.UsageError("--build needs a glove.toml: leave out --line and name one")
         _listen(line, baud, seconds, [] if names is None else [name.strip() for name in names.split(",")], propose)
         return
     assert glove is not None
@@ -85,8 +80,6 @@ def command(
             found += look()
             report(number + 1, len(looks))
     show(found, _print)
-    if write:
-        _write(glove, found)
     if not all(finding.present for finding in found):
         click.get_current_context().exit(1)
 
@@ -122,17 +115,6 @@ def _listen(port: str, baud: int, seconds: float, columns: "Sequence[str]", prop
     if propose is not None:
         write_atomically(propose, text.encode())
         err().print(f"{propose}: review it, then run `thenar doctor {propose}`", highlight=False)
-
-
-def _write(glove: Path, found: "Sequence[CheckResult]") -> None:
-    from thenar.runtime.harness.writing import write_record_us
-    from thenar.runtime.live.checkup import RECORD
-
-    measured = next((one.measured_us for one in found if one.part == RECORD), None)
-    if measured is None:
-        raise click.ClickException(f"no CyberGlove record was measured: {glove} is unchanged")
-    write_record_us(glove, round(measured))
-    err().print(f"{glove}: record_us = {measured:.0f}", highlight=False)
 
 
 def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[CheckResult]":

@@ -163,7 +163,7 @@ def command(
     chosen on its training rows.
 
     With --streams, GRASPS holds whole movements: placement, tables and segment costs are learnt without the subject
-    whose streams are decoded, live and afterwards. The dwell rule, a sequential test and a plain hidden Markov model
+    whose streams are decoded, live and afterwards. The dwell rule and a plain hidden Markov model
     are decoded for comparison.
 
     --by subject --adapt leaves out each subject. It adapts the others' model to the subject's first trials, as `thenar

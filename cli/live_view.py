@@ -111,19 +111,13 @@ def _ms(age_us: int | None) -> str:
 
 
 def health_lines(report: HealthReport | None) -> tuple[str, ...]:
-    """Return the glove's health in lines; only problems get a line, apart from the rates."""
+    """Return the glove's health in lines; the rates, and a line a device."""
     if report is None:
         return ()
-    found = {
-        "stuck open": report.stuck_open,
-        "stuck closed": report.stuck_closed,
-        "chattering": report.chattering,
-        "drifting": [f"{drift.joint} by {drift.codes:+d} codes" for drift in report.drifting],
-    }
     rates = f"switches {report.switch_hz:.0f}/s, glove {report.glove_hz:.0f}/s; {report.frames} frames"
     share = f", {report.changing} changing, {report.degraded} degraded, {report.unknown} unknown"
     late = f", {report.overflowed} frames missed" if report.overflowed else ""
-    lines = [rates + share + late, *(f"{what}: {', '.join(names)}" for what, names in found.items() if names)]
+    lines = [rates + share + late]
     for device in report.devices:
         counts = ", ".join(f"{count.name} {count.value}" for count in device.counts if count.value)
         lines.append(f"{device.name}: {counts or 'nothing counted'}")

@@ -10,20 +10,21 @@ from .printing import say_page
 
 @click.command("monitor")
 @click.argument("recording", metavar="RECORDING.mcap", type=existing_file)
-@click.option("-b", "--build", metavar="BUILD", type=existing_folder, help="The build to score the recording with.")
+@click.option(
+    "-b", "--build", metavar="BUILD", type=existing_folder, required=True, help="The build to score the recording with."
+)
 @click.option("--web", metavar="ADDRESS", default=WEB_ADDRESS, show_default=True, help="Address of the page.")
 @web_token_option
-def command(recording: Path, build: Path | None, web: str, web_token: str | None) -> None:
+def command(recording: Path, build: Path, web: str, web_token: str | None) -> None:
     """Show a recording on a page in the browser.
 
-    The page jumps to any moment, plays from there, and shows the labels next to the predictions; with --build also the
-    hand at that moment, and the other types' probabilities.
+    The page jumps to any moment, plays from there, and shows the labels next to the predictions, the hand at that
+    moment, and the other types' probabilities.
 
     SIGINT, SIGTERM and SIGHUP end it, with exit code 0.
 
     \b
     Example:
-        thenar monitor run.mcap
         thenar monitor run.mcap --build build/
     """
     from thenar.runtime.web.replay import ReplayPage

@@ -14,7 +14,7 @@ import click
 from click.core import ParameterSource
 
 from .options import LazyOption
-from .parameters import Number, OutputFile, OutputFolder, existing_file, existing_folder, overwrite_flag, web_options
+from .parameters import Number, OutputFile, existing_file, existing_folder, overwrite_flag, web_options
 from .printing import of_device, out, say, say_page
 from .replaying import nobody_listens, replay_recording, replay_set, say_what_was_lost, selecting, spoilt
 
@@ -71,12 +71,6 @@ def _sinks_help() -> str:
 )
 @overwrite_flag
 @web_options
-@click.option(
-    "--recordings",
-    type=OutputFolder(),
-    metavar="FOLDER",
-    help="Folder for recordings of the page.  [default: recordings]",
-)
 @click.option("--status", is_flag=True, help="Report the glove's health once a second, in the view and to all sinks.")
 @click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop after N frames.")
 @click.option("--lead", type=Number(0), help="Lead in score units that a new grasp type needs.")
@@ -88,8 +82,6 @@ def _sinks_help() -> str:
     help="Maximum age of a late CyberGlove record.  [default: four periods, at least 60]",
 )
 @click.option("--no-quarantine", is_flag=True, help="Use inputs even if they are stuck, chatter or drift.")
-@click.option("--error-rate", type=Number(0, 1), help="Decide by a sequential test with this error rate instead.")
-@click.option("--spacing-ms", type=Number(0, 10_000), help="Minimum spacing of frames in the sequential test.")
 @click.option(
     "--lag-ms", type=Number(0, 10_000), help="Time after which the state of a segment is final.  [default: 150]"
 )
@@ -104,7 +96,6 @@ def command(
     record: Path | None,
     web: str | None,
     web_token: str | None,
-    recordings: Path | None,
     status: bool,
     frames: int | None,
     **deciding: Any,
@@ -119,7 +110,7 @@ def command(
     \b
     Example:
         thenar run build/ --glove glove.toml --status
-        thenar run build/ --glove glove.toml --sink unix:/run/grasps --preshape barrett_bh8 --record run.mcap
+        thenar run build/ --glove glove.toml --sink tcp:7777 --preshape barrett_bh8 --record run.mcap
         thenar run build/ --glove glove.toml --web
         thenar run build/ --replay run.mcap | head -3
         thenar run build/ --replay set.grasps --sink jsonl:grasps.jsonl --preshape parallel_gripper
@@ -137,13 +128,12 @@ def command(
         viewed = sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
         asked: dict[str, Any] = {"preshapes": preshape, "record": record, "status": status}
         asked |= {"change_while_held": change_while_held}
-        asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy, "recordable": web is not None}
+        asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy}
         page_of = None
         if web is not None:
             from thenar.runtime.web.live import LivePage
 
-            folder = recordings or Path("recordings")
-            page_of = partial(LivePage, folder=build, address=web, token=web_token, recordings=folder)
+            page_of = partial(LivePage, folder=build, address=web, token=web_token)
         _run_live(loaded, glove, viewed, page_of, frames, **asked)
     elif replay.suffix == ".mcap":
         selector = selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
@@ -152,9 +142,8 @@ def command(
         replay_set(loaded, replay, sinks, selecting(loaded, preshape, segments=False), frames, period_us)
 
 
-_WEB = ("web_token", "recordings")
-_LIVE = ("record", "web", *_WEB, "status")
-_POLICY = ("lead", "dwell_ms", "max_lost", "grace_ms", "no_quarantine", "error_rate", "spacing_ms", "lag_ms")
+_LIVE = ("record", "web", "web_token", "status")
+_POLICY = ("lead", "dwell_ms", "max_lost", "grace_ms", "no_quarantine", "lag_ms")
 
 
 def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
@@ -162,7 +151,7 @@ def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
     if click.get_current_context().params["preshape"] is None:
         _refuse("without --preshape", "change_while_held")
     if click.get_current_context().params["web"] is None:
-        _refuse("without --web", *_WEB)
+        _refuse("without --web", "web_token")
     if glove is not None:
         _refuse("on a glove", "period_us")
     elif replay is not None and replay.suffix == ".mcap":
@@ -170,10 +159,6 @@ def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
     else:
         alone = "for a set of grasps, each row of which is classified alone"
         _refuse(alone, "change_while_held", *_LIVE, *_POLICY)
-    if click.get_current_context().params["error_rate"] is not None:
-        _refuse("with --error-rate, whose test decides alone", "lead", "dwell_ms")
-    else:
-        _refuse("without --error-rate", "spacing_ms")
 
 
 def _refuse(where: str, *names: str) -> None:
@@ -233,10 +218,11 @@ def _run_live(
         reports = glove.reports()
         say(f"{glove.frames} frame{'s' * (glove.frames != 1)}")
         say_what_was_lost(reports)
-        recorders = [*([] if recorder is None else [recorder]), *([] if page is None else page.recorded)]
-        for each in recorders:
-            say("; ".join(filter(None, (f"{each.path}: {each.messages} messages", each.lost, each.failure))))
-    if any(each.lost or each.failure for each in recorders) or spoilt(reports):
+        incomplete = ""
+        if recorder is not None:
+            incomplete = "; ".join(filter(None, (recorder.lost, recorder.failure)))
+            say("; ".join(filter(None, (f"{recorder.path}: {recorder.messages} messages", incomplete))))
+    if incomplete or spoilt(reports):
         click.get_current_context().exit(1)
 
 

@@ -175,9 +175,12 @@ def _scan(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) -> 
     names = [joint.name for joint in manifest.joints]
     glove = propose_cyberglove(names) if harness is None else harness.cyberglove
     if names and glove is not None:
-        how = "by the vendor's formula" if glove.record_us is None else "as measured"
         us = microseconds(glove_us(glove, len(names)))
-        yield Fact("scan", "CyberGlove", f"a record of {counted(len(names), 'sensor')} takes {us} us at best, {how}")
+        yield Fact(
+            "scan",
+            "CyberGlove",
+            f"a record of {counted(len(names), 'sensor')} takes {us} us at best, by the vendor's formula",
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ Where the sources of the protocol disagree, each variant is accepted or selectab
 
 import logging
 from collections import deque
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from time import monotonic, monotonic_ns
@@ -52,7 +52,6 @@ _LONGEST_S = 1.0
 _LONGEST = 4096  # bytes searched for a reply; the information text has some hundreds
 _TRIES = 3
 # The rates that the box supports without an internal change, the usual one first.
-BAUD_RATES = (115_200, 38_400, 19_200, 9_600)
 # After power-on, a box reports for a while that it is not ready.
 _READY_S = 1.0
 # After this time without a byte the glove counts as dead: short, since it must be read within a second of its return.
@@ -147,24 +146,15 @@ class GloveInfo:
         return len(self.places)
 
 
-def find_line(url: str, rates: Sequence[int]) -> SerialLine:
-    """Return an open line at the first of `rates` at which the box replies. Raises DeviceError if it never does."""
-    for baud in rates:
-        with ExitStack() as opened:
-            line = opened.enter_context(SerialLine(url, baud))
-            dialogue = Dialogue(line)
-            try:
-                dialogue.stop_stream()
-                dialogue.ask(query("G"))
-            except DeviceError as reason:
-                if len(rates) == 1:
-                    raise
-                failure = reason
-            else:
-                opened.pop_all()
-                return line
-    tried = ", ".join(map(str, rates))
-    raise DeviceError(f"{url}: no CyberGlove replies at {tried} baud: check its power and the cable") from failure
+def open_line(url: str, baud: int) -> SerialLine:
+    """Return an open line on which the box replies. Raises DeviceError if it does not."""
+    with ExitStack() as opened:
+        line = opened.enter_context(SerialLine(url, baud))
+        dialogue = Dialogue(line)
+        dialogue.stop_stream()
+        dialogue.ask(query("G"))
+        opened.pop_all()
+    return line
 
 
 def set_up(
@@ -277,7 +267,7 @@ def _optional(dialogue: Dialogue, command: Command) -> bytes | None:
 class CyberGlove(Closing):
     """A glove at `url`: a device or socket://HOST:PORT.
 
-    baud     bits a second; None tries the rates that a box supports
+    baud     bits a second
     rate_hz  records a second; None: as many as possible
     sensors  18 or 22; None: as reported by the glove
     only     places, in wire order, of the requested sensors; None: all. If the box cannot send only these, by its
@@ -291,7 +281,7 @@ class CyberGlove(Closing):
         self,
         url: str,
         *,
-        baud: int | None = 115_200,
+        baud: int = 115_200,
         rate_hz: float | None = None,
         sensors: int | None = None,
         only: Collection[int] | None = None,
@@ -299,7 +289,7 @@ class CyberGlove(Closing):
     ) -> None:
         self.url = url
         self.counts = RecordCounts()
-        self._rates = BAUD_RATES if baud is None else (baud,)
+        self._baud = baud
         self._words, self._sensors, self._only, self._filtered = period_words(rate_hz), sensors, only, filtered
         self._line: SerialLine | None = None
         self._misfits = 0
@@ -312,7 +302,7 @@ class CyberGlove(Closing):
         Raises DeviceError if there is no such port, or no supported glove replies.
         """
         self.close()
-        line = find_line(self.url, self._rates)
+        line = open_line(self.url, self._baud)
         try:
             info = self._info = set_up(line, self._words, self._sensors, self._only, self._filtered)
             if self._unmasked:

@@ -13,7 +13,6 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     ),
     "stability": ("mpmath",),
     "ros": ("cyclonedds",),
-    "ws": ("websockets",),
     "lsl": ("pylsl",),
     "web": ("aiohttp",),
     "foxglove": ("foxglove",),

@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 from .closing import Closing
 from .errors import SettingError
 from .names import LONGEST_SHOWN, shortened
-from .senders import Address, FirstSender, parse_address
+from .senders import FirstSender
 from .transports import Datagrams, Transport, line_port_fault, open_transport
 
 # Long enough for two thousand columns of five digits.
@@ -355,24 +355,20 @@ class RowReader(Closing, ABC):
 
 
 class LineReader(RowReader):
-    """Rows of the lines from `port`, of `columns` columns; 0: unknown. The constructor does not open it.
+    """Rows of the lines from `port`, of `columns` columns; 0: unknown. The constructor does not open it."""
 
-    sender  the address of the only sender of datagrams that counts; "": the first one
-    """
-
-    def __init__(self, port: str, baud: int = 115_200, columns: int = 0, sender: str = "") -> None:
+    def __init__(self, port: str, baud: int = 115_200, columns: int = 0) -> None:
         self.port, self._baud = port, baud
         self._line: Transport | None = None
         self._parser = LineParser(columns)
-        self._named = parse_address(sender) if sender else None
-        self._senders = FirstSender(self._named)
+        self._senders = FirstSender()
 
     def open(self) -> None:
         """Open the port."""
         if reason := line_port_fault(self.port):
             raise SettingError(f"{shortened(repr(self.port))} {reason}")
         self._parser.begin()
-        self._senders = FirstSender(self._named)
+        self._senders = FirstSender()
         self._line = open_transport(self.port, self._baud)
 
     def read(self, timeout_s: float) -> Sequence[Row]:
@@ -389,10 +385,9 @@ class LineReader(RowReader):
         self.odd = self._parser.odd
         return rows
 
-    def _of_datagram(self, data: bytes, address: Address, came_us: int) -> Sequence[Row]:
+    def _of_datagram(self, data: bytes, sender: str, came_us: int) -> Sequence[Row]:
         """Return the rows of a datagram, each of which begins and ends lines; none if it is from another sender."""
-        named, before = self._named, self._senders.current
-        sender = named if named is not None and named.covers(address) else address
+        before = self._senders.current
         if not self._senders.admits(sender, came_us):
             self._parser.counts.foreign += data.strip().count(b"\n") + 1
             return ()
@@ -405,10 +400,7 @@ class LineReader(RowReader):
         other = self._senders.other(monotonic_ns() // 1000)
         if other is None:
             return ""
-        advice = "" if self._named else f', or choose one by `from = "{self._senders.current}"` in glove.toml'
-        return (
-            f"{other} sends, too, and its lines are left out: those of {self._senders.current} count; stop it{advice}"
-        )
+        return f"{other} sends, too, and its lines are left out: those of {self._senders.current} count; stop it"
 
     def counts(self) -> LineCounts:
         """Return the counts of input that was not a row."""

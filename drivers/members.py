@@ -1,7 +1,6 @@
 """Registries: all members of one kind, from thenar and from other packages."""
 
 import importlib
-import pkgutil
 from collections.abc import Container, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
@@ -59,8 +58,7 @@ class Members(Mapping[str, M], Generic[M]):
     @cached_property
     def _members(self) -> dict[str, M]:
         found: dict[str, M] = {}
-        folder = importlib.import_module(self.package)
-        for module in sorted(info.name for info in pkgutil.iter_modules(folder.__path__)):
+        for module in self._modules():
             defined = getattr(importlib.import_module(f"{self.package}.{module}"), "MEMBER", ())
             for member in defined if isinstance(defined, tuple) else (defined,):
                 found[member.name] = member
@@ -70,6 +68,11 @@ class Members(Mapping[str, M], Generic[M]):
             self._check_free(member.name, found)
             found[member.name] = member
         return found
+
+    def _modules(self) -> list[str]:
+        from pkgutil import iter_modules  # as below
+
+        return sorted(info.name for info in iter_modules(importlib.import_module(self.package).__path__))
 
     def _points(self) -> "list[EntryPoint]":
         # Imported only where members are needed: it takes a third as long as everything else.
@@ -134,9 +137,7 @@ class MembersByName(Members[M]):
     @cached_property
     def _places(self) -> "dict[str, EntryPoint | None]":
         """Entry points by member name; None for members of the folder."""
-        folder = importlib.import_module(self.package)
-        modules = sorted(info.name for info in pkgutil.iter_modules(folder.__path__))
-        places: dict[str, EntryPoint | None] = {module.replace("_", ".", 1): None for module in modules}
+        places: dict[str, EntryPoint | None] = {module.replace("_", ".", 1): None for module in self._modules()}
         for point in self._points():
             self._check_free(point.name, places)
             places[point.name] = point

@@ -8,12 +8,11 @@ import os
 import re
 import stat
 from pathlib import Path
-from urllib.parse import parse_qsl, urlsplit
 
 from .errors import DeviceError, SettingError
 from .names import shortened
 
-_HOST = re.compile(r"[A-Za-z0-9._-]+|[0-9A-Fa-f:.]+(%[A-Za-z0-9._-]+)?")
+_SOCKET = re.compile(r"socket://(?:[a-z0-9._-]+|\[[0-9a-f:.]+(?:%[a-z0-9._-]+)?\]):0*([1-9][0-9]{0,4})/?", re.I | re.A)
 _WAYS = "a port is a device such as /dev/ttyUSB0 or socket://HOST:PORT"
 
 
@@ -24,7 +23,8 @@ def port_fault(port: str) -> str:
         return device_fault(port)
     if scheme.lower() != "socket":
         return f"is not a supported port: {_WAYS}"
-    return _url_fault(port)
+    address = _SOCKET.fullmatch(port)
+    return "" if address and int(address[1]) < 65536 else f"is not the address of a line: {_WAYS}"
 
 
 def device_fault(path: str) -> str:
@@ -63,19 +63,3 @@ def check_node(path: str) -> None:
     if not stat.S_ISCHR(mode):
         kind = "a folder" if stat.S_ISDIR(mode) else "a file" if stat.S_ISREG(mode) else "not a character device"
         raise DeviceError(f"{path} is {kind}, not a device: it was left as it is")
-
-
-def _url_fault(url: str) -> str:
-    if not (url.isascii() and url.isprintable()):  # urlsplit drops line breaks
-        return f"is not the address of a line: {_WAYS}"
-    try:
-        parts = urlsplit(url)
-        host, port = parts.hostname, parts.port
-        options = parse_qsl(parts.query, keep_blank_values=True, max_num_fields=8)
-    except ValueError as reason:
-        return f"is not the address of a line ({reason}): {_WAYS}"
-    if not host or not port or not _HOST.fullmatch(host) or parts.path not in ("", "/") or parts.fragment:
-        return f"is not the address of a line: {_WAYS}"
-    if parts.username is not None or parts.password is not None:
-        return f"names a user, which no serial line needs: {_WAYS}"
-    return f"has the option {options[0][0]!r}, which it does not support: a socket has none" if options else ""

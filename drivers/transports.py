@@ -1,11 +1,9 @@
-"""Ports of lines: a serial port, TCP, UDP, a Unix socket, stdin or a WebSocket, all read in the same way.
+"""Ports of lines: a serial port, TCP, UDP or stdin, all read in the same way.
 
 /dev/ttyUSB0          a serial port
 tcp://HOST:PORT       a server that sends lines to whoever connects
 udp://HOST:PORT       datagrams that come to this port; HOST is this computer's own address: 127.0.0.1, or 0.0.0.0
 for all; a datagram holds one line or more; datagrams of a second sender are left out
-unix:PATH             a Unix socket that somebody listens on
-ws://HOST:PORT/PATH   a WebSocket, also wss://; needs the extra `ws`
 -                     standard input
 """
 
@@ -17,21 +15,12 @@ import socket
 import struct
 import sys
 from collections.abc import Sequence
-from contextlib import ExitStack
-from pathlib import Path
 from time import monotonic_ns, time_ns
-from typing import TYPE_CHECKING
-from urllib.parse import urlsplit
 
 from .closing import Closing
 from .errors import DeviceError, SettingError
-from .extras import optional
 from .ports import port_fault
-from .senders import Address, address_of
 from .serial_line import SerialLine
-
-if TYPE_CHECKING:
-    from websockets.sync.client import ClientConnection
 
 _CHUNK = 65_536
 _CONNECT_S = 2.0
@@ -41,48 +30,26 @@ _TIMESPEC = struct.Struct("@ll")
 # Labels of a host's name are not empty, and at most 63 characters long: getaddrinfo raises UnicodeError for others.
 _HOST = r"[A-Za-z0-9_-]{1,63}(?:\.[A-Za-z0-9_-]{1,63})*\.?"
 _NET = re.compile(rf"(tcp|udp)://(\[[0-9A-Fa-f:.%]+\]|{_HOST}):(\d{{1,5}})/?")
-_WAYS = (
-    "lines come from a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, udp://HOST:PORT, unix:PATH, "
-    "ws://HOST:PORT/PATH or - (standard input)"
-)
+_WAYS = "lines come from a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, udp://HOST:PORT or - (standard input)"
 
 
 def line_port_fault(port: str) -> str:
     """Return why `port` cannot deliver lines, or ""; streams of LSL and topics of ROS are other readers'."""
     if port == "-" or port.startswith(("lsl:", "ros:")):
         return ""
-    if port.startswith("unix:"):
-        path = port.removeprefix("unix:")
-        return "" if path and path.isprintable() else f"does not name a socket: {_WAYS}"
     if port.startswith(("tcp:", "udp:")):
         found = _NET.fullmatch(port)
         return "" if found and 0 < int(found[3]) < 65536 else f"is not an address: {_WAYS}"
-    if port.startswith(("ws:", "wss:")):
-        return "" if _is_web(port) else f"is not an address: {_WAYS}"
     if "://" in port and not port.startswith("socket://"):
         return f"is not a supported port: {_WAYS}"
     return port_fault(port)
-
-
-def _is_web(port: str) -> bool:
-    if not (port.isascii() and port.isprintable()):
-        return False
-    try:
-        parts = urlsplit(port)
-        return bool(parts.hostname and port.partition("://")[1]) and parts.port != 0
-    except ValueError:
-        return False
 
 
 def open_transport(port: str, baud: int) -> "Transport":
     """Return the open port. Raises DeviceError if a retry may help, SettingError if it does not."""
     if port == "-":
         return Descriptor(port, None)
-    if port.startswith(("ws:", "wss:")):
-        return WebSocket(port)
     try:
-        if port.startswith("unix:"):
-            return Descriptor(port, _unix(port.removeprefix("unix:")))
         if found := _NET.fullmatch(port):
             host, number = found[2].strip("[]"), int(found[3])
             return Datagrams(port, _bound(host, number)) if found[1] == "udp" else Descriptor(port, _tcp(host, number))
@@ -93,25 +60,11 @@ def open_transport(port: str, baud: int) -> "Transport":
 
 def _advice(port: str, reason: OSError) -> str:
     said = reason.strerror or str(reason)
-    # Of a Unix socket: the path exists.
-    if reason.errno == errno.ECONNREFUSED and port.startswith("unix:") and not Path(port[5:]).is_socket():
-        return "it is not a socket: name the one on which the sender listens"
     if reason.errno == errno.EACCES:
-        return f"{said}: set the permissions of the socket, or use a port above 1023"
+        return f"{said}: use a port above 1023"
     if port.startswith("udp:"):
         return f"{said}: use an address of this computer as host, and close other programs that have the port"
     return f"{said}: is the sender running, and does it listen?"
-
-
-def _unix(path: str) -> socket.socket:
-    line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    try:
-        line.settimeout(_CONNECT_S)
-        line.connect(path)
-    except OSError:
-        line.close()
-        raise
-    return line
 
 
 def _tcp(host: str, port: int) -> socket.socket:
@@ -167,7 +120,7 @@ class Datagrams(Closing):
     def __init__(self, port: str, line: socket.socket) -> None:
         self._port, self._line = port, line
 
-    def read(self, timeout_s: float) -> tuple[bytes, Address, int] | None:
+    def read(self, timeout_s: float) -> tuple[bytes, str, int] | None:
         """Return the next datagram, its sender's address, and when it came, by the monotonic clock; None: none came."""
         try:
             ready, _, _ = select.select([self._line], [], [], max(0.0, timeout_s))
@@ -177,7 +130,7 @@ class Datagrams(Closing):
         except (OSError, ValueError) as reason:  # ValueError: closed meanwhile
             raise DeviceError(f"{self._port}: it is gone ({reason})") from reason
         waited_us = _waited_us(notes)
-        return data, address_of(host, port), monotonic_ns() // 1000 - waited_us
+        return data, f"[{host}]:{port}" if ":" in host else f"{host}:{port}", monotonic_ns() // 1000 - waited_us
 
     def close(self) -> None:
         """Close the socket."""
@@ -194,33 +147,4 @@ def _waited_us(notes: Sequence[tuple[int, int, bytes]]) -> int:
     return 0
 
 
-class WebSocket(Closing):
-    """The messages of a WebSocket; the end of each ends a line."""
-
-    def __init__(self, port: str) -> None:
-        with optional(SettingError, port):
-            from websockets.sync.client import connect
-        self._port = port
-        try:
-            self._open = ExitStack()
-            line = connect(port, open_timeout=_CONNECT_S, close_timeout=0.2, max_size=_CHUNK, proxy=None)
-            self._line: ClientConnection = self._open.enter_context(line)
-        except Exception as reason:  # many kinds, from the library and the socket
-            raise DeviceError(f"{port}: {reason}: is the sender running, and does it listen?") from reason
-
-    def read(self, timeout_s: float) -> bytes:
-        """Return the next message. Raises DeviceError if the other end is gone."""
-        try:
-            message = self._line.recv(timeout_s)
-        except TimeoutError:
-            return b""
-        except Exception as reason:
-            raise DeviceError(f"{self._port}: the sender hung up ({reason})") from reason
-        return (message.encode() if isinstance(message, str) else message) + b"\n"
-
-    def close(self) -> None:
-        """Close it."""
-        self._open.close()
-
-
-Transport = SerialLine | Descriptor | Datagrams | WebSocket
+Transport = SerialLine | Descriptor | Datagrams

@@ -97,10 +97,6 @@ class Newest(Generic[F]):
         if time_us >= self.time_us:
             self.frame, self.time_us, self.expires_us = frame, time_us, time_us + longest_us
 
-    def fresh(self, now_us: int) -> F | None:
-        """Return the newest frame, or None once it has expired."""
-        return self.frame if now_us <= self.expires_us else None
-
 
 class BitRemap:
     """Converts a set of a device's bits to a set of switches, as given by `pairs` (bit, switch).

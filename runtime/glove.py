@@ -1,6 +1,6 @@
 """`Glove`: a glove that recognises grasps, as an iterator of published moments."""
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from os import PathLike
@@ -13,7 +13,7 @@ from .build import Build
 from .calibration import AngleReader
 from .frames import GloveFrame, SwitchFrame, now_us
 from .harness.wiring import Harness
-from .live.quarantine import CHATTERING, STUCK_CLOSED, STUCK_OPEN, Quarantine
+from .live.quarantine import Quarantine
 from .live.recogniser import Moment
 from .live.sources import Snapshot
 from .live.system import LiveSystem
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from .recording.writer import LiveRecorder
 
 _REPORT_US = 1_000_000
+# More than come in a second.
+_MOST_FRAMES = 20_000
 
 
 class Glove:
@@ -50,11 +52,9 @@ class Glove:
         Whether the preshape may change while something is held. Otherwise it changes only after nothing was held, if
         the build was trained with such rows.
     sinks : sequence of str or Sink
-        Further receivers of each moment: "unix:/run/grasps", as `thenar run --sink` spells them.
+        Further receivers of each moment: "tcp:7777", as `thenar run --sink` spells them.
     record : str or path, optional
         A new .mcap file for the raw frames and the predictions.
-    recordable : bool
-        Whether recordings may begin later (`new_recording`): all sensors are read, as for `record`.
     status : bool
         Whether sinks get a report of the glove's health once a second, and whenever a device comes or goes.
     stop : threading.Event, optional
@@ -109,7 +109,6 @@ class Glove:
         change_while_held: bool = False,
         sinks: Sequence[str | Sink] = (),
         record: str | PathLike[str] | None = None,
-        recordable: bool = False,
         status: bool = False,
         stop: Event | None = None,
         feed: Callable[[], Snapshot] | None = None,
@@ -125,7 +124,7 @@ class Glove:
         self.health: HealthReport | None = None
         self.recorder: LiveRecorder | None = None
         # A recording is for training: it holds all sensors.
-        whole = recordable or record is not None
+        whole = record is not None
         devices = system.sources(all_sensors=whole)
         self._recognizer, self.sources = system.recognizer(), devices
         self.feed = feed
@@ -159,7 +158,9 @@ class Glove:
             opening.callback(self._fanout.close)
             self._fanout.begin(self.system.build)
             if self._record is not None:
-                self.recorder = opening.enter_context(self.new_recording(Path(self._record)))
+                from .recording.writer import LiveRecorder
+
+                self.recorder = opening.enter_context(LiveRecorder(Path(self._record), self._session()))
             if self.feed is None:
                 opening.enter_context(self.sources)
             self._open = opening.pop_all()
@@ -196,16 +197,6 @@ class Glove:
             self._look(now)
         self.frames += 1
         return moment
-
-    def new_recording(self, path: Path) -> "LiveRecorder":
-        """Return a running recording of this glove. Only the thread that iterates may set it as `recorder`, or remove
-        it; its creator closes it.
-
-        Raises SettingError if the file exists, OSError as the operating system gives it.
-        """
-        from .recording.writer import LiveRecorder
-
-        return LiveRecorder(path, self._session())
 
     @property
     def has_preshapes(self) -> bool:
@@ -288,13 +279,9 @@ class GloveHealth:
         outputs: tuple[OutputTrouble, ...] = (),
     ) -> HealthReport:
         """Return the current health."""
-        quarantine, published = self._quarantine, self._published
+        published = self._published
         return HealthReport(
             time_us=now_us,
-            stuck_open=quarantine.names(STUCK_OPEN),
-            stuck_closed=quarantine.names(STUCK_CLOSED),
-            chattering=quarantine.names(CHATTERING),
-            drifting=quarantine.drifts(),
             switch_hz=self._switches.hz(now_us),
             glove_hz=self._glove.hz(now_us),
             frames=published.total(),
@@ -303,38 +290,24 @@ class GloveHealth:
             unknown=published["unknown"],
             overflowed=overflowed,
             devices=tuple(devices),
-            quarantined=quarantine.found,
+            quarantined=self._quarantine.found,
             outputs=outputs,
         )
 
 
 class FrameRate:
-    """Frames per second over the last second."""
+    """The number of frames in the last second."""
 
     def __init__(self) -> None:
-        self._began_us: int | None = None
-        self._last_us = -1
-        self._frames = 0
-        self._hz = 0.0
+        self._times_us = deque[int](maxlen=_MOST_FRAMES)
 
     def frame(self, time_us: int) -> None:
         """Count a frame, unless it is no newer than the last one."""
-        if time_us <= self._last_us:
-            return
-        self._last_us = time_us
-        if self._began_us is None:
-            self._began_us = time_us
-            return
-        self._frames += 1
-        if time_us - self._began_us >= _REPORT_US:
-            self._hz = self._over(time_us)
-            self._began_us, self._frames = time_us, 0
+        if not self._times_us or time_us > self._times_us[-1]:
+            self._times_us.append(time_us)
 
     def hz(self, now_us: int) -> float:
-        """Return the rate of the last whole second, or of the time since the last frames, if none come."""
-        if self._began_us is not None and now_us - self._began_us > 2 * _REPORT_US:
-            return self._over(now_us)
-        return self._hz
-
-    def _over(self, now_us: int) -> float:
-        return self._frames * 1e6 / (now_us - (self._began_us or 0))
+        """Return the rate."""
+        while self._times_us and self._times_us[0] <= now_us - _REPORT_US:
+            self._times_us.popleft()
+        return float(len(self._times_us))

@@ -8,7 +8,6 @@ from thenar.drivers.errors import SettingError
 
 # Limits beyond which no frames that a hand can hold would ever decide.
 _LARGEST_LEAD = 1e6
-_LEAST_RATE = 1e-100
 _GRACE_US = 60_000
 # Limit of the time for which paths are kept.
 _LONGEST_LAG_US = 10_000_000
@@ -23,10 +22,6 @@ class Policy(Struct, frozen=True):
     hold_us     maximum time for which a grasp type is kept while frames favour others, or while none is whole; at least
                 dwell_us
     max_lost    the largest share of the tables' weight (recogniser.py) that may be lost before "unknown" is reported
-    error_rate  None: hysteresis and dwell (decision.py) decide. A rate: a sequential test (decision.py) decides, with
-                at most this error rate under the assumptions stated there; `dwell_us` is not used then, and `hold_us`
-                is the maximum time of one test and of its result
-    spacing_us  sequential test: minimum time between frames that count
     grace_us    maximum age of a late record of the glove, used with health "degraded", before its joints are lost;
                 None: four of its periods, at least 60 ms
     quarantine  whether inputs that are read but wrong (quarantine.py) are treated as lost
@@ -37,8 +32,6 @@ class Policy(Struct, frozen=True):
     dwell_us: int = 50_000
     hold_us: int = 500_000
     max_lost: float = 0.5
-    error_rate: float | None = None
-    spacing_us: int = 0
     grace_us: int | None = None
     quarantine: bool = True
     lag_us: int | None = 150_000
@@ -52,14 +45,10 @@ class Policy(Struct, frozen=True):
             )
         if not 0 <= self.max_lost <= 1:
             raise SettingError(f"a lost share of {self.max_lost} is out of range: use 0 to 1")
-        if self.error_rate is not None and not _LEAST_RATE <= self.error_rate < 1:
-            raise SettingError(f"an error rate of {self.error_rate} is out of range: use {_LEAST_RATE} to below 1")
         if self.lag_us is not None and not 0 <= self.lag_us <= _LONGEST_LAG_US:
             raise SettingError(f"a lag of {self.lag_us} us is out of range: use 0 to {_LONGEST_LAG_US}")
         if self.grace_us is not None and self.grace_us < 0:
             raise SettingError(f"a grace of {self.grace_us} us is out of range: use 0 or more")
-        if self.spacing_us < 0:
-            raise SettingError(f"a spacing of {self.spacing_us} us is out of range: use 0 or more")
 
     def grace_of(self, period_us: int) -> int:
         """Return `grace_us`, or the default for records every `period_us`."""

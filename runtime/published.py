@@ -17,14 +17,14 @@ class LiveGrasp(msgspec.Struct, frozen=True, omit_defaults=False):
 
     time_us       host's monotonic clock when this was calculated; unix_us: the same moment in Unix time
     number        counts the frames of this run from 0
-    grasp         the decided grasp type, "unknown" while too little can be read and before a sequential test ends
+    grasp         the decided grasp type, "unknown" while too little can be read
     candidate     the best grasp type of this frame alone
     probability   of `grasp` in this frame (softmax of the scores); 0 when unknown
     margin        lead of the candidate over the second best, in integer steps
     health        "ok": everything is read, `grasp` was decided on whole frames, and the candidate does not lead it by
                   the lead that a change takes (policy.py) or more. "changing": everything is read, but the candidate
-                  leads `grasp` by that much, and the dwell time has not passed; or no sequential test has ended yet.
-                  "degraded": means replace lost inputs, or the glove's record is late. "unknown": too much is lost
+                  leads `grasp` by that much, and the dwell time has not passed. "degraded": means replace lost inputs,
+                  or the glove's record is late. "unknown": too much is lost
     switch_age_us, glove_age_us   how old the newest frames are; None before the first, or without such a device
     latency_us    from the newer of both frames to this moment
     lost          names of the switches and joints that are missing
@@ -78,13 +78,6 @@ class DeviceHealth(msgspec.Struct, frozen=True):
     counts: tuple[Count, ...] = ()
 
 
-class Drift(msgspec.Struct, frozen=True):
-    """The number of codes by which a joint has drifted."""
-
-    joint: str
-    codes: int
-
-
 class Quarantined(msgspec.Struct, frozen=True):
     """An input that is read but wrong, why ("stuck closed", "stuck open", "chattering", "drifting"), and whether it is
     still `used`: because too much would be lost without it, or because the policy says so.
@@ -110,20 +103,15 @@ class OutputTrouble(msgspec.Struct, frozen=True):
 class HealthReport(msgspec.Struct, frozen=True):
     """State at `time_us` of the host's monotonic clock.
 
-    stuck_open, stuck_closed, chattering, drifting  inputs with these faults, as the quarantine finds them
     switch_hz, glove_hz        frames per second over the last whole second
     frames, changing, degraded, unknown  numbers of grasps published so far, in all and with that health
     overflowed                 frames that arrived but were not taken in time: a recording lacks them
     devices                    as reported by their drivers
-    quarantined                inputs treated as lost, because they are read but wrong
+    quarantined                inputs that are read but wrong
     outputs                    the recording and the sinks, as long as they take nothing
     """
 
     time_us: int
-    stuck_open: tuple[str, ...]
-    stuck_closed: tuple[str, ...]
-    chattering: tuple[str, ...]
-    drifting: tuple[Drift, ...]
     switch_hz: float
     glove_hz: float
     frames: int

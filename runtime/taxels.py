@@ -287,7 +287,7 @@ class Taxels:
         highest: int | None = None,
     ) -> None:
         settings = settings or TaxelSettings()
-        self.names = tuple(names)
+        self.names, self.highest = tuple(names), highest
         self._levels = [[(limit, 1 << switch) for limit, switch in each] for each in levels]
         self._masks = [sum(bit for _, bit in each) for each in self._levels]
         self.owned: Mask = sum(self._masks)

@@ -22,27 +22,6 @@ _TYPES |= {"object": "a table"}
 # msgspec's names for the types of TOML values.
 _KINDS = {float: "float", int: "int", str: "str", bool: "bool", list: "array", dict: "object"}
 _BOUNDS = {">=": "at least", "<=": "at most", ">": "above", "<": "below"}
-# Units, by the last part of a key.
-_UNITS = {
-    "mm": "lengths are in millimetres",
-    "g": "masses are in grams",
-    "deg": "angles are in degrees",
-    "n": "forces are in newtons",
-    "ms": "times are in milliseconds",
-    "us": "times are in microseconds",
-    "s": "times are in seconds",
-    "hz": "rates are in hertz",
-}
-_OTHER_UNITS = {
-    "mm": ("m", "cm", "um", "inch", "in"),
-    "g": ("kg", "mg", "lb", "oz"),
-    "deg": ("rad", "mrad", "degrees"),
-    "n": ("mn", "kn", "gf", "kgf"),
-    "ms": ("s", "us"),
-    "us": ("s", "ms"),
-    "s": ("ms", "us", "min"),
-    "hz": ("khz", "mhz"),
-}
 
 
 def convert(source: TomlText, place: Place, table: object, kind: type[S]) -> S:
@@ -88,12 +67,7 @@ def check_finite(source: TomlText, place: Place, value: object) -> None:
 
 def _advice(key: str, known: Collection[str]) -> str:
     """Return advice for an unknown key."""
-    stem, _, unit = key.rpartition("_")
-    same = [name for name in known if name.rpartition("_")[0] in (stem, key) and name.rpartition("_")[2] in _UNITS]
-    same.sort(key=lambda name: unit.lower() not in _OTHER_UNITS[name.rpartition("_")[2]])
-    if not same:
-        return f"this key is unknown{nearest(key, sorted(known))}"
-    return f"{_UNITS[same[0].rpartition('_')[2]]}: {same[0]}"
+    return f"this key is unknown{nearest(key, sorted(known))}"
 
 
 def _worded(source: TomlText, place: Place, table: dict[str, object], kind: type[S], reason: str) -> ThenarError:

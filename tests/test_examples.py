@@ -4,6 +4,7 @@ import ast
 import csv
 import os
 import re
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -66,9 +67,16 @@ def example(name: str, *arguments: str) -> tuple[str, ...]:
 
 
 @pytest.fixture
-def live(bench: Path) -> Iterator["subprocess.Popen[str]"]:
-    """Return a live run that serves a Unix socket, and goes on until the test ends."""
-    sinks = ("--sink", "jsonl:-", "--sink", "unix:grasps")
+def port() -> str:
+    """Return a free port."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        return str(free.getsockname()[1])
+
+
+@pytest.fixture
+def live(bench: Path, port: str) -> Iterator["subprocess.Popen[str]"]:
+    """Return a live run that serves the port, and goes on until the test ends."""
+    sinks = ("--sink", "jsonl:-", "--sink", f"tcp:{port}")
     command = emulated(*THENAR, "run", "build", "--glove", "{glove}", *sinks)
     with subprocess.Popen(command, cwd=bench, stdout=subprocess.PIPE, text=True) as process:
         yield process
@@ -98,10 +106,12 @@ def test_run_build_says_what_is_recognised(bench: Path) -> None:
 
 
 @slow
-def test_subscribe_prints_a_line_a_frame_from_where_it_came(bench: Path, live: "subprocess.Popen[str]") -> None:
+def test_subscribe_prints_a_line_a_frame_from_where_it_came(
+    bench: Path, port: str, live: "subprocess.Popen[str]"
+) -> None:
     assert live.stdout is not None
-    live.stdout.readline()  # by now the socket is there
-    with subprocess.Popen(example("subscribe.py", "grasps"), cwd=bench, stdout=subprocess.PIPE, text=True) as reader:
+    live.stdout.readline()  # by now the port is there
+    with subprocess.Popen(example("subscribe.py", port), cwd=bench, stdout=subprocess.PIPE, text=True) as reader:
         assert reader.stdout is not None
         numbers = [int(reader.stdout.readline().split()[0]) for _ in range(20)]
         reader.terminate()

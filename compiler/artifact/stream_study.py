@@ -16,7 +16,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from thenar.runtime.live.decision import Decision, Ranking, SequentialTest
+from thenar.runtime.live.decision import Decision, Ranking
 from thenar.runtime.policy import Policy
 from thenar.runtime.recipe import Inputs, Recipe
 from thenar.runtime.scores import LANE_OFFSET
@@ -47,14 +47,12 @@ from .training import scores_of, segments_for
 Labels = NDArray[np.intp]
 _INNER = 4
 _LEARNT = 5500  # most rows to learn from
-_ERROR_RATE = 0.01  # of the sequential test
 # The methods compared, in the order of the table; the first is the one that a live glove uses.
 METHODS = {
     "decoder, live": f"lag {LAG_TICKS * TICK_US // 1000} ms",
     "decoder, afterwards": "exact",
     "dwell 50 ms": "today's rule",
     "dwell 200 ms": "",
-    "sequential test": f"error rate {_ERROR_RATE:g}",
     "plain HMM": "a state a frame, afterwards",
 }
 SHARES = (*(f"F1@{overlap}" for overlap in OVERLAPS), "edit", "recognised")
@@ -233,16 +231,12 @@ def _decoded(
     none, policy = model.n_types, Policy()
     live = live_states(model, scores, LAG_TICKS)
     lead = policy.lead_steps(scale)
-    rules: dict[str, Decision | SequentialTest] = {
-        f"dwell {ms} ms": Decision(lead, 1000 * ms, policy.hold_us) for ms in (50, 200)
-    }
-    rules["sequential test"] = SequentialTest(none + 1, scale, _ERROR_RATE, policy.hold_us)
+    rules = {f"dwell {ms} ms": Decision(lead, 1000 * ms, policy.hold_us) for ms in (50, 200)}
     ruled: dict[str, list[int]] = {name: [] for name in rules}
     for tick, row in enumerate((scores + LANE_OFFSET).tolist()):
         standing = Ranking(tuple(row))
         for name, rule in rules.items():
-            state = rule.update(tick * TICK_US, standing)
-            ruled[name].append(none if state is None else state)
+            ruled[name].append(rule.update(tick * TICK_US, standing))
     return {
         "decoder, live": (live, announced_live(live, none, LAG_TICKS)),
         "decoder, afterwards": (decode(model, emissions(scores, model)), None),

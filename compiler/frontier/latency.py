@@ -1,6 +1,6 @@
 """Decision latency: the time from a hand's arrival in a grasp until `thenar run` decides on it.
 
-The runtime's `Decision`, `SequentialTest` and `LiveSegments` decide on a stream, played at 1 kHz at most. Segments are
+The runtime's `Decision` and `LiveSegments` decide on a stream, played at 1 kHz at most. Segments are
 trained on whole movements: tables with a class for nothing held, and the costs of segments with them.
 """
 
@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.live.decision import Decision, Ranking, SequentialTest
+from thenar.runtime.live.decision import Decision, Ranking
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.policy import Policy
 from thenar.runtime.recipe import Recipe
@@ -50,13 +50,12 @@ POLICIES: Mapping[DecisionKind, Policy | None] = MappingProxyType(
     {
         "single": Policy(lead=0.0, dwell_us=0),
         "dwell": Policy(),
-        "sequential": Policy(dwell_us=0, error_rate=0.01),
         "segments": None,
     }
 )
 
 
-@stored(9)
+@stored(10)
 def latencies(
     samples: Samples,
     rows: Rows,
@@ -226,10 +225,7 @@ def decider_of(tables: IntegerTables, policy: Deciding) -> Decide:
     """Return the live recogniser's decider under `policy`."""
     if policy is None or isinstance(policy, SegmentModel):
         return _by_segments(tables, policy)
-    if policy.error_rate is None:
-        return Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us).update
-    test = SequentialTest(tables.n_classes, tables.scale, policy.error_rate, policy.hold_us, policy.spacing_us)
-    return test.update
+    return Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us).update
 
 
 def _by_segments(tables: IntegerTables, model: SegmentModel | None) -> Decide:

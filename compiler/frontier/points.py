@@ -21,7 +21,7 @@ MAX_BYTES = 64 << 20
 # formula: the vendor's, from a single source. given: by the user. guess: measured elsewhere, times an assumed factor.
 # unknown: left out of every sum.
 How = Literal["measured", "simulated", "wire", "model", "formula", "given", "guess", "unknown"]
-DecisionKind = Literal["single", "dwell", "sequential", "segments"]
+DecisionKind = Literal["single", "dwell", "segments"]
 # The population of a rate: left-out subjects, or rows of all subjects in random folds of whole trials.
 By = Literal["new subject", "pooled"]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]

@@ -302,7 +302,7 @@ class PricedTables(Struct, frozen=True):
         return max(scan_us, joints_us) + self.classified.us
 
 
-@stored(6)
+@stored(7)
 def price(
     samples: Samples,
     names: tuple[str, ...],

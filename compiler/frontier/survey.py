@@ -291,7 +291,7 @@ class Survey:
         return dict(zip(calls, self.cache.ask(function, list(calls.values())), strict=True))
 
 
-stored(4)(choose_path)
+stored(5)(choose_path)
 stored(3)(rank_joints)
 
 

@@ -1,6 +1,6 @@
 """Wirings of a glove, given or new, with port expanders at some clock or on a board; and the times of reading them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import fsum
 
@@ -232,8 +232,8 @@ def records_of(
     """Return the time of reading some of the joints with these names.
 
     A CyberGlove, whose sensors may have other names if it is wired as `glove`, sends only the requested ones if its
-    mask is set (`masked`), else all of its 18 or 22. Its time is `glove_us`: as measured if glove.toml has it, else by
-    the vendor's formula. `given_us` for all joints overrides that. The time of other joints is unknown.
+    mask is set (`masked`), else all of its 18 or 22. Its time is by the vendor's formula (`glove_us`).
+    `given_us` for all joints overrides that. The time of other joints is unknown.
     """
     if given_us is not None and joints:
         return ReadingCost(each_us=given_us / len(joints), how="given")
@@ -246,13 +246,10 @@ def records_of(
     least = 0.0 if masked else fixed + sensors * (more - fixed)
     if wired.rate_hz:
         least = max(least, 1e6 / wired.rate_hz)
-    how: How = "formula" if wired.record_us is None else "measured"
-    return ReadingCost(fixed, more - fixed, least, how, _RECORDS[how])
+    return ReadingCost(fixed, more - fixed, least, "formula", _FORMULA)
 
 
-_RECORDS: Mapping[How, str] = {
-    "formula": "a CyberGlove's record is the vendor's formula, of a single source: each sensor is digitised in 250 us "
-    "(376 us through the filter) before the record is sent; thenar doctor measures a connected glove",
-    "measured": "a CyberGlove's record is record_us of glove.toml, as measured, and for fewer sensors "
-    "in proportion to the vendor's formula",
-}
+_FORMULA = (
+    "a CyberGlove's record is the vendor's formula, of a single source: each sensor is digitised in 250 us "
+    "(376 us through the filter) before the record is sent; thenar doctor measures a connected glove"
+)

@@ -1,16 +1,14 @@
-"""Emulated boards or programs that send rows of numbers as lines: over a pty, TCP, UDP or a Unix socket."""
+"""Emulated boards or programs that send rows of numbers as lines: over a pty, TCP or UDP."""
 
 import contextlib
 import json
 import math
 import socket
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from threading import Event, Lock, Thread
 from time import monotonic
 
 from ..closing import Closing
-from ..errors import DeviceError
 from ..lines import CLOCK_US, SEQUENCES, ColumnHeader, checked, parsed, switches_field
 
 _UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
@@ -104,23 +102,14 @@ class BoardSender(LineSender):
 
 
 class LineServer(Closing):
-    """A server of lines on loopback (`tcp://127.0.0.1:PORT`) or at a path (`unix:PATH`) for all clients.
+    """A server of lines on loopback for all clients; a port of 0 is any free one.
 
     port  its address, in the form of a `[[stream]]`
     """
 
-    def __init__(self, path: Path | None = None) -> None:
-        family = socket.AF_INET if path is None else socket.AF_UNIX
-        self._listener, self._path = socket.socket(family, socket.SOCK_STREAM), path
-        try:
-            if path is not None:
-                path.unlink(missing_ok=True)
-            self._listener.bind(("127.0.0.1", 0) if path is None else str(path))
-        except OSError as reason:
-            self._listener.close()
-            raise DeviceError(f"no socket can be created at {path}: {reason.strerror or reason}") from reason
-        self._listener.listen()
-        self.port = f"tcp://127.0.0.1:{self._listener.getsockname()[1]}" if path is None else f"unix:{path}"
+    def __init__(self, port: int = 0) -> None:
+        self._listener = socket.create_server(("127.0.0.1", port))
+        self.port = f"tcp://127.0.0.1:{self._listener.getsockname()[1]}"
         self._clients: list[socket.socket] = []
         self._lock = Lock()
         self._thread = Thread(target=self._accept, name=f"lines at {self.port}", daemon=True)
@@ -144,8 +133,6 @@ class LineServer(Closing):
         self._thread.join()
         for client in self._clients:
             client.close()
-        if self._path is not None:
-            self._path.unlink(missing_ok=True)
 
     def _accept(self) -> None:
         while True:
@@ -178,10 +165,6 @@ class DatagramLines(Closing):
         self._line.close()
 
 
-def lines_like(port: str, path: Path) -> LineServer | DatagramLines:
-    """Return a sender of lines on loopback: of datagrams if `port` takes them, over TCP for another network address,
-    and otherwise at the Unix socket `path`.
-    """
-    if port.startswith("udp:"):
-        return DatagramLines()
-    return LineServer(None if port.startswith(("tcp:", "ws:", "wss:")) else path)
+def lines_like(port: str) -> LineServer | DatagramLines:
+    """Return a sender of lines on loopback: of datagrams if `port` takes them, otherwise over TCP."""
+    return DatagramLines() if port.startswith("udp:") else LineServer()

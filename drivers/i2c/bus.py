@@ -1,6 +1,5 @@
 """An I2C bus with port expanders and converters: its chips, their health, and scans of their ports."""
 
-from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from time import monotonic, sleep
@@ -23,6 +22,11 @@ class PlacedPort:
     member: PlacedChip
     reading: Reading
     believed: tuple[bytes, int] | None = None
+
+    @property
+    def slow(self) -> bool:
+        """Whether it is a conversion that is begun and waited for before it is read."""
+        return isinstance(self.reading, Conversion) and bool(self.reading.start)
 
     @property
     def query(self) -> Query:
@@ -62,15 +66,17 @@ def cut(ports: Sequence[PlacedPort], way: BatchMode) -> Iterator[Group]:
 
 def _fits(port: PlacedPort, gathered: Sequence[PlacedPort], way: BatchMode) -> bool:
     last = gathered[-1]
-    if way is BatchMode.PORT or port.member.route != last.member.route:
+    if way is BatchMode.PORT or port.member.route != last.member.route or port.slow or last.slow:
         return False
     if way is BatchMode.CHIP and port.member is not last.member:
         return False
     return sum(other.query.messages for other in gathered) + port.query.messages <= MOST_MESSAGES
 
 
-class GroupScan:
-    """Ports in a fixed order, read by as few transfers as the adapter allows."""
+class Scan:
+    """Ports in a fixed order, read by as few transfers as the adapter allows; a conversion that takes time is waited
+    for.
+    """
 
     def __init__(self, keeper: ChipSupervisor, ports: Sequence[PlacedPort]) -> None:
         self._node, self._keeper, self._ports = keeper.node, keeper, ports
@@ -92,6 +98,8 @@ class GroupScan:
             self._plan()
         replies: list[int | None] = [None] * len(self._ports)
         for (route, ports), run in self._groups:
+            if not self._converted(ports[0][1]):
+                continue
             try:
                 if route is not None:
                     keeper.routes.select(route)
@@ -103,6 +111,21 @@ class GroupScan:
                     continue
                 replies[number] = self._doubt(port, reply) if port.doubtful(reply) else port.value(reply)
         return replies
+
+    def _converted(self, port: PlacedPort) -> bool:
+        """Begin a conversion that takes time and wait for it; return whether the port can be read."""
+        reading, member = port.reading, port.member
+        if not isinstance(reading, Conversion) or not reading.start:
+            return True
+
+        def start() -> bool:
+            self._node.write(member.address, reading.start)
+            return True
+
+        begun = member.present and self._keeper.attempt(member, start)
+        if begun:
+            sleep(reading.us * 1e-6)
+        return bool(begun)
 
     def _need_open(self) -> None:
         if not self._node.is_open:
@@ -150,89 +173,6 @@ class GroupScan:
         return port.value(reply)
 
 
-class _Converting:
-    """A converter in a scan: its conversions by step, the steps left, the one that converts, and the time until which
-    it is busy.
-    """
-
-    def __init__(self, keeper: ChipSupervisor, member: PlacedChip) -> None:
-        self._keeper, self._member = keeper, member
-        self.conversions: dict[int, Conversion] = {}
-        self.left: deque[int] = deque()
-        self.converts: int | None = None
-        # A conversion from a scan that was broken off is not stopped: the chip accepts no other before it is over.
-        self.until = 0.0
-
-    def begin(self) -> None:
-        """Start the next conversion, if one is left and none is running. An absent chip has nothing to wait for."""
-        if self.converts is not None or not self.left or monotonic() < self.until:
-            return
-        self.converts = step = self.left.popleft()
-        conversion, member = self.conversions[step], self._member
-        if member.present and self._keeper.attempt(member, lambda: self._start(conversion)):
-            self.until = monotonic() + conversion.us * 1e-6
-
-    def _start(self, conversion: Conversion) -> bool:
-        self._keeper.node.write(self._member.address, conversion.start)
-        return True
-
-
-class Scan:
-    """Groups of ports, read in order; conversions that take time are groups of one port.
-
-    Each converter starts its next conversion as soon as its last was read. While the next port of the scan converts,
-    the first later one that is ready is read ahead. `thenar.runtime.scanning.timing` models the same order.
-    """
-
-    def __init__(self, keeper: ChipSupervisor, groups: Sequence[Sequence[PlacedPort]]) -> None:
-        self._scans = [GroupScan(keeper, group) for group in groups]
-        slow: dict[PlacedChip, _Converting] = {}
-        self._slow: dict[int, _Converting] = {}
-        for step, group in enumerate(groups):
-            for port in group:
-                if isinstance(port.reading, Conversion) and port.reading.start:
-                    chip = slow.setdefault(port.member, _Converting(keeper, port.member))
-                    chip.conversions[step] = port.reading
-                    self._slow[step] = chip
-        self._chips = tuple(slow.values())
-
-    def read(self) -> list[int | None]:
-        """Return the values of all ports, as `GroupScan.read` does."""
-        return [reply for replies in self for reply in replies]
-
-    def __iter__(self) -> Iterator[list[int | None]]:
-        """Yield the values of each group, as soon as it and all before it were read."""
-        if not self._slow:
-            for scan in self._scans:
-                yield scan.read()
-            return
-        for chip in self._chips:
-            chip.left, chip.converts = deque(chip.conversions), None
-        left, found = list(range(len(self._scans))), dict[int, list[int | None]]()
-        for step in range(len(self._scans)):
-            while step not in found:
-                able = self._able(left)
-                found[able] = self._scans[able].read()
-                left.remove(able)
-                if able in self._slow:
-                    self._slow[able].converts = None
-                    self._slow[able].begin()
-            yield found.pop(step)
-
-    def _able(self, left: Sequence[int]) -> int:
-        """Return the first step that can be read, after a wait if there is none."""
-        while True:
-            for chip in self._chips:
-                chip.begin()
-            now = monotonic()
-            for step in left:
-                slow = self._slow.get(step)
-                if slow is None or (slow.converts == step and now >= slow.until):
-                    return step
-            pending = [chip.until for chip in self._chips if chip.left or chip.converts is not None]
-            sleep(max(0.0, min(pending) - monotonic()))
-
-
 class I2cBus(ChipSupervisor, Closing):
     """The chips on one device node, and the health of each. Use it from one thread at a time.
 
@@ -254,16 +194,13 @@ class I2cBus(ChipSupervisor, Closing):
         self.begin()
         # Registers, not ports, each twice: this tests batches of two chips and of two reads of one chip.
         control = [_control(member) for member in self.chips]
-        trial = GroupScan(self, [port for port in control for _ in range(2)])
+        trial = Scan(self, [port for port in control for _ in range(2)])
         for _ in BatchMode:
             trial.read()
 
-    def prepare(self, groups: Sequence[Sequence[PlacedPort]]) -> Scan:
-        """Return a reusable scan of groups of ports, in this order, with conversions overlapped with other transfers.
-
-        A conversion that takes time is a separate group.
-        """
-        return Scan(self, groups)
+    def prepare(self, ports: Sequence[PlacedPort]) -> Scan:
+        """Return a reusable scan of ports, in this order."""
+        return Scan(self, ports)
 
     @property
     def way(self) -> str:

@@ -8,7 +8,6 @@ from thenar.drivers.errors import SettingError
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.ports import device_fault, port_fault
-from thenar.drivers.senders import parse_address
 from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.drivers.transports import line_port_fault
 
@@ -118,8 +117,6 @@ def _of_stream(place: Place, stream: StreamWiring) -> Iterator[Fault]:
             yield (*place, *where), f"there is no column {shortened(repr(name))}{nearest(name, known)}"
         if stream.time == name and where != ("time",):
             yield (*place, *where), f"{name!r} is the sender's clock"
-    if stream.sender is not None and (reason := _sender_fault(stream.port, stream.sender)):
-        yield (*place, "from"), reason
     yield from _of_values(place, stream)
     if stream.board is not None:
         yield from _of_board((*place, "board"), stream, stream.board)
@@ -190,16 +187,6 @@ def _used_twice(used: Iterable[tuple[Place, str]]) -> Iterator[Fault]:
         if pin in seen:
             yield where, f"{pin} is already {spelled(seen[pin])}: use another one"
         seen[pin] = where
-
-
-def _sender_fault(port: str, sender: str) -> str:
-    if not port.startswith("udp:"):
-        return "is for udp:// ports, to which several may send: leave it out"
-    try:
-        parse_address(sender)
-    except SettingError as reason:
-        return str(reason)
-    return ""
 
 
 def _of_values(place: Place, stream: StreamWiring) -> Iterator[Fault]:

@@ -33,10 +33,8 @@ class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit
 class GloveWiring(_Table, frozen=True):
     """The CyberGlove: its port (a device or socket://), and how it is read.
 
-    baud         "auto" tries the usual ones
     rate_hz      None: as fast as it can
     filter       whether the box's digital filter is on; None: as set on the box
-    record_us    measured time of a record of all sensors (`thenar doctor --write`); None: by the formula
     mask         whether a run omits sensors from the records that no joint of the build uses
     sensors      None: as the glove reports
     calibration  path of its calibration; relative paths in a file count from that file's folder
@@ -44,10 +42,9 @@ class GloveWiring(_Table, frozen=True):
     """
 
     port: Text
-    baud: Baud | Literal["auto"] = 115_200
+    baud: Baud = 115_200
     rate_hz: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
     filter: bool | None = None
-    record_us: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
     mask: bool = True
     sensors: Literal[18, 22] | None = None
     calibration: Text | None = None
@@ -152,8 +149,6 @@ Range = tuple[float, float]
 class StreamWiring(_Table, frozen=True):
     """Rows of numbers sent by a board or a program: lines (`thenar.drivers.transports`), LSL, a ROS topic.
 
-    sender       (`from`) the address of the only sender of datagrams that counts, with or without its port; None: the
-                 first one
     columns      the columns in order, "" for unused ones; (): the sender names them
     time         the column with the sender's clock, in `time_unit`
     rate_hz      rows per second
@@ -167,7 +162,6 @@ class StreamWiring(_Table, frozen=True):
 
     port: Text
     baud: Baud = 115_200
-    sender: Text | None = field(name="from", default=None)
     columns: Annotated[tuple[str, ...], Meta(max_length=MOST_COLUMNS)] = ()
     time: Text | None = None
     time_unit: Literal["s", "ms", "us"] = "ms"
@@ -199,7 +193,8 @@ class StreamWiring(_Table, frozen=True):
 
 # A hand changes some ten times a second; a press is seen within 5 ms.
 SCANS_HZ = 200.0
-ScanRate = Annotated[float, Meta(ge=0.1, le=10_000.0)]
+FASTEST_HZ = 10_000.0
+ScanRate = Annotated[float, Meta(ge=0.1, le=FASTEST_HZ)]
 
 
 class BusWiring(_Table, frozen=True):

@@ -1,27 +1,4 @@
-"""The decision, frame after frame: the leader of one frame, hysteresis and dwell, and a sequential test.
-
-The sequential test takes as many frames as the given error rate requires, no more.
-
-The scores of a frame are log-likelihoods of the grasp types, up to a constant: their softmax is the probability of each
-type given the frame, and Bayes' rule divides that by the types' shares in training. The test adds the scores of frames
-and decides on the type that leads each of the others by at least ln((K - 1) / error_rate): Armitage's matrix of Wald's
-sequential probability ratio tests (P. Armitage, J. R. Stat. Soc. B 12, 1950; A. Wald, Sequential Analysis, 1947). For
-two types it is Wald's test. By Ville's inequality a wrong type leads the right one by ln(a) in *any* frame, now or
-later, with a probability of at most 1 / a; so, summed over the K - 1 wrong types, whatever the right one is, a test
-ends wrong with a probability of at most error_rate. Thresholds and sums are integers: scores in steps, ln(a) rounded
-up.
-
-That holds only under these assumptions:
-  - one type during a test: evidence older than the longest test is dropped, undecided, and the test starts afresh;
-  - scores are log-likelihood ratios: the ensemble's probabilities are calibrated, types were recorded equally often;
-  - frames are independent, given the type. Successive frames are not: a resting hand sends nearly the same frame
-    again, which is no new evidence. `spacing_us` leaves out frames nearer than that to the last one that counted; use
-    the time after which two frames of one grasp are no more alike than frames of two grasps of that type.
-
-Whole frames and frames with lost inputs are never evidence in the same test. While a result or a test based on whole
-frames is no older than the longest test, frames with lost inputs are ignored; after that they have separate tests,
-whose results and evidence are dropped at the next whole frame.
-"""
+"""The decision, frame after frame: the leader of one frame, hysteresis and dwell."""
 
 import math
 
@@ -127,55 +104,3 @@ class Decision(Struct):
     def _take(self, candidate: int, time_us: int, whole: bool) -> int:
         self.held, self._whole, self._rival, self._supported_us = candidate, whole, None, time_us
         return candidate
-
-
-class SequentialTest(Struct):
-    """Decides test after test; a result holds until the next test has one, or `longest_us` have passed.
-
-    After a whole frame, one with no input lost, both the result and the evidence are based on whole frames.
-
-    error_rate is between 0 and 1, scale is in steps per unit of score, times are in microseconds.
-    """
-
-    classes: int
-    scale: float
-    error_rate: float
-    longest_us: int
-    spacing_us: int = 0
-    held: int | None = None
-    threshold: int = 0
-    _sums: tuple[int, ...] = ()
-    _began_us: int = 0
-    _counted_us: int | None = None
-    _decided_us: int = 0
-    _whole: bool = True
-
-    def __post_init__(self) -> None:
-        self.threshold = math.ceil(self.scale * math.log((self.classes - 1) / self.error_rate))
-
-    def update(self, time_us: int, standing: Ranking, *, whole: bool = True) -> int | None:
-        """Return the class of the last test that ended, None if none did lately; `whole`: no input is lost."""
-        if self.held is not None and time_us - self._decided_us > self.longest_us:
-            self.held = None
-        under_way = bool(self._sums) and time_us - self._began_us <= self.longest_us
-        if whole != self._whole and (whole or not (self.held is not None or under_way)):
-            self.forget()
-            self._whole = whole
-        last_us = self._counted_us
-        if whole == self._whole and (last_us is None or time_us - last_us >= max(self.spacing_us, 1)):
-            self._counted_us = time_us
-            self._add(time_us, standing.biased_scores)
-        return self.held
-
-    def forget(self) -> None:
-        """Drop evidence and result: too little can be read."""
-        self.held, self._sums, self._counted_us = None, (), None
-
-    def _add(self, time_us: int, biased_scores: tuple[int, ...]) -> None:
-        if not self._sums or time_us - self._began_us > self.longest_us:
-            self._sums, self._began_us = (0,) * self.classes, time_us
-        self._sums = tuple(map(int.__add__, self._sums, biased_scores))
-        second, best = sorted(self._sums)[-2:]
-        if best - second >= self.threshold:
-            self.held, self._decided_us = self._sums.index(best), time_us
-            self._sums = ()

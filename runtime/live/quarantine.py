@@ -50,7 +50,7 @@ from ..build import Build
 from ..frames import Mask, SwitchFrame
 from ..model.integers import IntegerTables
 from ..model.terms.base import HIGHEST_CODE
-from ..published import Drift, Quarantined
+from ..published import Quarantined
 
 # Time for which contacts must stay the same before a grasp is evaluated.
 SETTLED_US = 100_000
@@ -324,17 +324,6 @@ class Quarantine:
             out = more if fits else out
             found.append(Quarantined(self._names[is_joint][number], reason, not fits))
         return (out[0], out[1]), tuple(found)
-
-    def names(self, reason: str) -> tuple[str, ...]:
-        """Return the inputs that are wrong for this reason, in the order of detection."""
-        wrong = (which for which, why in self._wrong.items() if why == reason)
-        return tuple(self._names[is_joint][number] for is_joint, number in wrong)
-
-    def drifts(self) -> tuple[Drift, ...]:
-        """Return the joints that drift, and by how many codes."""
-        return tuple(
-            Drift(name, codes) for name, codes in zip(self._names[True], self._drift.codes, strict=False) if codes
-        )
 
     def look(self, frame: SwitchFrame, biased_scores: Sequence[int], lost: Mask) -> None:
         """Take a frame, its scores, and the switches that are scored as lost."""

@@ -15,7 +15,7 @@ from ..preshape import Preshape
 from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
 from ..scores import LiveScores
 from ..segmenting.decoder import LiveSegments, Segment
-from .decision import Decision, Ranking, SequentialTest
+from .decision import Decision, Ranking
 from .quarantine import Quarantine
 
 
@@ -82,7 +82,8 @@ class LiveRecognizer:
         self._missing = MissingInputs(build, self._policy.max_lost)
         self.quarantine = Quarantine(build, self._missing.may_be_lost, active=self._policy.quarantine)
         self._all_joints = (1 << tables.n_joints) - 1
-        self._decider, self._lead = _decider(build, self._policy), self._policy.lead_steps(tables.scale)
+        self._lead = self._policy.lead_steps(tables.scale)
+        self._decider = Decision(self._lead, self._policy.dwell_us, self._policy.hold_us)
         lag_us, model = self._policy.lag_us, build.manifest.segmenting
         self._segments = None if lag_us is None else LiveSegments(model, build.grasps, lag_us)
         self._rejector, self._none_leads = build.rejector, build.none_leads
@@ -189,13 +190,6 @@ class LiveRecognizer:
             segment.began_us,
             of_segment,
         )
-
-
-def _decider(build: Build, policy: Policy) -> Decision | SequentialTest:
-    scale = build.tables.scale
-    if policy.error_rate is None:
-        return Decision(policy.lead_steps(scale), policy.dwell_us, policy.hold_us)
-    return SequentialTest(len(build.manifest.classes), scale, policy.error_rate, policy.hold_us, policy.spacing_us)
 
 
 class MissingInputs:

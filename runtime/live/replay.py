@@ -43,18 +43,14 @@ def moments(
 ) -> Iterator[tuple[LiveGrasp, Moment]]:
     """Yield the recorded prediction and the complete new moment; see `replayed`."""
     reader = Reader(recording)
-    recognizer = _system(build, reader.session, reader.path.name, policy).recognizer()
-    switches: SwitchFrame | None = None
-    glove: GloveFrame | None = None
-    for entry in reader:
-        if isinstance(entry, SwitchFrame):
-            switches = entry
-        elif isinstance(entry, GloveFrame):
-            glove = entry
-        elif isinstance(entry, LiveGrasp):
-            yield entry, recognizer.step(entry.time_us, entry.unix_us, switches, glove)
-    for fault in reader.faults():
-        warn(fault.message)
+    if reader.session.build != build.manifest.checksum:
+        raise SettingError(
+            f"{reader.path.name} was recorded with another build: replay it with its own, or let "
+            "`thenar segment` classify it with this one"
+        )
+    for entry, moment in _stepped(reader, Stepper(build, reader.path.name, (None, None), policy), warn):
+        if isinstance(entry, LiveGrasp):
+            yield entry, moment
 
 
 def recognised(build: Build, recording: Path, warn: Callable[[str], None] = lambda _: None) -> Iterator[Moment]:
@@ -67,13 +63,17 @@ def recognised(build: Build, recording: Path, warn: Callable[[str], None] = lamb
     Raises FormatError if it is not a recording, SettingError if it lacks an input of the build.
     """
     reader = Reader(recording)
-    if reader.session.build == build.manifest.checksum:
-        yield from (moment for _, moment in moments(build, recording, None, warn))
-        return
-    stepper = Stepper(build, recording.name, periods_us(Reader(recording)))
+    own = reader.session.build == build.manifest.checksum
+    periods = (None, None) if own else periods_us(Reader(recording))
+    for _, moment in _stepped(reader, Stepper(build, recording.name, periods), warn):
+        yield moment
+
+
+def _stepped(reader: Reader, stepper: "Stepper", warn: Callable[[str], None]) -> Iterator[tuple[Entry, Moment]]:
+    """Yield the moments of all entries of a recording."""
     for entry in reader:
         if (moment := stepper.take(entry)) is not None:
-            yield moment
+            yield entry, moment
     for fault in reader.faults():
         warn(fault.message)
 
@@ -85,9 +85,13 @@ class Stepper:
     build.
     """
 
-    def __init__(self, build: Build, name: str, periods: tuple[int | None, int | None]) -> None:
-        """Take the build, the file's name, and the periods of its frames (`periods_us`)."""
-        self._build, self._name, self._periods = build, name, periods
+    def __init__(
+        self, build: Build, name: str, periods: tuple[int | None, int | None], policy: Policy | None = None
+    ) -> None:
+        """Take the build, the file's name, and the periods of its frames (`periods_us`); recordings of the same build
+        are decided by `policy`, if one is given.
+        """
+        self._build, self._name, self._periods, self._policy = build, name, periods, policy
         self.session: Session | None = None
         self.switches: SwitchFrame | None = None
         self.glove: GloveFrame | None = None
@@ -118,7 +122,7 @@ class Stepper:
         self.session, self.switches, self.glove, self._now_us = session, None, None, 0
         if session.build == self._build.manifest.checksum:
             self._inputs: _Inputs | None = None
-            self._recognizer = _system(self._build, session, self._name, None).recognizer()
+            self._recognizer = _system(self._build, session, self._name, self._policy).recognizer()
         else:
             self._inputs = _Inputs(self._build, session, self._name)
             self._recognizer = self._inputs.recognizer(*self._periods)
@@ -180,11 +184,6 @@ class _Inputs:
 
 
 def _system(build: Build, session: Session, name: str, policy: Policy | None) -> LiveSystem:
-    if session.build != build.manifest.checksum:
-        raise SettingError(
-            f"{name} was recorded with another build: replay it with its own, or let "
-            "`thenar segment` classify it with this one"
-        )
     harness = parse_harness(session.harness, name)
     scan = LiveSystem.map_of(build, harness)
     system = LiveSystem(

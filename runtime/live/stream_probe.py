@@ -14,11 +14,10 @@ from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.lines import Row, RowReader
 
 from ..frames import now_us
-from ..harness.wiring import Harness, Range, StreamWiring
+from ..harness.wiring import Range, StreamWiring
 from ..names import fault, list_names, nearest, shortened
-from ..scanning.ports import whole_scan
 from ..sources.base import SOURCES
-from ..sources.rows import RowKind, RowSource
+from ..sources.rows import RowKind
 
 # Boards that are reset when their port opens start their program within this time.
 _PATIENCE_US = 6_000_000
@@ -156,9 +155,6 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], every: str, r
     for name, found in values.items():
         if missing := found.count(None):
             remarks.append(f"{name}: {missing} of {len(found)} values were not numbers")
-    gaps = [later - earlier for (earlier, _), (later, _) in pairwise(timed)]
-    if gaps and max(gaps) > max(4 * median(gaps), 100_000):
-        remarks.append(f"the longest break between two rows was {max(gaps) / 1000:.0f} ms")
     if time is None and not stamped:
         remarks.append("no column is a clock, so rows are timed when they arrive: add a column of millis() if possible")
     stream = msgspec.structs.replace(
@@ -171,23 +167,11 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], every: str, r
         joints={name: _joint_range(numbers[name]) for name, kind in kinds.items() if kind == "joint"},
         taxels={name: _range(numbers[name]) for name, kind in kinds.items() if kind == "taxel"},
     )
-    if measured and (faults := _faults(stream, timed)):
-        remarks.append(f"counted: {faults}")
     heard = (
         ColumnGuess(name, min(found, default=None), max(found, default=None), kinds[name])
         for name, found in numbers.items()
     )
     return Proposal(stream, tuple(heard), len(came), tuple(remarks))
-
-
-def _faults(stream: StreamWiring, came: Sequence[tuple[int, Row]]) -> str:
-    """Return the counts of faults that a run with this stream would have had with these rows."""
-    harness = Harness(name="glove", streams=(stream,))
-    scan = whole_scan(harness, harness.switches, every_taxel=True)
-    source = RowSource(reader_of(stream), harness, 0, harness.switches, scan)
-    for time_us, row in came:
-        source.take(row, time_us)
-    return source.faults()
 
 
 def _columns(given: tuple[str, ...], names: tuple[str, ...] | None, width: int, remarks: list[str]) -> tuple[str, ...]:

@@ -52,9 +52,8 @@ DEFINITIONS = {
 # Prefix of the program's name in the file's header.
 WRITER = "thenar "
 
-SWITCHES, GLOVE, GRASP, RECOGNITION, TRIALS, TAXELS, MARKS = range(1, 8)
-# Channel number: (topic, type of its messages). The taxels' channel exists only if the glove has taxels, that of marks
-# only if marks can be set.
+SWITCHES, GLOVE, GRASP, RECOGNITION, TRIALS, TAXELS = range(1, 7)
+# Channel number: (topic, type of its messages). The taxels' channel exists only if the glove has taxels.
 CHANNELS = {
     SWITCHES: ("/thenar/switches", BYTES),
     GLOVE: ("/thenar/glove", BYTES),
@@ -62,7 +61,6 @@ CHANNELS = {
     RECOGNITION: ("/thenar/recognition", STRING),
     TRIALS: ("/thenar/trials", STRING),
     TAXELS: ("/thenar/taxels", BYTES),
-    MARKS: ("/thenar/marks", STRING),
 }
 _SCHEMAS = {name: number for number, name in enumerate(DEFINITIONS, start=1)}
 

@@ -21,15 +21,14 @@ from ..published import LiveGrasp
 from . import layout
 from .layout import Tail
 from .mcap import End, Opcode, RawRecord, RecordStream, decode, kind_of
-from .session import METADATA, Label, Mark, Session, from_metadata
+from .session import METADATA, Label, Session, from_metadata
 
-Entry = Session | SwitchFrame | GloveFrame | LiveGrasp | Label | Mark
+Entry = Session | SwitchFrame | GloveFrame | LiveGrasp | Label
 
 _MESSAGE = Struct("<HIQQ")
-_DECODERS: dict[int, Callable[[bytes], LiveGrasp | Label | Mark]] = {
+_DECODERS: dict[int, Callable[[bytes], LiveGrasp | Label]] = {
     layout.RECOGNITION: msgspec.json.Decoder(LiveGrasp).decode,
     layout.TRIALS: msgspec.json.Decoder(Label).decode,
-    layout.MARKS: msgspec.json.Decoder(Mark).decode,
 }
 # Limits that no valid time or count of a recording exceeds.
 _LEAST, _LARGEST = -(2**63), 2**63 - 1
@@ -183,7 +182,7 @@ def parsed(opcode: Opcode, content: bytes) -> tuple[list[Any], int]:
         raise FormatError(f"is not a valid {kind_of(opcode)}: {shortened(str(wrong))}") from None
 
 
-def _from_json(channel: int, text: bytes) -> LiveGrasp | Label | Mark | None:
+def _from_json(channel: int, text: bytes) -> LiveGrasp | Label | None:
     decoder = _DECODERS.get(channel)
     if decoder is None:
         return None

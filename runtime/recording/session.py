@@ -67,13 +67,6 @@ class Label(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     object: str
 
 
-class Mark(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A moment that a user marked during the recording, on the host's monotonic clock, and the user's text."""
-
-    time_us: Number
-    text: Annotated[str, msgspec.Meta(max_length=200)] = ""
-
-
 class Session(msgspec.Struct, frozen=True, kw_only=True):
     """One stretch of recording.
 

@@ -21,7 +21,7 @@ from ..published import LiveGrasp
 from ..writer_thread import WriterThread
 from . import layout
 from .layout import Tail
-from .session import Label, Mark, Session
+from .session import Label, Session
 
 SYNC_S = 1.0
 
@@ -139,10 +139,8 @@ class Recorder(Closing):
         The number of messages that the disk did not take.
     """
 
-    def __init__(
-        self, path: Path, session: Session, *, tail: Tail | None = None, marks: bool = False, sync_s: float = SYNC_S
-    ) -> None:
-        """Begin a file that must not exist, with or without `marks`, or continue after the `tail` of an existing one.
+    def __init__(self, path: Path, session: Session, *, tail: Tail | None = None, sync_s: float = SYNC_S) -> None:
+        """Begin a file that must not exist, or continue after the `tail` of an existing one.
 
         Raises SettingError if the file exists, OSError as the operating system gives it.
         """
@@ -150,7 +148,7 @@ class Recorder(Closing):
         self.session = replace(session, clock_ns=max(time.time_ns(), after_ns) - time.monotonic_ns())
         self.path = path
         self.lost = 0
-        self._tail = _begun(path, self.session, marks) if tail is None else tail
+        self._tail = _begun(path, self.session) if tail is None else tail
         self._file = AppendedFile(path, self._tail.size, sync_s)
         if tail is not None:
             record = layout.session_record(self.session)
@@ -196,12 +194,6 @@ class Recorder(Closing):
         """Record the outcome of a trial."""
         self._write([(layout.TRIALS, label.time_us, layout.encode_text(_json(label)))])
 
-    def mark(self, mark: Mark) -> None:
-        """Record a mark. Raises SettingError if the recording was begun without marks."""
-        if layout.MARKS not in self._tail.counts:
-            raise SettingError(f"{self.path} was begun without marks: begin a recording with them")
-        self._write([(layout.MARKS, mark.time_us, layout.encode_text(_json(mark)))])
-
     def close(self) -> None:
         """Write the summary and close; may wait for the disk, and may be called again."""
         if self._file.size == self._tail.size:
@@ -241,15 +233,15 @@ MOST_WAITING = 8192
 
 
 class LiveRecorder(Closing):
-    """A recording, with marks, whose disk delays nobody: its messages are written on a separate thread.
+    """A recording whose disk delays nobody: its messages are written on a separate thread.
 
-    A moment is written at once, unless the disk hangs: then up to `MOST_WAITING` moments and marks wait, and those
-    beyond are lost. A kill takes what waits.
+    A moment is written at once, unless the disk hangs: then up to `MOST_WAITING` moments wait, and those beyond are
+    lost. A kill takes what waits.
     """
 
     def __init__(self, path: Path, session: Session) -> None:
         """Begin a file. Raises as `Recorder` does."""
-        self._recorder = Recorder(path, session, marks=True)
+        self._recorder = Recorder(path, session)
         self._thread = WriterThread("recording", MOST_WAITING)
         self.path = path
 
@@ -278,24 +270,18 @@ class LiveRecorder(Closing):
         """Record the frames that arrived since the last moment, then the prediction for the newest of them."""
         self._thread.put(partial(self._recorder.moment, arrived, grasp))
 
-    def mark(self, mark: Mark) -> None:
-        """Record a mark."""
-        self._thread.put(partial(self._recorder.mark, mark))
-
     def close(self) -> None:
         """Write what waits and the summary, unless the disk hangs, and close; may be called again."""
         self._thread.close(self._recorder.close)
 
 
-def _begun(path: Path, session: Session, marks: bool) -> Tail:
+def _begun(path: Path, session: Session) -> Tail:
     """Make the file, its first session in it, and return its tail."""
     if path.exists():
         raise SettingError(f"{path} exists, and a recording is never overwritten: name another file")
     tail = Tail()
     if session.taxels:
         tail.counts[layout.TAXELS] = 0
-    if marks:
-        tail.counts[layout.MARKS] = 0
     first, record = layout.beginning(session.thenar, tail), layout.session_record(session)
     # Written whole or not at all, so that no file lacks a session.
     write_atomically(path, first + record, mode=_PRIVATE)

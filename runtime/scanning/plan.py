@@ -4,7 +4,7 @@ Units stay together, such as the ports behind one channel of a mux. A unit is a 
 in between. Costs are wire times in integer nanoseconds, so that sums do not depend on order.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Union
 
 from msgspec.structs import replace
@@ -14,7 +14,7 @@ from ..harness.wiring import Harness
 from ..names import list_names
 from .ports import whole_scan
 from .scanmap import Port, ScanMap
-from .timing import mux_of, port_us, reading_of, select_us, selections, waiting_us
+from .timing import mux_of, port_us, reading_of, select_us, selections
 
 Unit = Union[int, Sequence["Unit"]]  # noqa: UP007 (an alias of itself has to be quoted)
 
@@ -32,16 +32,13 @@ class Costs:
     """The costs of `ports`, by their numbers.
 
     units holds all of them as nested tuples: the ports behind one channel stay together, and if a bus has several
-    muxes, those behind one mux. A bus with slow conversions takes as long as its wire, or as the chip whose conversions
-    together take longest: they go on while the bus reads other ports.
+    muxes, those behind one mux.
     """
 
     def __init__(self, ports: Sequence[Port], harness: Harness) -> None:
         self._ns, rooms = list[int](), set(selections(ports, harness))
         opened: dict[_Room, tuple[int, int]] = {}
         nested: dict[_Room, dict[_Room, list[int]]] = {}
-        chips: dict[tuple[int, int], int] = {}
-        self._waits: list[int] = []
         for number, port in enumerate(ports):
             clock_hz, reading = harness.line_of(port.bus).clock_hz, reading_of(port, harness)
             mux = mux_of(port, harness)
@@ -52,35 +49,18 @@ class Costs:
             outer, inner = (way[0], way[-1]) if way else ((number,), (number,))
             nested.setdefault(outer, {}).setdefault(inner, []).append(number)
             self._ns.append(round(1000 * port_us(reading, clock_hz)))
-            self._waits.append(round(1000 * waiting_us(reading)))
-            chips[port.bus, port.chip] = chips.get((port.bus, port.chip), 0) | 1 << number
         self._rooms = tuple(opened.values())
         self.units: tuple[Unit, ...] = tuple(tuple(map(tuple, inside.values())) for inside in nested.values())
-        self._slow: list[tuple[int, tuple[int, ...]]] = []  # of each bus with waiting times: its ports, chip by chip
-        for bus in dict.fromkeys(bus for bus, _ in chips):
-            mine = tuple(mask for (on, _), mask in chips.items() if on == bus)
-            if any(self._waits[port] for port in range(len(ports)) if sum(mine) >> port & 1):
-                self._slow.append((sum(mine), mine))
 
     def after(self, read: int, port: int) -> int:
         """Return the time to read `port` after the ports `read`: the first behind a channel must select it."""
-        for every, chips in self._slow:
-            if every >> port & 1:
-                return self._elapsed((read | 1 << port) & every, chips) - self._elapsed(read & every, chips)
         return self._ns[port] + sum(ns for room, ns in self._rooms if room >> port & 1 and not read & room)
-
-    def _elapsed(self, read: int, chips: Sequence[int]) -> int:
-        """Return the time of a bus with these chips for the ports `read`, all of them its own."""
-        wire = sum(self._ns[port] for port in _numbers(read)) + sum(ns for room, ns in self._rooms if room & read)
-        slowest = max(sum(self._ns[port] + self._waits[port] for port in _numbers(read & chip)) for chip in chips)
-        return max(wire, slowest)
 
     def of(self, unit: Unit) -> int:
         """Return the time to read a unit, with the selections that it alone needs."""
         ports = ports_in(unit)
         inside = sum(1 << port for port in ports)
-        # Conversions count as if nothing were read in parallel.
-        own = sum(self._ns[port] + self._waits[port] for port in ports)
+        own = sum(self._ns[port] for port in ports)
         return own + sum(ns for room, ns in self._rooms if not room & ~inside)
 
     def shares(self) -> list[float]:
@@ -95,10 +75,6 @@ class Costs:
             for port, ns in zip(ports, alone, strict=True):
                 shares[port] = ns + common
         return shares
-
-
-def _numbers(ports: int) -> Iterator[int]:
-    return (port for port in range(ports.bit_length()) if ports >> port & 1)
 
 
 def plan_scan(switch_names: Sequence[str], harness: Harness) -> ScanMap:

@@ -2,9 +2,6 @@
 
 A transaction takes its SCL periods plus the time for which the bus must be free before the next START, which the
 standard gives by speed: 4.7, 1.3 and 0.5 us up to 100 kHz, 400 kHz and above.
-
-A slow converter begins its next conversion as soon as its last was read, and the bus reads other ports in the
-meantime: the first in scan order that can be read. It waits if none can.
 """
 
 from collections import Counter
@@ -24,7 +21,6 @@ from .scanmap import Port, ScanMap
 
 _FREE_US = ((100_000, 4.7), (400_000, 1.3))
 _FREE_FASTEST_US = 0.5
-_BAUD = 115_200
 
 
 class ChipTime(Struct, frozen=True):
@@ -44,8 +40,7 @@ class ChipTime(Struct, frozen=True):
 class ScanTime(Struct, frozen=True):
     """The time of a whole scan: chip by chip in the order of their first reading, selections, and in total.
 
-    full_us is a scan of all switches and taxels that are wired to chips, kept or not, for comparison. With overlapped
-    conversions, `us` is less than the sum of the chips.
+    full_us is a scan of all switches and taxels that are wired to chips, kept or not, for comparison.
     """
 
     chips: tuple[ChipTime, ...]
@@ -66,21 +61,15 @@ def free_us(clock_hz: int) -> float:
 
 
 def port_us(reading: Reading, clock_hz: int) -> float:
-    """Return the wire time of one reading, in microseconds; a conversion includes the transfer that begins it."""
+    """Return the time of one reading, in microseconds; a conversion includes the transfer that begins it, and the wait
+    for its result.
+    """
+    us = reading.scl_periods * 1e6 / clock_hz
     if isinstance(reading, Transfer):
-        return reading.scl_periods * 1e6 / clock_hz + SELECT_US
-    return reading.scl_periods * 1e6 / clock_hz + free_us(clock_hz) + start_us(reading, clock_hz)
-
-
-def start_us(reading: Reading, clock_hz: int) -> float:
-    """Return the wire time of the transfer that begins a conversion; 0 if there is none."""
-    periods = reading.start_periods if isinstance(reading, Conversion) else 0
-    return periods * 1e6 / clock_hz + free_us(clock_hz) if periods else 0.0
-
-
-def waiting_us(reading: Reading) -> float:
-    """Return the time from the beginning of a conversion until it can be read; 0 if nothing has to wait."""
-    return reading.us if isinstance(reading, Conversion) else 0.0
+        return us + SELECT_US
+    if isinstance(reading, Conversion) and reading.start:
+        us += reading.start_periods * 1e6 / clock_hz + free_us(clock_hz) + reading.us
+    return us + free_us(clock_hz)
 
 
 def select_us(clock_hz: int) -> float:
@@ -109,60 +98,8 @@ def scan_us(scan: ScanMap, harness: Harness) -> ScanTime:
 
 
 def _whole_us(ports: Sequence[Port], harness: Harness) -> float:
-    """Return the time to read these ports. fsum: in another order, the same to the last bit if nothing waits."""
-    slow = {port.bus for port in ports if waiting_us(reading_of(port, harness))}
-    fast = [port for port in ports if port.bus not in slow]
-    times = (*_selected_us(fast, harness), *(t.us for t in _chip_times(fast, harness)))
-    overlapped = (overlapped_us([port for port in ports if port.bus == bus], harness) for bus in sorted(slow))
-    return fsum((*times, *overlapped))
-
-
-def overlapped_us(ports: Sequence[Port], harness: Harness) -> float:
-    """Return the time to read these ports of one bus, with conversions overlapped with other readings."""
-    clock_hz = harness.line_of(ports[0].bus).clock_hz
-    route: MuxChannel | None = None
-    us = 0.0
-    for _ in range(2):  # the first scan leaves the mux in the state that every further one finds
-        us, route = _one_round(ports, harness, clock_hz, route)
-    return us
-
-
-def _one_round(
-    ports: Sequence[Port], harness: Harness, clock_hz: int, route: MuxChannel | None
-) -> tuple[float, MuxChannel | None]:
-    """Return the time of one scan, and the channel that is connected after it."""
-    now, ready = 0.0, dict[int, float]()
-    left = list(ports)
-
-    def transfer(port: Port, wire_us: float) -> None:
-        nonlocal now, route
-        mux = mux_of(port, harness)
-        if mux is not None and mux != route:
-            between = route is not None and route.address != mux.address
-            now += (1 + between) * select_us(clock_hz)
-            route = mux
-        now += wire_us
-
-    def begin(chip: int) -> None:
-        port = next((port for port in left if port.chip == chip), None)
-        if port is not None and (wait_us := waiting_us(reading := reading_of(port, harness))):
-            transfer(port, start_us(reading, clock_hz))
-            ready[chip] = now + wait_us
-
-    for chip in dict.fromkeys(port.chip for port in ports):
-        begin(chip)
-    while left:
-        first = {port.chip: port for port in reversed(left)}
-        able = [p for p in left if first[p.chip] is p or p.chip not in ready]
-        port = next((p for p in able if ready.get(p.chip, 0.0) <= now), None)
-        if port is None:
-            port = min(able, key=lambda p: ready[p.chip])
-            now = ready[port.chip]
-        left.remove(port)
-        reading = reading_of(port, harness)
-        transfer(port, port_us(reading, clock_hz) - start_us(reading, clock_hz))
-        begin(port.chip)
-    return now, route
+    """Return the time to read these ports. fsum: in another order, the same to the last bit."""
+    return fsum((*_selected_us(ports, harness), *(time.us for time in _chip_times(ports, harness))))
 
 
 def selections(ports: Iterable[Port], harness: Harness) -> tuple[tuple[int, ...], ...]:
@@ -181,16 +118,11 @@ def selections(ports: Iterable[Port], harness: Harness) -> tuple[tuple[int, ...]
 def glove_us(glove: GloveWiring, sensors: int) -> float:
     """Return the shortest period of a CyberGlove's records of `sensors` sensors, in microseconds.
 
-    It is the vendor's formula (`shortest_us`), scaled by the ratio of the measured `record_us` for all sensors to it;
-    and no less than the requested period. An unknown rate counts as 115200 baud.
+    It is the vendor's formula (`shortest_us`), and no less than the requested period.
     """
     from thenar.drivers.cyberglove_protocol import shortest_us  # for gloves with one
 
-    baud = _BAUD if glove.baud == "auto" else glove.baud
-    filtered = bool(glove.filter)
-    us = shortest_us(sensors, baud, status=True, filtered=filtered)
-    if glove.record_us is not None:
-        us *= glove.record_us / shortest_us(glove.all_sensors, baud, status=True, filtered=filtered)
+    us = shortest_us(sensors, glove.baud, status=True, filtered=bool(glove.filter))
     return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
 
 
@@ -221,10 +153,5 @@ def _chip_times(ports: Iterable[Port], harness: Harness) -> Iterator[ChipTime]:
             place=harness.chip_of(bus, chip).place,
             readings=tuple(port.reading for port in group),
             switches=sum(len(port.elements) for port in group),
-            us=sum(_alone_us(reading_of(port, harness), line.clock_hz) for port in group),
+            us=sum(port_us(reading_of(port, harness), line.clock_hz) for port in group),
         )
-
-
-def _alone_us(reading: Reading, clock_hz: int) -> float:
-    """Return the time of a reading if nothing else is read in parallel."""
-    return port_us(reading, clock_hz) + waiting_us(reading)

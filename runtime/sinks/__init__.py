@@ -2,12 +2,10 @@
 
 from ..published import JointAngles
 from .base import SINKS, Fanout, Sink, SinkError, SinkKind, SinkPlace, SinkReport, open_sink
-from .jsonl import DetailLine, GraspLine, HeaderLine, HealthLine, JsonLines, Line
-from .sockets import SocketLines
+from .jsonl import GraspLine, HeaderLine, HealthLine, JsonLines, Line
 
 __all__ = [
     "SINKS",
-    "DetailLine",
     "Fanout",
     "GraspLine",
     "HeaderLine",
@@ -20,6 +18,5 @@ __all__ = [
     "SinkKind",
     "SinkPlace",
     "SinkReport",
-    "SocketLines",
     "open_sink",
 ]

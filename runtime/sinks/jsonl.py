@@ -18,7 +18,6 @@ from typing import BinaryIO
 import msgspec
 from msgspec import json, structs
 
-from ..detail import Detail
 from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
@@ -40,18 +39,11 @@ class GraspLine(LiveGrasp, frozen=True, tag_field="kind", tag="grasp"):
     angles: tuple[float, ...] | None = None
 
 
-class DetailLine(Detail, frozen=True, tag_field="kind", tag="detail"):
-    """The fields of `Detail`, the `number` of the grasp line that it belongs to, and the build's checksum."""
-
-    number: int = 0
-    build: str = ""
-
-
 class HealthLine(HealthReport, frozen=True, tag_field="kind", tag="health"):
     """The fields of `HealthReport`."""
 
 
-Line = HeaderLine | GraspLine | DetailLine | HealthLine
+Line = HeaderLine | GraspLine | HealthLine
 
 # While nothing changes, in a live run.
 _RATE_HZ = 10
@@ -75,11 +67,6 @@ def encode(grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | No
 def encode_header(angles: JointAngles) -> bytes:
     """Return the line that names the joints of these angles."""
     return _encode(HeaderLine(angles.names)) + b"\n"
-
-
-def encode_detail(detail: Detail, number: int, build: str) -> bytes:
-    """Return a detail's line, including its newline."""
-    return _encode(DetailLine(**structs.asdict(detail), number=number, build=build)) + b"\n"
 
 
 def encode_health(report: HealthReport) -> bytes:

@@ -1,4 +1,4 @@
-"""JSON lines to all readers of a socket, which is a path in the file system or a port of this machine.
+"""JSON lines to all readers of a TCP port.
 
 Everything happens inside `publish`, without threads and without waiting: new readers are accepted, and each gets the
 line if it keeps up. A slow reader loses whole lines, which shows as gaps in `number`, and delays nobody. Only the rest
@@ -9,28 +9,20 @@ Places are limited. A reader that takes nothing for five seconds is dropped.
 
 import errno
 import ipaddress
-import os
 import re
 import select
 import socket
-import stat
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from thenar.drivers.errors import SettingError
 
-from ..detail import Details
 from ..preshape import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from .base import Sink, SinkError, SinkKind, SinkReport
-from .jsonl import encode, encode_detail, encode_header, encode_health
-
-if TYPE_CHECKING:
-    from ..build import Build
-    from ..live.recogniser import Moment
+from .jsonl import encode, encode_header, encode_health
 
 _BACKLOG = 16
 MAX_READERS = 32
@@ -42,48 +34,31 @@ HANGING_S = 5.0
 SEND_BUFFER = 16384
 # Readers accepted per frame, so that many at once do not delay it.
 _KNOCKS = 16
-# People cannot follow faster changes.
-_DETAIL_US = 10_000
 _HERE = frozenset({"127.0.0.1", "::1"})
 
 
 class SocketLines(Sink):
-    """Serves the readers of a listening socket, which it takes over; `tidy` is called once, at the end."""
+    """Serves the readers of a listening socket, which it takes over."""
 
-    def __init__(
-        self,
-        listener: socket.socket,
-        where: str,
-        tidy: Callable[[], None] = lambda: None,
-        clock: Callable[[], float] = monotonic,
-        detail: bool = False,
-    ) -> None:
-        """Serve `listener`; `clock` gives seconds. With `detail`, readers also get the details of grasps."""
+    def __init__(self, listener: socket.socket, where: str, clock: Callable[[], float] = monotonic) -> None:
+        """Serve `listener`; `clock` gives seconds."""
         listener.setblocking(False)
         self._listener = listener
         self._listener_poll = select.poll()
         self._listener_poll.register(listener, select.POLLIN)
         self._where = where
-        self._tidy = tidy
         self._clock = clock
         self._readers: list[_Reader] = []
         self._sent = self._lost = self._dropped = 0
         self._error = ""
         self._joints: tuple[str, ...] = ()
         self._header = b""
-        self._details: Details | None = None
-        self._build, self._detail_us = "" if detail else None, 0
-
-    def begin(self, build: "Build") -> None:
-        """Take the build that recognises."""
-        if self._build is not None:
-            self._build, self._details = build.manifest.checksum, Details(build)
 
     @property
-    def address(self) -> tuple[str, int] | str:
-        """The address of the socket: host and port, or the path."""
-        name: tuple[str, int] | str = self._listener.getsockname()
-        return name if isinstance(name, str) else name[:2]
+    def address(self) -> tuple[str, int]:
+        """The host and port of the socket."""
+        host, port = self._listener.getsockname()[:2]
+        return host, port
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Accept new readers, and send every reader the line, after a header if the joints are others than before."""
@@ -93,13 +68,6 @@ class SocketLines(Sink):
             self._send_all(self._header)
         if self._readers:
             self._send_all(encode(grasp, preshape, angles))
-
-    def moment(self, moment: "Moment") -> None:
-        """Send every reader the line of the grasp's details, at most a hundred times a second."""
-        details, grasp = self._details, moment.grasp
-        if details is not None and self._readers and not 0 <= grasp.time_us - self._detail_us < _DETAIL_US:
-            self._detail_us = grasp.time_us
-            self._send_all(encode_detail(details(moment), grasp.number, self._build or ""))
 
     def health(self, report: HealthReport) -> None:
         """Accept new readers, and send every reader the report's line."""
@@ -118,7 +86,7 @@ class SocketLines(Sink):
             self._error = reason.strerror or str(reason)
 
     def _add_client(self, reader: socket.socket, peer: Any) -> None:
-        host = _host(reader, peer)
+        host = _host(peer)
         if self._has_room(host):
             self._readers.append(_Reader(reader, host))
             if self._header:
@@ -170,7 +138,6 @@ class SocketLines(Sink):
         for reader in self._readers:
             reader.close()
         self._readers.clear()
-        self._tidy()
 
 
 class _Reader:
@@ -181,8 +148,7 @@ class _Reader:
     def __init__(self, reader: socket.socket, host: str) -> None:
         reader.setblocking(False)
         reader.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
-        if reader.family != socket.AF_UNIX:
-            reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.host = host
         self._socket, self._rest = reader, b""
         self._stalled_s: float | None = None
@@ -212,10 +178,8 @@ class _Reader:
         self._socket.close()
 
 
-def _host(reader: socket.socket, peer: Any) -> str:
+def _host(peer: Any) -> str:
     """Return the key of a reader's machine: its address, for IPv6 its 64-bit network; "" for this machine."""
-    if reader.family == socket.AF_UNIX:
-        return ""
     address = ipaddress.ip_address(peer[0].partition("%")[0])
     mapped = getattr(address, "ipv4_mapped", None)
     address = address if mapped is None else mapped
@@ -224,73 +188,7 @@ def _host(reader: socket.socket, peer: Any) -> str:
     return str(address if address.version == 4 else ipaddress.ip_network((address, 64), strict=False))
 
 
-def open_unix(path: str, clock: Callable[[], float] = monotonic, *, detail: bool = False) -> SocketLines:
-    """Return a sink on a Unix socket at `path`.
-
-    A socket left behind by a killed process is replaced; anything else at that path stays. Raises SinkError, or
-    SettingError if the path is not valid for a socket.
-    """
-    where = f"unix:{path}"
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    try:
-        _make_way(path, where)
-        listener.bind(path)
-        listener.listen(_BACKLOG)
-        made = Path(path).lstat()
-    except OSError as reason:
-        listener.close()
-        raise _unix_error(where, reason) from None
-    except ValueError:
-        listener.close()
-        raise SettingError(f"{where}: no file can have that name") from None
-
-    def tidy() -> None:
-        if _same(path, made):
-            Path(path).unlink()
-
-    return SocketLines(listener, where, tidy, clock, detail)
-
-
-def _make_way(path: str, where: str) -> None:
-    """Remove a dead socket from `path`. Raises SinkError if anything else is there."""
-    try:
-        found = Path(path).lstat()
-    except FileNotFoundError:
-        return
-    if not stat.S_ISSOCK(found.st_mode):
-        raise SinkError(f"{where}: another file has that name, and it is kept: use another name")
-    if not _refuses(path):
-        raise SinkError(f"{where} is in use: another process serves it; stop that one or use another name")
-    if _same(path, found):
-        Path(path).unlink()
-
-
-def _refuses(path: str) -> bool:
-    """Return whether nobody listens at `path` any more."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as knock:
-        knock.setblocking(False)
-        return knock.connect_ex(path) == errno.ECONNREFUSED
-
-
-def _same(path: str, made: os.stat_result) -> bool:
-    try:
-        return os.path.samestat(Path(path).lstat(), made)
-    except OSError:
-        return False
-
-
-def _unix_error(where: str, reason: OSError) -> Exception:
-    if isinstance(reason, SinkError):
-        return reason
-    if reason.errno is None:  # "AF_UNIX path too long" carries no number
-        return SettingError(f"{where}: {reason}: a socket's path has at most 107 bytes")
-    hint = ": create its folder first" if reason.errno == errno.ENOENT else ""
-    return SinkError(f"{where} cannot be opened: {reason.strerror}{hint}")
-
-
-def open_tcp(
-    place: str, *, public: bool = False, clock: Callable[[], float] = monotonic, detail: bool = False
-) -> SocketLines:
+def open_tcp(place: str, *, public: bool = False, clock: Callable[[], float] = monotonic) -> SocketLines:
     """Return a sink on a TCP port: "127.0.0.1:7777", "localhost:7777", "[::1]:7777" or, on 127.0.0.1, "7777".
 
     Anyone who can connect can read, so only addresses of this machine are accepted unless `public`. Port 0 means any
@@ -299,7 +197,7 @@ def open_tcp(
     where = f"tcp:{place}" + "?public" * public
     family, address = resolve(place, where, "tcp:127.0.0.1:7777")
     check_readers(address, f"tcp:{place}", public=public)
-    return SocketLines(_listener(family, address, where), where, clock=clock, detail=detail)
+    return SocketLines(_listener(family, address, where), where, clock)
 
 
 def check_readers(address: tuple[str, int], where: str, *, public: bool) -> None:
@@ -348,21 +246,11 @@ def resolve(place: str, where: str, example: str) -> tuple[socket.AddressFamily,
     return family, address  # type: ignore[return-value]
 
 
-MEMBER = (
-    SinkKind(
-        "unix",
-        "PATH",
-        "JSON lines to all who connect to a socket",
-        lambda where: open_unix(where.place, detail="detail" in where.options),
-        ("detail",),
-        rank=1,
-    ),
-    SinkKind(
-        "tcp",
-        "127.0.0.1:PORT",
-        "the same on a port of this machine; with public also for other machines",
-        lambda where: open_tcp(where.place, public="public" in where.options, detail="detail" in where.options),
-        ("detail", "public"),
-        rank=2,
-    ),
+MEMBER = SinkKind(
+    "tcp",
+    "127.0.0.1:PORT",
+    "JSON lines to all who connect to a port of this machine; with public also to other machines",
+    lambda where: open_tcp(where.place, public="public" in where.options),
+    ("public",),
+    rank=2,
 )

@@ -13,12 +13,16 @@ from thenar.drivers.members import Members
 
 from ..frames import GloveFrame, Mask, SwitchFrame
 from ..harness.wiring import Debounce, Harness
+from ..names import list_names
 from ..published import Count
 from ..scanning.scanmap import ScanMap
+from ..taxels import Taxels
 
 # A device is expected back at least this often, however fast it is: a shorter limit would mistake a busy computer, or
 # the 16 ms for which a USB serial adapter may buffer bytes, for a cut cable.
 SHORTEST_US = 10_000
+# Counts that say nothing of faults.
+_USUAL = {"transfers", "rows", "rows a second", "records"}
 
 
 class Pace:
@@ -53,12 +57,21 @@ class Source(ABC):
         The expected time from frame to frame. It may change with `open`.
     longest_us : int
         How long a frame is current, from its reading time: usually two periods, PERIODS * period_us.
+    taxels : sequence of Taxels
+        The taxels that it reads, one in each.
+    part : str
+        What the device says it is, once it is open; "" if it says nothing.
+    notes : sequence of str
+        Oddities of an open device that are no faults, in sentences.
     """
 
     name: str
     period_us: int
     longest_us: int
     owned: Mask = 0
+    taxels: Sequence[Taxels] = ()
+    part: str = ""
+    notes: Sequence[str] = ()
 
     @abstractmethod
     def open(self) -> None:
@@ -79,9 +92,25 @@ class Source(ABC):
         """Return the counts of frames and faults, for health reports."""
         return ()
 
+    @property
+    def wire_us(self) -> float:
+        """The least time from frame to frame, by the arithmetic of its wire."""
+        return self.period_us
+
+    def faults(self) -> str:
+        """Return the counts of what did not work, or lacked something: "late 3, gaps 1"."""
+        wrong = (count for count in self.counts() if count.value and count.name not in _USUAL)
+        return ", ".join(f"{count.name} {count.value}" for count in wrong)
+
     def fault_message(self) -> str:
         """Return the fault of an open device; "" if there is none."""
         return ""
+
+    def taxel_faults(self) -> str:
+        """Return a sentence on the taxels with faults, "" without any; silent ones are reported with their device."""
+        found = ((each.names[0], each.faults[0]) for each in self.taxels)
+        faulty = [f"{name}: {fault}" for name, fault in found if fault not in ("", "silent")]
+        return f"taxels with faults: {list_names(faulty)}" if faulty else ""
 
     def read_only(self, sensors: Sequence[str]) -> None:  # noqa: B027
         """Allow the source to leave other joints' sensors than these out of its frames, as 0, and taxels without
@@ -181,15 +210,28 @@ class Debouncer:
 
         Switches that were not read keep their state, and their timers run on. A time that goes back is ignored.
         """
-        now = self._advance(time_us, known)
-        free = known & ~self._locked(now) if self._locks else known
-        pressed = closed & free & ~self._closed
-        opened = ~closed & free & self._closed
+        if self._time is None:
+            self._time = time_us
+        interval = max(0, time_us - self._time)
+        if interval > self._pause_us or known != self._known:
+            self._forget_after_pauses(self._time, interval, known)
+        self._time = now = self._time + interval
+        # The shortest recent period is the earliest time of the next reading.
+        if self._period is None or interval <= self._period:
+            self._period = interval or self._period
+        else:
+            self._period = min(interval, self._period + (self._period >> 2) + 1)
+        free = known
+        if self._locks:
+            self._locks = [lock for lock in self._locks if lock[0] > now]
+            for _, mask in self._locks:
+                free &= ~mask
+        pressed, opened = closed & free & ~self._closed, ~closed & free & self._closed
         if opened or self._openings:
             self._closed &= ~self._released(now, opened, closed & free)
         if pressed:
             self._closed |= pressed
-            self._lock(now, now + self.press_lockout_us, pressed)
+            self._locks.append((now + self.press_lockout_us, pressed))
         return self._closed
 
     def _forget_after_pauses(self, last_us: int, interval: int, known: Mask) -> None:
@@ -203,56 +245,22 @@ class Debouncer:
             [(time, mask & ~over) for time, mask in timers if mask & ~over] for timers in (self._locks, self._openings)
         )
 
-    def _advance(self, time_us: int, known: Mask) -> int:
-        """Store the time, and the shortest recent period as the earliest time of the next reading; forget the switches
-        that are read after a pause.
-        """
-        if self._time is None:
-            self._time = time_us
-        interval = max(0, time_us - self._time)
-        if interval > self._pause_us or known != self._known:
-            self._forget_after_pauses(self._time, interval, known)
-        self._time += interval
-        if self._period is None or interval <= self._period:
-            self._period = interval or self._period
-        else:
-            self._period = min(interval, self._period + (self._period >> 2) + 1)
-        return self._time
-
-    def _locked(self, now: int) -> Mask:
-        self._locks = [lock for lock in self._locks if lock[0] > now]
-        locked = 0
-        for _, mask in self._locks:
-            locked |= mask
-        return locked
-
-    def _lock(self, now: int, until: int, mask: Mask) -> None:
-        if until > now:
-            self._locks.append((until, mask))
-
     def _released(self, now: int, opened: Mask, closed: Mask) -> Mask:
-        """Return the open switches whose release time is over; their bounce is locked out."""
-        released, begun, openings = 0, opened, []
-        for since, group in self._openings:
-            begun &= ~group
-            going = self._go(now, since, group & opened)
-            released |= going
-            if rest := group & ~closed & ~going:
+        """Return the open switches whose release time is over, or would be before the next reading; their bounce is
+        locked out.
+        """
+        fresh, released, openings = opened, 0, list[tuple[int, Mask]]()
+        for _, group in self._openings:
+            fresh &= ~group
+        for since, group in (*self._openings, (now, fresh)):
+            going = group & opened
+            if going and now + (self._period or 0) >= since + self.release_us:
+                self._locks.append((since + self.release_us, going))
+                released |= going
+            if rest := group & ~closed & ~released:
                 openings.append((since, rest))
-        if begun:
-            going = self._go(now, now, begun)
-            released |= going
-            if rest := begun & ~going:
-                openings.append((now, rest))
         self._openings = openings
         return released
-
-    def _go(self, now: int, since: int, group: Mask) -> Mask:
-        """Return `group` if the next reading would come too late for its release, else 0."""
-        if not group or now + (self._period or 0) < since + self.release_us:
-            return 0
-        self._lock(now, since + self.release_us, group)
-        return group
 
 
 def debouncer_of(debounce: Debounce) -> Debouncer | None:

@@ -9,9 +9,8 @@ from ..frames import PERIODS, GloveFrame
 from ..harness.wiring import GloveWiring, Harness
 from ..published import Count
 from ..scanning.scanmap import ScanMap
+from ..scanning.timing import glove_us
 from .base import SHORTEST_US, Source, SourceKind, counted
-
-_SLOWEST_BAUD = 9_600
 
 
 class GloveDevice(Source):
@@ -27,13 +26,13 @@ class GloveDevice(Source):
         self.longest_us = PERIODS * self.period_us
         self._wiring, self._unplugged = wiring, False
         self.info: GloveInfo | None = None
-        self.driver = self._driver(None)
+        self.driver, self._read = self._driver(None), self.sensors
 
     def _driver(self, only: tuple[int, ...] | None) -> CyberGlove:
         wiring = self._wiring
         return CyberGlove(
             wiring.port,
-            baud=None if wiring.baud == "auto" else wiring.baud,
+            baud=wiring.baud,
             rate_hz=wiring.rate_hz,
             sensors=self.sensors,
             only=only,
@@ -42,13 +41,18 @@ class GloveDevice(Source):
 
     def read_only(self, sensors: Sequence[str]) -> None:
         """Request only these sensors from the box: the others are 0 in the frames, which no sensor value is."""
-        self.driver = self._driver(
-            tuple(place for place, name in enumerate(self._wiring.sensor_names) if name in sensors)
-        )
+        places = tuple(place for place, name in enumerate(self._wiring.sensor_names) if name in sensors)
+        self.driver, self._read = self._driver(places), len(places) or self.sensors
+
+    @property
+    def wire_us(self) -> float:
+        """The time of a record, by the vendor's formula."""
+        return glove_us(self._wiring, self._read)
 
     def open(self) -> None:
         """Open the glove."""
         self.info = self.driver.open()
+        self.part, self.notes = self.info.text, self.info.notes
 
     def read(self, timeout_s: float) -> GloveFrame | None:
         """Return the next record that holds a measurement."""
@@ -84,12 +88,11 @@ class GloveDevice(Source):
 
 
 def glove_period_us(wiring: GloveWiring) -> int:
-    """Return the longest expected period of a CyberGlove with this wiring; the slowest possible one if it is open.
+    """Return the longest expected period of a CyberGlove with this wiring.
 
     A glove that cannot reach the requested rate sends as fast as box and line allow.
     """
-    baud = _SLOWEST_BAUD if wiring.baud == "auto" else wiring.baud
-    shortest = round(shortest_us(wiring.all_sensors, baud, status=True, filtered=True))
+    shortest = round(shortest_us(wiring.all_sensors, wiring.baud, status=True, filtered=True))
     return max(SHORTEST_US, shortest, round(1e6 / wiring.rate_hz) if wiring.rate_hz else 0)
 
 

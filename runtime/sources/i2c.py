@@ -1,17 +1,17 @@
 """I2C buses of a harness, their ports read in the order of a scan map."""
 
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 
 from thenar.drivers.i2c.bus import I2cBus, PlacedPort, Scan
-from thenar.drivers.i2c.chips import Conversion, Converter
+from thenar.drivers.i2c.chips import Converter
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.drivers.spi.chips import SpiChip
 
 from ..frames import PERIODS, BitRemap, Mask, SwitchFrame, now_us
 from ..harness.wiring import Debounce, Harness
-from ..names import list_names
 from ..published import Count
-from ..scanning.scanmap import Port, ScanMap
+from ..scanning.scanmap import SCHEMA, Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
 from ..taxels import TaxelCalibration, Taxels, calibration_of
 from .base import Pace, Source, SourceKind, debouncer_of, paced_us
@@ -45,8 +45,8 @@ class PortLevels:
         channel = [reading.name for reading in wired.chip.readings].index(port.reading)
         self.name = wired.numbered_pins[channel]
         self.place = harness.taxel_names.index(self.name)
-        self.highest = wired.chip.highest if isinstance(wired.chip, Converter | SpiChip) else None
-        self.taxels = Taxels([self.name], [port.levels], calibration, harness.taxel_settings, self.highest)
+        highest = wired.chip.highest if isinstance(wired.chip, Converter | SpiChip) else None
+        self.taxels = Taxels([self.name], [port.levels], calibration, harness.taxel_settings, highest)
         self.targets = self.taxels.owned
 
     def states(self, reply: int | None) -> tuple[Mask, Mask]:
@@ -58,7 +58,51 @@ class PortLevels:
         return self._debouncer.update(time_us, closed, self.targets & ~lost) & ~lost, lost
 
 
-class I2cDevice(Source):
+class PortScanner(Source):
+    """A device whose ports are read in a scan: those of `ports`, bus number `bus` of a scan map."""
+
+    def __init__(self, harness: Harness, bus: int, ports: Sequence[Port]) -> None:
+        calibration, wiring = calibration_of(harness.taxel_settings), harness.line_of(bus)
+        self._ports = [
+            PortSwitches(port, harness.debounce) if port.switches else PortLevels(port, harness, calibration)
+            for port in ports
+        ]
+        self.owned: Mask = sum(port.targets for port in self._ports)
+        self.taxels = tuple(port.taxels for port in self._ports if isinstance(port, PortLevels))
+        self._wire_us = scan_us(ScanMap(SCHEMA, harness.fingerprint, tuple(ports)), harness).us
+        self._everything = len(harness.taxel_names)
+        self._pace, self._held_up = Pace(wiring.rate_hz), 0
+
+    @property
+    def wire_us(self) -> float:
+        """The time of a scan."""
+        return self._wire_us
+
+    @abstractmethod
+    def replies(self) -> Sequence[int | None]:
+        """Read all ports; return the reply of each, None for those that gave none."""
+
+    def read(self, timeout_s: float) -> SwitchFrame | None:
+        """Scan once, when it is due."""
+        if not self._pace.wait(timeout_s):
+            return None
+        began_us, closed, lost = now_us(), 0, 0
+        codes: list[int | None] = [None] * self._everything
+        for port, reply in zip(self._ports, self.replies(), strict=True):
+            shut, silent = port.states(reply)
+            closed, lost = closed | shut, lost | silent
+            if isinstance(port, PortLevels):
+                codes[port.place] = reply
+        time_us = now_us()
+        if time_us - began_us > self.longest_us:
+            # A chip held the bus: the readings before that are out of date.
+            self._held_up += 1
+            return SwitchFrame(time_us, 0, self.owned)
+        taxels = tuple(codes) if any(code is not None for code in codes) else None
+        return SwitchFrame(time_us, closed, lost, taxels=taxels)
+
+
+class I2cDevice(PortScanner):
     """Bus number `number` of a harness, scanned as in `scan`, whose levels are limits in counts; only its chips are
     accessed.
     """
@@ -69,68 +113,30 @@ class I2cDevice(Source):
         self.name = f"i2c at {wiring.device}"
         self.period_us = _bus_period_us(harness, number, scan)
         self.longest_us = PERIODS * self.period_us
-        calibration = calibration_of(harness.taxel_settings)
-        self._ports = [
-            PortSwitches(port, harness.debounce) if port.switches else PortLevels(port, harness, calibration)
-            for port in ports
-        ]
-        self._taxels = len(harness.taxel_names)
-        self.owned: Mask = sum(port.targets for port in self._ports)
         chips = sorted({port.chip for port in ports})
         placed = {chip: _placed(harness, number, chip, ports) for chip in chips}
         self.bus = I2cBus(wiring.device, tuple(placed.values()))
-        self._reads = [PlacedPort(placed[port.chip], reading_of(port, harness)) for port in ports]
+        # Conversions that are waited for come last: what is read together stays together.
+        reads = [(PlacedPort(placed[port.chip], reading_of(port, harness)), port) for port in ports]
+        reads.sort(key=lambda each: each[0].slow)
+        self._reads = [each for each, _ in reads]
         self._scan: Scan | None = None
-        self._groups: list[list[int]] = []
-        self._pace, self._held_up = Pace(wiring.rate_hz), 0
+        super().__init__(harness, number, [port for _, port in reads])
 
     @property
-    def taxels(self) -> tuple[PortLevels, ...]:
-        """The taxels that are read."""
-        return tuple(port for port in self._ports if isinstance(port, PortLevels))
+    def part(self) -> str:  # type: ignore[override]
+        """How reads are batched."""
+        return f"reads {self.bus.way}"
 
     def open(self) -> None:
         """Open the bus and set up its chips."""
         self.bus.open()
-        self._groups = self._grouped(range(len(self._reads)))
-        self._scan = self.bus.prepare([[self._reads[port] for port in group] for group in self._groups])
+        self._scan = self.bus.prepare(self._reads)
 
-    def scan(self, chip: PlacedChip | None = None) -> Scan:
-        """Return a reader of all ports, or of those of this chip of the bus."""
-        ports = [port for port, read in enumerate(self._reads) if chip is None or read.member is chip]
-        return self.bus.prepare([[self._reads[port] for port in group] for group in self._grouped(ports)])
-
-    def _grouped(self, ports: Sequence[int]) -> list[list[int]]:
-        """Return the ports that are read together: all but slow conversions."""
-        slow = [port for port in ports if _takes_time(self._reads[port])]
-        together = [port for port in ports if port not in slow]
-        return [*([together] if together else []), *([port] for port in slow)]
-
-    def read(self, timeout_s: float) -> SwitchFrame | None:
-        """Scan once, when it is due."""
-        if not self._pace.wait(timeout_s):
-            return None
-        began_us = now_us()
-        frame = self._scanned()
-        if frame.time_us - began_us > self.longest_us:
-            # A chip held the bus: the readings before that are out of date.
-            frame = SwitchFrame(frame.time_us, 0, self.owned)
-            self._held_up += 1
-        return frame
-
-    def _scanned(self) -> SwitchFrame:
+    def replies(self) -> Sequence[int | None]:
+        """Read all ports."""
         assert self._scan is not None
-        closed = lost = 0
-        codes: list[int | None] = [None] * self._taxels
-        for group, replies in zip(self._groups, self._scan, strict=False):
-            for number, reply in zip(group, replies, strict=True):
-                port = self._ports[number]
-                shut, silent = port.states(reply)
-                closed, lost = closed | shut, lost | silent
-                if isinstance(port, PortLevels):
-                    codes[port.place] = reply
-        taxels = tuple(codes) if any(code is not None for code in codes) else None
-        return SwitchFrame(now_us(), closed, lost, taxels=taxels)
+        return self._scan.read()
 
     def counts(self) -> tuple[Count, ...]:
         """Return the numbers of transfers, of scans too slow to count, and of each chip's failures."""
@@ -142,21 +148,11 @@ class I2cDevice(Source):
     def fault_message(self) -> str:
         """Return the fault of the bus, or the absent chips; "" if there is none."""
         absent = (chip.last_error for chip in self.bus.chips if not chip.present)
-        return self.bus.fault_message or "; ".join((*absent, *taxel_faults(self.taxels)))
+        return self.bus.fault_message or "; ".join(filter(None, (*absent, self.taxel_faults())))
 
     def close(self) -> None:
         """Close the bus."""
         self.bus.close()
-
-
-def taxel_faults(taxels: Sequence[PortLevels]) -> list[str]:
-    """Return a sentence on the taxels with faults, if any; lost ones are reported with their chip."""
-    faulty = [f"{each.name}: {fault}" for each in taxels if (fault := each.taxels.faults[0]) not in ("", "silent")]
-    return [f"taxels with faults: {list_names(faulty)}"] if faulty else []
-
-
-def _takes_time(read: PlacedPort) -> bool:
-    return isinstance(read.reading, Conversion) and bool(read.reading.start)
 
 
 def _placed(harness: Harness, bus: int, number: int, ports: list[Port]) -> PlacedChip:

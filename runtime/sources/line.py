@@ -1,4 +1,4 @@
-"""Lines of a board or a program: CSV, JSON or name:value, over serial, TCP, UDP, a Unix socket, stdin, a WebSocket."""
+"""Lines of a board or a program: CSV, JSON or name:value, over serial, TCP, UDP or stdin."""
 
 from thenar.drivers.lines import LineReader
 
@@ -7,12 +7,12 @@ from .rows import row_kinds
 
 
 def _reader(wiring: StreamWiring) -> LineReader:
-    return LineReader(wiring.port, wiring.baud, len(wiring.columns), wiring.sender or "")
+    return LineReader(wiring.port, wiring.baud, len(wiring.columns))
 
 
 MEMBER = row_kinds(
     "line",
-    "Lines of numbers over serial, TCP, UDP, a Unix socket, stdin or a WebSocket: [[stream]].",
+    "Lines of numbers over serial, TCP, UDP or stdin: [[stream]].",
     lambda port: not port.startswith(("lsl:", "ros:")),
     _reader,
     3,

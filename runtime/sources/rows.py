@@ -258,7 +258,7 @@ class RowSource(Source):
         self._ready.clear()
         self.watch.begin()
         self._debouncer = debouncer_of(self._debounce)
-        self._taxels = [
+        self.taxels = [
             Taxels([name], [levels], self._calibration, self._settings, grid.last)
             for name, levels, grid in zip(self._taxel_names, self._levels, self._grids, strict=True)
         ]
@@ -266,6 +266,11 @@ class RowSource(Source):
     def _need(self, joints: Iterable[str], taxels: Iterable[str]) -> None:
         time = () if self.wiring.time is None else (self.wiring.time,)
         self._columns.needed = self._read.union(joints, taxels, time)
+
+    @property
+    def wire_us(self) -> float:
+        """The time from row to row, as wired."""
+        return self.wiring.period_us
 
     def read_only(self, sensors: Sequence[str]) -> None:
         """Accept rows that lack other joints than these, and taxels without levels."""
@@ -361,7 +366,7 @@ class RowSource(Source):
                 closed |= bit if (value > threshold) != low else 0
         row: list[int | None] = [None] * len(self._everything)
         measured = values[self._first_taxel : self._first_taxel + len(self._grids)]
-        for taxels, grid, place, value in zip(self._taxels, self._grids, self._places, measured, strict=True):
+        for taxels, grid, place, value in zip(self.taxels, self._grids, self._places, measured, strict=True):
             row[place] = code = self._code(grid, value)
             pressed, lost = taxels.read(time_us, (code,))
             closed, known = closed | pressed, known | taxels.owned & ~lost
@@ -381,10 +386,6 @@ class RowSource(Source):
         """Return the rate of rows, and counts of their faults."""
         rate = Count("rows a second", 0 if self._silent else round(self.watch.hz or 0))
         return (rate, *counted(self.watch.counts), *counted(self.reader.counts()))
-
-    def faults(self) -> str:
-        """Return the counts of rows and lines that did not count, or lacked something: "late 3, gaps 1"."""
-        return ", ".join(f"{count.name} {count.value}" for count in self.counts()[2:] if count.value)
 
     def fault_message(self) -> str:
         """Return the fault of arriving rows or lines; "" if there is none."""
@@ -413,7 +414,7 @@ class RowSource(Source):
                 "name columns in glove.toml as it does" if self.wiring.board is None else "upload this build's sketch"
             )
             return f"its rows lack {list_names(self._columns.absent)}: {advice}"
-        return self._wrong_rate() or self._faulty_taxels()
+        return self._wrong_rate() or self.taxel_faults()
 
     def _wrong_rate(self) -> str:
         hz, stated = self.watch.hz, self.wiring.rate_hz
@@ -423,10 +424,6 @@ class RowSource(Source):
         return (
             f"{hz:.3g} rows a second arrive, but glove.toml says {stated:g}: set rate_hz = {float(f'{hz:.2g}'):g}{two}"
         )
-
-    def _faulty_taxels(self) -> str:
-        faulty = [f"{each.names[0]}: {each.faults[0]}" for each in self._taxels if each.faults[0] not in ("", "silent")]
-        return f"taxels with faults: {list_names(faulty)}" if faulty else ""
 
     def _uncounted(self) -> tuple[int, int, int]:
         """Return how many rows had other columns, how many lines were not rows, and how many bytes came."""

@@ -4,54 +4,41 @@ from collections.abc import Callable, Iterator, Sequence
 
 from thenar.drivers.spi.device import SpiDevice
 
-from ..frames import PERIODS, Mask, SwitchFrame, now_us
+from ..frames import PERIODS
 from ..harness.wiring import Harness
 from ..published import Count
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import reading_of
-from ..taxels import calibration_of
-from .base import Pace, Source, SourceKind, paced_us
-from .i2c import PortLevels, taxel_faults
+from .base import Source, SourceKind, paced_us
+from .i2c import PortScanner
 
 
-class SpiConverter(Source):
+class SpiConverter(PortScanner):
     """SPI device number `number` of a harness, read as in `scan`, whose levels are limits in counts.
 
     silent  whether the last replies were not a converter's
     """
 
     def __init__(self, harness: Harness, number: int, scan: ScanMap) -> None:
-        wiring = harness.spi[number]
-        ports = [port for port in scan.ports if port.bus == len(harness.buses) + number]
-        calibration = calibration_of(harness.taxel_settings)
-        self.name = f"spi at {wiring.device}"
-        self.taxels = tuple(PortLevels(port, harness, calibration) for port in ports)
-        self.owned: Mask = sum(port.targets for port in self.taxels)
+        wiring, bus = harness.spi[number], len(harness.buses) + number
+        ports = [port for port in scan.ports if port.bus == bus]
+        self.name, self.part = f"spi at {wiring.device}", wiring.kind
         self.period_us = paced_us(wiring.rate_hz)
         self.longest_us = PERIODS * self.period_us
         self.device = SpiDevice(wiring.device, wiring.chip, wiring.clock_hz)
         self.run: Callable[[], list[int | None]] = self.device.prepare([reading_of(port, harness) for port in ports])
-        self._everything = len(harness.taxel_names)
-        self._pace = Pace(wiring.rate_hz)
         self.silent = False
+        super().__init__(harness, bus, ports)
 
     def open(self) -> None:
         """Open the device."""
         self.device.open()
 
-    def read(self, timeout_s: float) -> SwitchFrame | None:
-        """Convert all channels once, when it is due."""
-        if not self._pace.wait(timeout_s):
-            return None
+    def replies(self) -> Sequence[int | None]:
+        """Convert all channels."""
         replies = self.run()
         self.silent = None in replies
-        closed = lost = 0
-        codes: list[int | None] = [None] * self._everything
-        for taxel, reply in zip(self.taxels, replies, strict=True):
-            shut, silent = taxel.states(reply)
-            closed, lost = closed | shut, lost | silent
-            codes[taxel.place] = reply
-        return SwitchFrame(now_us(), closed, lost, taxels=tuple(codes))
+        return replies
 
     def counts(self) -> tuple[Count, ...]:
         """Return the numbers of transfers, and of replies that were not a converter's."""
@@ -59,8 +46,8 @@ class SpiConverter(Source):
 
     def fault_message(self) -> str:
         """Return the fault of the converter or its taxels; "" if there is none."""
-        silent = [f"{self.device.chip.name} does not reply: check its supply, its wires and its chip select"]
-        return "; ".join(silent if self.silent else taxel_faults(self.taxels))
+        silent = f"{self.device.chip.name} does not reply: check its supply, its wires and its chip select"
+        return silent if self.silent else self.taxel_faults()
 
     def close(self) -> None:
         """Close the device."""

@@ -4,7 +4,7 @@ The file is scanned while the page is open; the scanned part can be shown at onc
 """
 
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -24,8 +24,8 @@ from ..harness.wiring import Harness
 from ..live.replay import Stepper, periods_us
 from ..published import LiveGrasp
 from ..recording.reader import Index
-from ..recording.session import Label, Mark, Session
-from .live import PAST_US, FrameText, build_message
+from ..recording.session import Label, Session
+from .live import PAST_US, Change, FrameText, build_message, change_of
 from .server import Server, message
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -35,14 +35,10 @@ LEAD_US = 1_500_000
 _SAMPLE_US, _MOST_CHANGES = 20_000, 100_000
 _FRAME_S, _IDLE_S, _TOLD_S = 0.02, 0.2, 0.5
 _PERIODS_OF = 20_000
-_MOST_MARKS = 10_000
-
-
-Change = tuple[int, str, str, str, str, int, str, int | None]
 
 
 class Overview:
-    """The overview of a whole recording: changes of the prediction, labelled spans, marks.
+    """The overview of a whole recording: changes of the prediction, and labelled spans.
 
     A trial's span lasts from its beginning to its judgement; a repeated trial has none.
     """
@@ -50,7 +46,6 @@ class Overview:
     def __init__(self) -> None:
         self.changes: list[Change] = []
         self.truth: list[tuple[int, int, str]] = []
-        self.marks: list[tuple[int, str]] = []
         self._begun: tuple[int, str] | None = None
 
     def take(self, unix_us: int, entry: object) -> None:
@@ -59,8 +54,6 @@ class Overview:
             self._change(entry)
         elif isinstance(entry, Label):
             self._label(unix_us, entry)
-        elif isinstance(entry, Mark) and len(self.marks) < _MOST_MARKS:
-            self.marks.append((unix_us, entry.text))
         elif isinstance(entry, Session):
             self._begun = None
 
@@ -76,16 +69,15 @@ class Overview:
         return message("past", changes=self.changes[first:last], until_us=unix_us)
 
     def text(self) -> bytes:
-        """Return the overview's message: spans of predictions, spans of labels, and marks."""
+        """Return the overview's message: spans of predictions, and spans of labels."""
         spans: list[tuple[int, str]] = []
         for unix_us, _, grasp, *_ in self.changes:
             if not spans or spans[-1][1] != grasp:
                 spans.append((unix_us, grasp))
-        return message("overview", predictions=spans, truth=self.truth, marks=self.marks)
+        return message("overview", predictions=spans, truth=self.truth)
 
     def _change(self, grasp: LiveGrasp) -> None:
-        entry = grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type
-        change = (grasp.time_us, *entry, grasp.segment_us)
+        change = change_of(grasp)
         last = self.changes[-1] if self.changes else None
         if last is not None and grasp.time_us < last[0]:  # clocks of two overlapping sessions
             return
@@ -112,9 +104,9 @@ class ReplayPage(Closing):
         The recording.
     address, token
         As for `Server`.
-    build : Path, optional
-        The folder of a build: the hand is drawn, and every frame scored by it. For a run of the same build, its own
-        predictions are shown; for other recordings, the predictions of this build.
+    build : Path
+        The folder of a build, by which every frame is scored. For a run of the same build, its own predictions are
+        shown; for other recordings, the predictions of this build.
 
     Attributes
     ----------
@@ -129,19 +121,17 @@ class ReplayPage(Closing):
         If the build cannot be read, or the recording lacks an input of it; and as `Server` does.
     """
 
-    def __init__(self, path: Path, address: str, *, token: str | None, build: Path | None = None) -> None:
+    def __init__(self, path: Path, address: str, *, token: str | None, build: Path) -> None:
         self._index, self._overview = Index(path), Overview()
-        self._build = None if build is None else Build.load(build)
-        first = self._index.session
-        self._own = self._build is not None and first.build == self._build.manifest.checksum
+        self._build = Build.load(build)
+        self._own = self._index.session.build == self._build.manifest.checksum
         self._walk = _Walk(self._index, self._build)
         self._asked = SimpleQueue[Mapping[str, object]]()
         self._faults = list[str]()
-        if build is None:
-            which = "the one that ran" if first.build else "any that reads these inputs"
-            self._faults.append(f"Without a build the hand cannot be drawn: name one with --build, {which}.")
         self._at_us, self._playing, self._speed, self._sought = 0, False, 1.0, True
-        self._first = self._described(path.name, build)
+        manifest = self._build.manifest
+        hand = message("hand", load_hand(build, manifest))
+        self._first = build_message(build, manifest, path.name, replay=True), hand
         self._scanned = Event()
         self._told = 0.0
         self._stop = Event()
@@ -166,13 +156,6 @@ class ReplayPage(Closing):
             self._thread.join()
         self.server.close()
 
-    def _described(self, name: str, folder: Path | None) -> Sequence[bytes]:
-        build = self._build
-        if build is None or folder is None:
-            return (build_message(None, None, name, replay=True),)
-        hand = message("hand", load_hand(folder, build.manifest))
-        return build_message(folder, build.manifest, name, replay=True), hand
-
     def _scan(self) -> None:
         """Scan the whole recording for its overview."""
         try:
@@ -189,8 +172,8 @@ class ReplayPage(Closing):
         self._scanned.set()
 
     def _predicted(self) -> Iterator[tuple[int, object]]:
-        """Yield labels, marks and predictions; those of the build if the recording is not its own."""
-        if self._build is None or self._own:
+        """Yield labels and predictions; those of the build if the recording is not its own."""
+        if self._own:
             for unix_us, entry in self._index.scan(_SAMPLE_US):
                 clock_us = unix_us - entry.time_us if isinstance(entry, LiveGrasp) else 0
                 yield unix_us, _dated(entry, clock_us) if isinstance(entry, LiveGrasp) else entry
@@ -277,40 +260,35 @@ class ReplayPage(Closing):
 class _Walk:
     """Moves through a recording to any moment, and holds the state there."""
 
-    def __init__(self, index: Index, build: Build | None) -> None:
-        self._index, self._build = index, build
-        self.periods = (None, None)
-        name = index.path.name
-        if build is not None:
-            head = islice(Index(index.path).scan(), _PERIODS_OF)
-            self.periods = periods_us(entry for _, entry in head)  # type: ignore[assignment]
-            Stepper(build, name, self.periods).take(index.session)
-            self._harness = parse_harness(index.session.harness, name) if index.session.harness else Harness(name="")
-            self._text = FrameText(build, self._harness)
+    def __init__(self, index: Index, build: Build) -> None:
+        self._index, self._build, name = index, build, index.path.name
+        self.periods = periods_us(entry for _, entry in islice(Index(index.path).scan(), _PERIODS_OF))
+        self._stepper = Stepper(build, name, self.periods)
+        self._stepper.take(index.session)
+        harness = parse_harness(index.session.harness, name) if index.session.harness else Harness(name="")
+        self._text = FrameText(build, harness)
         self._entries: Iterator[tuple[int, object]] = iter(())
         self._next: tuple[int, Any] | None = None
         self._at_us = -1
-        self._shown: object = None
-        self._grasp: LiveGrasp | None = None
+        self._shown: Any = None
         self._moment: Any = None
 
     def to(self, unix_us: int) -> bool:
         """Go to a moment; return whether there is something new to show."""
         if not self._at_us <= unix_us <= self._at_us + 2 * LEAD_US:
             self._entries = self._index.since(unix_us - LEAD_US)
-            self._stepper = None if self._build is None else Stepper(self._build, self._index.path.name, self.periods)
-            self._next, self._grasp, self._moment = None, None, None
+            self._stepper = Stepper(self._build, self._index.path.name, self.periods)
+            self._next = self._moment = None
         self._at_us = unix_us
         while True:
             if self._next is None:
                 self._next = next(self._entries, None)
             # Before the first prediction, the first one is shown.
-            none_yet = self._moment is None and self._grasp is None
-            if self._next is None or self._next[0] > unix_us + LEAD_US * none_yet:
+            if self._next is None or self._next[0] > unix_us + LEAD_US * (self._moment is None):
                 break
             self._take(*self._next)
             self._next = None
-        newest = self._moment or self._grasp
+        newest = self._moment
         changed, self._shown = newest is not None and newest is not self._shown, newest
         if self._next is None:
             self._at_us = -1  # the part that is scanned later starts afresh
@@ -318,23 +296,15 @@ class _Walk:
 
     def text(self) -> bytes:
         """Return the message of the newest moment."""
-        if self._moment is not None:
-            return self._text(self._moment)
-        return message("frame", self._grasp)
+        return self._text(self._moment)
 
     def _take(self, unix_us: int, entry: Any) -> None:
-        moment = None if self._stepper is None else self._stepper.take(entry)
-        if isinstance(entry, LiveGrasp):
-            self._grasp = _dated(entry, unix_us - entry.time_us)
-        if moment is not None:
-            recorded = self._grasp if self._is_own else None
-            moment.grasp = recorded or _dated(moment.grasp, unix_us - moment.grasp.time_us)
+        moment, session = self._stepper.take(entry), self._stepper.session
+        if moment is not None and session is not None:
+            own = session.build == self._build.manifest.checksum
+            grasp = entry if own and isinstance(entry, LiveGrasp) else moment.grasp
+            moment.grasp = _dated(grasp, unix_us - grasp.time_us)
             self._moment = moment
-
-    @property
-    def _is_own(self) -> bool:
-        session = None if self._stepper is None else self._stepper.session
-        return session is not None and self._build is not None and session.build == self._build.manifest.checksum
 
 
 def _dated(grasp: LiveGrasp, clock_us: int) -> LiveGrasp:

@@ -67,9 +67,6 @@ def cable_of(scene: Scene, line: int) -> Cable | None:
     return cable
 
 
-_USUAL_BAUD = 115_200
-
-
 class Bench(Closing):
     """Emulated devices for every device of `harness`, their serial ports linked in `folder`.
 
@@ -100,8 +97,7 @@ class Bench(Closing):
         with ExitStack() as stack:
             self.glove: EmulatedCyberGlove | None = None
             if harness.cyberglove is not None:
-                baud = harness.cyberglove.baud
-                line = self._line("cyberglove", _USUAL_BAUD if baud == "auto" else baud, stack)
+                line = self._line("cyberglove", harness.cyberglove.baud, stack)
                 self.glove = stack.enter_context(EmulatedCyberGlove(line, sensors=harness.cyberglove.all_sensors))
             self.i2c: EmulatedI2c | None = None
             if harness.buses or harness.spi:
@@ -126,8 +122,8 @@ class Bench(Closing):
 
     def _stream(self, number: int, wiring: StreamWiring, stack: ExitStack) -> tuple[LineSender, str]:
         """Return the sender of a stream's rows, and its port; LSL and ROS streams are also sent as lines."""
-        if "://" in wiring.port or wiring.port.startswith(("-", "unix:", "lsl:", "ros:")):
-            way = lines_like(wiring.port, self._folder / f"stream{number}")
+        if "://" in wiring.port or wiring.port.startswith(("-", "lsl:", "ros:")):
+            way = lines_like(wiring.port)
             stack.callback(way.close)
             send, port = way.send, way.port
         else:
@@ -214,7 +210,6 @@ def _moved(harness: Harness, folder: Path, ports: Sequence[str]) -> Harness:
         harness,
         cyberglove=None if glove is None else msgspec.structs.replace(glove, port=str(folder / "cyberglove")),
         streams=tuple(
-            msgspec.structs.replace(wiring, port=port, sender=None)
-            for wiring, port in zip(harness.streams, ports, strict=True)
+            msgspec.structs.replace(wiring, port=port) for wiring, port in zip(harness.streams, ports, strict=True)
         ),
     )

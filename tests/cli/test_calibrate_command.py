@@ -90,7 +90,7 @@ def test_pose_by_pose_every_sensor_gets_its_two_points(
     line: PtyLine, tmp_path: Path, sensors: int, names: tuple[str, ...]
 ) -> None:
     output = tmp_path / "anna.toml"
-    with EmulatedCyberGlove(line, sensors=sensors) as glove, calibrating(line, output, "--baud", "auto") as process:
+    with EmulatedCyberGlove(line, sensors=sensors) as glove, calibrating(line, output) as process:
         code, out, said = converse(process, Wearer(glove, sensors, {}))
     assert (code, out) == (0, f"{output}: {sensors} sensors of anna\n"), said
     assert all(f"Pose {number} of 7, {pose.name}: {pose.instruction}" in said for number, pose in enumerate(ALL, 1))
@@ -230,4 +230,4 @@ def test_missing_port_and_wrong_baud_rate_are_reported_in_a_sentence(tmp_path: P
     for baud in ("fast", "0", "-3", "99999999999"):
         done = thenar("calibrate", "x", "-o", tmp_path / "a.toml", "--baud", baud)
         assert done.returncode == 2
-        assert f"'{baud}' is neither a baud rate nor auto" in done.stderr
+        assert "--baud" in done.stderr

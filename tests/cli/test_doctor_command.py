@@ -36,25 +36,24 @@ def calibrated(harness: Path, *joints: str) -> None:
     harness.write_text(harness.read_text() + 'calibration = "anna.toml"\n')
 
 
-def test_doctor_reports_devices_scan_times_and_records_against_the_formula(harness: Path) -> None:
-    before = harness.read_text() + "# mine\n"
-    harness.write_text(before)
-    done = thenar("doctor", harness, "--json", "--write")
+def test_doctor_measures_records_as_fast_as_they_come_against_the_formula(harness: Path) -> None:
+    harness.write_text(harness.read_text() + "rate_hz = 10\n")
+    done = thenar("doctor", harness, "--json")
     assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert [one["part"] for one in found[1:]] == ["a record", "a record of 9 sensors"]
-    assert all(one["present"] and one["measured_us"] > 0.9 * one["predicted_us"] for one in found)
-    assert [round(one["predicted_us"]) for one in found] == [6323, 6323, round(9 * 250 + 12 * 10e6 / 115_200)]
-    assert "of the vendor's formula, 6323 us" in found[1]["remarks"][0]
-    measured = round(found[1]["measured_us"])
-    assert harness.read_text() == before.replace("[cyberglove]\n", f"[cyberglove]\nrecord_us = {measured}\n")
-    assert thenar("doctor", harness, "--write").returncode == 0
-    assert harness.read_text().count("record_us") == 1
+    (found,) = json.loads(done.stdout)
+    assert found["present"]
+    assert round(found["predicted_us"]) == 6323
+    assert 0.9 * found["predicted_us"] < found["measured_us"] < 2 * found["predicted_us"]
+    assert found["part"] == "CyberGlove, emulated"
 
 
-def test_a_box_without_a_mask_is_found(harness: Path, glove: EmulatedCyberGlove) -> None:
+def test_a_box_without_a_mask_is_found(
+    small_set: GraspSet, harness: Path, glove: EmulatedCyberGlove, tmp_path: Path
+) -> None:
+    build = compile_build(small_set, tmp_path / "build", rounds=5, folds=0, inputs="joints").folder
+    calibrated(harness, "j0", "j1")
     glove.box.doubts = Doubts(mask="ignored")
-    done = thenar("doctor", harness)
+    done = thenar("doctor", harness, "--build", build)
     assert done.returncode == 0, done.stderr
     assert "it accepts no sensor mask" in " ".join(done.stdout.split())
 

@@ -42,7 +42,7 @@ LINES: dict[str, tuple[str, str]] = {
     "firmware": ("build", "--target host -o new"),
     "spec": ("build", "-o new"),
     "run": ("build", "--replay set.grasps"),
-    "monitor": ("missing.mcap", "--web 127.0.0.1:0"),
+    "monitor": ("missing.mcap", "-b build --web 127.0.0.1:0"),
     "teach": ("movements.grasps", "-b build -o new.json"),
     "calibrate": ("missing/port", "-o new.toml"),
     "record": ("", "--glove glove.toml --subject A --objects objects.toml --taxonomy own -o new.grasps"),

@@ -277,12 +277,9 @@ def test_a_page_that_cannot_be_served_leaves_no_file(folder: Path, start: Start)
 
 
 def test_a_port_without_anybody_at_its_other_end_is_no_device(folder: Path) -> None:
-    (folder / "glove.toml").write_text(
-        f'name = "bench"\n[[stream]]\nport = "unix:{folder}/rows"\nswitches = ["a", "b"]\n'
-    )
-    with socket.socket(socket.AF_UNIX) as silent:
-        silent.bind(str(folder / "rows"))
-        silent.listen()
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        port = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        (folder / "glove.toml").write_text(f'name = "bench"\n[[stream]]\nport = "{port}"\nswitches = ["a", "b"]\n')
         said = refused(command_of(folder, "--taxonomy", "own", "--objects", folder / "objects.toml"))
     assert "nothing came in 3 s; nothing is recorded" in said
 

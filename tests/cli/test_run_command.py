@@ -121,7 +121,6 @@ def test_a_reader_that_goes_away_leaves_no_traceback(set_file: Path, build_folde
         ("set.grasps", "--record", ("more.mcap",)),
         ("set.grasps", "--status", ()),
         ("set.grasps", "--lead", ("1",)),
-        ("set.grasps", "--error-rate", ("0.1",)),
         ("set.grasps", "--lag-ms", ("100",)),
         ("set.grasps", "--change-while-held", ()),
         ("run.mcap", "--web", ()),
@@ -256,10 +255,3 @@ def test_a_preshape_table_without_the_builds_grasp_types_is_refused(set_file: Pa
     done = thenar("run", build_folder, "--replay", set_file, "--preshape", "parallel_gripper")
     assert (done.returncode, done.stdout) == (2, "")
     assert "none of the build's grasp types (cup, pen, rod) is among the table's" in done.stderr
-
-
-def test_a_sequential_test_takes_no_settings_of_the_hysteresis(build_folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "run.mcap").touch()
-    done = thenar("run", build_folder, "--replay", tmp_path / "run.mcap", "--error-rate", 0.1, "--dwell-ms", 20)
-    assert done.returncode == 2
-    assert "--dwell-ms has no effect with --error-rate" in done.stderr

@@ -41,8 +41,6 @@ PORTS = [
     "/dev/ttyUSB0",
     "tcp://glove.local:3333",
     "udp://0.0.0.0:3333",
-    "unix:/run/glove",
-    "ws://glove.local/rows",
     "-",
 ]
 
@@ -67,10 +65,10 @@ def sending(send: Callable[[int], object], every_s: float = 0.01) -> Iterator[No
 
 
 @pytest.fixture
-def moving(tmp_path: Path) -> Iterator[LineServer]:
+def moving() -> Iterator[LineServer]:
     """Yield a sender of a clock, a count, two switches, a pad and a flex sensor, which all move."""
     began = monotonic()
-    with LineServer(tmp_path / "line") as lines:
+    with LineServer() as lines:
 
         def move(n: int) -> None:
             row = [1000 * (monotonic() - began), n, n // 10 % 2, n // 15 % 2]
@@ -224,15 +222,13 @@ def test_words_are_shown_and_rows_ending_in_carriage_returns_read(cases: Path, w
         assert json.loads(done.stdout)["stream"]["columns"] == ["c1", "c2", "c3", "c4", "c5", "c6"]
 
 
-def test_doctor_reports_two_senders_and_late_rows(tmp_path: Path) -> None:
+def test_doctor_reports_two_senders(tmp_path: Path) -> None:
     path = tmp_path / "glove.toml"
     with DatagramLines() as first, DatagramLines() as second:
         second.to = first.to
 
         def send(n: int) -> None:
             first.send(b"%d,%d,%d" % (10 * n, n % 2, 40 * (n % 9)))
-            if n % 20 == 0:
-                first.send(b"%d,0,0" % (10 * n - 15))
             second.send(b"%d,1,7" % (10 * n))
 
         asked = ("--baud", "9600", "--seconds", "2", "--propose", path, "--json")
@@ -243,7 +239,6 @@ def test_doctor_reports_two_senders_and_late_rows(tmp_path: Path) -> None:
     for said in (
         r"127.0.0.1:\d+ sends, too, and its lines are left out",
         r"\d+ rows of another sender",
-        r"counted: .*late \d",
     ):
         assert re.search(said, remarks), remarks
     assert load_harness(path).streams[0].baud == 115_200
@@ -269,7 +264,7 @@ def test_doctor_says_what_is_wrong_with_rows(
 ) -> None:
     monkeypatch.setattr(checkup, "_STARTS_S", 0.0)  # no board is reset here
     path, began = tmp_path / "glove.toml", monotonic()
-    with LineServer(tmp_path / "line") as lines:
+    with LineServer() as lines:
         text = STREAM.format(port=lines.port, joints="{ j0 = [0, 127.5], j1 = [0, 127.5] }")
         path.write_text(text.replace("rate_hz = 100", f"rate_hz = {rate_hz}"))
 
@@ -305,7 +300,6 @@ def test_a_line_where_nothing_comes_or_nothing_can_is_said(tmp_path: Path) -> No
     for port, said in (
         ("spy://x", "is not a supported port"),
         ("/dev/none", "there is no such port"),
-        (f"unix:{tmp_path}/none", "is the sender running"),
     ):
         done = thenar("doctor", "--line", port)
         assert done.returncode == 2
@@ -398,7 +392,7 @@ def test_a_broken_sender_spoils_no_answer_and_is_counted(build_folder: Path, tmp
     out, began = tmp_path / "out.jsonl", monotonic()
     said = '[[stream]]\nrate_hz = 50\nswitches = ["s0", "s1", "s2", "s3", "s4", "s5"]\n'
     said += 'joints = { j0 = [0, 127.5], j1 = [0, 127.5] }\ntime = "ms"\n'
-    with LineServer(tmp_path / "s") as lines:
+    with LineServer() as lines:
         (tmp_path / "mine.toml").write_text(f'{said}port = "{lines.port}"\n')
         values = {f"s{number}": number % 2 for number in range(6)} | {"j0": 60.0, "j1": 35.0}
 
@@ -417,22 +411,17 @@ def test_a_broken_sender_spoils_no_answer_and_is_counted(build_folder: Path, tmp
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("named", [False, True])
-def test_a_second_board_on_the_port_and_impossible_clocks_change_no_answer(
-    build_folder: Path, tmp_path: Path, named: bool
-) -> None:
+def test_a_second_board_on_the_port_and_impossible_clocks_change_no_answer(build_folder: Path, tmp_path: Path) -> None:
     out, began, path = tmp_path / "out.jsonl", monotonic(), tmp_path / "mine.toml"
     with DatagramLines() as first, DatagramLines() as second:
         second.to = first.to
-        first._line.bind(("127.0.0.1", 0))
-        sender = f'from = "127.0.0.1:{first._line.getsockname()[1]}"\n' if named else ""
         text = STREAM.format(port=first.port, joints="{ j0 = [0, 127.5], j1 = [0, 127.5] }")
-        path.write_text(text.replace("rate_hz = 100\n", f"rate_hz = 50\n{sender}"))
+        path.write_text(text.replace("rate_hz = 100\n", "rate_hz = 50\n"))
 
         def send(_number: int) -> None:
             now = round(1000 * (monotonic() - began))
             first.send(b"%d,0,1,0,1,0,1,60,35\nA512B300C200\n1e305,0,0,0,0,0,0,0,0" % now)
-            if named or (out.exists() and '"health":"ok"' in out.read_text()):
+            if out.exists() and '"health":"ok"' in out.read_text():
                 second.send(b"%d,1,0,1,0,1,0,35,60" % (now + 5))
 
         command = ["run", build_folder, "--glove", path, "--frames", "200", "--status"]
@@ -454,7 +443,7 @@ def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(tmp_path: Pa
     recorded.save(tmp_path / "set.grasps")
     build = compile_build(recorded, tmp_path / "build", rounds=10, folds=0, inputs="joints").folder
     (tmp_path / "mine.toml").write_text(
-        '[[stream]]\nport = "udp://0.0.0.0:1"\nfrom = "192.168.4.7"\nrate_hz = 100\n'
+        '[[stream]]\nport = "udp://0.0.0.0:1"\nrate_hz = 100\n'
         "joints = { flex_1 = [0, 4095], flex_2 = [3000, 10] }\n"
         'columns = ["flex_1", "flex_2"]\n'
     )
@@ -480,7 +469,7 @@ def test_calibrate_refuses_rows_from_stdin_where_the_user_types(tmp_path: Path, 
 @pytest.mark.slow
 def test_calibrate_asks_for_the_joints_of_a_stream(tmp_path: Path) -> None:
     path, out = tmp_path / "glove.toml", tmp_path / "anna.toml"
-    with LineServer(tmp_path / "s") as lines, LineSender(lines.send, ("flex",), 100, None, "ms") as sender:
+    with LineServer() as lines, LineSender(lines.send, ("flex",), 100, None, "ms") as sender:
         path.write_text(f'[[stream]]\nport = "{lines.port}"\njoints = {{ flex = [0, 1000] }}\ncolumns = ["flex"]\n')
         master, slave = pty.openpty()
         command = [sys.executable, "-m", "thenar.cli", "calibrate", str(path), "-o", str(out), "--hold", "0.1"]

@@ -15,9 +15,6 @@ import pytest
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Mark
-
 from .conftest import thenar
 
 PATIENCE_S = 30
@@ -88,77 +85,21 @@ def ask(live: ClientConnection, **asked: object) -> None:
     live.send(json.dumps(asked))
 
 
-def test_a_page_of_a_run_records_marks_and_stops(
+def test_a_page_of_a_run_shows_it_and_takes_no_requests(
     start: Callable[..., Command], build_folder: Path, glove: Path, tmp_path: Path
 ) -> None:
-    run = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0")
+    run, before = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0"), set(tmp_path.rglob("*"))
     with run.page() as live:
         build = told(live, "build")
-        assert (build["name"], build["grasps"], build["records"]) == ("glove <b>", ["cup", "pen", "rod", "none"], True)
+        assert (build["name"], build["grasps"], build["replay"]) == ("glove <b>", ["cup", "pen", "rod", "none"], False)
         assert told(live, "hand")["switches"]
-        assert told(live, "recording")["folder"] == "recordings"
         frame = told(live, "frame")
         assert (frame["grasp"], frame["probabilities"]) == ("unknown", None)
         assert told(live, "health")["devices"][0]["error"]
         ask(live, do="record", name="one")
-        state = told(live, "recording", lambda state: state["on"])
-        ask(live, do="mark", text="here <b>")
-        told(live, "recording", lambda state: state["marks"] == 1)
-        ask(live, do="record", name="two")
-        assert told(live, "refused")["why"] == "a recording is running: stop it first"
-        ask(live, do="stop")
-        told(live, "recording", lambda state: not state["on"])
-        ask(live, do="record")
-        last = told(live, "recording", lambda state: state["on"])
-    # What nobody stops, the end of the run does.
-    assert run.end() == 0
-    names = [state["name"], last["name"]]
-    assert sorted(path.name for path in (tmp_path / "recordings").iterdir()) == sorted(names)
-    assert re.fullmatch(r"one-[0-9]{8}-[0-9]{6}\.mcap", names[0])
-    said = "".join(run.said)
-    assert all(f"recordings/{name}: " in said for name in names)
-    readers = [Reader(tmp_path / "recordings" / name) for name in names]
-    entries = [list(reader) for reader in readers]
-    assert not [fault for reader in readers for fault in reader.faults()]
-    assert [entry.text for entry in entries[0] if isinstance(entry, Mark)] == ["here <b>"]
-
-
-NO_NAMES = (
-    *("../up", "/etc/cron.d/x", "a/b", "a\\b", ".hidden", "-option", "x.mcap", "a b", "x" * 41, "\0", "ä", "x\n"),
-    *(5, None, ["x"], {"x": 1}),
-)
-
-
-def test_a_name_that_is_no_part_of_a_files_name_is_refused(
-    start: Callable[..., Command], build_folder: Path, glove: Path, tmp_path: Path
-) -> None:
-    run = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0", "--recordings", tmp_path / "own")
-    before = set(tmp_path.rglob("*"))
-    with run.page() as live:
-        for name in NO_NAMES:
-            ask(live, do="record", name=name)
-            assert "at most 40 letters of a to z, digits, - and _" in told(live, "refused")["why"], name
-        ask(live, do="mark", text="x" * 201)
-        assert "no recording is running" in told(live, "refused")["why"]
-        ask(live, do="format")
-        assert "a page can request record, mark or stop, not 'format'" in told(live, "refused")["why"]
+        assert told(live, "refused")["why"] == "this page takes no requests"
     assert run.end() == 0
     assert set(tmp_path.rglob("*")) == before
-
-
-def test_pages_mark_but_never_end_the_commands_recording(
-    start: Callable[..., Command], build_folder: Path, glove: Path, tmp_path: Path
-) -> None:
-    options = ("--web", "127.0.0.1:0", "--record", tmp_path / "own.mcap")
-    run = start("run", build_folder, "--glove", glove, *options)
-    with run.page() as live:
-        told(live, "recording", lambda state: state["on"] and state["fixed"])
-        ask(live, do="stop")
-        assert "was begun by the command (--record), and ends with it" in told(live, "refused")["why"]
-        ask(live, do="mark")
-        told(live, "recording", lambda state: state["marks"] == 1)
-    assert run.end() == 0
-    assert [entry.text for entry in Reader(tmp_path / "own.mcap") if isinstance(entry, Mark)] == [""]
 
 
 def test_the_token_is_said_once_and_asked_for(start: Callable[..., Command], build_folder: Path, glove: Path) -> None:
@@ -182,7 +123,6 @@ def test_the_token_is_said_once_and_asked_for(start: Callable[..., Command], bui
         (("--web", ""), "is not an address"),
         (("--web", "no.such.host.invalid:80"), "there is no host no.such.host.invalid"),
         (("--web-token",), "--web-token has no effect without --web: leave it out"),
-        (("--recordings", "folder"), "--recordings has no effect without --web: leave it out"),
     ],
 )
 def test_what_cannot_be_is_one_sentence(build_folder: Path, glove: Path, options: tuple[str, ...], said: str) -> None:
@@ -241,7 +181,7 @@ def test_a_recording_is_shown_from_any_moment_of_it(
 def test_what_is_no_recording_is_refused(build_folder: Path, recording: Path, tmp_path: Path) -> None:
     (tmp_path / "text.mcap").write_text("no")
     for name, said in (("none.mcap", "does not exist"), ("text.mcap", "does not begin like an MCAP file")):
-        done = thenar("monitor", tmp_path / name)
+        done = thenar("monitor", tmp_path / name, "--build", build_folder)
         assert done.returncode == 2, done.stderr
         assert said in " ".join(done.stderr.split())
         assert "Traceback" not in done.stderr

@@ -5,10 +5,8 @@ import os
 import socket
 import sys
 from collections.abc import Callable, Iterator
-from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
-from threading import Thread
 from time import monotonic, monotonic_ns
 
 import pytest
@@ -19,54 +17,18 @@ from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.lines import LineReader, Row
 from thenar.drivers.transports import line_port_fault
 
-from ..conftest import tool
-
 LONG_S = 10.0
 Send = Callable[[bytes], None]
 
 
-@pytest.fixture(params=["serial", "tcp://h:1", "udp://h:1", "unix:x", "ws://h:1"])
+@pytest.fixture(params=["serial", "tcp://h:1", "udp://h:1"])
 def way(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str, Send]]:
-    if request.param.startswith("ws") and find_spec("websockets") is None:
-        tool("websockets of PyPI")
     if request.param == "serial":
         with PtyLine(tmp_path / "port") as line:
             yield str(line.link), line.send
         return
-    if request.param.startswith("ws"):
-        with web_socket() as way:
-            yield way
-        return
-    with contextlib.closing(lines_like(request.param, tmp_path / "s")) as sender:
+    with contextlib.closing(lines_like(request.param)) as sender:
         yield sender.port, sender.send
-
-
-@contextlib.contextmanager
-def web_socket() -> Iterator[tuple[str, Send]]:
-    """Serve a WebSocket; give its port, and a function that sends to all clients."""
-    from websockets.sync.server import ServerConnection, serve
-
-    clients = set[ServerConnection]()
-
-    def attend(client: ServerConnection) -> None:
-        clients.add(client)
-        for _ in client:  # until it goes
-            pass
-        clients.discard(client)
-
-    def send(data: bytes) -> None:
-        for client in tuple(clients):
-            with contextlib.suppress(Exception):
-                client.send(data.decode())
-
-    with serve(attend, "127.0.0.1", 0, compression=None) as server:
-        thread = Thread(target=server.serve_forever)
-        thread.start()
-        yield f"ws://127.0.0.1:{server.socket.getsockname()[1]}/", send
-        for client in tuple(clients):
-            client.close()
-        server.shutdown()
-        thread.join()
 
 
 def heard(reader: LineReader, rows: int) -> list[Row]:
@@ -145,8 +107,7 @@ def test_a_second_sender_counts_only_after_the_first_is_silent() -> None:
         assert reader.counts().foreign == 3
         ours, others = (f"127.0.0.1:{source_of(sender)[1]}" for sender in (first, second))
         assert reader.other_sender() == (
-            f"{others} sends, too, and its lines are left out: those of {ours} count; stop it, "
-            f'or choose one by `from = "{ours}"` in glove.toml'
+            f"{others} sends, too, and its lines are left out: those of {ours} count; stop it"
         )
         end, rows = monotonic() + LONG_S, list[Row]()
         while not rows:
@@ -154,28 +115,6 @@ def test_a_second_sender_counts_only_after_the_first_is_silent() -> None:
             second.send(b"7,8")
             rows += reader.read(0.05)
         assert rows[0] == Row(None, (7, 8), None, rows[0].came_us)
-
-
-@pytest.mark.parametrize("with_port", [False, True])
-def test_the_sender_of_datagrams_that_is_named_counts_whoever_was_first(with_port: bool) -> None:
-    with contextlib.ExitStack() as stack:
-        first, named = (stack.enter_context(sender) for sender in datagrams(2))
-        named._line.bind(("127.0.0.2", 0))
-        host, port = named._line.getsockname()
-        reader = stack.enter_context(LineReader(first.port, sender=f"{host}:{port}" if with_port else host))
-        reader.open()
-        for number in range(3):
-            first.send(b"1,2")
-            named.send(b"3,%d" % number)
-        assert [row.values for row in heard(reader, 3)] == [(3, 0), (3, 1), (3, 2)]
-        assert reader.counts().foreign == 3
-        assert reader.other_sender().endswith("count; stop it")
-
-
-@pytest.mark.parametrize("sender", ["glove.local", "192.168.4.7:0", "192.168.4.7:70000", "[::1]", "1.2.3", "::1:x"])
-def test_what_is_no_address_of_a_sender_is_refused(sender: str) -> None:
-    with pytest.raises(SettingError, match="is not the address of a sender"):
-        LineReader("udp://127.0.0.1:5", sender=sender)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux dates datagrams")
@@ -207,10 +146,12 @@ def test_bytes_without_a_row_are_counted() -> None:
         assert (reader.counts().misfits, reader.odd) == (1, "'A512B300'")
 
 
-def test_half_a_line_before_a_break_spoils_no_later_line(tmp_path: Path) -> None:
-    with LineReader(f"unix:{tmp_path}/s") as reader:
+def test_half_a_line_before_a_break_spoils_no_later_line() -> None:
+    with LineServer() as first:
+        port = first.port
+    with LineReader(port) as reader:
         for last in (b"1,2\n77,", b"3,4\n"):
-            with LineServer(tmp_path / "s") as server:
+            with LineServer(int(port.rpartition(":")[2])) as server:
                 reader.open()
                 while not server._clients:
                     pass
@@ -233,19 +174,14 @@ def test_standard_input_is_read_and_its_end_is_said(monkeypatch: pytest.MonkeyPa
             reader.read(LONG_S)
 
 
-def test_nobody_there_is_a_device_error_that_says_what_to_look_at(tmp_path: Path) -> None:
+def test_nobody_there_is_a_device_error_that_says_what_to_look_at() -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     taken = DatagramLines()
-    (tmp_path / "file").write_text("1,2\n")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(taken.to)
         for where, said in (
             (f"tcp://127.0.0.1:{port}", "is the sender running"),
-            (f"ws://127.0.0.1:{port}/", "is the sender running"),
-            (f"unix:{tmp_path}/none", "is the sender running"),
-            (f"unix:{tmp_path}/{'x' * 200}", "too long"),
-            (f"unix:{tmp_path}/file", "it is not a socket"),
             (taken.port, "close other programs that have the port"),
         ):
             with pytest.raises(DeviceError, match=said):
@@ -256,7 +192,7 @@ def test_nobody_there_is_a_device_error_that_says_what_to_look_at(tmp_path: Path
 @pytest.mark.parametrize(
     "port",
     [
-        *("", "tcp://:80", "tcp://h", "udp://h:0", "udp://h:99999", "unix:", "ws://", "ws://h:x/", "spy://x"),
+        *("", "tcp://:80", "tcp://h", "udp://h:0", "udp://h:99999", "ws://h/", "spy://x"),
         *("http://h:1", "tcp://a..b:1", f"tcp://{'a' * 64}.x:1", "udp://.a:1"),
     ],
 )

@@ -26,7 +26,7 @@ MEMBER = Method(name="exits", help="Ends the program", learn=ranked(lambda bits,
 """
 GLOVE = """name = "maker"
 [[stream]]
-port = "unix:/nowhere/glove"
+port = "tcp://127.0.0.1:1"
 columns = ["s0", "s1", "s2"]
 rate_hz = 100
 switches = ["s0", "s1", "s2"]

@@ -98,7 +98,7 @@ def soak(build: Build, harness: Harness, rows: Path, folder: Path, frames: int) 
         build,
         harness,
         preshapes="barrett_bh8",
-        sinks=("jsonl:/dev/null?every", f"unix:{folder}/socket"),
+        sinks=("jsonl:/dev/null?every", "tcp:0"),
         record=folder / "soak.mcap",
         status=True,
         feed=feed.take,

@@ -19,7 +19,7 @@ from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.model.terms.line import Slope
 from thenar.runtime.preshape import Preshape
-from thenar.runtime.published import Count, DeviceHealth, Drift, HealthReport, JointAngles, LiveGrasp
+from thenar.runtime.published import Count, DeviceHealth, HealthReport, JointAngles, LiveGrasp, Quarantined
 
 from ..tables import describe as _describe
 
@@ -143,6 +143,5 @@ def angles() -> JointAngles:
 @pytest.fixture(scope="session")
 def health() -> HealthReport:
     glove = DeviceHealth("cyberglove", True, "", (Count("resyncs", 2),))
-    return HealthReport(
-        7, ("s001",), (), ("s002",), (Drift("index_mpj", -3),), 100.0, 99.5, 600, 25, 10, 1, 0, (glove,)
-    )
+    wrong = Quarantined("s001", "stuck open"), Quarantined("index_mpj", "drifting", used=True)
+    return HealthReport(7, 100.0, 99.5, 600, 25, 10, 1, 0, (glove,), wrong)

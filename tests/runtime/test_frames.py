@@ -10,10 +10,9 @@ PAIRS = st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)), unique_by=(l
 
 def test_a_frame_counts_for_its_stated_time() -> None:
     newest = Newest[SwitchFrame]()
-    assert newest.fresh(0) is None
+    assert newest.frame is None
     newest.take(SwitchFrame(1000, 5), 1000, 200)
-    assert newest.fresh(1200) == SwitchFrame(1000, 5)
-    assert newest.fresh(1201) is None
+    assert newest.expires_us == 1200
     assert newest.time_us == 1000
 
 
@@ -22,15 +21,14 @@ def test_a_frame_from_the_future_ages_from_when_it_came(ahead: int, again: int) 
     newest = Newest[SwitchFrame]()
     for late in range(again + 1):
         newest.take(SwitchFrame(1000 + ahead, 5), 1000 + 30 * late, 200)
-    assert newest.fresh(1200) is not None
-    assert newest.fresh(1201) is None
+    assert newest.expires_us == 1200
 
 
 def test_an_older_frame_does_not_replace_a_newer_one() -> None:
     newest = Newest[SwitchFrame]()
     for frame in (SwitchFrame(50, 1), SwitchFrame(49, 2), SwitchFrame(50, 3)):
         newest.take(frame, 60, 200)
-    assert newest.fresh(60) == SwitchFrame(50, 3)
+    assert newest.frame == SwitchFrame(50, 3)
 
 
 @given(PAIRS, st.lists(st.integers(0, 2**41 - 1)))

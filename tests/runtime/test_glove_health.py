@@ -8,7 +8,7 @@ from thenar.runtime import Build
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.glove import GloveHealth
 from thenar.runtime.live.quarantine import Chattering, JointDrift, Quarantine
-from thenar.runtime.published import UNKNOWN, Count, DeviceHealth, Drift, HealthReport, LiveGrasp
+from thenar.runtime.published import UNKNOWN, Count, DeviceHealth, HealthReport, LiveGrasp
 
 MakeBuild = Callable[..., Build]
 
@@ -89,9 +89,7 @@ def test_faults_are_those_of_the_quarantine(build: Build) -> None:
         quarantine.look_at_joints(second * SECOND, [100, code])
     quarantine.left_out(0, 0)
     report = health.report(0)
-    assert (report.chattering, report.drifting) == (("s1",), (Drift("j1", 30),))
     assert [(one.name, one.reason) for one in report.quarantined] == [("s1", "chattering"), ("j1", "drifting")]
-    assert (report.stuck_open, report.stuck_closed) == ((), ())
 
 
 @pytest.mark.parametrize("hz", [10, 100, 333])

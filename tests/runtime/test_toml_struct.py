@@ -85,17 +85,17 @@ def test_a_wrong_value_is_named_with_line_and_requirement(text: str, message: st
 @pytest.mark.parametrize(
     ("key", "advice"),
     [
-        ("width_cm", "lengths are in millimetres: width_mm"),
-        ("width", "lengths are in millimetres: width_mm"),
-        ("mass_kg", "masses are in grams: mass_g"),
-        ("hold_s", "times are in milliseconds: hold_ms"),
-        ("rate_khz", "rates are in hertz: rate_hz"),
-        ("sd_rad", "angles are in degrees: sd_deg"),
-        ("sd_cm", "lengths are in millimetres: sd_mm"),
+        ("width_cm", "this key is unknown (did you mean 'width_mm"),
+        ("width", "this key is unknown (did you mean 'width_mm"),
+        ("mass_kg", "this key is unknown (did you mean 'mass_g"),
+        ("hold_s", "this key is unknown (did you mean 'hold_ms"),
+        ("rate_khz", "this key is unknown (did you mean 'rate_hz"),
+        ("sd_rad", "this key is unknown (did you mean 'sd_deg"),
+        ("sd_cm", "this key is unknown (did you mean 'sd_mm"),
     ],
 )
-def test_a_key_in_another_unit_is_told_the_unit(key: str, advice: str) -> None:
-    assert complaint(f"width_mm = 1\n{key} = 1") == f"a.toml, line 3: thing.{key}: {advice}"
+def test_a_key_in_another_unit_is_told_the_nearest(key: str, advice: str) -> None:
+    assert complaint(f"width_mm = 1\n{key} = 1").startswith(f"a.toml, line 3: thing.{key}: {advice}")
 
 
 def test_an_unknown_key_is_told_the_nearest() -> None:
@@ -118,7 +118,7 @@ def test_what_is_no_table_is_refused() -> None:
     ("text", "message"),
     [
         ("[[in]]\n[[in]]\nwidht_mm = 1", "line 3: in[1].widht_mm: this key is unknown (did you mean 'width_mm'"),
-        ("[[in]]\nwidth_cm = 1", "line 2: in[0].width_cm: lengths are in millimetres: width_mm"),
+        ("[[in]]\nwidth_cm = 1", "line 2: in[0].width_cm: this key is unknown (did you mean 'width_mm"),
         ("[one]\nside = 'lefd'", "line 2: one.side: 'lefd' is not among its values (did you mean 'left'"),
         ("[one]\ncount = 31", "line 2: one.count: 31 is not among its values (there are: 18, 22)"),
         ("[one]\nnames = { a = 'x', b = 3 }", "line 2: one.names.b: must be text, not 3"),

@@ -18,7 +18,6 @@ export class Replay {
   #ask;
   #state = null; // null: the page is of a run
   #spans = { truth: [], predictions: [], wrong: [] };
-  #marks = [];
   #held = false; // while the slider is dragged, messages do not move it
   #wanted = null; // the requested moment, until the position has changed
   #timer = null;
@@ -40,13 +39,12 @@ export class Replay {
     addEventListener("keydown", (event) => this.#key(event));
   }
 
-  /** Take the predictions, labels and marks of the whole recording. */
-  overview({ predictions, truth, marks }) {
+  /** Take the predictions and labels of the whole recording. */
+  overview({ predictions, truth }) {
     const span = ([from, to, name]) => ({ from, to, name });
     this.#spans.truth = truth.map(span);
     this.#spans.predictions = predictions.map(([from, name], at) => span([from, predictions[at + 1]?.[0] ?? Infinity, name]));
     this.#spans.wrong = this.#wrong();
-    this.#marks = marks;
     this.#draw();
   }
 
@@ -157,8 +155,6 @@ export class Replay {
     const drawn = drawLanes($("whole"), lanes, first_us, Math.max(last_us, first_us + 1), types);
     if (drawn === null) return;
     const { pen, x, high, style } = drawn;
-    pen.fillStyle = style.focus;
-    for (const [us] of this.#marks) pen.fillRect(x(us) - 1, 0, 2, 6);
     pen.fillStyle = style.text;
     pen.fillRect(x(at_us) - 1, 0, 2, high);
     const counts = `${truth.length} labelled spans, ${predictions.length} predictions, wrong in ${wrong.length} spans`;

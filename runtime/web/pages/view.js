@@ -50,9 +50,8 @@ export class View {
     $("types").replaceChildren();
     for (const grasp of build.grasps) this.#row(grasp);
     $("preshape").hidden = !build.preshapes;
-    $("hand-panel").hidden = Boolean(build.partial);
-    say($("build-state"), `build: ${build.build || "not named"}`);
-    $("empty-hand").hidden = build.empty_hand ?? true;
+    say($("build-state"), `build: ${build.build}`);
+    $("empty-hand").hidden = build.empty_hand;
     this.classes = build.grasps;
   }
 
@@ -96,12 +95,6 @@ export class View {
     this.quarantined = report.quarantined.map(({ name, reason, used }) =>
       `${name}: ${reason}, ${used ? "still used" : "treated as lost"}`,
     );
-    this.suspects = [
-      ...report.stuck_open.map((name) => `${name}: stuck open`),
-      ...report.stuck_closed.map((name) => `${name}: stuck closed`),
-      ...report.chattering.map((name) => `${name}: chatters`),
-      ...report.drifting.map(({ joint, codes }) => `${joint}: has drifted by ${codes} codes`),
-    ];
     this.rates = `${report.switch_hz.toFixed(0)}/s switches, ${report.glove_hz.toFixed(0)}/s glove`;
     this.#wrong();
   }
@@ -141,8 +134,6 @@ export class View {
     const news = this.shown?.grasp !== frame.grasp;
     this.shown = frame;
     this.#now(frame);
-    // Without a build, the switches and the probabilities of the other types are not known.
-    $("types-say").hidden = frame.closed !== undefined;
     this.#hand(frame);
     this.timeline.draw();
     if (news || now - this.words >= WORDS_MS) {
@@ -167,7 +158,7 @@ export class View {
   }
 
   #hand(frame) {
-    if (!this.drawing || frame.closed === undefined) return;
+    if (!this.drawing) return;
     const lost = new Set(frame.lost), gone = [];
     for (const [name, bit] of this.bits) {
       gone[bit] = lost.has(name);
@@ -222,7 +213,7 @@ export class View {
   #wrong() {
     const named = new Set(this.quarantined.map((text) => text.split(": ")[0]));
     const lost = (this.frame?.lost ?? []).filter((name) => !named.has(name)).map((name) => `${name}: lost`);
-    const all = [...this.quarantined, ...lost, ...(this.suspects ?? [])];
+    const all = [...this.quarantined, ...lost];
     list($("wrong"), all.length ? all : ["nothing"]);
   }
 

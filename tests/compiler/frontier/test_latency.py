@@ -19,7 +19,7 @@ from thenar.compiler.movements.segments import Span
 from thenar.compiler.movements.streams import Stream
 from thenar.runtime.build import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.decision import Decision, Ranking, SequentialTest
+from thenar.runtime.live.decision import Decision, Ranking
 from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import IntegerTables
@@ -30,7 +30,7 @@ from thenar.runtime.scores import LANE_OFFSET
 from ...tables import describe
 
 CLASSES, SWITCHES, JOINTS = 4, 7, 3
-KINDS = ("single", "dwell", "sequential", "segments")
+KINDS = ("single", "dwell", "segments")
 
 
 def make_tables(seed: int, joints: int = JOINTS) -> IntegerTables:
@@ -78,13 +78,10 @@ def make_build(tables: IntegerTables) -> Build:
     return Build(structs.replace(describe(tables), joints=joints), tables)
 
 
-def policy_of(
-    kind: Any, dwell_us: int, error_rate: float, spacing_us: int = 0, hold_us: int = 500_000
-) -> Policy | None:
+def policy_of(kind: Any, dwell_us: int, hold_us: int = 500_000) -> Policy | None:
     changes: dict[str, Any] = {
         "single": {},
         "dwell": {"dwell_us": dwell_us, "hold_us": hold_us},
-        "sequential": {"error_rate": error_rate, "spacing_us": spacing_us, "hold_us": hold_us},
     }
     usual = POLICIES[kind]
     return None if usual is None else structs.replace(usual, **changes[kind])
@@ -120,13 +117,12 @@ def played_live(tables: IntegerTables, replay: Replay, step_us: int, policy: Pol
     seed=st.integers(0, 999),
     step_us=st.integers(700, 9_000),
     dwell_us=st.integers(0, 60_000),
-    spacing_us=st.sampled_from([0, 5_000, 30_000]),
 )
 def test_what_is_decided_is_what_the_live_recogniser_publishes(
-    kind: Any, joints: int, seed: int, step_us: int, dwell_us: int, spacing_us: int
+    kind: Any, joints: int, seed: int, step_us: int, dwell_us: int
 ) -> None:
     tables, replay = make_tables(seed, joints), make_random_replay(seed, grasps=2)
-    policy = policy_of(kind, dwell_us, 0.05, spacing_us, 70_000)
+    policy = policy_of(kind, dwell_us, 70_000)
     live = played_live(tables, replay, step_us, policy)
     found = decided_at(decided_on(tables, replay, step_us, policy), len(live))
     names = [UNKNOWN if number < 0 else f"grasp {number}" for number in found]
@@ -172,7 +168,7 @@ def by_definition(tables: IntegerTables, replay: Replay, step_us: int, policy: P
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(5))
 def test_latency_follows_its_definition_frame_by_frame(kind: Any, seed: int) -> None:
-    tables, replay, policy = make_tables(seed), make_random_replay(seed), policy_of(kind, 15_000, 0.2)
+    tables, replay, policy = make_tables(seed), make_random_replay(seed), policy_of(kind, 15_000)
     found = latency(tables, replay, 2_500.2, policy)
     assert [found.mean_us, found.p99_us, found.missed, found.wrong] == pytest.approx(
         by_definition(tables, replay, 2_500, policy)
@@ -196,9 +192,6 @@ def two_grasps(flicker: bool = False) -> tuple[IntegerTables, Replay]:
         # Frames begin at 0, 1, 2 ... ms: the first that sees class 1 begins 0.7 ms after it, and takes 1 ms.
         (POLICIES["single"], 1_000, 1_700),
         (Policy(dwell_us=50_000, lead=1.0), 1_000, 51_700),
-        # ln(1 / 0.01) is 461 steps, each frame brings 400: two frames; but the test that begins with the last frame of
-        # class 0 has to make up for it.
-        (POLICIES["sequential"], 2_000, 3_700),
         # Of a tick each 10 ms that of 1010 ms is the first of class 1, and is final 15 ticks later.
         (None, 151_000, 160_700),
     ],
@@ -272,11 +265,7 @@ def at_each(decided: tuple[np.ndarray, np.ndarray], count: int) -> list[int]:
 
 
 def frame_by_frame(runs: Runs, policy: Policy) -> list[int]:
-    decider: Decision | SequentialTest
-    if policy.error_rate is None:
-        decider = Decision(policy.lead_steps(SCALE), policy.dwell_us, policy.hold_us)
-    else:
-        decider = SequentialTest(DECIDED, SCALE, policy.error_rate, policy.hold_us, policy.spacing_us)
+    decider = Decision(policy.lead_steps(SCALE), policy.dwell_us, policy.hold_us)
     scores, at_us, step_us = runs
     found = []
     for time_us in range(0, int(at_us[-1]), step_us):
@@ -306,8 +295,6 @@ def policies(draw: st.DrawFn) -> Policy:
         lead=draw(st.sampled_from([0.0, 0.3, 1.0, 4.0])),
         dwell_us=dwell_us,
         hold_us=dwell_us + draw(times),
-        error_rate=draw(st.sampled_from([None, 0.5, 0.1, 1e-3])),
-        spacing_us=draw(st.sampled_from([0, 1, 17, 60, 300])),
     )
 
 

@@ -14,7 +14,7 @@ from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.placement import choose, kept_joints
 from thenar.compiler.placement.ports import PortCosts, record_times_us
 from thenar.compiler.samples import Columns, Samples, TrainingError
-from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.harness.wiring import GloveWiring
 
 # Three switches, then two taxels of three and two levels.
@@ -177,4 +177,3 @@ def test_records_are_known_of_a_cyberglove_however_its_joints_are_called() -> No
     named = tuple(f"g{sensor}" for sensor in range(18))
     assert record_times_us(named[:2]) == record_times_us(()) == ()
     assert record_times_us(named[:2], GloveWiring(port="p", joints=named)) == record_times_us(SENSORS_18[:2])
-    assert record_times_us(SENSORS_22[:1], GloveWiring(port="p", record_us=9e3, sensors=22))[0] > 400

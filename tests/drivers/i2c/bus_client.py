@@ -32,7 +32,7 @@ class Client:
 
     def prepare(self, ports: list[tuple[int, str]]) -> None:
         self._scan = self._bus.prepare(
-            [[PlacedPort(self._members[chip], self._reading(chip, name)) for chip, name in ports]]
+            [PlacedPort(self._members[chip], self._reading(chip, name)) for chip, name in ports]
         )
 
     def read(self) -> list[int | None]:

@@ -164,7 +164,7 @@ def test_a_file_is_no_bus_and_is_not_even_opened(tmp_path: Path) -> None:
 
 def test_a_bus_that_was_not_opened_or_was_closed_says_so(rig: MakeRig) -> None:
     chip = PlacedChip(CHIPS["mcp23017"], 0x20, frozenset())
-    scan = I2cBus("/dev/i2c-7", [chip]).prepare([[PlacedPort(chip, chip.chip.readings[0])]])
+    scan = I2cBus("/dev/i2c-7", [chip]).prepare([PlacedPort(chip, chip.chip.readings[0])])
     with pytest.raises(DeviceError, match="is not open"):
         scan.read()
     glove = rig(("mcp23017", 0x20))

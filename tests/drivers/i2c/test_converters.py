@@ -1,4 +1,4 @@
-"""Conversions that go on while the bus reads other ports, on an emulated wire in this process and in its time."""
+"""Conversions, on an emulated wire in this process and in its time."""
 
 from collections.abc import Sequence
 
@@ -14,9 +14,10 @@ from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.i2c.node import DeviceNode, Query, Run
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
+from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.scanmap import Port
-from thenar.runtime.scanning.timing import overlapped_us, reading_of
+from thenar.runtime.scanning.timing import reading_of, scan_us
 
 CLOCK_HZ = 400_000
 Place = tuple[str, int, int | None, int | None]  # kind, address, mux, channel
@@ -105,8 +106,8 @@ def harness_of(places: Sequence[Place]) -> Harness:
     return Harness(name="x", buses=(bus,))
 
 
-def groups_of(bus: I2cBus, ports: Sequence[Port], harness: Harness) -> list[list[PlacedPort]]:
-    return [[PlacedPort(bus.chips[port.chip], reading_of(port, harness))] for port in ports]
+def placed(bus: I2cBus, ports: Sequence[Port], harness: Harness) -> list[PlacedPort]:
+    return [PlacedPort(bus.chips[port.chip], reading_of(port, harness)) for port in ports]
 
 
 PLACES: dict[str, list[Place]] = {
@@ -136,41 +137,24 @@ def test_a_scan_takes_the_planned_time_and_gives_every_code(
     @given(data=st.data())
     def scans(data: st.DataObject) -> None:
         world, harness = World(*places), harness_of(places)
-        scan = whole_scan(harness, [*harness.switches, *(f"{name}>1" for name in harness.taxel_names)])
-        ports = data.draw(st.permutations(scan.ports))[: data.draw(st.integers(1, len(scan.ports)))]
+        names = [*harness.switches, *(f"{name}>1" for name in harness.taxel_names)]
+        scan = plan_scan(data.draw(st.permutations(names))[: data.draw(st.integers(1, len(names)))], harness)
+        ports = scan.ports
         codes = [data.draw(st.lists(st.integers(1, 4095), min_size=4, max_size=4)) for _ in places]
         with monkeypatch.context() as patch:
             bus = opened(patch, world, places)
             for station, four, (kind, *_) in zip(world.stations, codes, places, strict=True):
                 if kind.startswith("ads"):
                     station.device.levels = sum(code << 16 * channel for channel, code in enumerate(four))
-            reads = bus.prepare(groups_of(bus, ports, harness))
+            reads = bus.prepare(placed(bus, ports, harness))
             reads.read()
             before, found = world.now, reads.read()
-        assert (world.now - before) * 1e6 == pytest.approx(overlapped_us(ports, harness), abs=0.01)
+        assert (world.now - before) * 1e6 == pytest.approx(scan_us(scan, harness).us, abs=0.01)
         for port, code in zip(ports, found, strict=True):
             if port.levels:
                 assert code == codes[port.chip][reading_of(port, harness).pins[0]]
 
     scans()
-
-
-def test_a_scan_that_ended_early_leaves_no_old_codes_behind(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The conversion that goes on is waited for, for the chip would take no other; and then the first begins anew."""
-    places = PLACES["one"]
-    world, harness = World(*places), harness_of(places)
-    bus = opened(monkeypatch, world, places)
-    scan = whole_scan(harness, [f"{name}>1" for name in harness.taxel_names])
-    reads = bus.prepare(groups_of(bus, scan.ports, harness))
-    device = world.stations[0].device
-    for code in (100, 200, 300):
-        device.levels = sum(code + channel << 16 * channel for channel in range(4))
-        for number, (answer,) in enumerate(reads):
-            assert answer == code + number
-            if number == 1:
-                break
-    device.levels = sum(7 + channel << 16 * channel for channel in range(4))
-    assert reads.read() == [7, 8, 9, 10]
 
 
 def test_a_converter_that_is_gone_is_no_answer_and_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -180,7 +164,7 @@ def test_a_converter_that_is_gone_is_no_answer_and_holds_nobody_up(monkeypatch: 
     scan = whole_scan(harness, [*harness.switches, *(f"{name}>1" for name in harness.taxel_names)])
     for station, (kind, *_) in zip(world.stations, places, strict=True):
         station.device.levels = 0x0004_0003_0002_0001 if kind.startswith("ads") else 0xFFFF
-    reads = bus.prepare(groups_of(bus, scan.ports, harness))
+    reads = bus.prepare(placed(bus, scan.ports, harness))
     whole = reads.read()
     assert [answer for port, answer in zip(scan.ports, whole, strict=True) if port.chip == 2] == [1, 2, 3, 4]
     world.stations[2].absent = True
@@ -200,7 +184,7 @@ def test_channels_at_rest_are_looked_into_once_a_check(monkeypatch: pytest.Monke
     world, harness = World(*places), harness_of(places)
     bus = opened(monkeypatch, world, places)
     scan = whole_scan(harness, [f"{name}>1" for name in harness.taxel_names])
-    reads = bus.prepare(groups_of(bus, scan.ports, harness))
+    reads = bus.prepare(placed(bus, scan.ports, harness))
     wire = world.adapter.wire
     bus.chips[0].checked += 1
     before = wire.transfers

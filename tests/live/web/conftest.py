@@ -77,11 +77,13 @@ def browser(chromium: Browser) -> Iterator[Browser]:
 class Run:
     """What runs, the scene that it looks at, and its page."""
 
-    def __init__(self, stack: ExitStack, scene: Any, harness: Harness, folder: Path, build: Path) -> None:
-        self.scene, self.recordings = scene, folder / "recordings"
+    def __init__(
+        self, stack: ExitStack, scene: Any, harness: Harness, folder: Path, build: Path, record: Path | None
+    ) -> None:
+        self.scene = scene
         self.bench, wired = on_bench(stack, scene, harness, folder)
-        self.glove = Glove(scene.truth.build, wired, policy=FRANK, recordable=True, status=True)
-        self.page = LivePage(self.glove, build, "127.0.0.1:0", token=None, recordings=self.recordings)
+        self.glove = Glove(scene.truth.build, wired, policy=FRANK, record=record, status=True)
+        self.page = LivePage(self.glove, build, "127.0.0.1:0", token=None)
         stack.enter_context(self.page)
         stack.enter_context(self.glove)
         self._thread = Thread(target=self._run, name="loop")
@@ -99,13 +101,15 @@ class Run:
 
 
 @pytest.fixture
-def run(stage: Any, harness_of: Callable[..., Harness], make_scene: Any, tmp_path: Path) -> Iterator[Callable[[], Run]]:
+def run(
+    stage: Any, harness_of: Callable[..., Harness], make_scene: Any, tmp_path: Path
+) -> Iterator[Callable[..., Run]]:
     """Return what starts a run of a glove and a board, showing row 0: all is well when it returns."""
     with ExitStack() as stack:
 
-        def start() -> Run:
+        def start(record: Path | None = None) -> Run:
             scene = make_scene(stage.truth("both"), None)
-            made = Run(stack, scene, harness_of("both", "glove", "board"), tmp_path, stage.builds["both"])
+            made = Run(stack, scene, harness_of("both", "glove", "board"), tmp_path, stage.builds["both"], record)
             scene.show(0)
             scene.well(now_us())
             return made

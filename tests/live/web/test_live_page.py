@@ -4,14 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from selenium.webdriver.common.action_chains import ActionChains
-from selenium.webdriver.common.keys import Keys
 
-from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.replay import replayed
-from thenar.runtime.published import LiveGrasp
-from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Mark
 from thenar.runtime.web.server import Server, message
 
 pytestmark = pytest.mark.slow
@@ -110,82 +103,6 @@ def test_what_is_lost_is_named_and_crossed_out(run: Callable[[], Any], browser: 
     browser.wait(
         lambda: browser.texts("#wrong li") == ["nothing"] and browser.text("glove-state") == "glove: connected"
     )
-
-
-def test_record_mark_and_stop_write_what_the_command_writes(run: Callable[[], Any], browser: Any) -> None:
-    running = run()
-    browser.open(running.page.server.url)
-    shown(browser, running.scene, 0)
-    browser.driver.find_element("id", "record-name").send_keys("first_try")
-    browser.click("record")
-    browser.wait(lambda: browser.text("recording").startswith("first_try-"))
-    for row in (5, 11):
-        shown(browser, running.scene, row)
-        browser.click("mark")
-    browser.wait(lambda: "2 marks" in browser.text("recording"))
-    browser.click("stop")
-    browser.wait(lambda: "is complete" in browser.text("recording"))
-    written = browser.text("recording")
-    browser.driver.get("about:blank")
-    running.end()
-    running.page.close()
-    (path,) = running.recordings.iterdir()
-    assert path.name in written
-    entries, reader = list(Reader(path)), Reader(path)
-    assert not list(reader.faults())
-    marks = [entry for entry in entries if isinstance(entry, Mark)]
-    recorded = [entry for entry in entries if isinstance(entry, LiveGrasp)]
-    assert len(marks) == 2
-    assert recorded[0].time_us < marks[0].time_us < marks[1].time_us < recorded[-1].time_us
-    first, last = recorded[0].time_us, recorded[-1].time_us
-    assert recorded == [one for one in running.scene.grasps.all if first <= one.time_us <= last]
-    pairs = list(replayed(running.glove.system.build, path, running.glove.system.policy))
-    assert {one.grasp for one in recorded} >= {running.scene.truth.answer(row) for row in (0, 5, 11)}
-    # Until both devices have sent something, they rest on what came in before the recording began.
-    begun_us = max(next(e.time_us for e in entries if isinstance(e, kind)) for kind in (SwitchFrame, GloveFrame))
-    known = [(then, now) for then, now in pairs if now.time_us > begun_us]
-    assert len(known) > 20
-    assert [then.candidate for then, _ in known] == [now.candidate for _, now in known]
-
-
-def test_a_keyboard_is_enough(run: Callable[[], Any], browser: Any) -> None:
-    running = run()
-    browser.open(running.page.server.url)
-    shown(browser, running.scene, 0)
-
-    def press(*keys: str) -> None:
-        ActionChains(browser.driver).send_keys(*keys).perform()
-
-    def focused() -> str:
-        return str(browser.script("return document.activeElement.id"))
-
-    press(Keys.TAB)
-    assert focused() == "record-name"
-    outline = "return getComputedStyle(document.activeElement).outlineStyle"
-    assert browser.script(outline) == "solid"
-    press("keys", Keys.ENTER)
-    browser.wait(lambda: browser.text("recording").startswith("keys-"))
-    browser.wait(lambda: focused() == "mark")
-    press(Keys.SPACE)
-    browser.wait(lambda: "1 mark" in browser.text("recording"))
-    press(Keys.TAB)
-    assert focused() == "stop"
-    press(Keys.ENTER)
-    browser.wait(lambda: "is complete" in browser.text("recording"))
-    browser.wait(lambda: focused() == "record")
-
-
-def test_what_cannot_be_is_said_beside_the_buttons(run: Callable[[], Any], browser: Any) -> None:
-    running = run()
-    running.recordings.write_text("a file where the folder should be")
-    browser.open(running.page.server.url)
-    browser.wait(lambda: browser.text("recording") == f"none; goes to {running.recordings}")
-    browser.click("record")
-    browser.wait(lambda: browser.text("refused") == f"nothing can be recorded in {running.recordings}: File exists")
-    running.recordings.unlink()
-    browser.click("record")
-    browser.wait(lambda: browser.text("recording").startswith("run-"))
-    assert browser.text("refused") == ""
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -287,23 +204,17 @@ def test_names_are_text_wherever_they_are_shown(browser: Any) -> None:
     }
     report = {
         **{
-            "stuck_open": [image],
-            "stuck_closed": [],
-            "chattering": [],
-            "drifting": [],
             "switch_hz": 1.0,
             "glove_hz": 0.0,
         },
         "devices": [{"name": image, "connected": False, "error": SCRIPT, "counts": [{"name": image, "value": 1}]}],
         "quarantined": [{"name": SCRIPT, "reason": image, "used": False}],
     }
-    state = {"folder": image, "on": True, "name": SCRIPT, "fixed": False, "since_s": 0.0, "messages": 1, "marks": 0}
     with Server(
         "live", "127.0.0.1:0", token=None, hello=lambda: [message("build", build), message("hand", hand)]
     ) as server:
         server.publish("frame", message("frame", frame))
         server.publish("health", message("health", report))
-        server.publish("recording", message("recording", state | {"failure": ""}))
         browser.open(server.url)
         browser.wait(lambda: browser.text("grasp") == SCRIPT and browser.texts("#wrong li"))
         assert browser.texts("#types .name") == [SCRIPT, image]

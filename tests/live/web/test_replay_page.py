@@ -16,7 +16,7 @@ from selenium.webdriver.common.keys import Keys
 from thenar.runtime.frames import SwitchFrame, now_us
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Label, Mark
+from thenar.runtime.recording.session import Label
 from thenar.runtime.web.replay import ReplayPage
 
 pytestmark = pytest.mark.slow
@@ -45,12 +45,11 @@ class Recorded:
 
 
 @pytest.fixture
-def recording(run: Callable[[], Any], tmp_path: Path) -> tuple[Path, dict[int, tuple[int, int]]]:
+def recording(run: Callable[..., Any], tmp_path: Path) -> tuple[Path, dict[int, tuple[int, int]]]:
     """Return a recording of several rows, each labelled as a trial, and when each was settled, by the host's clock."""
-    running, path, spans = run(), tmp_path / "run.mcap", dict[int, tuple[int, int]]()
-    scene = running.scene
-    recorder = running.glove.new_recording(path)
-    running.glove.recorder = recorder
+    path, spans = tmp_path / "run.mcap", dict[int, tuple[int, int]]()
+    running = run(path)
+    scene, recorder = running.scene, running.glove.recorder
     for number, row in enumerate(ROWS, 1):
         scene.show(row)
         answer = scene.settled(row).candidate
@@ -61,7 +60,6 @@ def recording(run: Callable[[], Any], tmp_path: Path) -> tuple[Path, dict[int, t
             label = Label(time_us, event, number, answer, "A", "thing")  # type: ignore[arg-type]
             # A run writes no labels itself: in its thread, as the next moment comes at any time.
             recorder._thread.put(partial(recorder._recorder.label, label))
-        recorder.mark(Mark(now_us(), f"row {row}"))
     running.end()
     recorder.close()
     return path, spans
@@ -72,7 +70,7 @@ def show(browser: Any) -> Iterator[Callable[..., Any]]:
     """Return what opens the page of a recording in the browser."""
     with ExitStack() as stack:
 
-        def opened(path: Path, build: Path | None, **how: Any) -> ReplayPage:
+        def opened(path: Path, build: Path, **how: Any) -> ReplayPage:
             page = stack.enter_context(ReplayPage(path, "127.0.0.1:0", token=None, build=build))
             stop = Event()
             thread = Thread(target=page.run, args=(stop,))
@@ -171,14 +169,3 @@ def test_a_recording_that_is_cut_shows_what_there_is_and_says_so(
     browser.wait(lambda: browser.text("grasp") == left.grasps[-1].grasp)
     assert browser.script("return document.documentElement.scrollWidth") <= 400
     assert browser.axe() == []
-
-
-def test_without_its_build_a_recording_shows_answers_and_labels(
-    recording: tuple[Path, dict[int, tuple[int, int]]], browser: Any, show: Callable[..., Any]
-) -> None:
-    recorded = Recorded(recording[0])
-    show(recording[0], None)
-    browser.script(_SEEK, recorded.seconds / 2)
-    browser.wait(lambda: browser.text("grasp") == recorded.at(recorded.seconds / 2).grasp)
-    assert "name one with --build, the one that ran" in browser.text("faults")
-    assert not browser.driver.find_element("id", "hand-panel").is_displayed()

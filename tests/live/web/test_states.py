@@ -53,7 +53,7 @@ class Run:
         told: Sequence[Mapping[str, object]] = [
             {"name": name, "connected": connected, "error": "", "counts": []} for name, connected in devices
         ]
-        empty = dict.fromkeys(("stuck_open", "stuck_closed", "chattering", "drifting", "quarantined"), ())
+        empty = {"quarantined": ()}
         self.server.publish("health", message("health", empty, switch_hz=0.0, glove_hz=0.0, devices=told))
 
     @property
@@ -169,7 +169,7 @@ def test_a_recordings_wrong_predictions_are_marked_by_sign_and_words(browser: An
     truth = [(500_000, 3_000_000, "Add"), (4_000_000, 8_000_000, "Add")]
     hello = [message("build", BUILD | {"replay": True})]
     with Server("live", "127.0.0.1:0", token=None, hello=lambda: hello) as server:
-        server.publish("overview", message("overview", predictions=predictions, truth=truth, marks=[]))
+        server.publish("overview", message("overview", predictions=predictions, truth=truth))
         browser.open(server.url)
         for grasp, label, said in (
             ("Add", "Add", "Truth: Add"),

@@ -13,7 +13,7 @@ name = "bench"
 
 [cyberglove]
 port = "/dev/ttyUSB0"
-baud = "auto"
+baud = 38_400
 rate_hz = 100
 sensors = 18
 calibration = "anna.toml"

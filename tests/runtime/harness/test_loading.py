@@ -27,7 +27,7 @@ def complaint(load: Load, text: str) -> str:
 def test_every_table_of_the_file_arrives(load: Load, full_text: str, tmp_path: Path) -> None:
     harness = load(full_text)
     calibration = str(tmp_path / "anna.toml")
-    glove = GloveWiring(port="/dev/ttyUSB0", baud="auto", rate_hz=100.0, sensors=18, calibration=calibration)
+    glove = GloveWiring(port="/dev/ttyUSB0", baud=38_400, rate_hz=100.0, sensors=18, calibration=calibration)
     assert (harness.name, harness.cyberglove) == ("bench", glove)
     (stream,) = harness.streams
     assert stream.board is not None
@@ -78,26 +78,21 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ),
         (
             "[[stream]]\nport = 'socket://a:1?x'\nswitches = ['a']",
-            "port: 'socket://a:1?x' has the option 'x', which it does not support",
+            "port: 'socket://a:1?x' is not the address of a line",
         ),
         *(
             (f"[[stream]]\nport = '{port}'", f"line 2: stream[0].port: '{port}' is not a supported port")
             for port in ("spy:///dev/null?file=a", "alt://a?class=b", "loop://", "hwgrep://a")
         ),
-        (
-            "[[stream]]\nport = 'udp://0.0.0.0:5'\nfrom = 'glove.local'\nswitches = ['a']",
-            "line 3: stream[0].from: 'glove.local' is not the address of a sender, such as 192.168.4.7",
-        ),
-        (
-            "[[stream]]\nport = '/dev/ttyUSB0'\nfrom = '192.168.4.7'\nswitches = ['a']",
-            "line 3: stream[0].from: is for udp:// ports",
-        ),
         ("[[bus]]\ndevice = 'spy://a'", "line 2: bus[0].device: 'spy://a' is not the path of a device, such as"),
         ("[[bus]]\ndevice = 'a\\u001bb'".replace("'", '"'), "bus[0].device: 'a\\x1bb' is not the path of a device"),
-        ("[cyberglove]\nport = 'x'\nbaud = 'fast'", "line 3: cyberglove.baud: 'fast' is not among its values (did"),
+        ("[cyberglove]\nport = 'x'\nbaud = 'fast'", "line 3: cyberglove.baud: must be a whole number, not 'fast'"),
         ("[cyberglove]\nport = 'x'\nbaud = 0", "line 3: cyberglove.baud: must be at least 1, not 0"),
         ("[cyberglove]\nport = 'x'\nsensors = 20", "line 3: cyberglove.sensors: 20 is not among its values"),
-        ("[cyberglove]\nport = 'x'\nrate_khz = 1", "line 3: cyberglove.rate_khz: rates are in hertz: rate_hz"),
+        (
+            "[cyberglove]\nport = 'x'\nrate_khz = 1",
+            "line 3: cyberglove.rate_khz: this key is unknown (did you mean 'rate_hz",
+        ),
         ("[cyberglove]\nport = 'x'\nrate_hz = nan", "line 3: cyberglove.rate_hz: must be a finite number"),
         (
             "[cyberglove]\nport = 'x'\njoints = ['a']",

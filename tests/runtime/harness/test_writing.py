@@ -1,13 +1,10 @@
 from collections.abc import Callable
-from pathlib import Path
 
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.drivers.ports import port_fault
-from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import (
     BoardWiring,
@@ -19,7 +16,7 @@ from thenar.runtime.harness.wiring import (
     MuxChannel,
     StreamWiring,
 )
-from thenar.runtime.harness.writing import harness_to_toml, write_record_us
+from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.names import fault
 from thenar.runtime.taxels import TaxelSettings
 
@@ -37,7 +34,7 @@ def board_of(switches: tuple[str, ...]) -> BoardWiring:
 gloves = st.builds(
     GloveWiring,
     port=ports,
-    baud=st.just("auto") | st.integers(1, 10**6),
+    baud=st.integers(1, 10**6),
     rate_hz=st.none() | st.floats(0.1, 900.0),
     sensors=st.sampled_from([None, 18, 22]),
     calibration=st.none() | st.just("/a/b.toml"),
@@ -94,21 +91,3 @@ def test_addresses_are_written_as_they_are_spoken_of(load: Load, full_text: str)
     assert "address = 0x20\n" in text
     assert "address = 0x70\nchannel = 2\n" in text
     assert '    { kind = "mcp23017", address = 0x21, pins = ' in text
-
-
-@pytest.mark.parametrize("rest", ["", "# mine\nbaud = 38_400\n", "record_us = 5.5\n\n[debounce]\nrelease_ms = 4\n"])
-def test_what_was_measured_is_written_and_all_else_is_kept(tmp_path: Path, rest: str) -> None:
-    path = tmp_path / "glove.toml"
-    path.write_text(f'name = "a"  # b\n[cyberglove]  # c\nport = "/dev/x"\n{rest}')
-    write_record_us(path, 6400)
-    rest = rest.replace("record_us = 5.5\n", "")
-    assert path.read_text() == f'name = "a"  # b\n[cyberglove]  # c\nrecord_us = 6400\nport = "/dev/x"\n{rest}'
-
-
-@pytest.mark.parametrize("text", ['cyberglove = { port = "/dev/x" }\n', 'cyberglove.port = "/dev/x"\n', 'name = "a"\n'])
-def test_a_file_without_room_stays_and_the_text_is_shown(tmp_path: Path, text: str) -> None:
-    path = tmp_path / "glove.toml"
-    path.write_text(text)
-    with pytest.raises(HarnessError, match="write `record_us = 6400` there"):
-        write_record_us(path, 6400)
-    assert path.read_text() == text

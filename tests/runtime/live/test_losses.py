@@ -101,7 +101,6 @@ POLICIES = {
     "hysteresis": Policy(),
     "anything may be lost": SHAKY,
     "no lead": Policy(lead=0.0, dwell_us=30_000, hold_us=60_000, max_lost=1.0),
-    "sequential test": Policy(error_rate=0.2, max_lost=1.0),
 }
 
 
@@ -135,12 +134,9 @@ def test_in_a_hundred_thousand_sequences_there_is_no_wrong_ok_line(make_build: M
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("error_rate", [None, 0.05])
-def test_a_still_hands_ok_lines_keep_its_grasp_through_losses(
-    make_build: MakeBuild, seed: int, error_rate: float | None
-) -> None:
+def test_a_still_hands_ok_lines_keep_its_grasp_through_losses(make_build: MakeBuild, seed: int) -> None:
     """150 ms of whole frames, 100 ms without switches, and whole frames again, of every state of the switches."""
-    build, policy, other, ok = make_build(seed), Policy(max_lost=1.0, error_rate=error_rate), 0, 0
+    build, policy, other, ok = make_build(seed), Policy(max_lost=1.0), 0, 0
     for closed in range(ALL + 1):
         live, lines = recognizer(build, policy), []
         for number in range(40):
@@ -152,6 +148,6 @@ def test_a_still_hands_ok_lines_keep_its_grasp_through_losses(
         sure = [line for line in lines if line.health == "ok"]
         assert all(line.grasp == lines[0].candidate for line in sure)
         ok += len(sure)
-        assert len(sure) == 30 or error_rate
+        assert len(sure) == 30
     assert other > 0
     assert ok > 30

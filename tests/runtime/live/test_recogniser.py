@@ -235,20 +235,3 @@ def test_after_unknown_the_first_candidate_is_decided_on_at_once(make_build: Mak
     assert live.step(90_000, 0, None, None).grasp.grasp == UNKNOWN
     found = live.step(9100, 0, SwitchFrame(9100, other), GloveFrame(9100, record)).grasp
     assert found.grasp == found.candidate == held.candidate
-
-
-def test_a_sequential_test_takes_whole_frames_only(make_build: MakeBuild) -> None:
-    live = recognizer(make_build(), Policy(error_rate=0.01, max_lost=1.0))
-    found = live.step(0, 0, SwitchFrame(0, 0, 0b11), GloveFrame(0, b"\x05\x06\x07\x08")).grasp
-    assert (found.health, found.lost) == ("degraded", ("s0", "s1"))
-
-
-def test_a_sequential_test_answers_once_it_has_decided(make_build: MakeBuild) -> None:
-    live, answers = recognizer(make_build(), Policy(error_rate=1e-6, hold_us=10**6)), []
-    for now in range(0, 100_000, 1000):
-        found = live.step(now, 0, SwitchFrame(now, 0b101), GloveFrame(now, b"\x05\x06\x07\x08")).grasp
-        answers.append(found.grasp)
-        assert (found.probability == 0) == (found.grasp == UNKNOWN)
-        assert found.health == ("changing" if found.grasp == UNKNOWN else "ok")
-    assert answers[0] == UNKNOWN
-    assert answers[-1] == found.candidate

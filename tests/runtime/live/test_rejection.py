@@ -15,7 +15,7 @@ from thenar.runtime.live.decision import Ranking
 from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.manifest import Rejection
 from thenar.runtime.policy import Policy
-from thenar.runtime.published import NONE, UNKNOWN, LiveGrasp
+from thenar.runtime.published import NONE, LiveGrasp
 
 MakeBuild = Callable[..., Build]
 
@@ -92,13 +92,6 @@ def test_none_is_decided_on_like_any_type(build: Build) -> None:
         assert {one.health for one in after[:50]} == {"changing"}
         assert {(one.grasp, one.health) for one in after[50:]} == {(after[-1].candidate, "ok")}
     assert held[-1].grasp == again[-1].grasp != empty[-1].grasp == NONE
-
-
-def test_a_sequential_test_ends_with_none(build: Build) -> None:
-    live = recognizer(build, Policy(error_rate=0.01))
-    assert {one.grasp for one in lasting(live, EMPTY, 200, 0)} <= {UNKNOWN, NONE}
-    assert lasting(live, EMPTY, 1, 200_000)[-1].grasp == NONE
-    assert lasting(live, HELD, 900, 201_000)[-1].grasp not in (UNKNOWN, NONE)
 
 
 def test_segments_begin_and_end_where_frames_are_refused_no_longer(build: Build) -> None:

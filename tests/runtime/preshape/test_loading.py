@@ -165,7 +165,7 @@ def test_ones_own_table_is_in_rad_and_metres_afterwards(own: Path) -> None:
         (
             "time_from_start_s",
             "time_from_start_ms",
-            "line 2: time_from_start_ms: times are in seconds: time_from_start_s",
+            "line 2: time_from_start_ms: this key is unknown (did you mean 'time_from_start_s",
         ),
         (
             "positions",

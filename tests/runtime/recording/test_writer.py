@@ -28,7 +28,7 @@ from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.layout import Tail
 from thenar.runtime.recording.mcap import LARGEST_RECORD
 from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Collection, Label, Mark, Session
+from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine
 
@@ -289,14 +289,6 @@ def test_a_session_that_does_not_fit_is_no_session(recording: Path, session: Ses
             Recorder(recording, session, tail=tail)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
-def test_a_mark_needs_a_recording_with_marks(tmp_path: Path, session: Session) -> None:
-    with (
-        Recorder(tmp_path / "a.mcap", session) as recorder,
-        pytest.raises(SettingError, match="was begun without marks: begin a recording with them"),
-    ):
-        recorder.mark(Mark(now_us(), "here"))
 
 
 def test_nobody_waits_for_a_slow_disk(tmp_path: Path, session: Session, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -254,7 +254,7 @@ def test_every_change_is_heard(sink: Sink, listen: Listen, again: MakeGrasp) -> 
 
 def test_how_the_glove_fares_is_published_as_json(sink: Sink, listen: Listen, health: HealthReport) -> None:
     heard = listen().hear("topic", "health", lambda: sink.health(health))
-    assert json.loads(heard["message"]["data"])["stuck_open"] == ["s001"]
+    assert json.loads(heard["message"]["data"])["quarantined"][0]["name"] == "s001"
 
 
 def resident_kb() -> int:

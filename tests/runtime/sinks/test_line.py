@@ -4,7 +4,6 @@ import io
 import json
 import socket
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -14,8 +13,9 @@ from msgspec.structs import asdict, replace
 
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import HealthReport, LiveGrasp
-from thenar.runtime.sinks import GraspLine, HeaderLine, HealthLine, JointAngles, JsonLines, open_sink
+from thenar.runtime.sinks import GraspLine, HeaderLine, HealthLine, JointAngles, JsonLines
 from thenar.runtime.sinks.jsonl import encode, encode_health
+from thenar.runtime.sinks.sockets import SocketLines, open_tcp
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 names = st.text(st.characters(codec="utf-8"))
@@ -38,27 +38,24 @@ def test_a_line_comes_back_as_it_was_published(
     assert typed_json.decode(line, type=GraspLine) == GraspLine(**asdict(rounded), preshape=preshape, angles=positions)
 
 
-@pytest.mark.parametrize("kind", ["jsonl", "unix"])
-def test_a_header_names_the_joints_before_their_angles(
-    make_grasp: Callable[..., LiveGrasp], tmp_path: Path, kind: str
-) -> None:
-    file, path = io.BytesIO(), str(tmp_path / "socket")
-    sink = JsonLines(file) if kind == "jsonl" else open_sink(f"unix:{path}")
-    reader = socket.socket(socket.AF_UNIX)
-    late = socket.socket(socket.AF_UNIX)
-    if kind == "unix":
-        reader.connect(path)
+@pytest.mark.parametrize("kind", ["jsonl", "tcp"])
+def test_a_header_names_the_joints_before_their_angles(make_grasp: Callable[..., LiveGrasp], kind: str) -> None:
+    file = io.BytesIO()
+    sink = JsonLines(file) if kind == "jsonl" else open_tcp("127.0.0.1:0")
+    reader, late = socket.socket(), socket.socket()
+    if isinstance(sink, SocketLines):
+        reader.connect(sink.address)
     one, other = JointAngles(("a", "b"), (0.12345, -1.0)), JointAngles(("c",), (2.0,))
     for number, angle in enumerate([None, one, one, other]):
-        if number == 2 and kind == "unix":
-            late.connect(path)
+        if number == 2 and isinstance(sink, SocketLines):
+            late.connect(sink.address)
         sink.publish(make_grasp(number), None, angle)
     sink.close()
     written = file.getvalue() or read_all(reader)
     lines = [typed_json.decode(line, type=GraspLine | HeaderLine) for line in written.splitlines()]
     kinds = [line.joints if isinstance(line, HeaderLine) else line.angles for line in lines]
     assert kinds == [None, ("a", "b"), (0.1235, -1.0), (0.1235, -1.0), ("c",), (2.0,)]
-    if kind == "unix":
+    if kind == "tcp":
         assert [typed_json.decode(line, type=GraspLine | HeaderLine) for line in read_all(late).splitlines()] == [
             lines[1],
             *lines[3:],

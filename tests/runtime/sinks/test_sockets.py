@@ -1,20 +1,15 @@
-"""Lines to several readers at a time, over real Unix and TCP sockets: slow, hanging and vanishing ones among them."""
+"""Lines to several readers at a time, over real sockets: slow, hanging and vanishing ones among them."""
 
 import socket
 import tracemalloc
 from collections.abc import Callable, Iterator
-from contextlib import closing
-from pathlib import Path
 
 import pytest
 from msgspec import json
-from msgspec.structs import replace
 
-from thenar.runtime.build import Build
-from thenar.runtime.live.recogniser import Moment
 from thenar.runtime.published import HealthReport, LiveGrasp
-from thenar.runtime.sinks import DetailLine, GraspLine, HealthLine, SocketLines
-from thenar.runtime.sinks.sockets import HANGING_S, MAX_OF_ONE, MAX_READERS, open_tcp, open_unix
+from thenar.runtime.sinks import GraspLine, HealthLine
+from thenar.runtime.sinks.sockets import HANGING_S, MAX_OF_ONE, MAX_READERS, SocketLines, open_tcp
 
 MakeGrasp = Callable[..., LiveGrasp]
 
@@ -34,12 +29,9 @@ def clock() -> Clock:
     return Clock()
 
 
-@pytest.fixture(params=["unix", "tcp"])
-def sink(request: pytest.FixtureRequest, tmp_path: Path, clock: Clock) -> Iterator[SocketLines]:
-    if request.param == "unix":
-        made = open_unix(str(tmp_path / "grasps"), clock)
-    else:
-        made = open_tcp("127.0.0.1:0", clock=clock)
+@pytest.fixture
+def sink(clock: Clock) -> Iterator[SocketLines]:
+    made = open_tcp("127.0.0.1:0", clock=clock)
     yield made
     made.close()
 
@@ -48,12 +40,7 @@ class Reader:
     """Connects, and reads lines when told to."""
 
     def __init__(self, sink: SocketLines) -> None:
-        address = sink.address
-        if isinstance(address, str):
-            self.socket = socket.socket(socket.AF_UNIX)
-            self.socket.connect(address)
-        else:
-            self.socket = socket.create_connection(address)
+        self.socket = socket.create_connection(sink.address)
         self.socket.settimeout(20)
         self.lines = self.socket.makefile("rb")
 
@@ -262,7 +249,6 @@ def test_where_readers_hang_on_every_place_honest_ones_follow(
 
 def test_one_other_machine_never_takes_every_place(make_grasp: MakeGrasp) -> None:
     sink = open_tcp("127.0.0.1:0")
-    assert isinstance(sink.address, tuple)
     address = sink.address
 
     def crowd(host: str) -> list[socket.socket]:
@@ -294,23 +280,3 @@ def test_closing_ends_every_reader_and_may_be_done_twice(
     assert reader.number() == 1
     assert reader.lines.readline() == b""
     assert sink.report().readers == 0
-
-
-@pytest.mark.parametrize("detail", [False, True])
-def test_requested_details_follow_grasps_100_times_a_second(
-    make_build: Callable[..., Build], make_grasp: MakeGrasp, tmp_path: Path, detail: bool
-) -> None:
-    build = make_build()
-    with closing(open_unix(str(tmp_path / "grasps"), detail=detail)) as sink:
-        sink.begin(build)
-        reader = Reader(sink)
-        for number in range(20):
-            grasp = replace(make_grasp(number), time_us=1_000_000 + 2_500 * number)
-            sink.publish(grasp, None, None)
-            sink.moment(Moment(grasp, None, None, None))
-    with closing(reader):
-        lines = [json.decode(line, type=GraspLine | DetailLine) for line in reader.lines]
-    details = [line for line in lines if isinstance(line, DetailLine)]
-    assert [line.number for line in details] == (list(range(0, 20, 4)) if detail else [])
-    assert {line.build for line in details} <= {build.manifest.checksum}
-    assert len(lines) == 20 + len(details)

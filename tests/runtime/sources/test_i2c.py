@@ -1,6 +1,6 @@
 """What a device makes of the answers of its ports; that the ports are read is shown on real device nodes."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -25,15 +25,13 @@ class Bench:
         self.now = 1_000_000
         self.answers: list[list[int | None]] = []
         self.takes_us = 100
-        self.groups = 1
 
     def sleep(self, seconds: float) -> None:
         self.now += round(1e6 * seconds)
 
-    def __iter__(self) -> Iterator[list[int | None]]:
-        for _ in range(self.groups):
-            self.now += self.takes_us
-            yield self.answers.pop(0)
+    def read(self) -> list[int | None]:
+        self.now += self.takes_us
+        return self.answers.pop(0)
 
 
 class Bus:
@@ -45,7 +43,7 @@ class Bus:
     def open(self) -> None:
         pass
 
-    def prepare(self, _groups: Sequence[Sequence[object]]) -> Bench:
+    def prepare(self, _ports: Sequence[object]) -> Bench:
         return self.bench
 
 

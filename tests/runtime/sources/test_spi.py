@@ -10,7 +10,7 @@ from thenar.drivers.spi.device import SpiDevice
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, Harness, SpiWiring
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.sources import i2c, spi
+from thenar.runtime.sources import i2c
 from thenar.runtime.sources.base import SOURCES, slowest_us
 from thenar.runtime.sources.spi import SpiConverter
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine, TaxelSettings
@@ -36,7 +36,6 @@ def answers(monkeypatch: pytest.MonkeyPatch) -> list[list[int | None]]:
         return lambda: given.pop(0)
 
     monkeypatch.setattr(SpiDevice, "prepare", prepare)
-    monkeypatch.setattr(spi, "now_us", lambda: 5)
     monkeypatch.setattr(i2c, "now_us", lambda: 5)
     monkeypatch.setattr("time.sleep", lambda _: None)
     return given
@@ -68,7 +67,7 @@ def test_a_converter_is_read_at_its_rate(answers: list[list[int | None]], monkey
 def test_where_no_converter_answers_levels_are_lost_and_it_says_so(answers: list[list[int | None]]) -> None:
     device = SpiConverter(HARNESS, 1, whole_scan(HARNESS, NAMES))
     answers.append([None, None])
-    assert device.read(0.1) == SwitchFrame(5, 0, lost=0b10101, taxels=(None, None, None))
+    assert device.read(0.1) == SwitchFrame(5, 0, lost=0b10101)
     assert "mcp3008 does not reply" in device.fault_message()
 
 

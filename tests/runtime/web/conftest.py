@@ -67,10 +67,5 @@ def visit() -> Callable[[Server], Client]:
 
 
 @pytest.fixture
-def hear_one() -> Callable[[ClientConnection], dict[str, Any]]:
-    return told
-
-
-@pytest.fixture
 def hear() -> Callable[[ClientConnection], dict[str, Any]]:
     return told

@@ -336,9 +336,7 @@ def test_a_page_that_replies_to_pings_keeps_its_place(
 def test_a_browser_that_stops_reading_is_dropped_and_others_see_all(
     serve: Callable[..., Any], hear: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "HANGING_S", 0.3)
-    # Not by the system, which notices it later.
-    monkeypatch.setattr(server, "_GONE_MS", 600_000)
+    monkeypatch.setattr(server, "PING_S", 0.2)
     client = serve()
     with connection(client, upgrade(client)) as hanging:
         assert hanging.recv(12) == b"HTTP/1.1 101"

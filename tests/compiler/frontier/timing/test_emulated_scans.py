@@ -133,7 +133,7 @@ def _scan_of(harness: Harness, number: int, stack: ExitStack) -> Scan:
     bus.open()
     ports = whole_scan(harness, harness.switches).ports
     return bus.prepare(
-        [[PlacedPort(chips[port.chip], reading_of(port, harness)) for port in ports if port.bus == number]]
+        [PlacedPort(chips[port.chip], reading_of(port, harness)) for port in ports if port.bus == number]
     )
 
 

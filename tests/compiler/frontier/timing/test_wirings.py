@@ -180,14 +180,6 @@ def test_a_cyberglove_may_be_wired_under_other_names() -> None:
     assert records_of(names[:5], None, GloveWiring(port="/dev/x", joints=names)) == records_of(SENSORS_18)
 
 
-def test_a_glove_that_was_measured_takes_that_and_fewer_sensors_in_proportion() -> None:
-    records = records_of(
-        SENSORS_18[:6], None, GloveWiring(port="/dev/x", record_us=2 * (18 * 250.0 + 21 * 10e6 / 115_200))
-    )
-    assert records.of(6).us == pytest.approx(2 * records_of(SENSORS_18).of(6).us)
-    assert records.how == "measured"
-
-
 def test_a_gloves_rate_is_limited_by_line_and_request() -> None:
     slow = records_of(SENSORS_18, None, GloveWiring(port="/dev/x", baud=38_400))
     assert slow.of(18).us == pytest.approx(18 * 250.0 + 21 * 10e6 / 38_400)

@@ -4,17 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from msgspec import json
 from msgspec.structs import replace
 
 from thenar.runtime.build import Build
-from thenar.runtime.detail import Details
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.live.recogniser import Moment
 from thenar.runtime.manifest import Calibration, Rejection
 from thenar.runtime.published import LiveGrasp
-from thenar.runtime.sinks import DetailLine
-from thenar.runtime.sinks.jsonl import encode_detail
+from thenar.runtime.web.live import Details
 
 MakeBuild = Callable[..., Build]
 MakeGrasp = Callable[..., LiveGrasp]
@@ -50,8 +47,6 @@ def test_probabilities_are_those_of_the_build_and_joints_are_in_their_unit(
         assert detail.joints is not None
         expected = codes if build is made else -5.0 + (codes - 10) / 2
         assert detail.joints == pytest.approx(expected.tolist())
-        line = json.decode(encode_detail(detail, 7, "sum"), type=DetailLine)
-        assert (line.number, line.build, line.closed) == (7, "sum", detail.closed)
 
 
 def test_a_refused_frame_shows_that_nothing_is_held(make_build: MakeBuild, make_grasp: MakeGrasp) -> None:
