@@ -76,8 +76,8 @@ _CURVES: tuple[tuple[str, str, bool, tuple[float, ...]], ...] = (
         (0.19, 0.29, 0.512, 0.690, 0.829, 0.914, 0.932, 0.935, 0.936),
     ),
     (
-        "rfe",
-        "Recursive elimination by logistic regression",
+        "cmim",
+        "Greedy by conditional mutual information",
         False,
         (0.18, 0.30, 0.548, 0.752, 0.858, 0.925, 0.935, 0.936, 0.936),
     ),
@@ -196,7 +196,7 @@ def _tried() -> tuple[Tried, ...]:
         *(("switches", size, 0.70 + 0.236 * (1 - 0.94 ** (size - 5)), 105 + 9.5 * size) for size in _sizes(6)),
         *(("both", size, 0.955 + 0.036 * (1 - 0.93**size), 2030 + 16 * size) for size in _sizes(4)),
     ]
-    methods = (("elimination", 0.998, 1.02, 120), ("id3", 0.985, 1.16, 100), ("rfe", 0.994, 1.1, 150))
+    methods = (("elimination", 0.998, 1.02, 120), ("id3", 0.985, 1.16, 100), ("cmim", 0.994, 1.1, 150))
     return tuple(
         Tried(PlacementChoice(method, float(size)), inputs, size, rounds, rate(mean * worse), us * slower)
         for (inputs, size, mean, us), (method, worse, slower, rounds) in product(kept, methods)

@@ -155,27 +155,21 @@ def ranked(rank: Callable[[Bits, Labels], Iterable[int]]) -> Callable[[Samples, 
 
     `rank(bits, labels)` returns or yields the columns of bits (n, s), all of which vary, best first; labels (n,) are
     class numbers, of which there are at least two. A generator is consumed only as far as needed. Joints are ignored,
-    and switches that never change are never chosen. A ranking by linear algebra may resolve near ties differently on
-    another machine.
+    and switches that never change are never chosen.
     """
 
     def learn(samples: Samples, _: PortCosts | None) -> Chooser:
-        from threadpoolctl import threadpool_limits
-
         bits, labels = samples.switches, samples.labels
         varying = np.flatnonzero(bits.any(axis=0) & ~bits.all(axis=0))
         order: list[int] = []
         rest: Iterator[int] = iter(())
         if varying.size and np.ptp(labels):
-            # The matrices are small: threads would spend more time waiting than working.
-            with threadpool_limits(1):
-                rest = iter(rank(bits[:, varying], labels))
+            rest = iter(rank(bits[:, varying], labels))
 
         def choose(most: float) -> Columns:
             size = min(max(int(most), 0), len(varying))
             if size > len(order):
-                with threadpool_limits(1):
-                    order.extend(int(varying[column]) for column in islice(rest, size - len(order)))
+                order.extend(int(varying[column]) for column in islice(rest, size - len(order)))
             return tuple(order[:size])
 
         return choose

@@ -1,4 +1,4 @@
-"""Baselines: by information about the grasp type, by scikit-learn's elimination, or at random.
+"""Baselines: by information about the grasp type, or at random.
 
 Ties of information, exactly compared, go to the lowest number.
 """
@@ -14,9 +14,6 @@ from ..gain import Cooccurrence
 from .base import Bits, Labels, Method, ranked
 
 _SEED = 0
-# With scikit-learn's default of 100 some fits end with a convergence warning. With its default tolerance, a tenth of
-# this one, elimination takes twice as long and the remaining switches are no more accurate.
-_ITERATIONS, _TOLERANCE = 2000, 1e-3
 
 
 def random_placement(n_inputs: int, m: int, seed: int) -> Columns:
@@ -70,27 +67,7 @@ def _sign(counts: Cooccurrence, scores: Floats, one: tuple[int, int | None], oth
     return counts.sign(one, other) if abs(apart) <= 2 * counts.error_bound else int(np.sign(apart))
 
 
-def _elimination_by_regression(bits: Bits, labels: Labels) -> Columns:
-    """Return the switches in the reverse order of recursive elimination, which drops one at a time."""
-    from scipy.sparse import csr_matrix
-    from sklearn.feature_selection import RFE
-    from sklearn.linear_model import LogisticRegression
-
-    # Few switches are closed at a time: sparse rows give the same model in a fraction of the time.
-    elimination = RFE(LogisticRegression(max_iter=_ITERATIONS, tol=_TOLERANCE), n_features_to_select=1, step=1)
-    elimination.fit(csr_matrix(bits, dtype=np.float64), labels)
-    return tuple(np.argsort(elimination.ranking_, kind="stable").tolist())
-
-
 MEMBER = (
-    Method(
-        name="rfe",
-        help="Recursive elimination by logistic regression (scikit-learn), one switch at a time",
-        learn=ranked(_elimination_by_regression),
-        nested=True,
-        tried="always",
-        rank=20,
-    ),
     Method(
         name="cmim",
         help="Greedy by conditional mutual information (CMIM)",

@@ -40,7 +40,7 @@ def data() -> tuple[Any, Any]:
     return bits, np.array(["cup", "key", "pen", "rod"])[labels]
 
 
-@pytest.mark.parametrize("name", ["id3", "elimination", "id3-cost", "rfe"])
+@pytest.mark.parametrize("name", ["id3", "elimination", "id3-cost"])
 def test_a_selector_keeps_what_thenar_place_keeps(name: str) -> None:
     grasps = make_set(rows=60, switches=10)
     selector = SwitchSelector(name, n_switches=4, min_samples=6).fit(grasps.switches, grasps.grasps)
