@@ -219,7 +219,7 @@ def test_an_import_without_its_extra_says_which_one_it_needs() -> None:
         ("firmware {build} --target host -o {new}", "", "compiler"),
         ("frontier {set} -o {new}", "", "compiler"),
         ("evaluate {set}", "", "compiler"),
-        ("place {set} --method id3-ccp --keep 2", "", "compiler"),
+        ("place {set} --method id3-cost --keep 2", "", "compiler"),
         ("place {set} --draw {new}.svg", "", "compiler"),
         ("simulate quick -o {new}.grasps", "", "compiler"),
         ("stability", "", "stability"),

@@ -14,7 +14,7 @@ from ..sets import grasp_set_of
 Captured = pytest.CaptureFixture[str]
 
 
-@pytest.mark.parametrize("method", ["elimination", "cmim", "id3-ccp"])
+@pytest.mark.parametrize("method", ["elimination", "cmim", "id3-cost"])
 def test_a_method_keeps_so_many_switches_in_its_order(
     set_file: Path, tmp_path: Path, method: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -46,12 +46,12 @@ _POINTS: tuple[tuple[Any, ...], ...] = (
     ("switches", 16, "elimination", 16, 60, 6, "mcp23017", 1000, 48.0, 150.6, "dwell", 0.866, 2100, 6400),
     ("switches", 24, "id3-cost", 24, 80, 8, "tca6424a", 1000, 58.0, 231.4, "dwell", 0.918, 2650, 6900),
     ("switches", 33, "elimination", 33, 100, 8, "mcp23017", 1000, 96, 344.0, "dwell", 0.929, 2910, 7400),
-    ("switches", 50, "id3-ccp", 50, 120, 8, "mcp23017", 400, 241.0, 429.0, "dwell", 0.934, 3260, 9100),
+    ("switches", 50, "id3-cost", 50, 120, 8, "mcp23017", 400, 241.0, 429.0, "dwell", 0.934, 3260, 9100),
     ("joints", 0, "elimination", 0, 150, 8, "as wired", 0, 0.0, 298.2, "single", 0.952, 5900, 11800),
     ("both", 8, "elimination", 8, 150, 8, "mcp23017", 1000, 48.0, 330.0, "dwell", 0.978, 6400, 12900),
     ("both", 16, "elimination", 16, 200, 8, "as wired", 400, 118.0, 421.3, "dwell", 0.988, 7200, 15100),
     ("both", 33, "elimination", 33, 300, 12, "board", 1000, 330.0, 905.7, "dwell", 0.9915, 9800, 24600),
-    ("both", 12, "id3-ccp", 0.25, 80, 6, "pca9555", 400, 122.0, 363.0, "single", 0.961, 5200, 10400),
+    ("both", 12, "id3-cost", 0.25, 80, 6, "pca9555", 400, 122.0, 363.0, "single", 0.961, 5200, 10400),
 )  # fmt: skip
 
 # What each method recognises with so many switches.

@@ -55,7 +55,7 @@ class Method:
         Whether the first of M switches are those of a smaller M, so that one ranking serves all M, with limits too.
     try_all_switches : bool
         Whether a frontier also tries to keep all switches.
-    tried : {"always", "wired", "unwired", "never"}
+    tried : {"always", "wired", "never"}
         When a frontier tries it by default: "wired" if the glove's actual wiring is known.
     label : str
         Its name in the tables of `evaluate`; "" for `name`.
@@ -78,7 +78,7 @@ class Method:
     sizes: tuple[int, ...] = COARSE
     nested: bool = False
     try_all_switches: bool = False
-    tried: Literal["always", "wired", "unwired", "never"] = "never"
+    tried: Literal["always", "wired", "never"] = "never"
     label: str = ""
     rank: int = 0
 
@@ -141,7 +141,7 @@ METHODS: Members[Method] = Members("placement method", Method, "thenar.compiler.
 
 def usual(*, ours: bool, wired: bool = False) -> tuple[str, ...]:
     """Return the methods, ours or the baselines, that a frontier tries by default."""
-    when = ("always", "wired" if wired else "unwired")
+    when = ("always", "wired") if wired else ("always",)
     return tuple(name for name, method in METHODS.items() if method.ours == ours and method.tried in when)
 
 

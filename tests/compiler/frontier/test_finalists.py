@@ -60,7 +60,7 @@ def test_what_is_wanted_is_among_them_however_bad() -> None:
 
 
 def test_equal_placements_count_once() -> None:
-    one, same = _screened(8, 0.9, 100), _screened(8, 0.9, 100, method="id3-ccp")
+    one, same = _screened(8, 0.9, 100), _screened(8, 0.9, 100, method="id3-cost")
     assert select_finalists([one, same], [], 2) == (one,)
 
 

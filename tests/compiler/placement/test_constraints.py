@@ -78,7 +78,6 @@ def test_every_method_obeys(found: tuple[Limits, Bound], seed: int, m: int) -> N
     for name in (
         "id3",
         "id3-cost",
-        "id3-ccp",
         "elimination-cost",
         "cmim",
         "mutual-information",
