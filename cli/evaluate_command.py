@@ -191,12 +191,9 @@ def command(
         given = {name: chosen[name] for name in LIMITS} | {"layout": layout, "glove": glove}
         if unused := next((name for name, value in given.items() if value), ""):
             raise click.UsageError(f"--{unused.replace('_', '-')} is not for --{kind}: leave one of them out.")
-        if streams:
-            _evaluate_streams(grasps, recipe, asked["subjects"], jobs, output)
-            return
-        if asked["scheme"] != "subject" or not all(numbers):
+        if numbers and (asked["scheme"] != "subject" or not all(numbers)):
             raise click.UsageError("--adapt leaves a subject out: give --by subject, and numbers of 1 or more trials.")
-        _evaluate_wearers(grasps, recipe, asked["subjects"], numbers, jobs, output)
+        _evaluate_people(grasps, recipe, asked["subjects"], numbers, jobs, output)
         return
     asked["tables"] = tuple(name for name in TABLES if name in asked["tables"])
     design = StudyDesign(recipe, **asked)
@@ -216,23 +213,28 @@ def command(
     show(study, _print)
 
 
-def _evaluate_wearers(
+def _evaluate_people(
     grasps: Path, recipe: "Recipe", subjects: tuple[str, ...], numbers: tuple[int, ...], jobs: int, output: Path | None
 ) -> None:
-    """Evaluate adaptation to each subject, left out in turn."""
+    """Leave out each subject: evaluate adaptation by these numbers of trials, or without any, decoders of segments."""
     import numpy as np
 
+    from thenar.compiler.artifact.stream_study import study_streams
     from thenar.compiler.artifact.wearers import study_wearers
     from thenar.compiler.recordings.graspset import GraspSet
 
-    with progress("adapting to each subject") as report:
-        grasp_set = GraspSet.load(grasps).without_none()
+    with progress("adapting to each subject" if numbers else "evaluating streams", lines=not numbers) as report:
+        grasp_set = GraspSet.load(grasps)
         if subjects:
             grasp_set = grasp_set.rows(np.isin(grasp_set.subjects, subjects))
-        study = study_wearers(grasp_set, recipe, (0, *numbers), jobs, report)
+        adapted = study_wearers(grasp_set.without_none(), recipe, (0, *numbers), jobs, report) if numbers else None
+        decoded = study_streams(grasp_set, recipe, jobs, report) if adapted is None else None
     if output is not None:
-        write_json(output, study)
-    show(study, _print_wearers)
+        write_json(output, adapted or decoded)
+    if adapted is not None:
+        show(adapted, _print_wearers)
+    elif decoded is not None:
+        show(decoded, _print_streams)
 
 
 def _print_wearers(study: "WearerStudy") -> None:
@@ -244,25 +246,6 @@ def _print_wearers(study: "WearerStudy") -> None:
     _print_grid(str(study.recipe), grid)
     people = counted(len(study.rows[0].people), "person", "people")
     out().print(f"{counted(study.trials, 'trial')} of {people}; accuracies in %, means over people with 95 % intervals")
-
-
-def _evaluate_streams(
-    grasps: Path, recipe: "Recipe", subjects: tuple[str, ...], jobs: int, output: Path | None
-) -> None:
-    """Evaluate the decoders of segments, each subject left out in turn."""
-    import numpy as np
-
-    from thenar.compiler.artifact.stream_study import study_streams
-    from thenar.compiler.recordings.graspset import GraspSet
-
-    with progress("evaluating streams", lines=True) as report:
-        grasp_set = GraspSet.load(grasps)
-        if subjects:
-            grasp_set = grasp_set.rows(np.isin(grasp_set.subjects, subjects))
-        study = study_streams(grasp_set, recipe, jobs, report)
-    if output is not None:
-        write_json(output, study)
-    show(study, _print_streams)
 
 
 def _print_streams(study: "StreamStudy") -> None:

@@ -44,16 +44,10 @@ def _described() -> dict[str, list[tuple[str, str]]]:
     help="A library that classifies frames; or an Arduino sketch for a board that prints the rows of a stream.",
 )
 @click.option(
-    "--calibration",
-    metavar="HAND.toml",
-    type=existing_file,
-    help="The wearer's calibration of the CyberGlove's bytes, from `thenar calibrate`.",
-)
-@click.option(
     "--glove",
     metavar="glove.toml",
     type=existing_file,
-    help="The glove whose readings a library converts, or whose [stream.board] a sketch reads.",
+    help="The glove whose readings a library converts, with its calibrations; or whose [stream.board] a sketch reads.",
 )
 @click.option(
     "--name",
@@ -79,7 +73,6 @@ def command(
     target: str | None,
     output: Path | None,
     mode: str,
-    calibration: Path | None,
     glove: Path | None,
     name: str,
     flash_limit: int | None,
@@ -105,20 +98,17 @@ def command(
     from thenar.compiler.firmware.sensors import sensors_of
     from thenar.compiler.firmware.targets import TARGETS
     from thenar.runtime.build import Build
-    from thenar.runtime.calibration import load_calibration
     from thenar.runtime.harness.loading import load_harness
 
     if mode == "rows":
-        libraries = {"target": target, "calibration": calibration, "flash-limit": flash_limit, "measure": measure}
+        libraries = {"target": target, "flash-limit": flash_limit, "measure": measure}
         if given := [option for option, value in libraries.items() if value]:
             raise click.UsageError(f"--{given[0]} is for libraries, not for sketches that print rows: leave it out.")
         return _write_sketches(build, glove, output, name, overwrite=overwrite)
-    _check(target, output is not None, measure, glove is not None and calibration is not None)
+    _check(target, output is not None, measure)
     assert target is not None
-    loaded, sensors = Build.load(build), None
-    if glove is not None or calibration is not None:
-        hand = None if calibration is None else load_calibration(calibration)
-        sensors = sensors_of(loaded.manifest, None if glove is None else load_harness(glove), hand)
+    loaded = Build.load(build)
+    sensors = None if glove is None else sensors_of(loaded.manifest, load_harness(glove))
     member = TARGETS[target]
     fit = fit_for(member, loaded.tables, flash_limit)
     library = Library(name, loaded.manifest, fit.layout, fit.notes(), sensors)
@@ -156,7 +146,7 @@ def _write_sketches(build: Path, glove: Path | None, output: Path | None, name: 
     return 0
 
 
-def _check(target: str | None, writes: bool, measures: bool, names_both: bool) -> None:
+def _check(target: str | None, writes: bool, measures: bool) -> None:
     """Raise UsageError for options of a library that conflict, or are missing."""
     from thenar.compiler.firmware.targets import TARGETS
 
@@ -166,8 +156,6 @@ def _check(target: str | None, writes: bool, measures: bool, names_both: bool) -
         raise click.UsageError("The host has no cycle counts: --measure is for microcontrollers.")
     if not writes and not measures:
         raise click.UsageError("Nothing to do: name a folder to write with -o, or add --measure.")
-    if names_both:
-        raise click.UsageError("glove.toml names its calibration: leave out --calibration, or --glove.")
 
 
 def _print(target: "Target", fit: "PartFit", measured: "Measured | None", output: Path | None) -> None:

@@ -1,9 +1,14 @@
 """Manifests of integer tables that nobody trained, and the codes of readings as a run has them."""
 
 import hashlib
+import json
+from pathlib import Path
 
 from thenar.compiler.firmware.sensors import CodeGrid, Sensor
+from thenar.drivers.calibration import GloveCalibration
 from thenar.runtime.code_line import CodeLine, Point
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.recipe import Recipe
@@ -38,3 +43,11 @@ def code_of(sensor: Sensor, reading: int) -> int:
     assert sensor.readings is not None
     first, second = map(Point, sensor.readings, sensor.codes)
     return CodeLine(first, second).code(reading if sensor.grid is None else grid_code(sensor.grid, reading))
+
+
+def calibrated_glove(folder: Path, calibration: GloveCalibration) -> Harness:
+    """Return a CyberGlove whose first sensors are those of a calibration."""
+    (folder / "hand.toml").write_text(calibration.to_toml())
+    names = [*(line.name for line in calibration.sensors), *(f"other {number}" for number in range(18))][:18]
+    text = f'[cyberglove]\nport = "x"\njoints = {json.dumps(names)}\ncalibration = "{folder / "hand.toml"}"\n'
+    return parse_harness(text, "glove.toml")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from thenar.drivers.calibration import GloveCalibration, poses_of
+from thenar.drivers.calibration import poses_of
 from thenar.drivers.errors import SettingError
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.calibration import Meaning, codes_of_bytes, load_calibration, numbers_of, place_of
@@ -83,23 +83,20 @@ class Sensors:
         return self.known and all(sensor.grid is not None for sensor in self.every)
 
 
-def sensors_of(names: Manifest, harness: Harness | None = None, calibration: GloveCalibration | None = None) -> Sensors:
-    """Return the sensors of a build, with the readings known from a glove's `harness` and its joints' `calibration`.
+def sensors_of(names: Manifest, harness: Harness | None = None) -> Sensors:
+    """Return the sensors of a build, with the readings known from a glove's `harness` and the calibrations it names.
 
     Raises SettingError where these do not match the build, FirmwareError where a stream's ranges are not whole numbers.
     """
     device = None if harness is None else harness.joint_device
-    if calibration is None and harness is not None and harness.calibration is not None:
-        calibration = load_calibration(Path(harness.calibration))
     ranges = device.joints if isinstance(device, StreamWiring) else {}
-    meaning: Meaning = calibration
-    if calibration is None and ranges:
-        meaning = numbers_of(ranges)
+    meaning: Meaning = numbers_of(ranges) if ranges else None
+    if harness is not None and harness.calibration is not None:
+        meaning = load_calibration(Path(harness.calibration))
     if device is not None:
         for joint in names.joints:
             place_of(joint.name, device.sensor_names)
-    known = device is not None or calibration is not None
-    joints = tuple(_joint(joint, meaning, ranges.get(joint.name), known=known) for joint in names.joints)
+    joints = tuple(_joint(joint, meaning, ranges.get(joint.name), known=device is not None) for joint in names.joints)
     thresholds = [(n, switch.threshold) for n, switch in enumerate(names.switches) if switch.threshold is not None]
     coded = {threshold.taxel.name: threshold for _, threshold in thresholds}
     places = {name: place for place, name in enumerate(coded, len(joints))}

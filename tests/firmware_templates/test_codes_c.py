@@ -25,7 +25,7 @@ from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.sources.rows import _Grid, steps_of
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine, count_limit
 
-from ..tables import code_of, grid_code
+from ..tables import calibrated_glove, code_of, grid_code
 
 SharedLibrary = Callable[..., ctypes.CDLL]
 
@@ -167,12 +167,14 @@ def hand(random: np.random.Generator, names: Sequence[str]) -> GloveCalibration:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_cyberglove_s_bytes_have_the_codes_that_a_run_gives_them(compiled: Callable[..., Codes], seed: int) -> None:
+def test_a_cyberglove_s_bytes_have_the_codes_that_a_run_gives_them(
+    compiled: Callable[..., Codes], seed: int, tmp_path: Path
+) -> None:
     random = np.random.default_rng(seed)
     joints = [random_joint(random, number) for number in range(8)]
     calibration = hand(random, [each.name for each in joints])
     names = names_of(joints)
-    codes = compiled(names, sensors_of(names, calibration=calibration))
+    codes = compiled(names, sensors_of(names, calibrated_glove(tmp_path, calibration)))
     for number, each in enumerate(joints):
         assert codes.sweep(number, range(256)) == list(codes_of_bytes(each, calibration))
 

@@ -1,6 +1,7 @@
 """Readings become codes on a microcontroller as in Python: run in the emulators of all cores."""
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.harness.loading import parse_harness
 
 from ....conftest import tool
-from ....tables import code_of, describe
+from ....tables import calibrated_glove, code_of, describe
 from ..conftest import make_tables
 
 STREAM = """
@@ -79,7 +80,7 @@ int main(void)
 
 
 @pytest.fixture(params=["stream", "cyberglove"])
-def library(request: pytest.FixtureRequest) -> Callable[[bool], Library]:
+def library(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[bool], Library]:
     """Return what makes the library of a glove, for an AVR or not."""
     tables = make_tables(switches=2, joints=3)
     manifest = describe(tables)  # degrees, half of one a code
@@ -93,7 +94,7 @@ def library(request: pytest.FixtureRequest) -> Callable[[bool], Library]:
         manifest = replace(manifest, joints=(manifest.joints[0], *fine))
         lines = zip((40, 200, 1), (160, 77, 255), (90.0, 33.3, 100.0), strict=True)
         hand = [SensorCalibration(f"j{n}", first, 0.0, last, value) for n, (first, last, value) in enumerate(lines)]
-        sensors = sensors_of(manifest, calibration=GloveCalibration(sensors=tuple(hand)))
+        sensors = sensors_of(manifest, calibrated_glove(tmp_path, GloveCalibration(sensors=tuple(hand))))
 
     return lambda avr: Library("hand", manifest, Layout(tables), glove=sensors)
 
