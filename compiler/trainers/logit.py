@@ -198,6 +198,7 @@ class Logit(Trainer):
 
     name = "logit"
     what = "multinomial logistic regression on a table for each input"
+    automatic = False  # in no set that we know is it better than the others
     settings = (
         Setting("penalty", "Pull of scores towards zero.", float, PENALTY, 1e-6, 1e6),
         Setting(
