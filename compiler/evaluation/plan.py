@@ -31,10 +31,8 @@ REFERENCE = "logitboost"  # the trainer with which the others are compared
 
 
 def learners() -> tuple[str, ...]:
-    """Return the methods in the table of trainers: REFERENCE, the other trainers that can be chosen automatically, and
-    CLASSIFIERS.
-    """
-    return tuple(dict.fromkeys([REFERENCE, *(name for name in TRAINERS if TRAINERS[name].automatic), *CLASSIFIERS]))
+    """Return the methods in the table of trainers: REFERENCE, the other trainers, and CLASSIFIERS."""
+    return tuple(dict.fromkeys([REFERENCE, *TRAINERS, *CLASSIFIERS]))
 
 
 def candidates_of(recipe: Recipe) -> Candidates:
