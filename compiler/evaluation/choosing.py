@@ -241,7 +241,7 @@ def _spread(samples: Samples) -> Rows:
     return np.arange(0, rows, max(1, min(frames // _FRAMES, -(-rows // _COMPARED))))
 
 
-def _values(training: Training) -> dict[str, float | str | None]:
+def _values(training: Training) -> dict[str, float | None]:
     return {name: float(value) if isinstance(value, int) else value for name, value in training.settings.items()}
 
 
