@@ -43,7 +43,7 @@ _ENOUGH = 1e-4  # of the slope, for Armijo's rule
 _ROUNDING = 2.0**-50  # of the loss, per entry of the rows: a smaller increase may be a rounding error
 _MARKS = 512.0  # marks per unit of a line, whose column spans one or two units
 _NO_CHANCE = 800.0  # below all scores: exp is exactly 0 there
-_MOST_CELLS, _FEW_CELLS = 256, 16  # of several columns together; of columns that are joined unseen
+_MOST_CELLS = 256  # of several columns together
 _UNSOLVED = 0.3  # of the gradient that a step may leave
 
 
@@ -307,48 +307,31 @@ def _factors(columns: Sequence[Column]) -> tuple["csr_array", "csr_array"]:
 
     Frames with the same bins in several neighbouring columns share a cell of these columns; a line has one cell.
     """
-    bins = np.column_stack([column.bins for column in columns])
-    firsts, widths = np.array([column.first for column in columns]), bins.max(axis=0) + 1
-    starts = np.cumsum([0, *(column.n_rows for column in columns)])
+    firsts, starts = np.array([column.first for column in columns]), np.cumsum([0, *(c.n_rows for c in columns)])
+    bins = np.array([column.bins for column in columns])
     groups: list[tuple[NDArray[np.intp], list[int]]] = []
-    for numbers in _runs(columns, widths.tolist()):
-        strides = np.cumprod([1, *widths[numbers[:-1]]])
-        cell = _numbered(bins[:, numbers] @ strides)
-        if groups and columns[numbers[0]].line is None and columns[groups[-1][1][0]].line is None:
-            both = _numbered(groups[-1][0] * (int(cell.max()) + 1) + cell)
-            if both.max() < _MOST_CELLS:
-                groups[-1] = both, [*groups[-1][1], *numbers]
+    for number, (column, last) in enumerate(zip(columns, bins.max(axis=1).tolist(), strict=True)):
+        if groups and column.line is None and columns[groups[-1][1][0]].line is None:
+            cell = _numbered(groups[-1][0] * (last + 1) + bins[number])
+            if cell.max() < _MOST_CELLS:
+                groups[-1] = cell, [*groups[-1][1], number]
                 continue
-        groups.append((cell, numbers))
+        groups.append((_numbered(bins[number]), [number]))
     places, values, inside, rows, used = [], [], [], [], 0
     for cell, numbers in groups:
         line, frame = columns[numbers[0]].line, np.zeros(int(cell.max()) + 1, np.intp)
         frame[cell] = np.arange(len(cell))
         places.append(used + cell)
         values.append(np.ones(len(cell)) if line is None else line.steps)
-        at = bins[np.ix_(frame, numbers)] - firsts[numbers]
+        at = bins[np.ix_(numbers, frame)] - firsts[numbers, np.newaxis]
         counted = np.nonzero(at >= 0)
-        inside.append(used + counted[0])
-        rows.append(starts[numbers][counted[1]] + at[counted])
+        inside.append(used + counted[1])
+        rows.append(starts[numbers][counted[0]] + at[counted])
         used += len(frame)
-    frames = np.repeat(np.arange(len(bins)), len(groups))
-    cells = sparse(np.column_stack(values).ravel(), frames, np.column_stack(places).ravel(), (len(bins), used))
+    frames = np.repeat(np.arange(bins.shape[1]), len(groups))
+    cells = sparse(np.column_stack(values).ravel(), frames, np.column_stack(places).ravel(), (bins.shape[1], used))
     counted = np.concatenate(inside)
     return cells, sparse(np.ones(len(counted)), counted, np.concatenate(rows), (used, int(starts[-1])))
-
-
-def _runs(columns: Sequence[Column], widths: list[int]) -> list[list[int]]:
-    """Return the numbers of neighbouring columns that have few cells together, and of each line."""
-    runs: list[list[int]] = []
-    size = math.inf
-    for number, (column, width) in enumerate(zip(columns, widths, strict=True)):
-        if column.line is None and size * width <= _FEW_CELLS:
-            runs[-1].append(number)
-            size *= width
-        else:
-            runs.append([number])
-            size = math.inf if column.line else width
-    return runs
 
 
 def _numbered(values: NDArray[np.intp]) -> NDArray[np.intp]:
