@@ -1,6 +1,7 @@
 """`thenar evaluate`: the paper's tables for the user's recordings."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 
     from thenar.compiler.artifact.stream_study import StreamStudy, SubjectMean
     from thenar.compiler.artifact.wearers import WearerStudy
-    from thenar.compiler.evaluation.study import Study, StudyDesign, StudyRun
+    from thenar.compiler.evaluation.study import Study, StudyRun
     from thenar.compiler.evaluation.tables import RateTable
     from thenar.runtime.recipe import Recipe
 
@@ -160,8 +161,7 @@ def command(
     Frames of one trial are never on both sides of a fold. Accuracies count trials, each classified by majority vote of
     its frames; if trials have several frames, the accuracy of single frames is added.
 
-    --tables trainers compares trainers with each other and with scikit-learn's simplest, each with hyperparameters
-    chosen on its training rows.
+    --tables trainers compares trainers, each with hyperparameters chosen on its training rows.
 
     With --streams, GRASPS holds whole movements: placement, tables and segment costs are learnt without the subject
     whose streams are decoded, live and afterwards. The dwell rule, a sequential test and a plain hidden Markov model
@@ -205,9 +205,9 @@ def command(
         raise click.UsageError("--plot shows the compositions: name them in --tables")
     grasp_set = GraspSet.load(grasps)
     run = StudyRun(grasp_set, design, **terms_of(recipe, grasp_set, layout, glove))
-    for sentence in run.warnings:
+    for sentence in run.study.warnings:
         warning(sentence)
-    study = run.study(_tables(run, design, jobs))
+    study = replace(run.study, tables=tuple(_tables(run, jobs)))
     if folder is not None:
         from thenar.compiler.evaluation.study import draw
 
@@ -301,18 +301,17 @@ def _print_grid(title: str, grid: "Grid", note: str = "") -> None:
         console.print(note)
 
 
-def _tables(run: "StudyRun", design: "StudyDesign", jobs: int) -> Iterator["RateTable"]:
+def _tables(run: "StudyRun", jobs: int) -> Iterator["RateTable"]:
     """Yield the tables; print each, laid out as in the paper, as soon as its fits are run."""
     from thenar.compiler.evaluation.folds import PROTOCOLS
 
     console = out()
     for protocol, meaning in PROTOCOLS.items():
-        if protocol in design.protocols and not wants_json():
+        if protocol in run.study.options.protocols and not wants_json():
             console.print(f"Protocol {protocol}: {meaning}")
     for name in run.names:
         with progress(f"evaluating {name[0]}") as report:
-            run.fit([name], jobs, report)
-            rated = run.table(*name)
+            (rated,) = run.tables([name], jobs, report)
         if not wants_json():
             _print_grid(rated.title, _rates(rated), rated.note)
         yield rated

@@ -1,6 +1,6 @@
 """An evaluation: the paper's tables for the user's recordings, with each distinct fit run once."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self
@@ -36,7 +36,6 @@ from .plan import (
     Labels,
     Planner,
     Progress,
-    RowPlan,
     TableName,
     candidates_of,
     run_fits,
@@ -183,19 +182,18 @@ def evaluate(
     True
     """
     run = StudyRun(grasp_set, (design or StudyDesign()).changed(**changes), ports, limits)
-    run.fit(run.names, jobs, progress)
-    return run.study([run.table(*name) for name in run.names])
+    return replace(run.study, tables=run.tables(run.names, jobs, progress))
 
 
 class StudyRun:
-    """An evaluation table by table; the parameters are those of `evaluate`.
+    """An evaluation some tables at a time; the parameters are those of `evaluate`.
 
     Attributes
     ----------
     names : tuple
         The name and protocol of each table, in their order.
-    warnings : tuple of str
-        Warnings about the set and its folds.
+    study : Study
+        The result without tables.
     """
 
     def __init__(
@@ -207,12 +205,6 @@ class StudyRun:
         reasons = {name: _why_not(name, chosen, populations, design) for name in design.tables}
         if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
             _check_all_switches(chosen, populations)
-        self._design, self._samples = design, Samples.of(chosen)
-        choices = InputChoices(self._samples, ports, limits)
-        self._planner = Planner(populations, choices, recipe, design.prune_list, design.baselines)
-        self._plans: dict[tuple[TableName, ProtocolName], list[RowPlan]] = {}
-        self._predicted: dict[FoldFit, Labels] = {}
-        self._groups = groups_of(chosen, scheme)
         self.names: tuple[tuple[TableName, ProtocolName], ...] = tuple(
             (name, protocol)
             for name, reason in reasons.items()
@@ -220,37 +212,34 @@ class StudyRun:
             for protocol in PROTOCOLS
             if protocol in design.protocols and (protocol == "nested" or name not in _NESTED)
         )
-        self.warnings = concerns(chosen, populations, scheme, recipe.folds)
+        samples, self._groups = Samples.of(chosen), groups_of(chosen, scheme)
+        choices = InputChoices(samples, ports, limits)
+        self._planner = Planner(populations, choices, recipe, design.prune_list, design.baselines)
+        self._predicted: dict[FoldFit, Labels] = {}
         empty = grasp_set.is_none & np.isin(grasp_set.subjects, np.unique(chosen.subjects))
-        self._study = Study(
+        self.study = Study(
             fingerprint=grasp_set.fingerprint(),
             rows=len(chosen),
-            trials=int(self._samples.trials.max()) + 1,
+            trials=int(samples.trials.max()) + 1,
             options=design,
-            grasps=self._samples.grasps,
-            warnings=self.warnings,
+            grasps=samples.grasps,
+            warnings=concerns(chosen, populations, scheme, recipe.folds),
             left_out=tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None),
             tables=(),
             rests=len(np.unique(grasp_set.trial_ids[empty])),
         )
 
-    def fit(
-        self, names: Iterable[tuple[TableName, ProtocolName]], jobs: int = -1, progress: Progress | None = None
-    ) -> None:
-        """Run the fits of these tables that were not run yet, each once."""
-        self._plans |= {name: self._planner.table(*name) for name in names}
-        fits = (fit for rows in self._plans.values() for row in rows for cell in row.cells for fit in cell.fits)
-        todo, candidates = (fit for fit in fits if fit not in self._predicted), candidates_of(self._design.recipe)
-        self._predicted |= run_fits(self._samples, todo, candidates, self._groups, jobs=jobs, progress=progress)
-
-    def table(self, name: TableName, protocol: ProtocolName) -> RateTable:
-        """Return a table whose fits were run."""
-        reader = RateReader(self._samples, self._predicted, OF[self._design.scheme], self._groups)
-        return reader.table(name, protocol, self._plans[name, protocol], _recipe_of(name, self._design.recipe))
-
-    def study(self, tables: Iterable[RateTable]) -> Study:
-        """Return the result with these tables."""
-        return replace(self._study, tables=tuple(tables))
+    def tables(
+        self, names: Sequence[tuple[TableName, ProtocolName]], jobs: int = -1, progress: Progress | None = None
+    ) -> tuple[RateTable, ...]:
+        """Return some of the tables; fits that were run for others are not run again."""
+        design, samples = self.study.options, self._planner.samples
+        plans = {name: self._planner.table(*name) for name in names}
+        fits = (fit for rows in plans.values() for row in rows for cell in row.cells for fit in cell.fits)
+        todo, candidates = (fit for fit in fits if fit not in self._predicted), candidates_of(design.recipe)
+        self._predicted |= run_fits(samples, todo, candidates, self._groups, jobs=jobs, progress=progress)
+        reader = RateReader(samples, self._predicted, OF[design.scheme], self._groups)
+        return tuple(reader.table(*name, rows, _recipe_of(name[0], design.recipe)) for name, rows in plans.items())
 
 
 def draw(study: Study, folder: Path) -> list[Path]:
