@@ -96,17 +96,14 @@ def levels_of(taxels: NDArray[np.uint16], labels: NDArray[np.intp], n_classes: i
             most_gain = max((split.gain for split in splits), default=0.0)
             close = [split for split in splits if split.gain >= most_gain - 2 * slack]
             one = first_of_most_gain(np.array([split.table for split in close])) if len(close) > 1 else 0
-            if not close or (found[at] and most_gain <= slack and not gain_bits(close[one].table)):
+            tells = bool(close) and (not found[at] or most_gain > slack or gain_bits(close[one].table) > 0)
+            if tells:
+                best = splits.pop(splits.index(close[one]))
+                found[at].append((int(keys[best.at - 1]) + int(keys[best.at])) // 2)
+                halves = (at, best.start, best.at), (at, best.at, best.stop)
+                parts += [half for half in halves if half[2] - half[1] > 1 and len(found[at]) < most]
+            if not tells or len(found[at]) == most:
                 del open_[at]
-                continue
-            best = close[one]
-            found[at].append((int(keys[best.at - 1]) + int(keys[best.at])) // 2)
-            if len(found[at]) == most:
-                del open_[at]
-                continue
-            splits.remove(best)
-            halves = (best.start, best.at), (best.at, best.stop)
-            parts += [(at, start, stop) for start, stop in halves if stop - start > 1]
     return [tuple(sorted(code - at * _SPAN for code in codes)) for at, codes in enumerate(found)]
 
 

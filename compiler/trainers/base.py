@@ -167,7 +167,7 @@ class Trainer(ABC):
 TRAINERS: Members[Trainer] = Members("trainer", Trainer, "thenar.compiler.trainers", "thenar.trainers")  # type: ignore[type-abstract]
 
 
-# Recipe that are settings of some trainers. None means not given.
+# Choices of a recipe that are settings of some trainers. None means not given.
 SHARED = ("rounds", "shrinkage", "tolerance", "max_bins")
 
 
@@ -190,11 +190,8 @@ class Training:
         invalid options.
         """
         trainer, given = _asked(options)[0]
-        return cls(
-            trainer.name,
-            {setting.name: setting.default for setting in trainer.settings} | trainer.checked(given),
-            options.robust,
-        )
+        defaults = {setting.name: setting.default for setting in trainer.settings}
+        return cls(trainer.name, defaults | trainer.checked(given), options.robust)
 
     @classmethod
     def candidates(cls, options: Recipe) -> "tuple[Training, ...]":
