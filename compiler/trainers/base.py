@@ -57,7 +57,7 @@ class Setting:
     least: float | None = None
     most: float | None = None
 
-    def checked(self, value: Number) -> Number:
+    def checked(self, value: Number | str) -> Number:
         """Return the value converted to its kind. Raises TrainingError for an invalid one."""
         if value is None:
             return None

@@ -310,8 +310,8 @@ def _factors(columns: Sequence[Column]) -> tuple["csr_array", "csr_array"]:
     firsts, starts = np.array([column.first for column in columns]), np.cumsum([0, *(c.n_rows for c in columns)])
     bins = np.array([column.bins for column in columns])
     groups: list[tuple[NDArray[np.intp], list[int]]] = []
-    for number, (column, last) in enumerate(zip(columns, bins.max(axis=1).tolist(), strict=True)):
-        if groups and column.line is None and columns[groups[-1][1][0]].line is None:
+    for number, (each, last) in enumerate(zip(columns, bins.max(axis=1).tolist(), strict=True)):
+        if groups and each.line is None and columns[groups[-1][1][0]].line is None:
             cell = _numbered(groups[-1][0] * (last + 1) + bins[number])
             if cell.max() < _MOST_CELLS:
                 groups[-1] = cell, [*groups[-1][1], number]
@@ -323,10 +323,10 @@ def _factors(columns: Sequence[Column]) -> tuple["csr_array", "csr_array"]:
         frame[cell] = np.arange(len(cell))
         places.append(used + cell)
         values.append(np.ones(len(cell)) if line is None else line.steps)
-        at = bins[np.ix_(numbers, frame)] - firsts[numbers, np.newaxis]
-        counted = np.nonzero(at >= 0)
-        inside.append(used + counted[1])
-        rows.append(starts[numbers][counted[0]] + at[counted])
+        at = bins[numbers][:, frame] - firsts[numbers, np.newaxis]
+        column, place = np.nonzero(at >= 0)
+        inside.append(used + place)
+        rows.append(starts[numbers][column] + at[column, place])
         used += len(frame)
     frames = np.repeat(np.arange(bins.shape[1]), len(groups))
     cells = sparse(np.column_stack(values).ravel(), frames, np.column_stack(places).ravel(), (bins.shape[1], used))
