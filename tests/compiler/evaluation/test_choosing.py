@@ -128,7 +128,11 @@ def test_any_number_of_workers_chooses_the_same(grasp_set: GraspSet, jobs: int) 
 def test_after_the_first_fold_the_surest_three_go_on_and_the_most_accurate(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first is right everywhere but sure of nothing; the last but one would win in the folds after the first."""
     samples = _samples([], [*range(9)], [0, 1, 2], [0, 1, 2], [0, 1, 2, 3])
-    wanted = [{"switch": 0, "faith": 1e-3}, *({"switch": switch} for switch in (2, 3, 4)), {"switch": 1}]
+    wanted: list[Mapping[str, float]] = [
+        {"switch": 0, "faith": 1e-3},
+        *({"switch": switch} for switch in (2, 3, 4)),
+        {"switch": 1},
+    ]
     candidates = _pointing(monkeypatch, *wanted)
     fitted: list[int] = []
     draft = Training.draft
