@@ -1,5 +1,7 @@
 """`thenar evaluate`: the paper's tables for the user's recordings."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,14 +32,14 @@ from .parameters import (
     keep_apart,
     overwrite_flag,
 )
-from .printing import json_flag, out, progress, show, table, warning, write_json
+from .printing import json_flag, out, progress, show, table, wants_json, warning, write_json
 
 if TYPE_CHECKING:
     from rich.table import Table as Grid
 
     from thenar.compiler.artifact.stream_study import StreamStudy, SubjectMean
     from thenar.compiler.artifact.wearers import WearerStudy
-    from thenar.compiler.evaluation.study import Study
+    from thenar.compiler.evaluation.study import Study, StudyRun
     from thenar.compiler.evaluation.tables import RateTable
     from thenar.runtime.recipe import Recipe
 
@@ -159,8 +161,7 @@ def command(
     Frames of one trial are never on both sides of a fold. Accuracies count trials, each classified by majority vote of
     its frames; if trials have several frames, the accuracy of single frames is added.
 
-    --tables trainers compares trainers with each other and with scikit-learn's simplest, each with hyperparameters
-    chosen on its training rows.
+    --tables trainers compares trainers, each with hyperparameters chosen on its training rows.
 
     With --streams, GRASPS holds whole movements: placement, tables and segment costs are learnt without the subject
     whose streams are decoded, live and afterwards. The dwell rule and a plain hidden Markov model
@@ -178,7 +179,7 @@ def command(
         thenar evaluate set.grasps --by subject --adapt 1,2,3
         thenar evaluate set.grasps --by subject --plot pictures/ -o result.json
     """
-    from thenar.compiler.evaluation.study import StudyDesign, evaluate
+    from thenar.compiler.evaluation.study import StudyDesign, StudyRun
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.recipe import Recipe, changed
 
@@ -199,18 +200,18 @@ def command(
     design = StudyDesign(recipe, **asked)
     if folder is not None and "compositions" not in design.tables:
         raise click.UsageError("--plot shows the compositions: name them in --tables")
-    with progress("evaluating") as report:
-        grasp_set = GraspSet.load(grasps)
-        study = evaluate(grasp_set, design, jobs, report, **terms_of(recipe, grasp_set, layout, glove))
+    grasp_set = GraspSet.load(grasps)
+    run = StudyRun(grasp_set, design, **terms_of(recipe, grasp_set, layout, glove))
+    for sentence in run.study.warnings:
+        warning(sentence)
+    study = replace(run.study, tables=tuple(_tables(run, jobs)))
     if folder is not None:
         from thenar.compiler.evaluation.study import draw
 
         draw(study, folder)
     if output is not None:
         write_json(output, study)
-    for sentence in study.warnings:
-        warning(sentence)
-    show(study, _print)
+    show(study, _print_end)
 
 
 def _evaluate_people(
@@ -283,16 +284,25 @@ def _print_grid(title: str, grid: "Grid", note: str = "") -> None:
         console.print(note)
 
 
-def _print(study: "Study") -> None:
-    """Print all tables, laid out as in the paper."""
+def _tables(run: "StudyRun", jobs: int) -> Iterator["RateTable"]:
+    """Yield the tables; print each, laid out as in the paper, as soon as its fits are run."""
     from thenar.compiler.evaluation.folds import PROTOCOLS
 
     console = out()
     for protocol, meaning in PROTOCOLS.items():
-        if protocol in study.options.protocols:
+        if protocol in run.study.options.protocols and not wants_json():
             console.print(f"Protocol {protocol}: {meaning}")
-    for rated in study.tables:
-        _print_grid(rated.title, _rates(rated), rated.note)
+    for name in run.names:
+        with progress(f"evaluating {name[0]}") as report:
+            (rated,) = run.tables([name], jobs, report)
+        if not wants_json():
+            _print_grid(rated.title, _rates(rated), rated.note)
+        yield rated
+
+
+def _print_end(study: "Study") -> None:
+    """Print what has no table, and what was evaluated."""
+    console = out()
     console.print()
     for missing in study.left_out:
         console.print(f"no table of {missing.name}: {missing.reason}")

@@ -71,7 +71,7 @@ def _timed() -> tuple[str, ...]:
 )
 @click.option("--baselines", type=method_list, help="Methods to compare them with, or none.  [default: most]")
 @trainer_option(AUTO)
-@click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="Most rounds to try.")
+@click.option("--rounds", type=click.IntRange(1, 300), default=100, show_default=True, help="Most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(
     "--finalists", type=click.IntRange(1), default=12, show_default=True, help="Placements to refine and price."

@@ -280,9 +280,7 @@ def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, A
 def _option(setting: "Setting", chosen: bool) -> click.Option:
     ends = (setting.least, setting.most)
     kind: click.ParamType[Any] = Number(*ends)
-    if setting.names:
-        kind = click.Choice(setting.names)
-    elif setting.kind is int:
+    if setting.kind is int:
         low, high = (None if end is None else int(end) for end in ends)
         kind = click.INT if ends == (None, None) else click.IntRange(low, high)
     what, _, default = setting.what.partition("  [default: ")

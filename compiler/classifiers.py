@@ -151,9 +151,6 @@ class LogitBoostClassifier(AdditiveClassifier):
         Training stops where the mean log-likelihood changes by less than this in a round (Weka's -L); None: never.
     max_bins : int, optional
         The most bins per input (2 or more); they hold rows as evenly as possible. None: one for each value.
-    ties : {"first", "least-used"}, default="first"
-        Between inputs whose stumps explain the same, take the first (Weka's rule), or the one that the fewest stumps
-        have used so far, so that with few rows the classifier does not depend on a few inputs.
     classes : sequence, optional
         All labels, if y may lack some of them (a fold without a rare class). None: those in y.
 
@@ -188,7 +185,6 @@ class LogitBoostClassifier(AdditiveClassifier):
         z_max: float = 3.0,
         tolerance: float | None = None,
         max_bins: int | None = None,
-        ties: str = "first",
         classes: Sequence[Any] | None = None,
     ) -> None:
         self.rounds = rounds
@@ -196,7 +192,6 @@ class LogitBoostClassifier(AdditiveClassifier):
         self.z_max = z_max
         self.tolerance = tolerance
         self.max_bins = max_bins
-        self.ties = ties
         self.classes = classes
 
     def staged_decision_function(self, X: ArrayLike) -> Iterator[Floats]:
@@ -221,7 +216,6 @@ class LogitBoostClassifier(AdditiveClassifier):
             tolerance=self.tolerance,
             weights=weights,
             max_bins=self.max_bins,
-            ties=self.ties,
             on_round=progress,
         )
         self.n_rounds_ = self.stumps_.n_rounds

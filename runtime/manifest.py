@@ -10,7 +10,7 @@ from msgspec import Meta, Struct
 
 from .names import list_names
 from .published import NONE
-from .recipe import AUTO, PAPERS_TRAINER, Count, Given, Name, Recipe, Share, Value
+from .recipe import AUTO, PAPERS_TRAINER, Count, Name, Recipe, Share, Value
 from .segmenting.model import SegmentModel
 
 SCHEMA = 1
@@ -56,7 +56,7 @@ class Compared(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     trainer: Name
-    settings: dict[Name, Given | None]
+    settings: dict[Name, Value | None]
     correct: Count
     total: Annotated[int, Meta(ge=1, le=2**53)]
     error: Share
@@ -81,12 +81,12 @@ class Compared(Struct, frozen=True, forbid_unknown_fields=True):
         return f"{self.name}: {100 * self.rate:.1f} +- {100 * self.error:.1f} %{behind}; tables of {self.rows:.0f} rows"
 
 
-def in_words(name: str, value: float | str) -> str:
+def in_words(name: str, value: float) -> str:
     """Return a setting in words: "max-bins 16"."""
-    return f"{name.replace('_', '-')} {value if isinstance(value, str) else format(value, 'g')}"
+    return f"{name.replace('_', '-')} {value:g}"
 
 
-def fit_name(trainer: str, settings: Mapping[str, float | str | None]) -> str:
+def fit_name(trainer: str, settings: Mapping[str, float | None]) -> str:
     """Return a trainer and its settings in words: "logit, penalty 1, smoothness 10"."""
     values = (in_words(name, value) for name, value in settings.items() if value is not None)
     return ", ".join([trainer, *values])
@@ -102,7 +102,7 @@ class Fitting(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     trainer: Name
-    settings: dict[Name, Given | None]
+    settings: dict[Name, Value | None]
     of: Of = "within subject"
     folds: Count = 0
     tried: Count = 1
@@ -112,7 +112,7 @@ class Fitting(Struct, frozen=True, forbid_unknown_fields=True):
     def number(self, name: str) -> float:
         """Return a setting that is a number; 0 if there is none of this name."""
         value = self.settings.get(name)
-        return 0.0 if value is None or isinstance(value, str) else value
+        return 0.0 if value is None else value
 
     def __str__(self) -> str:
         """Return the trainer and its settings."""
@@ -399,7 +399,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
         if self.fitting is not None:
             return self.fitting
         asked = self.options
-        given: dict[Name, Given | None] = {"max_bins": asked.max_bins, **asked.settings}
+        given: dict[Name, Value | None] = {"max_bins": asked.max_bins, **asked.settings}
         if asked.trainer not in (AUTO, PAPERS_TRAINER):
             return Fitting(asked.trainer, given)
         boosted = {name: getattr(asked, name) for name in ("rounds", "shrinkage", "tolerance")}

@@ -88,10 +88,8 @@ def _wrong_texts(manifest: Manifest) -> Iterator[str]:
     source, options, fit = manifest.source, manifest.options, manifest.fit
     texts = [manifest.thenar, source.taxonomy, options.placement, options.trainer, *options.settings]
     texts += [*options.keep_these, *options.never]
-    texts += [fit.trainer, *(value for value in options.settings.values() if isinstance(value, str))]
-    for settings in (fit.settings, *(each.settings for each in fit.compared)):
-        texts += [text for text in (*settings, *settings.values()) if isinstance(text, str)]
-    texts += [each.trainer for each in fit.compared]
+    texts += [fit.trainer, *fit.settings]
+    texts += [text for each in fit.compared for text in (each.trainer, *each.settings)]
     yield from _wrong_names("texts", texts)
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
 

@@ -20,8 +20,6 @@ Count = Annotated[int, Meta(ge=0, le=2**53)]
 Value = Annotated[float, Meta(ge=-1e300, le=1e300)]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Name = Annotated[str, Meta(min_length=1)]
-# A number, or one of a few names.
-Given = Value | Name
 # What a choice changes, and all that comes after it: the elements, the model, the integer tables, or only what is
 # measured.
 Part = Literal["placement", "limits", "training", "tables", "rates"]
@@ -80,7 +78,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     ] = None
     width: Annotated[Annotated[int, Meta(ge=4, le=16)], _choice("tables", "Bits that every sum of scores fits.")] = 16
     trainer: Annotated[Name, _choice("training", "What trains the model.")] = AUTO
-    settings: Annotated[dict[Name, Given], _choice("training", "Settings of the trainer, by name.")] = {}
+    settings: Annotated[dict[Name, Value], _choice("training", "Settings of the trainer, by name.")] = {}
     by: Annotated[
         By | None,
         _choice(

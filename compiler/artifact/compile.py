@@ -36,7 +36,7 @@ from ..publication import check_folder, publish_folder, sweep
 from ..recogniser import Recogniser, predicted_classes
 from ..recordings.graspset import GraspSet, Joint
 from ..samples import Samples
-from ..trainers.base import SHARED, TRAINERS, Report, Training
+from ..trainers.base import SHARED, Report, Training
 from ..wearer import STRENGTH
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, TRY_NAME, BuildReport, Documents
@@ -213,9 +213,7 @@ def _sound(options: Recipe) -> Recipe:
         # Nothing is left to choose. Recipe with rounds mean LogitBoost.
         trainer, settings = AUTO if only.trainer == PAPERS_TRAINER else only.trainer, dict(only.settings)
     values = {name: float(value) if isinstance(value, int) else value for name, value in settings.items()}
-    # The first of several names is the default, and is not written.
-    usual = {setting.name: setting.default for setting in TRAINERS[only.trainer].settings if setting.names}
-    unusual: dict[str, Any] = {n: value for n, value in values.items() if value is not None and value != usual.get(n)}
+    unusual: dict[str, Any] = {name: value for name, value in values.items() if value is not None}
     shared = {name: unusual.pop(name, None) for name in SHARED}
     shared |= {name: int(shared[name]) for name in ("rounds", "max_bins") if shared[name] is not None}
     # msgspec omits a value that equals its default only if it is the same object.

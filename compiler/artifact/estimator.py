@@ -273,7 +273,6 @@ def _trained_by(classifier: Any, options: Recipe) -> Recipe:
         shrinkage=float(classifier.shrinkage),
         tolerance=classifier.tolerance,
         max_bins=classifier.max_bins,
-        settings={} if classifier.ties == "first" else {"ties": classifier.ties},
     )
 
 

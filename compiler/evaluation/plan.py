@@ -25,32 +25,22 @@ Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
 # For each learner of a fit, the trainings among which each fit chooses.
 Candidates = Mapping[str, tuple[Training, ...]]
-# Classifiers of scikit-learn with its own settings, neighbours weighted by distance: to compare the trainers with.
-CLASSIFIERS = ("logistic-regression", "5-nearest-neighbours")
 REFERENCE = "logitboost"  # the trainer with which the others are compared
-
-
-def learners() -> tuple[str, ...]:
-    """Return the methods in the table of trainers: REFERENCE, the other trainers that can be chosen automatically, and
-    CLASSIFIERS.
-    """
-    return tuple(dict.fromkeys([REFERENCE, *(name for name in TRAINERS if TRAINERS[name].automatic), *CLASSIFIERS]))
 
 
 def candidates_of(recipe: Recipe) -> Candidates:
     """Return the candidates of each learner: requested settings apply to the trainers that have them."""
-    trainers = dict.fromkeys([*learners(), recipe.trainer])
+    trainers = dict.fromkeys([*TRAINERS, recipe.trainer])
     recipes = {name: recipe if name == recipe.trainer else Recipe(trainer=name) for name in trainers}
-    compared = {name: Training.candidates(recipes[name]) for name in trainers if name not in CLASSIFIERS}
-    return {"": (Training.of(recipe),), **compared}
+    return {"": (Training.of(recipe),), **{name: Training.candidates(recipes[name]) for name in trainers}}
 
 
 @dataclass(frozen=True, slots=True)
 class FoldFit:
     """Train on a fold's training rows with these elements, joints, and classes `grasps` (ascending labels); then test.
 
-    `learner` is a trainer or AUTO, whose settings are chosen on the training rows, or one of CLASSIFIERS; "": the
-    trainer and settings of the recipe. Two fits are equal if they have the same `Fold` object, inputs and learner.
+    `learner` is a trainer or AUTO, whose settings are chosen on the training rows; "": the trainer and settings of the
+    recipe. Two fits are equal if they have the same `Fold` object, inputs and learner.
     """
 
     fold: Fold
@@ -81,29 +71,11 @@ def predictions(
     if not read.varies:
         return np.full(len(fit.fold.test), read.most_frequent)
     learning = replace(read, labels=np.searchsorted(grasps, read.labels), grasps=tuple(map(str, fit.grasps)))
-    if fit.learner in CLASSIFIERS:
-        return grasps[_classified(fit.learner, learning, test)]
     (training,) = candidates[""]
     if fit.learner:
         fitting = choose_training(learning, candidates[fit.learner], groups=None if groups is None else groups[rows])
         training = Training.chosen(fitting, masked=training.masked)
     return grasps[winners(training.draft(learning).scores(test.switches, test.codes))]
-
-
-def _classified(name: str, learning: Samples, test: Samples) -> Labels:
-    """Return the class numbers that one of CLASSIFIERS, on standardised inputs, predicts for test rows (n,)."""
-    from sklearn.linear_model import LogisticRegression
-    from sklearn.neighbors import KNeighborsClassifier
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
-
-    # scikit-learn's classifiers cannot be fitted to a single class.
-    if (learning.labels == learning.labels[0]).all():
-        return np.full(len(test.labels), learning.labels[0])
-    logistic = name == "logistic-regression"
-    classifier = LogisticRegression(max_iter=10_000) if logistic else KNeighborsClassifier(5, weights="distance")
-    pipeline = make_pipeline(StandardScaler(), classifier).fit(learning.inputs.astype(np.float64), learning.labels)
-    return np.asarray(pipeline.predict(test.inputs.astype(np.float64)), dtype=np.intp)
 
 
 def run_fits(
@@ -291,7 +263,7 @@ class Planner:
             self,
             populations=tuple(replace(population, repeats=population.repeats[:1]) for population in self.populations),
         )
-        return [once._row(name, kind.what, kind, chosen, name) for kind in self.kinds for name in learners()]
+        return [once._row(name, kind.what, kind, chosen, name) for kind in self.kinds for name in TRAINERS]
 
     @property
     def kinds(self) -> tuple[Composition, ...]:

@@ -1,5 +1,6 @@
 """An evaluation: the paper's tables for the user's recordings, with each distinct fit run once."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self
@@ -31,6 +32,8 @@ from .folds import (
 )
 from .plan import (
     BASELINES,
+    FoldFit,
+    Labels,
     Planner,
     Progress,
     TableName,
@@ -178,40 +181,65 @@ def evaluate(
     >>> 0 <= study.tables[0].rows[0].rate.mean <= 1
     True
     """
-    design = (design or StudyDesign()).changed(**changes)
-    recipe, scheme = design.recipe, design.scheme
-    chosen = _of_subjects(grasp_set.without_none(), design.subjects)
-    populations = populations_of(chosen, scheme, recipe.folds, design.repeats, recipe.seed)
-    reasons = {name: _why_not(name, chosen, populations, design) for name in design.tables}
-    if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
-        _check_all_switches(chosen, populations)
-    samples = Samples.of(chosen)
-    planner = Planner(populations, InputChoices(samples, ports, limits), recipe, design.prune_list, design.baselines)
-    plans = {
-        (name, protocol): planner.table(name, protocol)
-        for name, reason in reasons.items()
-        if reason is None
-        for protocol in PROTOCOLS
-        if protocol in design.protocols and (protocol == "nested" or name not in _NESTED)
-    }
-    fits = (fit for rows in plans.values() for row in rows for cell in row.cells for fit in cell.fits)
-    groups, candidates = groups_of(chosen, scheme), candidates_of(recipe)
-    predicted = run_fits(samples, fits, candidates, groups, jobs=jobs, progress=progress)
-    reader = RateReader(samples, predicted, OF[scheme], groups)
-    empty = grasp_set.is_none & np.isin(grasp_set.subjects, np.unique(chosen.subjects))
-    return Study(
-        fingerprint=grasp_set.fingerprint(),
-        rows=len(chosen),
-        trials=int(samples.trials.max()) + 1,
-        options=design,
-        grasps=samples.grasps,
-        warnings=concerns(chosen, populations, scheme, recipe.folds),
-        left_out=tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None),
-        tables=tuple(
-            reader.table(name, protocol, rows, _recipe_of(name, recipe)) for (name, protocol), rows in plans.items()
-        ),
-        rests=len(np.unique(grasp_set.trial_ids[empty])),
-    )
+    run = StudyRun(grasp_set, (design or StudyDesign()).changed(**changes), ports, limits)
+    return replace(run.study, tables=run.tables(run.names, jobs, progress))
+
+
+class StudyRun:
+    """An evaluation some tables at a time; the parameters are those of `evaluate`.
+
+    Attributes
+    ----------
+    names : tuple
+        The name and protocol of each table, in their order.
+    study : Study
+        The result without tables.
+    """
+
+    def __init__(
+        self, grasp_set: GraspSet, design: StudyDesign, ports: PortCosts | None = None, limits: Limits | None = None
+    ) -> None:
+        recipe, scheme = design.recipe, design.scheme
+        chosen = _of_subjects(grasp_set.without_none(), design.subjects)
+        populations = populations_of(chosen, scheme, recipe.folds, design.repeats, recipe.seed)
+        reasons = {name: _why_not(name, chosen, populations, design) for name in design.tables}
+        if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
+            _check_all_switches(chosen, populations)
+        self.names: tuple[tuple[TableName, ProtocolName], ...] = tuple(
+            (name, protocol)
+            for name, reason in reasons.items()
+            if reason is None
+            for protocol in PROTOCOLS
+            if protocol in design.protocols and (protocol == "nested" or name not in _NESTED)
+        )
+        samples, self._groups = Samples.of(chosen), groups_of(chosen, scheme)
+        choices = InputChoices(samples, ports, limits)
+        self._planner = Planner(populations, choices, recipe, design.prune_list, design.baselines)
+        self._predicted: dict[FoldFit, Labels] = {}
+        empty = grasp_set.is_none & np.isin(grasp_set.subjects, np.unique(chosen.subjects))
+        self.study = Study(
+            fingerprint=grasp_set.fingerprint(),
+            rows=len(chosen),
+            trials=int(samples.trials.max()) + 1,
+            options=design,
+            grasps=samples.grasps,
+            warnings=concerns(chosen, populations, scheme, recipe.folds),
+            left_out=tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None),
+            tables=(),
+            rests=len(np.unique(grasp_set.trial_ids[empty])),
+        )
+
+    def tables(
+        self, names: Sequence[tuple[TableName, ProtocolName]], jobs: int = -1, progress: Progress | None = None
+    ) -> tuple[RateTable, ...]:
+        """Return some of the tables; fits that were run for others are not run again."""
+        design, samples = self.study.options, self._planner.samples
+        plans = {name: self._planner.table(*name) for name in names}
+        fits = (fit for rows in plans.values() for row in rows for cell in row.cells for fit in cell.fits)
+        todo, candidates = (fit for fit in fits if fit not in self._predicted), candidates_of(design.recipe)
+        self._predicted |= run_fits(samples, todo, candidates, self._groups, jobs=jobs, progress=progress)
+        reader = RateReader(samples, self._predicted, OF[design.scheme], self._groups)
+        return tuple(reader.table(*name, rows, _recipe_of(name[0], design.recipe)) for name, rows in plans.items())
 
 
 def draw(study: Study, folder: Path) -> list[Path]:

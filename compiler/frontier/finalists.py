@@ -18,7 +18,7 @@ from ..placement.elements import Elements
 from ..placement.methods.base import BEST, METHODS, PAPERS
 from .points import STEP, By, Curve, ReferencePoint, front
 from .price import PricedTables
-from .search import CURVE_SIZES, JOINTS, SHAPES, Search, placed, tabled
+from .search import CURVE_SIZES, JOINTS, PAPERS_ROUNDS, SHAPES, Search, placed, tabled
 from .survey import FoldHits, Survey, TrialAccuracy
 
 # The inputs that need a placement; without joints, only the second.
@@ -32,8 +32,6 @@ _PAPERS = 62
 _USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
 # The share of errors below which differences do not count: too small for a screening of some hundred rows.
 _FEWEST = 0.002
-# The share of the rows that more rounds than the paper's must win in the first repeat.
-_DEEPER = 0.002
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,26 +205,18 @@ def _different(screened: Sequence[Screened]) -> list[Screened]:
 
 
 def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[EvaluatedFinalist, ...]:
-    """Return the finalists with all evaluations.
-
-    All are trained to the last round in the folds of the first repeat. In the others, those that gain nothing by more
-    rounds than the paper's hundred are trained for these alone.
-    """
+    """Return the finalists with all evaluations, trained to the last round in all folds."""
     recipes = [one.recipe for one in chosen]
     searches = {recipe: survey.search.alone(recipe.trainer) for recipe in recipes}
     survey.choose(recipes, survey.cuts.others)
     survey.choose_joints(recipes, survey.cuts.others)
     survey.tune(recipes, survey.cuts.others)
-    fits = survey.fit(recipes, survey.cuts.screening, lambda recipe: (searches[recipe].stages, searches[recipe].tabled))
-    depths = {
-        recipe: depth_of(search, [fits[recipe, fold] for fold in survey.cuts.screening], len(survey.cuts.trials))
-        for recipe, search in searches.items()
-    }
-    fits |= survey.fit(recipes, survey.cuts.others, lambda recipe: (depths[recipe].stages, depths[recipe].tabled))
+    folds = (*survey.cuts.screening, *survey.cuts.others)
+    fits = survey.fit(recipes, folds, lambda recipe: (searches[recipe].stages, searches[recipe].tabled))
     finalists, tables = [], {}
     for one in chosen:
         of_folds = {fold: fit for (recipe, fold), fit in fits.items() if recipe == one.recipe}
-        finalist = _evaluated(survey, one, depths[one.recipe], of_folds)
+        finalist = _evaluated(survey, one, searches[one.recipe], of_folds)
         papers = papers_tables(one.recipe, searches[one.recipe])
         tables[one.recipe] = tuple(dict.fromkeys([*worthwhile(finalist.tables), papers]))
         finalists.append(finalist)
@@ -268,23 +258,8 @@ def marks_of(
 
 
 def papers_tables(recipe: Recipe, search: Search) -> Recipe:
-    """Return a recipe with tables like the paper's: of its hundred rounds, at the required width."""
-    return tabled(recipe, papers_depth(search).tabled[-1])
-
-
-def papers_depth(search: Search) -> Search:
-    """Return the same search, limited to the paper's hundred rounds."""
-    return replace(search, rounds=min(100, search.rounds))
-
-
-def depth_of(search: Search, fits: Sequence[FoldHits], rows: int) -> Search:
-    """Return the search with the rounds worth training, by the folds of the first repeat, of `rows` rows."""
-    few = papers_depth(search)
-    correct = [
-        sum(int.from_bytes(fit.stages[number]).bit_count() for fit in fits) for number in range(len(search.stages))
-    ]
-    gained = max(correct) - max(correct[: len(few.stages)])
-    return search if gained > _DEEPER * rows else few
+    """Return a recipe with tables like the paper's: of at most its hundred rounds, at the required width."""
+    return tabled(recipe, max(rounds for rounds in search.tabled if rounds <= min(search.rounds, PAPERS_ROUNDS)))
 
 
 def worthwhile(tables: Mapping[Recipe, TrialAccuracy]) -> tuple[Recipe, ...]:

@@ -58,9 +58,9 @@ _DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in P
 _WIDER = 3
 # Number of placements to try with fewer joints.
 _FEWER = 5
-# Calls of `Cache.ask`: the calibration, five to screen, four with fewer joints, three with other trainers, six for the
+# Calls of `Cache.ask`: the calibration, five to screen, four with fewer joints, three with other trainers, five for the
 # finalists, the simulations, the latencies.
-_ROUNDS = 21
+_ROUNDS = 20
 _UNTIMED = (
     "the time of reading the joints ({}) is unknown and is left out of every frame time and latency: give it with "
     "--joint-us"

@@ -9,7 +9,7 @@ from msgspec import Meta, Struct, field
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.manifest import in_words
 from thenar.runtime.names import fault, shortened
-from thenar.runtime.recipe import PAPERS_TRAINER, Given, Inputs, Name, TableBits
+from thenar.runtime.recipe import PAPERS_TRAINER, Inputs, Name, TableBits, Value
 
 from ..evaluation.rates import Rate
 
@@ -75,7 +75,7 @@ class PointSetting(Struct, frozen=True, forbid_unknown_fields=True, omit_default
     table_bits: TableBits = field(default_factory=lambda: WIDEST)
     max_bins: Annotated[int, Meta(ge=2, le=2**53)] | None = field(default_factory=lambda: None)
     trainer: Name = PAPERS_TRAINER
-    settings: dict[Name, Given] = {}
+    settings: dict[Name, Value] = {}
     keep_joints: Annotated[int, Meta(ge=1, le=2**16)] | None = None
     levels: Annotated[int, Meta(ge=1, le=65535)] | None = None
 

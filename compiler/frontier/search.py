@@ -20,6 +20,7 @@ from .points import FrontierError, PlacementChoice
 # Baselines are only shown for comparison: their curves have few sizes.
 CURVE_SIZES = (4, 8, 16, 33, 66)
 ROUNDS = (1, 2, 3, 5, 8, 12, 20, 30, 50, 75, 100, 150, 200, 300)
+PAPERS_ROUNDS = 100  # no point of our frontiers has more
 # The shapes of integer tables: the bits that every sum fits; and one in which a byte is enough for an entry.
 SHAPES = (*(Recipe(width=width) for width in (16, 12, 8, 6, 5, 4)), Recipe(table_bits=8))
 # The numbers of levels of each taxel to choose from, at most.
@@ -91,7 +92,7 @@ class Search:
     repeats: int = 3
     seed: int = 1
     screening: int = 60
-    rounds: int = 300
+    rounds: int = PAPERS_ROUNDS
     finalists: int = 12
     by: Literal["subject", "trial"] | None = None
     trainer: str = AUTO

@@ -295,7 +295,7 @@ stored(5)(choose_path)
 stored(3)(rank_joints)
 
 
-@stored(3)
+@stored(4)
 def choose_settings(
     samples: Samples,
     rows: Rows,

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 # The models that trainers return: score tables, or an ensemble that collapses to them.
 Model = Stumps | ScoreTables
 Report = Callable[[int, int], None]
-Number = float | int | str | None
+Number = float | int | None
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A number or name that configures a trainer: `--name` on the command line, with hyphens.
+    """A number that configures a trainer: `--name` on the command line, with hyphens.
 
     Parameters
     ----------
@@ -37,38 +37,32 @@ class Setting:
     what : str
         The sentence in `--help`.
     kind : type
-        int, float, or str.
-    default : int, float, str or None
+        int or float.
+    default : int, float or None
         The value if none is given; None is a valid default.
     least, most : int or float, optional
         The range of valid numbers.
-    names : tuple of str, optional
-        The valid values of a str.
 
     Examples
     --------
     >>> from thenar.compiler import TRAINERS
     >>> [setting.name for setting in TRAINERS["logitboost"].settings]
-    ['rounds', 'shrinkage', 'tolerance', 'max_bins', 'ties']
+    ['rounds', 'shrinkage', 'tolerance', 'max_bins']
     """
 
     name: str
     what: str
-    kind: type[int] | type[float] | type[str]
+    kind: type[int] | type[float]
     default: Number
     least: float | None = None
     most: float | None = None
-    names: tuple[str, ...] = ()
 
-    def checked(self, value: Number) -> Number:
+    def checked(self, value: Number | str) -> Number:
         """Return the value converted to its kind. Raises TrainingError for an invalid one."""
         if value is None:
             return None
-        if self.names or isinstance(value, str):
-            if value not in self.names:
-                wanted = f"one of {', '.join(self.names)}" if self.names else "a number"
-                raise TrainingError(f"{self.name}={value!r} must be {wanted}")
-            return value
+        if isinstance(value, str):
+            raise TrainingError(f"{self.name}={value!r} must be a number")
         if self.least is not None and not value >= self.least:
             raise TrainingError(f"{self.name}={value} must be at least {self.least}")
         if self.most is not None and not value <= self.most:
@@ -173,7 +167,7 @@ class Trainer(ABC):
 TRAINERS: Members[Trainer] = Members("trainer", Trainer, "thenar.compiler.trainers", "thenar.trainers")  # type: ignore[type-abstract]
 
 
-# Recipe that are settings of some trainers. None means not given.
+# Choices of a recipe that are settings of some trainers. None means not given.
 SHARED = ("rounds", "shrinkage", "tolerance", "max_bins")
 
 
@@ -196,11 +190,8 @@ class Training:
         invalid options.
         """
         trainer, given = _asked(options)[0]
-        return cls(
-            trainer.name,
-            {setting.name: setting.default for setting in trainer.settings} | trainer.checked(given),
-            options.robust,
-        )
+        defaults = {setting.name: setting.default for setting in trainer.settings}
+        return cls(trainer.name, defaults | trainer.checked(given), options.robust)
 
     @classmethod
     def candidates(cls, options: Recipe) -> "tuple[Training, ...]":

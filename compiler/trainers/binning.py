@@ -59,7 +59,8 @@ class TwoValued:
         self._high = high
         # 2^bits cells per partition, and in total not many more than there are rows.
         few = [bits for bits in range(2, _MOST_BITS + 1) if -(-len(high) // bits) << bits <= 2 * high.shape[1]]
-        self._bits = max(few, default=1)
+        self._bits = bits = max(few, default=1)
+        self._has_bit = (np.arange(1 << bits) >> np.arange(bits)[:, np.newaxis] & 1).astype(np.float64)
         self._batches: list[csc_array] = []
 
     def sums(self, by_row: Floats) -> Floats:
@@ -68,8 +69,7 @@ class TwoValued:
         if not self._batches:
             widths = [1 << bits] * -(-len(self._high) // bits)
             self._batches = [_one_hot(self._cells(batch), width) for batch, width in _batches(widths, summands)]
-        has_bit = (np.arange(1 << bits) >> np.arange(bits)[:, np.newaxis] & 1).astype(np.float64)
-        sums = [has_bit @ (one_hot @ by_row).reshape(-1, 1 << bits, summands) for one_hot in self._batches]
+        sums = [self._has_bit @ (one_hot @ by_row).reshape(-1, 1 << bits, summands) for one_hot in self._batches]
         return np.concatenate(sums).reshape(-1, summands)[: len(self._high)]
 
     def _cells(self, batch: slice) -> Iterator[NDArray[np.int32]]:

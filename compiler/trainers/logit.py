@@ -106,10 +106,10 @@ def fit_logit(
     most `max_bins` bins (2 or more; None: one for each value) that hold frames as evenly as possible. With `linear` a
     column of more than two values adds scores in proportion to them, between minimum and maximum, and `smoothness`
     pulls the contribution of one standard deviation; a share of these weights, `sparsity`, is 0, relative to the last
-    class. The number of set bits among the first `counted` columns adds
-    scores as well, with the weak pull of a bin, so that their common effect is learned at once. Frames in `held` (n,)
-    are known not to be of the last class, which learns nothing from them. No derivative of the loss is larger at the
-    solution than `tolerance` times the sum of weights. Raises TrainingError.
+    class. The number of set bits among the first `counted` columns adds scores as well, with the weak pull of a bin, so
+    that their common effect is learned at once. Frames in `held` (n,) are known not to be of the last class, which
+    learns nothing from them. No derivative of the loss is larger at the solution than `tolerance` times the sum of
+    weights. Raises TrainingError.
     """
     if not (0 < penalty < math.inf and 0 <= smoothness < math.inf):
         raise TrainingError(f"penalty={penalty} must be above 0, and smoothness={smoothness} at least 0, both finite")
@@ -198,6 +198,7 @@ class Logit(Trainer):
 
     name = "logit"
     what = "multinomial logistic regression on a table for each input"
+    automatic = False  # in no set that we know is it better than the others
     settings = (
         Setting("penalty", "Pull of scores towards zero.", float, PENALTY, 1e-6, 1e6),
         Setting(

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 # Ties are counted on a grid whose units grow with the square of z_max: far above this, all stumps would tie.
 LARGEST_Z_MAX = 100.0
-TIES = ("first", "least-used")
 # Far below this, all scores of a hundred rounds would lie within the tolerance of a tie (tables.TIE).
 SMALLEST_SHRINKAGE = 1e-6
 
@@ -39,7 +38,6 @@ def boost(
     tolerance: float | None = None,
     weights: Floats | None = None,
     max_bins: int | None = None,
-    ties: str = "first",
     on_round: Callable[[int, int], None] | None = None,
     with_losses: bool = True,
 ) -> tuple[Stumps, tuple[float, ...]]:
@@ -47,13 +45,12 @@ def boost(
 
     Stops early where the mean log-likelihood changes by less than `tolerance` in a round (Weka's -L; None: never), or
     where no column varies. With `max_bins` (2 or more) columns have at most that many bins, which hold rows as evenly
-    as possible. Between stumps that explain the same, `ties` takes the lowest column ("first", Weka's rule), or the one
-    that the fewest stumps have used so far ("least-used"). `on_round(done, rounds)` is called after every round.
+    as possible. `on_round(done, rounds)` is called after every round.
 
     Return the ensemble, and the losses before the first round and after every round: the mean of -ln P(true class).
     They take a sixth of the time; without `with_losses`, they are computed for a tolerance only. Raises TrainingError.
     """
-    _check_options(rounds, shrinkage, z_max, tolerance, max_bins, ties)
+    _check_options(rounds, shrinkage, z_max, tolerance, max_bins)
     check_rows(X, labels, n_classes, weights)
     if weights is not None:
         # Scale by a power of two, which changes no result: sums of huge weights stay finite, of tiny ones exact.
@@ -72,12 +69,11 @@ def boost(
         return probability
 
     probability = shares(scores)
-    used = np.zeros(X.shape[1], dtype=np.int64) if ties == "least-used" else None
     fitted: list[tuple[NDArray[np.int32], Floats, Floats]] = []
     stopped = False
     while len(fitted) < rounds and binned.columns and not stopped:
         targets = Targets(*weights_and_responses(probability, member, z_max, weights))
-        stumps = fit_stumps(binned, targets, z_max, used)
+        stumps = fit_stumps(binned, targets, z_max)
         # Drop the outputs: with a million rows they would take a hundred megabytes a round.
         fitted.append((stumps.columns, stumps.thresholds, stumps.values))
         scores, carry = add_exactly(scores, carry, centred(stumps.outputs, shrinkage))
@@ -116,11 +112,7 @@ def _stack(
     )
 
 
-def _check_options(
-    rounds: int, shrinkage: float, z_max: float, tolerance: float | None, max_bins: int | None, ties: str
-) -> None:
-    if ties not in TIES:
-        raise TrainingError(f"ties={ties!r} must be one of {', '.join(TIES)}")
+def _check_options(rounds: int, shrinkage: float, z_max: float, tolerance: float | None, max_bins: int | None) -> None:
     if rounds < 1:
         raise TrainingError(f"rounds={rounds} must be at least 1")
     if max_bins is not None and max_bins < 2:
@@ -144,20 +136,19 @@ class LogitBoost(Trainer):
     automatic = False  # in no set that we know is it better than the others
     staged = True
     tried = (
-        {"rounds": 30, "max_bins": 16, "ties": "least-used"},
-        {"rounds": 100, "max_bins": 16, "ties": "least-used"},
+        {"rounds": 30, "max_bins": 16},
+        {"rounds": 100, "max_bins": 16},
     )
     settings = (
         Setting("rounds", "Rounds of LogitBoost.", int, 100, 1),
         Setting("shrinkage", "Factor on the contribution of each round.", float, 1.0, SMALLEST_SHRINKAGE, 1.0),
         Setting("tolerance", "Stop after a round that changes the mean loss by less than this.", float, None, 0),
         Setting("max_bins", MAX_BINS, int, None, 2),
-        Setting("ties", "Between equal stumps, take the first or the least used input.", str, "first", names=TIES),
     )
 
     def candidates(self, given: Mapping[str, Number]) -> tuple[dict[str, Number], ...]:
         """Return the candidates to compare; given rounds mean the paper's recipe, which leaves nothing else open."""
-        recipe = {"shrinkage": 1.0, "max_bins": None, "ties": "first"} if "rounds" in given else {}
+        recipe = {"shrinkage": 1.0, "max_bins": None} if "rounds" in given else {}
         return super().candidates({**recipe, **given})
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> Stumps:

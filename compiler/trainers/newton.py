@@ -101,7 +101,7 @@ class Column:
     @property
     def n_rows(self) -> int:
         """The number of its rows."""
-        return math.prod(self.cells) if self.cells else int(self.bins.max()) + 1 - self.first
+        return math.prod(self.cells) if self.cells else len(self.edges) + 1 - self.first
 
     def pulls(self, penalty: float, smoothness: float) -> Floats:
         """Return the pull (rows,) on each row."""
@@ -115,18 +115,18 @@ def columns_of(
     X: NDArray[np.generic], max_bins: int | None, weights: Floats | None, straight: Floats | None
 ) -> list[Column]:
     """Return the columns; those of more than two values as lines, if their weights (n,) are given as `straight`."""
-    columns, binned = [], bin_columns(X, max_bins, weights).columns
+    columns, binned, constant = [], bin_columns(X, max_bins, weights).columns, np.zeros(len(X), np.intp)
     for number in range(X.shape[1]):
-        x = np.asarray(X[:, number], np.float64)
-        edges = binned[number].edges if number in binned else np.zeros(0)
-        bins: NDArray[np.intp] = np.searchsorted(edges, x)
+        column = binned.get(number)
+        edges, bins = (np.zeros(0), constant) if column is None else (column.edges, column.bins.astype(np.intp))
         # A single bin is redundant with the bias, and one of two bins with the other.
-        if bins.max() < 2:
+        if len(edges) < 2:
             columns.append(Column(edges, bins, 1))
-        elif straight is None or not len(edges):
+        elif straight is None:
             columns.append(Column(edges, bins, 0))
         else:
-            columns.append(Column(np.zeros(0), np.zeros(len(x), np.intp), 0, Ruler.of(x, straight)))
+            ruler = Ruler.of(np.asarray(X[:, number], np.float64), straight)
+            columns.append(Column(np.zeros(0), constant, 0, ruler))
     return columns
 
 
@@ -176,6 +176,7 @@ class Fit:
             start += column.n_rows
         self._cells, self._shared = _factors([Column(np.zeros(0), np.zeros(n, np.intp), 0), *columns])
         self._by_cell, self._by_row = self._cells.T.tocsr(), self._shared.T.tocsr()
+        self._squares = self._by_cell * self._by_cell
         # Bounds on the sums over a frame's values and over a row's values, in units of which they are multiples.
         marks = _MARKS if any(column.line for column in columns) else 1.0
         self._across = float((abs(self._cells) @ self._shared.sum(axis=1)).max()) * marks
@@ -273,8 +274,7 @@ class Fit:
         """Return V with H V = -gradient up to `unsolved`, by conjugate gradients preconditioned with H's diagonal."""
         p = point.probability
         spread = p * (1.0 - p) if self._weights is None else p * (1.0 - p) * self._weights[:, np.newaxis]
-        squares = self._by_cell * self._by_cell
-        diagonal = self._by_row @ (squares @ on_one_grid(spread, self._down * _MARKS)) + self._stiffness
+        diagonal = self._by_row @ (self._squares @ on_one_grid(spread, self._down * _MARKS)) + self._stiffness
         found, rest = np.zeros_like(point.rows), -point.gradient
         near = rest / diagonal
         along, size = near, dot(rest, near)
@@ -307,27 +307,29 @@ def _factors(columns: Sequence[Column]) -> tuple["csr_array", "csr_array"]:
 
     Frames with the same bins in several neighbouring columns share a cell of these columns; a line has one cell.
     """
+    firsts, starts = np.array([column.first for column in columns]), np.cumsum([0, *(c.n_rows for c in columns)])
+    bins = np.array([column.bins for column in columns])
     groups: list[tuple[NDArray[np.intp], list[int]]] = []
-    for number, column in enumerate(columns):
-        if groups and column.line is None and columns[groups[-1][1][0]].line is None:
-            cell = _numbered(groups[-1][0] * (int(column.bins.max()) + 1) + column.bins)
+    for number, (each, last) in enumerate(zip(columns, bins.max(axis=1).tolist(), strict=True)):
+        if groups and each.line is None and columns[groups[-1][1][0]].line is None:
+            cell = _numbered(groups[-1][0] * (last + 1) + bins[number])
             if cell.max() < _MOST_CELLS:
                 groups[-1] = cell, [*groups[-1][1], number]
                 continue
-        groups.append((_numbered(column.bins), [number]))
-    starts = np.cumsum([0, *(column.n_rows for column in columns)])
+        groups.append((_numbered(bins[number]), [number]))
     places, values, inside, rows, used = [], [], [], [], 0
     for cell, numbers in groups:
-        line, frame = columns[numbers[0]].line, np.unique(cell, return_index=True)[1]
+        line, frame = columns[numbers[0]].line, np.zeros(int(cell.max()) + 1, np.intp)
+        frame[cell] = np.arange(len(cell))
         places.append(used + cell)
         values.append(np.ones(len(cell)) if line is None else line.steps)
-        for number in numbers:
-            at = columns[number].bins[frame] - columns[number].first
-            inside.append(used + np.flatnonzero(at >= 0))
-            rows.append(starts[number] + at[at >= 0])
+        at = bins[numbers][:, frame] - firsts[numbers, np.newaxis]
+        column, place = np.nonzero(at >= 0)
+        inside.append(used + place)
+        rows.append(starts[numbers][column] + at[column, place])
         used += len(frame)
-    frames = np.tile(np.arange(len(cell)), len(groups))
-    cells = sparse(np.concatenate(values), frames, np.concatenate(places), (len(cell), used))
+    frames = np.repeat(np.arange(bins.shape[1]), len(groups))
+    cells = sparse(np.column_stack(values).ravel(), frames, np.column_stack(places).ravel(), (bins.shape[1], used))
     counted = np.concatenate(inside)
     return cells, sparse(np.ones(len(counted)), counted, np.concatenate(rows), (used, int(starts[-1])))
 

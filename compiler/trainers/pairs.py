@@ -130,10 +130,7 @@ class Pairs(Trainer):
         ),
     )
     drafting = DRAFT
-    tried = (
-        {"penalty": 3.0, "smoothness": 24.0, "max_bins": 32, "pair_smoothness": 10.0},
-        {"penalty": 0.3, "smoothness": 2.0, "max_bins": 32, "pair_smoothness": 0.3},
-    )
+    tried = ({"penalty": 0.3, "smoothness": 2.0, "max_bins": 32, "pair_smoothness": 0.3},)
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> ScoreTables:
         """Return the tables. Raises TrainingError for settings that make no sense."""

@@ -130,12 +130,9 @@ class FittedStumps:
     outputs: Floats  # (K, n)
 
 
-def fit_stumps(binned: Binned, targets: Targets, z_max: float, used: NDArray[np.int64] | None = None) -> FittedStumps:
-    """Fit one stump per class. Ties go to the lowest column, then to the lowest threshold. |value| <= z_max.
-
-    With `used` (d,), the number of stumps on each column, ties go to the least used column; the counts are updated.
-    """
-    columns, splits = _best_splits(binned, targets, _tie_bound(targets, z_max), used)
+def fit_stumps(binned: Binned, targets: Targets, z_max: float) -> FittedStumps:
+    """Fit one stump per class. Ties go to the lowest column, then to the lowest threshold. |value| <= z_max."""
+    columns, splits = _best_splits(binned, targets, _tie_bound(targets, z_max))
     chosen = [(binned.columns[column], split) for column, split in zip(columns.tolist(), splits.tolist(), strict=True)]
     # A column of two values has bits for bins, and one split.
     left = np.array([~column.bins if column.bins.dtype == bool else column.bins <= split for column, split in chosen])
@@ -162,9 +159,7 @@ def _tie_bound(targets: Targets, z_max: float) -> Floats:
     return bound
 
 
-def _best_splits(
-    binned: Binned, targets: Targets, tie_bound: Floats, used: NDArray[np.int64] | None
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _best_splits(binned: Binned, targets: Targets, tie_bound: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the column and split (K,) that explain most, for each class; ties go to the lowest."""
     n_classes = len(tie_bound)
     by_row, totals = np.ascontiguousarray(targets.both.units.T), targets.both.units.sum(axis=1)
@@ -180,21 +175,8 @@ def _best_splits(
         most = parts.max(axis=2)
         explained[sums.columns] = most
         splits[sums.columns] = (parts >= (most - tie_bound)[..., np.newaxis]).argmax(axis=2)
-    tied = explained >= explained.max(axis=0) - tie_bound
-    columns = tied.argmax(axis=0) if used is None else _least_used(tied, used, len(binned.columns))
+    columns = (explained >= explained.max(axis=0) - tie_bound).argmax(axis=0)
     return columns, splits[columns, np.arange(n_classes)]
-
-
-def _least_used(tied: NDArray[np.bool_], used: NDArray[np.int64], varying: int) -> NDArray[np.intp]:
-    """Return the least used of the `tied` columns (d, K) for each class, (K,), and count its use."""
-    columns: NDArray[np.intp] = tied.argmax(axis=0)
-    for k, among in enumerate(tied.T):
-        candidates = np.flatnonzero(among)
-        # Where all columns tie, none is informative: do not spread thresholds over others because of that.
-        if len(candidates) < varying:
-            columns[k] = candidates[used[candidates].argmin()]
-        used[columns[k]] += 1
-    return columns
 
 
 def _explained(sums: SplitSums, totals: Floats, least: Floats) -> Floats:

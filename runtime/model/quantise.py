@@ -90,9 +90,10 @@ def finest_scale(tables: ScoreTables, limit: float, widest: int, grid: int = 1) 
         return 1.0
     extremes = _Extremes(tables, grid)
     most = limit + grid * (len(tables.terms) - len(tables.lines) + 2) + WIDEST * len(tables.lines)
+    unbound = grid > 1 or widest >= 2 * limit  # a lookup is a part of some sum
     fits, too_fine = 0.0, min(most / whole, FINEST_SCALE)
     while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
-        if extremes.reach(middle) <= limit and (grid > 1 or extremes.span(middle) <= widest):
+        if extremes.reach(middle) <= limit and (unbound or extremes.span(middle) <= widest):
             fits = middle
         else:
             too_fine = middle

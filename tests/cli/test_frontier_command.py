@@ -19,7 +19,7 @@ from thenar.runtime import Build
 from .conftest import thenar
 
 # A trainer of which nothing is left to choose.
-SETTLED = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536, "--ties", "least-used")
+SETTLED = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536)
 QUICK = (
     *("--target", "host", "--methods", "elimination,id3", "--baselines", "cmim"),
     *("--rounds", 6, "--finalists", 2, "--repeats", 1, "--jobs", 1, *SETTLED),

@@ -40,7 +40,7 @@ def test_a_method_of_another_package_is_listed_chosen_by_and_compared(
     assert [kept["number"] for kept in placed["switches"]] == np.argsort(-(closed + opened), kind="stable")[:4].tolist()
 
     quick = ("--rounds", "2", "--finalists", "1", "--repeats", "1", "--jobs", "1", "--json")
-    settled = ("--trainer", "logitboost", "--shrinkage", "1", "--max-bins", "65536", "--ties", "least-used")
+    settled = ("--trainer", "logitboost", "--shrinkage", "1", "--max-bins", "65536")
     found = json.loads(
         there.thenar(
             *("frontier", str(file), "-o", str(tmp_path / "found"), "--methods", "chi2", "--baselines", "none"),

@@ -49,5 +49,5 @@ def test_a_recipe_read_from_a_file_obeys_the_ranges() -> None:
 
 
 def test_other_names_are_settings_of_the_trainer() -> None:
-    recipe = changed(Recipe(settings={"ties": "first"}), {"prune": 13, "penalty": 2.0})
-    assert (recipe.prune, recipe.settings) == (13, {"ties": "first", "penalty": 2.0})
+    recipe = changed(Recipe(settings={"penalty": 1.0, "smoothness": 3.0}), {"prune": 13, "penalty": 2.0})
+    assert (recipe.prune, recipe.settings) == (13, {"penalty": 2.0, "smoothness": 3.0})

@@ -191,24 +191,3 @@ def test_options_at_the_end_of_their_range_are_taken(options: dict[str, Any]) ->
 def test_inputs_that_are_no_table_of_the_labels_rows_are_refused(shape: tuple[int, ...]) -> None:
     with pytest.raises(TrainingError, match="must be"):
         boost(np.zeros(shape), np.zeros(6 if shape[0] else 0, np.intp), 2)
-
-
-@given(st.integers(0, 2**32), st.integers(2, 6))
-def test_of_equal_columns_the_least_used_takes_turns(seed: int, copies: int) -> None:
-    rng = np.random.default_rng(seed)
-    X, labels = rng.integers(0, 4, size=(30, 3)), np.arange(30) % 3
-    many, _ = boost(np.hstack([X] * copies), labels, 3, rounds=12, ties="least-used")
-    first, _ = boost(X, labels, 3, rounds=12)
-    # What is learnt is that of one copy, if none of its own columns tie; which copy, takes turns.
-    assert many.values.tobytes() == boost(X, labels, 3, rounds=12, ties="least-used")[0].values.tobytes()
-    used = np.bincount(many.columns.ravel(), minlength=3 * copies).reshape(copies, 3)
-    assert (np.ptp(used, axis=0) <= 1).all()
-    assert first.columns.tobytes() == boost(X, labels, 3, rounds=12, ties="first")[0].columns.tobytes()
-
-
-def test_fewer_rounds_of_spread_ties_are_the_first_of_more() -> None:
-    rng = np.random.default_rng(8)
-    X, labels = rng.integers(0, 2, size=(8, 60)), np.arange(8) % 4
-    long, short = (boost(X, labels, 4, rounds=rounds, ties="least-used")[0] for rounds in (20, 7))
-    assert long.first(7).columns.tobytes() == short.columns.tobytes()
-    assert len(np.unique(long.columns)) > len(np.unique(boost(X, labels, 4, rounds=20)[0].columns))

@@ -8,7 +8,6 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.finalists import (
     Screened,
-    depth_of,
     papers_tables,
     recipes_to_mark,
     select_finalists,
@@ -18,7 +17,7 @@ from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.price import Classified, PricedTables
 from thenar.compiler.frontier.search import SHAPES, Search, placed, tabled
-from thenar.compiler.frontier.survey import FoldHits, TrialAccuracy
+from thenar.compiler.frontier.survey import TrialAccuracy
 from thenar.compiler.frontier.wirings import ScanTimes
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.methods.base import METHODS
@@ -81,18 +80,6 @@ def test_the_papers_tables_have_at_most_a_hundred_rounds() -> None:
     searches = [Search(methods=("id3",), baselines=(), rounds=most) for most in (300, 100, 50, 1)]
     assert [papers_tables(CHOICE, search).rounds for search in searches] == [100, 100, 50, 1]
     assert all(papers_tables(CHOICE, search).rounds in search.tabled for search in searches)
-
-
-def right(count: int) -> bytes:
-    return np.packbits(np.arange(500) < count).tobytes()
-
-
-@pytest.mark.parametrize(("late", "rounds"), [(0, 100), (2, 100), (3, 300)])
-def test_further_rounds_are_followed_if_they_win_a_fifth_percent(late: int, rounds: int) -> None:
-    search = Search(methods=("id3",), baselines=())
-    correct = [450 + (late if stage > 100 else 0) for stage in search.stages]
-    fits = [FoldHits(tuple(map(right, counts)), (), ()) for counts in (correct, [450] * len(correct))]
-    assert depth_of(search, fits, 1000).rounds == rounds
 
 
 QUICK = Classified(40.0, "model", 900, 30)

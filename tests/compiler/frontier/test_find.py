@@ -66,7 +66,7 @@ def asked(folder: Path, grasp_set: GraspSet, **changes: Any) -> Request:
         "trainer": "logitboost",
     }
     # Nothing is left to choose: no code has so many bins.
-    search["settings"] = {"shrinkage": 1.0, "max_bins": 65536, "ties": "least-used"}
+    search["settings"] = {"shrinkage": 1.0, "max_bins": 65536}
     search |= {"repeats": 1, "finalists": 2, "seed": 1, "by": None}
     search |= {name: changes.pop(name) for name in list(changes) if name in search}
     return {"grasp_set": grasp_set, "output": folder / "out", "search": Search(**search), "jobs": 1} | changes

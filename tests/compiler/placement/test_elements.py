@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from sklearn.tree import DecisionTreeClassifier
 
-from thenar.compiler.placement.elements import Element, bits_of, elements_of, ports_of, taxel_levels
+from thenar.compiler.placement.elements import Element, bits_of, elements_of, ports_of
+from thenar.compiler.placement.elements import levels_of as levels_of_taxels
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.samples import Samples, TrainingError
@@ -22,7 +23,7 @@ def samples_of(codes: list[int], labels: list[int]) -> Samples:
 
 
 def levels_of(codes: list[int], labels: list[int], most: int) -> tuple[int, ...]:
-    return taxel_levels(np.array(codes, np.uint16), np.array(labels), 3, most)
+    return levels_of_taxels(np.array(codes, np.uint16)[:, np.newaxis], np.array(labels), 3, most)[0]
 
 
 def entropy(labels: list[int]) -> float:

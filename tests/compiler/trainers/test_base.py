@@ -47,7 +47,7 @@ def constant(monkeypatch: pytest.MonkeyPatch) -> Constant:
 
 
 def test_options_give_a_trainer_all_its_settings(constant: Constant) -> None:
-    given = {"rounds": 7, "shrinkage": 1.0, "tolerance": None, "max_bins": 3, "ties": "first"}
+    given = {"rounds": 7, "shrinkage": 1.0, "tolerance": None, "max_bins": 3}
     assert Training.of(Recipe(rounds=7, max_bins=3)) == Training("logitboost", given)
     asked = changed(Recipe(), {"trainer": "constant", "excess": 2, "prune": 4})
     assert (asked.prune, asked.settings) == (4, {"excess": 2})
@@ -65,8 +65,6 @@ def test_options_give_a_trainer_all_its_settings(constant: Constant) -> None:
         ({"rounds": 0}, "rounds=0 must be at least 1"),
         ({"shrinkage": SMALLEST_SHRINKAGE / 2}, "shrinkage=5e-07 must be at least 1e-06"),
         ({"shrinkage": 1.5}, "shrinkage=1.5 must be at most 1"),
-        ({"ties": "last"}, "ties='last' must be one of first, least-used"),
-        ({"ties": 1.0}, "ties=1.0 must be one of first, least-used"),
         ({"trainer": "constant", "weight": "much"}, "weight='much' must be a number"),
         ({"tolerance": -1e-9}, "tolerance=-1e-09 must be at least 0"),
         ({"trainer": "constant", "weight": 0.4}, "weight=0.4 must be at least 0.5"),
