@@ -182,7 +182,11 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def pytest_collection(session: pytest.Session) -> None:
-    """Let every worker begin with other files: a file whose assertions one of them has rewritten, the others read."""
+    """Let every worker begin with other files: a file whose assertions one of them has rewritten, the others read.
+
+    Until all is collected no garbage is searched for: half a million objects are made, and stay.
+    """
+    gc.disable()
     here, config = Path(__file__).parent, session.config
     if [Path(argument).absolute() for argument in config.args] == [here]:
         entries = sorted(str(path) for path in here.iterdir() if path.is_dir() or path.match("test_*.py"))
@@ -206,6 +210,7 @@ def pytest_collection_finish() -> None:
     """Leave what was collected, half a million objects, out of every later search for garbage."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")
