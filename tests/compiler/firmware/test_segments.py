@@ -73,10 +73,11 @@ def _lanes(runs: Any, model: SegmentModel, ticks: int, seed: int) -> tuple[np.nd
     return lanes, (np.random.default_rng(seed).random(len(lanes)) < 0.2) & (model.refusal is not None)
 
 
-@pytest.mark.parametrize("seed", range(18))
+# Seeds 0 to 8 have every shift, every lag, and types of common and of other costs to leave.
+@pytest.mark.parametrize("seed", range(9))
 def test_on_this_machine_it_is_pythons_state_at_every_tick(runs: Any, seed: int) -> None:
     model, lag = _random_model(seed), (1, 5, 15, 40, 250)[seed % 5]
-    lanes, refused = _lanes(runs, model, 400, seed)
+    lanes, refused = _lanes(runs, model, 800, seed)
     expected = runs.python_states(model, lanes, refused, lag)
     np.testing.assert_array_equal(runs.run_host(model, lanes, refused, lag).states, expected)
 
