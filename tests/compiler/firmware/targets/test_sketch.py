@@ -153,7 +153,10 @@ def expected_of(build: Build, sensors: Sensors, known: bool, closed: np.ndarray,
 
 @pytest.mark.parametrize(
     ("case", "known"),
-    [(case, known) for case in CASES for known in (True, False) if known or case[3] + case[4]],
+    [
+        *((case, True) for case in CASES),
+        *(pytest.param(case, False, marks=pytest.mark.slow) for case in CASES if case[3] + case[4]),
+    ],
     ids=lambda value: "-".join(map(str, value)) if isinstance(value, tuple) else "of a glove" * value or "filled in",
 )
 def test_every_frame_is_answered_as_by_python(
