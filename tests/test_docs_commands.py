@@ -26,7 +26,7 @@ from .conftest import tool
 
 ROOT = Path(__file__).resolve().parents[1]
 TUTORIALS = [*sorted((ROOT / "docs" / "tutorials").glob("*.md")), ROOT / "docs" / "how-to" / "wearer.md"]
-QUICK = ("README", "first-board", "first-recogniser")  # pages of `make test`
+QUICK = ("README", "first-board")  # pages of `make test`
 LIMIT_S = 600
 
 # What a reader of a clone has, apart from thenar itself.

@@ -92,6 +92,7 @@ def test_on_an_avr_it_is_pythons_state_at_every_tick(runs: Any, avr: None, seed:
     np.testing.assert_array_equal(runs.run_avr(model, lanes, refused, lag).states, expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("core", ["cortex-m0plus", "cortex-m4"])
 def test_on_arms_cores_it_is_pythons_state_at_every_tick(runs: Any, cores: Any, core: str) -> None:
     for model in (_random_model(5), runs.models()["each type its own"]):
