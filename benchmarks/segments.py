@@ -22,6 +22,7 @@ from thenar.compiler.firmware.tools import (
     HOST_COMPILER,
     STRICT,
     call,
+    compile_objects,
     find,
     workshop,
 )
@@ -150,15 +151,14 @@ def run_avr(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run:
         files = sources(model, "avr", function)
         with workshop(files) as folder:
             command = [find(AVR_COMPILER), "-mmcu=atmega328p", "-Os", *STRICT, _lag(lag)]
-            call([*command, *_compiled(files), "-o", "program.elf"], folder)
+            objects = compile_objects(command, _compiled(files), folder)
+            call([*command, *objects, "-o", "program.elf"], folder)
             lines = call(["avr-nm", "--format=posix", "program.elf"], folder).decode().splitlines()
             words = {word[0]: word for word in map(str.split, lines)}
             span = f"0x{words['record'][2]}:{size}"
             places = [f"0x{words[symbol][2]}" for symbol in (function, "_end")]
             printed = call([str(program), "atmega328p", "16000000", "program.elf", *places, span, span], folder, given)
-            parts = [path for path in _compiled(files) if path != "main.c"]
-            call([*command, "-c", *parts], folder)
-            sizes = call(["avr-size", *(path.rsplit(".", 1)[0] + ".o" for path in parts)], folder)
+            sizes = call(["avr-size", *(path for path in objects if path != "main.c.o")], folder)
             flash = sum(int(line.split()[0]) + int(line.split()[1]) for line in sizes.decode().splitlines()[1:])
             ram = sum(int(words[symbol][3], 16) for symbol in ("stream", "memory"))
         shape = np.dtype([("record", "u1", size), ("state", "u1"), ("r25", "u1"), ("cycles", "<u4"), ("stack", "<u2")])

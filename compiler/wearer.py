@@ -207,14 +207,15 @@ class Adaptation:
         rows, roots, counted = self._rows, self._roots, self._roots * kept[:, np.newaxis]
         scores = self.tables.scores(self.bits[rows], self.codes[rows])
         truth = np.equal.outer(self.labels[rows], np.arange(self.tables.n_classes)).astype(np.float64)
+        kernel, inverse = _rounded(self._kernel), _rounded(self._inverse)  # once, not in each of the products below
         now = ahead = start
         age = 1.0
         for _ in range(_MOST_STEPS):
-            shares = softmax(np.ascontiguousarray((scores + _product(self._kernel, roots * ahead)).T)).T
+            shares = softmax(np.ascontiguousarray((scores + kernel @ _rounded(roots * ahead)).T)).T
             slope = counted * (shares - truth) + self.strength * ahead
             if np.abs(slope).max() <= tolerance:
                 break
-            following = ahead - _product(self._inverse, slope)
+            following = ahead - inverse @ _rounded(slope)
             older, age = age, (1 + math.sqrt(1 + 4 * age * age)) / 2
             if dot(ahead - following, following - now) > 0:
                 older = age = 1.0  # the momentum leads uphill: start it again

@@ -140,26 +140,27 @@ IN_REAL_TIME = {"live"}
 # alone with a long one at the end, and what a module sets up is set up once.
 LONGEST = (
     "stability/test_catalogue.py",
-    "test_docs_commands.py",
-    "test_written_bytes.py",
     "compiler/firmware/test_costs.py",
-    "live/process/test_end_to_end.py",
-    "live/test_soak.py",
-    "compiler/frontier/test_luck.py",
-    "fuzz/test_fuzz_files.py",
+    "test_docs_commands.py",
     "simulator/planning/test_plan_scene.py",
-    "compiler/frontier/test_find.py",
-    "cli/test_frontier_command.py",
+    "test_written_bytes.py",
     "live/process/test_bus_faults.py",
+    "live/test_soak.py",
+    "cli/test_run_outside.py",
+    "compiler/frontier/test_find.py",
     "cli/test_every_option.py",
-    "fuzz/test_fuzz_recordings.py",
-    "compiler/firmware/test_names.py",
-    "compiler/firmware/test_core.py",
-    "compiler/artifact/test_random_builds.py",
     "mutants/test_named_faults.py",
-    "test_quarantine_benchmark.py",
-    "runtime/live/test_losses.py",
+    "fuzz/test_fuzz_files.py",
+    "compiler/firmware/test_core.py",
+    "live/process/test_end_to_end.py",
+    "compiler/artifact/test_random_builds.py",
+    "fuzz/test_fuzz_recordings.py",
     "test_examples.py",
+    "runtime/live/test_losses.py",
+    "compiler/frontier/test_luck.py",
+    "test_quarantine_benchmark.py",
+    "stability/test_spoiled.py",
+    "cli/test_frontier_command.py",
     "test_packaging.py",
     "compiler/firmware/test_cppcheck.py",
     "compiler/artifact/test_verify.py",
@@ -182,7 +183,11 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def pytest_collection(session: pytest.Session) -> None:
-    """Let every worker begin with other files: a file whose assertions one of them has rewritten, the others read."""
+    """Let every worker begin with other files: a file whose assertions one of them has rewritten, the others read.
+
+    Until all is collected no garbage is searched for: half a million objects are made, and stay.
+    """
+    gc.disable()
     here, config = Path(__file__).parent, session.config
     if [Path(argument).absolute() for argument in config.args] == [here]:
         entries = sorted(str(path) for path in here.iterdir() if path.is_dir() or path.match("test_*.py"))
@@ -206,6 +211,7 @@ def pytest_collection_finish() -> None:
     """Leave what was collected, half a million objects, out of every later search for garbage."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")

@@ -26,6 +26,7 @@ from .conftest import tool
 
 ROOT = Path(__file__).resolve().parents[1]
 TUTORIALS = [*sorted((ROOT / "docs" / "tutorials").glob("*.md")), ROOT / "docs" / "how-to" / "wearer.md"]
+QUICK = ("README", "first-board")  # pages of `make test`
 LIMIT_S = 600
 
 # What a reader of a clone has, apart from thenar itself.
@@ -166,7 +167,13 @@ def check(path: Path, steps: list[Step], clone: Clone, update: bool) -> None:
 
 
 @pytest.mark.flaky(reruns=2)  # glove-to-robot.md plays an emulated glove in real time
-@pytest.mark.parametrize("path", [ROOT / "README.md", *TUTORIALS], ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem not in QUICK))
+        for path in (ROOT / "README.md", *TUTORIALS)
+    ],
+)
 def test_commands_print_what_the_page_shows(path: Path, clone: Clone, update_golden: bool) -> None:
     steps = steps_of(path.read_text(encoding="utf-8"))
     stop = next((i for i, step in enumerate(steps) if is_slow(step)), len(steps))

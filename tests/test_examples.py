@@ -149,6 +149,7 @@ def test_the_sample_table_is_what_its_script_makes(tmp_path: Path) -> None:
     assert TABLE.stat().st_size < 400_000
 
 
+@slow
 def test_the_notebook_runs_and_prints_the_accuracies_of_the_tutorial(tmp_path: Path) -> None:
     page = (EXAMPLES.parent / "docs" / "tutorials" / "your-own-table.md").read_text(encoding="utf-8")
     printed = run(tmp_path, sys.executable, str(NOTEBOOK))

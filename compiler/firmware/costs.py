@@ -21,7 +21,7 @@ from .probes import Predictions, Unit, extreme_frames, joined, random_frames
 from .straight import straight
 from .targets import TARGETS, Target
 from .targets.base import Formula
-from .tools import STRICT, call, find, workshop
+from .tools import STRICT, call, compile_objects, find, workshop
 
 NAME_BYTES = 16  # of a grasp type's name, its end included, where the names are not known
 _NOTE_WIDTH = 114
@@ -250,8 +250,7 @@ def sizes(library: Library, target: Target) -> tuple[int, int]:
     hand += f"uint16_t memory[THENAR_{library.name.upper()}_MEMORY];\n"
     with workshop({**library.files, "hand.c": hand}) as folder:
         compiling = [compiler := find(target.compiler), *target.flags]
-        call([*compiling, *STRICT, *_SECTIONS, "-c", *sources, "hand.c"], folder)
-        objects = [path.replace(".c", ".o") for path in (*sources, "hand.c")]
+        objects = compile_objects([*compiling, *STRICT, *_SECTIONS], [*sources, "hand.c"], folder)
         linking = [*compiling, "-nostartfiles", "-nostdlib", "-Wl,--gc-sections,-e,thenar_classify", *called]
         call([*linking, *objects, "-lgcc", "-o", "linked.elf"], folder)
         line = call([compiler.removesuffix("gcc") + "size", "linked.elf"], folder).decode().splitlines()[1]

@@ -1,10 +1,12 @@
 """Compilers and emulators: finding them and running them, with a time limit, in a temporary folder."""
 
 import os
+import re
 import shutil
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -79,3 +81,34 @@ def call(command: Sequence[str], folder: Path, given: bytes = b"", limit_s: floa
         said = (done.stderr or done.stdout).decode(errors="replace").strip()
         raise FirmwareError(f"{program} ended with {done.returncode}: {said[:2000] or 'without a message'}")
     return done.stdout
+
+
+_INCLUDED = re.compile(rb'^#include "([^"]+)"', re.MULTILINE)
+
+
+def compile_objects(command: Sequence[str], sources: Sequence[str], folder: Path) -> list[str]:
+    """Compile files of `folder`, which has no folders in it, by `command`; return the names of the objects.
+
+    The core has the same text in every build, and takes most of the time: what was compiled of the same texts by the
+    same command, in this process, is not compiled again.
+
+    Raises FirmwareError as `call` does.
+    """
+    objects = []
+    for source in sources:
+        names = [source]
+        for name in names:
+            included = (each.decode() for each in _INCLUDED.findall((folder / name).read_bytes()))
+            names += [each for each in included if each not in names and (folder / each).is_file()]
+        texts = tuple((name, (folder / name).read_bytes()) for name in names)
+        objects.append(f"{source}.o")
+        (folder / objects[-1]).write_bytes(_object(tuple(command), texts))
+    return objects
+
+
+@lru_cache(maxsize=32)
+def _object(command: tuple[str, ...], texts: tuple[tuple[str, bytes], ...]) -> bytes:
+    """Return the object of the first of `texts`; the others are all that it includes."""
+    with workshop(dict(texts)) as folder:
+        call([*command, "-c", texts[0][0], "-o", "object"], folder)
+        return (folder / "object").read_bytes()

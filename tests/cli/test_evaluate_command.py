@@ -169,7 +169,7 @@ def test_a_users_mistake_ends_with_2_and_a_sentence(
 
 
 def test_trainers_are_compared_in_a_table(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["evaluate", grasps, *QUICK, "--tables", "trainers", "--protocol", "nested"]) == 0
+    assert run(["evaluate", grasps, *QUICK, "--folds", "2", "--tables", "trainers", "--protocol", "nested"]) == 0
     printed = capsys.readouterr().out
     for text in ("against logitboost", "discriminant", "linear", "logit ", "pairs", ", p "):
         assert text in printed

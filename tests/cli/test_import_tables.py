@@ -158,25 +158,37 @@ LISTS = {
 }
 
 
+def wide_codes(capsys: pytest.CaptureFixture[str]) -> np.ndarray:
+    """Return the codes of a table with a column for each number of the lists."""
+    wide = pd.DataFrame([[row[0], row[1], *map(float, row[2:])] for row in rows(3)])
+    wide.columns = pd.Index(["grasp", "trial", "data.0", "data.1", "data.2"])
+    wide.to_csv("u.csv", index=False)
+    return imported("u.csv", capsys).codes
+
+
 @pytest.mark.parametrize("kind", LISTS)
 def test_lists_in_cells_become_columns(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     table = pd.DataFrame(
         [[row[0], row[1], LISTS[kind](row[2:])] for row in rows(3)], columns=["grasp", "trial", "data"]
     )
     table.to_csv("t.csv", index=False)
-    table.to_excel("t.xlsx", index=False)
-    sets = [imported(name, capsys) for name in ("t.csv", "t.xlsx")]
-    assert sets[0].joint_names == ("data.0", "data.1", "data.2")
-    wide = pd.DataFrame([[row[0], row[1], *map(float, row[2:])] for row in rows(3)])
-    wide.columns = pd.Index(["grasp", "trial", "data.0", "data.1", "data.2"])
-    wide.to_csv("u.csv", index=False)
-    assert np.array_equal(imported("u.csv", capsys).codes, sets[0].codes)
-    assert np.array_equal(sets[1].codes, sets[0].codes)
-    lists = table.assign(data=[[float(cell) for cell in row[2:]] for row in rows(3)], trial=table["trial"].astype(int))
-    for made in (lists, lists.assign(data=[np.array(row) for row in lists["data"]])):
-        assert np.array_equal(from_dataframe(made).codes, sets[0].codes)
+    grasp_set = imported("t.csv", capsys)
+    assert grasp_set.joint_names == ("data.0", "data.1", "data.2")
+    assert np.array_equal(grasp_set.codes, wide_codes(capsys))
+
+
+def test_so_do_lists_of_spreadsheets_data_frames_and_parquet(capsys: pytest.CaptureFixture[str]) -> None:
+    lists = pd.DataFrame(
+        [[row[0], int(row[1]), [float(cell) for cell in row[2:]]] for row in rows(3)],
+        columns=["grasp", "trial", "data"],
+    )
+    codes = wide_codes(capsys)
+    lists.astype({"data": str}).to_excel("t.xlsx", index=False)
     lists.to_parquet("t.parquet")
-    assert np.array_equal(imported("t.parquet", capsys).codes, sets[0].codes)
+    for name in ("t.xlsx", "t.parquet"):
+        assert np.array_equal(imported(name, capsys).codes, codes)
+    for made in (lists, lists.assign(data=[np.array(row) for row in lists["data"]])):
+        assert np.array_equal(from_dataframe(made).codes, codes)
 
 
 def test_the_lists_of_the_cases(cases: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,6 +26,8 @@ from thenar.runtime.frames import now_us
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.reader import Reader
 
+pytestmark = pytest.mark.slow
+
 PATIENCE_S = 60.0
 # What has waited for longer is not published.
 LATE_US = 500_000

@@ -1,10 +1,11 @@
 """Our C as shared libraries, for Python to call."""
 
 import ctypes
-import subprocess
 from collections.abc import Callable, Mapping
 
 import pytest
+
+from thenar.compiler.firmware.tools import call, compile_objects
 
 from ..conftest import tool
 
@@ -22,9 +23,8 @@ def shared_library(tmp_path_factory: pytest.TempPathFactory) -> SharedLibrary:
         for name, text in files.items():
             (folder / name).write_text(text)
         sources = [name for name in files if name.endswith(".c")]
-        command = [tool("gcc"), *FLAGS, *flags, *sources, "-o", "made.so"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
+        command = [tool("gcc"), *FLAGS, *flags]
+        call([*command, *compile_objects(command, sources, folder), "-o", "made.so"], folder)
         return ctypes.CDLL(str(folder / "made.so"))
 
     return load

@@ -44,7 +44,7 @@ FAULTS = (
         "compiler/trainers/stumps.py",
         "np.clip(values, -z_max, z_max).T",
         "values.T",
-        "tests/compiler/test_drawn_numbers.py",
+        "tests/compiler/test_drawn_numbers.py::test_no_stump_explains_more_and_branches_answer_with_their_means",
     ),
     Fault(
         "an empty branch counts as one of next to no weight",
@@ -151,12 +151,14 @@ FAULTS = (
 def staged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("staged")
     subprocess.run([sys.executable, STAGE, folder], check=True)
+    # Bytecode that names its source by content: what is as long as before, and of the same second, is compiled again.
+    compiling = ("-m", "compileall", "-q", "--invalidation-mode", "checked-hash", folder / "thenar")
+    subprocess.run([sys.executable, *compiling], check=True)
     return folder
 
 
 def run(staged: Path, *tests: str) -> "subprocess.CompletedProcess[str]":
-    # No bytecode: what is as long as before and written within the same second would not be compiled again.
-    environment = {**os.environ, "PYTHONPATH": str(staged), "PYTHONDONTWRITEBYTECODE": "1", "THENAR_MUTATED": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(staged), "THENAR_MUTATED": "1"}
     options = ["-x", "-q", "-pno:cacheprovider", "-m", "not slow", "--tb=no"]
     command = [sys.executable, "-m", "pytest", *options, *tests]
     return subprocess.run(command, cwd=staged, env=environment, capture_output=True, text=True, check=False)

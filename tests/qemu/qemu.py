@@ -27,7 +27,7 @@ from thenar.compiler.firmware.probes import (
     sent_frames,
 )
 from thenar.compiler.firmware.targets import TARGETS, Target
-from thenar.compiler.firmware.tools import LIMIT_S, STRICT, Tool, call, find, lacking, workshop
+from thenar.compiler.firmware.tools import LIMIT_S, STRICT, Tool, call, compile_objects, find, lacking, workshop
 
 _HERE = Path(__file__).parent
 
@@ -84,12 +84,13 @@ class Core:
         places = {"FLASH_ORIGIN_": self.flash_at, "FLASH_": self.flash, "RAM_ORIGIN_": self.ram_at, "RAM_": self.ram}
         memory = [f"-Wl,--defsym={name}={value}" for name, value in places.items()]
         sources = sorted(path for path in (*files, "startup.c") if path.endswith(".c"))
-        linked = ["-ffunction-sections", "-Wl,--gc-sections", "-nostdlib", *memory, "-T", "link.ld"]
+        linked = ["-Wl,--gc-sections", "-nostdlib", *memory, "-T", "link.ld"]
         quiet = ["-display", "none", "-monitor", "none", "-serial", "none"]
         counted = ["-icount", f"shift={self.shift}", "-semihosting-config", "enable=on,target=native"]
         with workshop({**files, **bare}) as folder:
-            compiling = [find(self.target.compiler), *flags, *self.target.flags, *linked, *sources, "-lgcc"]
-            call([*compiling, "-o", "classifier.elf"], folder)
+            compiling = [find(self.target.compiler), *self.target.flags]
+            objects = compile_objects([*compiling, *flags, "-ffunction-sections"], sources, folder)
+            call([*compiling, *linked, *objects, "-lgcc", "-o", "classifier.elf"], folder)
             emulating = [find(self.emulator), "-M", self.machine, *quiet, *counted, "-kernel", "classifier.elf"]
             call(emulating, folder, limit_s=limit_s)
             return (folder / "predictions").read_bytes()

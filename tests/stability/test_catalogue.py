@@ -30,7 +30,7 @@ def _holds(found: CaseReport) -> None:
     assert found.holds
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [name for name in CASES if name != "platform"])  # it starts programs: in full alone
 def test_a_case_holds_quickly(name: str) -> None:
     _holds(run_case(name, full=False))
 

@@ -274,6 +274,7 @@ def test_there_is_a_spoiled_input_for_each_case() -> None:
     assert SPOILED.keys() == CASES.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_a_case_notices_a_fault(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     spoil, checks = SPOILED[name]

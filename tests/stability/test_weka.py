@@ -70,6 +70,7 @@ def test_a_jvm_that_refuses_is_quoted(weka: Callable[..., str]) -> None:
         weka_stumps(X, labels, CLASSES, 1, ("-XX:-UseNothingOfTheKind",))
 
 
+@pytest.mark.slow
 def test_the_stumps_read_give_wekas_own_probabilities(weka: Callable[..., str], tmp_path: Path) -> None:
     X, labels = separable_set()
     half = len(X) // 2
@@ -87,6 +88,7 @@ def test_the_stumps_read_give_wekas_own_probabilities(weka: Callable[..., str], 
     assert (ours.argmax(axis=1) == theirs.argmax(axis=1)).all()
 
 
+@pytest.mark.slow
 def test_weka_parts_from_itself_and_thenar_from_weka_not_before(compared: WekaComparison) -> None:
     parts = compared.weka_itself.parts
     assert parts is not None

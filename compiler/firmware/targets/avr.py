@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, ClassVar
 from thenar.firmware_templates.rendering import render
 
 from .. import FirmwareError
-from ..tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lacking, workshop
+from ..tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, compile_objects, find, lacking, workshop
 from .base import Formula, Target
 
 if TYPE_CHECKING:
@@ -65,13 +65,14 @@ class Avr(Target):
         from ..probes import record_files, sent_frames
 
         sent = sent_frames(frames, lost, layout)
-        command = [find(AVR_COMPILER), *STRICT, *self.flags]
+        command = [find(AVR_COMPILER), *self.flags]
         program = harness("simavr_classify")
         main = record_files(name, layout, "avr", lost=lost is not None)
         entry = "classify" if lost is None else "predict"
         with workshop({**files, **main}) as folder:
             sources = sorted(path for path in (*files, *main) if path.endswith((".c", ".S")))
-            call([*command, *sources, "-o", "classifier.elf"], folder)
+            objects = compile_objects([*command, *STRICT], sources, folder)
+            call([*command, *objects, "-o", "classifier.elf"], folder)
             found = _symbols(folder)
             size = 2 * layout.tables.n_classes
             if lost is None:

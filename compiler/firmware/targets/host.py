@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from thenar.firmware_templates.rendering import render
 
-from ..tools import HOST_COMPILER, STRICT, call, find, lacking, workshop
+from ..tools import HOST_COMPILER, STRICT, call, compile_objects, find, lacking, workshop
 from .base import Target
 
 if TYPE_CHECKING:
@@ -56,7 +56,8 @@ class Host(Target):
         main = record_files(name, layout, "host", lost=lost is not None, segments=segments)
         with workshop({**files, **main}) as folder:
             sources = sorted(path for path in (*files, *main) if path.endswith(".c"))
-            call([command, *STRICT, *_SANITIZED, *sources, "-o", "classifier"], folder)
+            objects = compile_objects([command, *STRICT, *_SANITIZED], sources, folder)
+            call([command, *_SANITIZED, *objects, "-o", "classifier"], folder)
             return answers_in(call([str(folder / "classifier")], folder, sent), len(frames), layout)
 
 

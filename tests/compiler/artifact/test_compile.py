@@ -128,9 +128,9 @@ OPEN: dict[str, Any] = {"trainer": "logit", "penalty": 1.0, "max_bins": 4}  # th
     "options",
     [
         {"rounds": ROUNDS, "prune": 5, "width": 5},
-        {"prune": 5, "width": 6, **OPEN},
+        pytest.param({"prune": 5, "width": 6, **OPEN}, marks=pytest.mark.slow),
         {"table_bits": 8, "keep": 4, "placement": "cmim", **OPEN},
-        {"rounds": 4, "keep_joints": 2},
+        pytest.param({"rounds": 4, "keep_joints": 2}, marks=pytest.mark.slow),
         pytest.param({"width": 6}, marks=pytest.mark.slow),
     ],
 )

@@ -27,6 +27,7 @@ TOOLS: dict[str, tuple[str, ...]] = {
     "avr": ("avr-gcc", "make", "gcc"),
 }
 PARTS = {"host": ["host"], "avr": ["atmega328p"]}
+EACH = pytest.mark.parametrize("kind", ["host", pytest.param("avr", marks=pytest.mark.slow)])
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +100,7 @@ def test_one_wrong_entry_is_found_with_the_first_frame_that_shows_it(
 
 
 @pytest.mark.usefixtures("few_frames")
-@pytest.mark.parametrize("kind", ["host", "avr"])
+@EACH
 def test_a_frame_that_the_compiled_code_does_not_refuse_is_found(
     build: Path, grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
@@ -115,7 +116,7 @@ def test_a_frame_that_the_compiled_code_does_not_refuse_is_found(
 
 
 @pytest.mark.usefixtures("few_frames")
-@pytest.mark.parametrize("kind", ["host", "avr"])
+@EACH
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

@@ -84,7 +84,11 @@ def test_a_row_counts_all_its_subjects_and_only_compositions_carry_confusions() 
 
 ALL: tuple[TableName, ...] = (*TABLES, "trainers")
 QUICK = StudyDesign(
-    Recipe(trainer="logitboost", rounds=5), repeats=2, prune_list=(0, 10), protocols=tuple(PROTOCOLS), tables=ALL
+    Recipe(trainer="logitboost", rounds=5, folds=2),
+    repeats=2,
+    prune_list=(0, 10),
+    protocols=tuple(PROTOCOLS),
+    tables=ALL,
 )
 
 
@@ -123,9 +127,10 @@ def test_confusion_matrices_count_every_row_and_agree_with_rates(study: Study) -
                 assert np.trace(counts) == sum(cell.rate.correct)
 
 
-def test_evaluations_are_identical_on_any_number_of_workers(study: Study) -> None:
-    again = evaluate(make_grasps(noise=0.2), QUICK, jobs=2)
-    assert msgspec.json.encode(again) == msgspec.json.encode(study)
+def test_evaluations_are_identical_on_any_number_of_workers() -> None:
+    grasps = make_grasps(n_switches=5, per_type=8, noise=0.2)
+    one, two = (evaluate(grasps, QUICK.changed(repeats=1), jobs=jobs) for jobs in (1, 2))
+    assert msgspec.json.encode(one) == msgspec.json.encode(two)
 
 
 @pytest.mark.usefixtures("one_way_to_train")
@@ -140,7 +145,7 @@ def test_rows_in_which_nothing_is_held_change_no_table() -> None:
 def test_choosing_from_test_rows_flatters_where_there_is_nothing_to_learn() -> None:
     # Coin flips say nothing about the grasp: a nested rate is about 1 in 4, and the paper's protocol is above it.
     grasps = make_grasps(n_switches=200, n_joints=0, subjects="A", noise=0.5, per_type=10)
-    study = evaluate(grasps, QUICK.changed(rounds=20, repeats=3, tables=("compositions",)), jobs=1)
+    study = evaluate(grasps, QUICK.changed(rounds=20, folds=4, repeats=3, tables=("compositions",)), jobs=1)
     paper, nested = (row(table(study, "compositions", name), "VI").cells[0].rate for name in ("paper", "nested"))
     assert paper.mean > nested.mean + 0.1
     assert nested.low <= 0.25 <= nested.high
@@ -160,7 +165,7 @@ def test_a_composition_without_inputs_predicts_the_most_frequent_grasp() -> None
     grasps = make_grasps(n_joints=0, subjects="A")
     study = evaluate(grasps, QUICK.changed(prune=1000, tables=("compositions",), protocols=("nested",)), jobs=1)
     (cell,) = row(table(study, "compositions"), "VI").cells
-    assert (cell.switches.most, cell.no_inputs) == (0, 8)
+    assert (cell.switches.most, cell.no_inputs) == (0, 4)
     assert cell.rate.mean <= 0.25
     assert row(table(study, "compositions"), "V").cells[0].no_inputs == 0
 

@@ -73,15 +73,18 @@ def _lanes(runs: Any, model: SegmentModel, ticks: int, seed: int) -> tuple[np.nd
     return lanes, (np.random.default_rng(seed).random(len(lanes)) < 0.2) & (model.refusal is not None)
 
 
-@pytest.mark.parametrize("seed", range(18))
+# Seeds 0 to 8 have every shift, every lag, and types of common and of other costs to leave.
+@pytest.mark.parametrize("seed", range(9))
 def test_on_this_machine_it_is_pythons_state_at_every_tick(runs: Any, seed: int) -> None:
     model, lag = _random_model(seed), (1, 5, 15, 40, 250)[seed % 5]
-    lanes, refused = _lanes(runs, model, 400, seed)
+    lanes, refused = _lanes(runs, model, 800, seed)
     expected = runs.python_states(model, lanes, refused, lag)
     np.testing.assert_array_equal(runs.run_host(model, lanes, refused, lag).states, expected)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 5, 6, 8, 9])
+@pytest.mark.parametrize(
+    "seed", [0, 1, 2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (3, 4, 5, 6, 8, 9))]
+)
 def test_on_an_avr_it_is_pythons_state_at_every_tick(runs: Any, avr: None, seed: int) -> None:
     model, lag = _random_model(seed), (1, 5, 15, 30, 60)[seed % 5]
     lanes, refused = _lanes(runs, model, 250, seed)
@@ -89,6 +92,7 @@ def test_on_an_avr_it_is_pythons_state_at_every_tick(runs: Any, avr: None, seed:
     np.testing.assert_array_equal(runs.run_avr(model, lanes, refused, lag).states, expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("core", ["cortex-m0plus", "cortex-m4"])
 def test_on_arms_cores_it_is_pythons_state_at_every_tick(runs: Any, cores: Any, core: str) -> None:
     for model in (_random_model(5), runs.models()["each type its own"]):

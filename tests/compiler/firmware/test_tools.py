@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.tools import call, find, lacking, workshop
+from thenar.compiler.firmware.tools import call, compile_objects, find, lacking, workshop
+
+from ...conftest import tool
 
 NOWHERE = (("no-such-compiler", "nor-this-one"), "no-such-package")
 SHELL = (("no-such-shell", "sh"), "dash")
@@ -74,3 +76,29 @@ def test_the_workshop_is_removed_after_ctrl_c_too(tmp_path: Path) -> None:
         _, said = process.communicate(timeout=60)
     assert "KeyboardInterrupt" in said
     assert list(temporary.iterdir()) == []
+
+
+def test_what_was_compiled_of_the_same_texts_is_not_compiled_again(tmp_path: Path) -> None:
+    tool("gcc")
+    compiler = tmp_path / "compiler"
+    compiler.write_text(f'#!/bin/sh\necho "$*" >> {tmp_path}/calls\nexec gcc "$@"\n')
+    compiler.chmod(0o755)
+    texts = {"a.c": '#include "a.h"\nint a = B;\n', "a.h": '#include "b.h"\n', "b.h": "#define B 1\n"}
+    for command, changes in (
+        ([], {}),
+        ([], {}),
+        ([], {"b.h": "#define B 2\n"}),
+        (["-O2"], {}),
+        ([], {"a.c": "int a;\n"}),
+        ([], {}),
+    ):
+        with workshop(texts | changes | {"main.c": "int main(void) { return 0; }\n"}) as folder:
+            objects = compile_objects([str(compiler), *command], ["a.c", "main.c"], folder)
+            call(["gcc", *objects, "-o", "program"], folder)
+    done = [line.split() for line in (tmp_path / "calls").read_text().splitlines()]
+    assert [words[:-2] for words in done if "a.c" in words] == [["-c", "a.c"]] * 2 + [
+        ["-O2", "-c", "a.c"],
+        ["-c", "a.c"],
+    ]
+    with workshop({"a.c": "int a = 1.5f +;\n"}) as folder, pytest.raises(FirmwareError, match="compiler ended with 1"):
+        compile_objects([str(compiler)], ["a.c"], folder)

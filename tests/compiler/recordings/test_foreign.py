@@ -97,9 +97,26 @@ def refused(path: Path) -> str:
     return str(found.value)
 
 
-@pytest.mark.parametrize("suffix", foreign.READERS)
+# Beginnings of files, by the suffixes of those that they begin.
+BEGINNINGS = {
+    **dict.fromkeys((".xlsx", ".ods", ".npz"), b"PK\3\4" + bytes(99)),
+    ".xls": b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(99),
+    ".parquet": b"PAR1\1\0\0\0PAR1",
+    **dict.fromkeys((".h5", ".hdf5"), b"\x89HDF\r\n\x1a\n\0\0"),
+    ".mat": b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + b"\xff" * 40,
+}
+
+
 @pytest.mark.parametrize(
-    "content", [b"", b"junk" * 999, b"PK\3\4" + bytes(99), b"PAR1\1\0\0\0PAR1", b"\x89HDF\r\n\x1a\n\0\0"]
+    ("suffix", "content"),
+    [
+        *((suffix, BEGINNINGS[suffix]) for suffix in foreign.READERS),
+        *(
+            (suffix, content)
+            for suffix in (".xlsx", ".parquet", ".h5", ".npz", ".mat")
+            for content in (b"", b"junk" * 999)
+        ),
+    ],
 )
 def test_what_is_no_such_file_is_refused_in_a_sentence(suffix: str, content: bytes, tmp_path: Path) -> None:
     path = tmp_path / f"t{suffix}"

@@ -284,8 +284,10 @@ def test_a_number_beyond_64_bits_is_refused(recording: Path) -> None:
         read(recording)
 
 
-@pytest.mark.parametrize("opcode", [Opcode.MESSAGE_INDEX, 0x80, Opcode.CHANNEL, Opcode.SCHEMA])
-@pytest.mark.parametrize("behind_the_data", [False, True])
+@pytest.mark.parametrize(
+    ("opcode", "behind_the_data"),
+    [(Opcode.MESSAGE_INDEX, True), (0x80, False), (Opcode.CHANNEL, True), (Opcode.SCHEMA, False)],
+)
 def test_records_without_measurements_are_read_up_to_a_limit(
     recording: Path, opcode: int, behind_the_data: bool
 ) -> None:

@@ -261,6 +261,7 @@ def resident_kb() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4
 
 
+@pytest.mark.slow
 def test_a_reader_that_hangs_holds_up_nobody(
     sink: Sink, listen: Listen, again: MakeGrasp, preshape: Preshape, angles: JointAngles
 ) -> None:

@@ -103,7 +103,9 @@ def python_s(sensors: Sensors, readings: Sequence[int]) -> list[int]:
     return [code_of(sensor, reading) for sensor in sensors.every for reading in readings]
 
 
-@pytest.mark.parametrize("name", ["cortex-m0plus", "cortex-m4", "rv32imac"])
+@pytest.mark.parametrize(
+    "name", ["cortex-m0plus", *(pytest.param(core, marks=pytest.mark.slow) for core in ("cortex-m4", "rv32imac"))]
+)
 def test_codes_are_python_s_in_an_emulator(library: Callable[[bool], Library], cores: Any, name: str) -> None:
     made, readings = library(False), range(-70_000, 70_000, 41)
     given = {"first": readings.start, "last": readings.stop, "step": readings.step}

@@ -22,7 +22,7 @@ from ....conftest import tool
 from ....tables import describe
 from ..conftest import make_tables
 
-KINDS = ("cortex-m0plus", "host", "micropython", "rv32imac")
+KINDS = ("host", "micropython", *(pytest.param(core, marks=pytest.mark.slow) for core in ("cortex-m0plus", "rv32imac")))
 Running = Callable[..., Predictions]
 TICKS = 3 * STREAM_TICKS + 77  # several streams, the last without its end
 
