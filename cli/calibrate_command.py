@@ -52,7 +52,6 @@ def _device(context: click.Context, argument: click.Parameter, text: str) -> str
 @overwrite_flag
 @click.option("--subject", help="Name of the subject.  [default: the file's name]")
 @click.option("--baud", type=click.IntRange(1, 12_000_000), default=115_200, show_default=True, help="Baud rate.")
-@click.option("--sensors", type=click.Choice(["18", "22"]), help="Expected sensor count.  [default: as reported]")
 @click.option("--taxels", is_flag=True, is_eager=True, help="Calibrate the taxels of a glove.toml, not a CyberGlove.")
 @click.option("--newtons", type=Number(0.001, 1000), help="Force of the presses, if known; with --taxels.")
 @click.option("--hold", type=Number(0.05, 60), default=1.0, show_default=True, help="Time to hold each pose, seconds.")
@@ -62,7 +61,6 @@ def command(
     output: Path,
     subject: str | None,
     baud: int,
-    sensors: str | None,
     taxels: bool,
     newtons: float | None,
     hold: float,
@@ -100,7 +98,7 @@ def command(
         said = _written(output, "taxel", [line.name for line in pads.taxels], harness.taxel_names, pads)
         echo(f"{said}; name it under [taxels] of {Path(port).name}")
         return
-    with _posing(port, baud, sensors, hold, web) as (guide, take):
+    with _posing(port, baud, hold, web) as (guide, take):
 
         def write() -> str:
             lines = guide.calibration(wearer)
@@ -173,9 +171,7 @@ def _await(sources: "Sources", read: Callable[[], Any], what: str) -> None:
 
 
 @contextmanager
-def _posing(
-    port: str, baud: int, sensors: str | None, hold_s: float, web: str | None
-) -> "Iterator[tuple[PoseGuide, Callable[[], None]]]":
+def _posing(port: str, baud: int, hold_s: float, web: str | None) -> "Iterator[tuple[PoseGuide, Callable[[], None]]]":
     """Yield a guide through the poses of a CyberGlove, or of the stream of a glove.toml, and a function that waits for
     the next bytes and passes them to it.
     """
@@ -208,7 +204,7 @@ def _posing(
             guide = PoseGuide(harness.sensor_names, hold_us, old_after_us(sources.glove_period_us))
             yield guide, partial(take, row, guide)
         return
-    glove = CyberGlove(port, baud=baud, sensors=int(sensors) if sensors else None)
+    glove = CyberGlove(port, baud=baud)
     try:
         info = glove.open()
         for note in info.notes:

@@ -178,9 +178,7 @@ def _performance(
 
         played = performance.of_set(GraspSet.load(path), period_us, rest_us=rest_us, cyberglove=cyberglove)
     elif rest_ms is not None:
-        raise click.UsageError(
-            "--rest-ms is for scenes and sets of grasps, and a recording has its rests: leave it out"
-        )
+        raise click.UsageError("--rest-ms is for scenes and sets, and a recording has its rests: leave it out")
     else:
         played = performance.of_recording(path, period_us, warning)
     return played, lambda _line: None

@@ -135,9 +135,7 @@ def _write_sketches(build: Path, glove: Path | None, output: Path | None, name: 
     from thenar.runtime.harness.loading import load_harness
 
     if glove is None or output is None:
-        raise click.UsageError(
-            "A sketch needs the glove's wiring and a folder to write: name them with --glove and -o."
-        )
+        raise click.UsageError("A sketch needs the glove's wiring and a folder: name them with --glove and -o.")
     files = rows_files(name, Build.load(build).manifest, load_harness(glove))
     write_folder(files, output, overwrite=overwrite)
     readme = shlex.quote(str(output / "README.md"))
