@@ -42,7 +42,7 @@ def command(
         ("verify", str(output), str(trials)),
         ("run", str(output), *harness, *some),
     ):
-        echo(f"\n$ {shlex.join(('thenar', *words))}", err=True)
+        echo(f"$ {shlex.join(('thenar', *words))}")
         if thenar.main(list(words), prog_name="thenar", standalone_mode=False):
             click.get_current_context().exit(1)
         if words[0] == "record":
