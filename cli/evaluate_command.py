@@ -164,8 +164,7 @@ def command(
     --tables trainers compares trainers, each with hyperparameters chosen on its training rows.
 
     With --streams, GRASPS holds whole movements: placement, tables and segment costs are learnt without the subject
-    whose streams are decoded, live and afterwards. The dwell rule and a plain hidden Markov model
-    are decoded for comparison.
+    whose streams are decoded, live and afterwards. The dwell rule and a plain hidden Markov model are compared.
 
     --by subject --adapt leaves out each subject. It adapts the others' model to the subject's first trials, as `thenar
     adapt` does, and tests it on the rest, before and after.
@@ -190,6 +189,7 @@ def command(
     if streams or numbers:
         kind = "streams" if streams else "adapt"
         given = {name: chosen[name] for name in LIMITS} | {"layout": layout, "glove": glove}
+        given["adapt"] = streams and numbers
         if unused := next((name for name, value in given.items() if value), ""):
             raise click.UsageError(f"--{unused.replace('_', '-')} is not for --{kind}: leave one of them out.")
         if numbers and (asked["scheme"] != "subject" or not all(numbers)):

@@ -27,6 +27,8 @@ from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.sources import FrameBuffer, Snapshot
 from thenar.runtime.recording.writer import LiveRecorder
+from thenar.runtime.sinks.base import open_sink
+from thenar.runtime.sinks.sockets import SocketLines
 
 WINDOW = 10_000
 # Calls are counted in the last frames of a window, in which every period of the feed lies at the same place.
@@ -94,19 +96,19 @@ def soak(build: Build, harness: Harness, rows: Path, folder: Path, frames: int) 
     clock = Clock()
     vars(thenar.runtime.live.sources)["now_us"] = clock
     feed = Feed(rows, build.tables.n_switches, clock)
+    lines = open_sink("tcp:0")
+    assert isinstance(lines, SocketLines)
     glove = Glove(
         build,
         harness,
         preshapes="barrett_bh8",
-        sinks=("jsonl:/dev/null?every", "tcp:0"),
+        sinks=("jsonl:/dev/null?every", lines),
         record=folder / "soak.mcap",
         status=True,
         feed=feed.take,
     )
-    with glove, socket.socket(socket.AF_UNIX) as reader:
+    with glove, socket.create_connection(lines.address, 10.0) as reader:
         assert glove.recorder is not None
-        reader.settimeout(10.0)
-        reader.connect(f"{folder}/socket")
         calls = 0
 
         def count_call(_frame: FrameType, event: str, _what: object) -> None:
