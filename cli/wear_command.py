@@ -23,16 +23,17 @@ def command(
 ) -> None:
     """Adapt BUILD to whoever wears the glove now, and run it: two minutes for 14 grasp types.
 
-    It asks for two trials of each type, as `thenar record --for BUILD` does, and calls `thenar adapt`, `verify` and
-    `run`. The trials are in DIR.grasps. However the collection ends, the same command continues it. BUILD stays as it
-    is: to undo, run it.
+    It asks for two trials of each type, and calls `thenar adapt`, `verify` and `run`. The trials are in DIR.grasps.
+    However the collection ends, the same command continues it. BUILD stays as it is: to undo, run it.
 
     \b
     Example:
         thenar wear build/ --glove glove.toml -o mine/
         thenar run build/ --glove glove.toml    # undo
     """
-    trials = output.with_name(f"{output.name}.grasps")
+    from thenar.compiler.artifact.compile import check_target
+
+    trials = Path(f"{check_target(output)}.grasps")
     harness = ("--glove", str(glove))
     collected = ("--subject", subject, "--repetitions", str(repetitions), "--countdown", str(countdown))
     some = () if frames is None else ("--frames", str(frames))

@@ -129,3 +129,10 @@ def test_a_glove_that_does_not_fit_is_refused_before_any_trial(folder: Path) -> 
     assert done.returncode == 2
     assert "s3" in done.stderr
     assert not list(folder.glob("mine*"))
+
+
+def test_a_folder_of_other_files_is_refused_before_any_trial(folder: Path) -> None:
+    done = thenar("wear", folder / "build", "--glove", folder / "glove.toml", "-o", folder)
+    assert done.returncode == 2
+    assert "is not empty and not a build" in done.stderr
+    assert not Path(f"{folder}.mcap").exists()
