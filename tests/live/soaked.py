@@ -13,6 +13,7 @@ import resource
 import socket
 import sys
 import threading
+import time
 from itertools import count
 from pathlib import Path
 from types import FrameType
@@ -42,15 +43,26 @@ READ_FRAMES = 8
 
 
 class Sample(msgspec.Struct):
-    """The state of the process after so many frames, and the mean number of calls that a counted frame made."""
+    """The state of the process after so many frames, and the mean number of calls that a counted frame made.
+
+    used_kib  the memory in use, without the gaps between its pieces, which depend on how threads took turns
+    """
 
     frames: int
     calls: float
     rss_kib: int
+    used_kib: int
     threads: int
     files: int
     recording: bool
     failure: str
+
+
+class Mallinfo2(ctypes.Structure):
+    """What glibc's malloc says of itself."""
+
+    _names = ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost")
+    _fields_ = tuple((name, ctypes.c_size_t) for name in _names)
 
 
 class Clock:
@@ -130,15 +142,28 @@ def soak(build: Build, harness: Harness, rows: Path, folder: Path, frames: int) 
                 pass
 
 
+def _rest() -> None:
+    """Wait until the threads have written what waits: how much that is depends on how they took turns."""
+    worked_s = -1.0
+    while time.process_time() - worked_s > 0.001:
+        worked_s = time.process_time()
+        time.sleep(0.01)
+
+
 def _sample(frame: int, calls: float, recorder: LiveRecorder) -> Sample:
+    _rest()
     # What is free goes back first: how far a queue once grew depends on the load of the machine.
     gc.collect()
-    ctypes.CDLL(None).malloc_trim(0)
+    library = ctypes.CDLL(None)
+    library.malloc_trim(0)
+    library.mallinfo2.restype = Mallinfo2
+    info = library.mallinfo2()
     status = Path("/proc/self/status").read_text().splitlines()
     rss_kib = next(int(line.split()[1]) for line in status if line.startswith("VmRSS"))
     files = len(os.listdir("/proc/self/fd"))  # noqa: PTH208
     failure = recorder.failure or ""
-    return Sample(frame, calls, rss_kib, threading.active_count(), files, not failure, failure)
+    used_kib = (info.uordblks + info.hblkhd) >> 10
+    return Sample(frame, calls, rss_kib, used_kib, threading.active_count(), files, not failure, failure)
 
 
 def main() -> None:

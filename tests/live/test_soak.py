@@ -24,8 +24,9 @@ FRAMES = 300_000
 MOST_BYTES = 48 << 20
 # Until caches are full and every path was taken once, in windows of 10,000 frames.
 WARM_UP = 5
-MOST_KIB = 1024
+MOST_KIB = 128
 MOST_SHARE = 0.02
+PHASES = pytest.mark.parametrize("recording", [True, False], ids=["while recording", "once the file was full"])
 
 
 def growth(samples: Sequence[Sample], of: Callable[[Sample], float]) -> float:
@@ -54,16 +55,18 @@ def samples(
     return found
 
 
-def test_no_memory_thread_or_file_is_gathered(samples: Sequence[Sample]) -> None:
-    later = samples[WARM_UP:]
-    assert len(later) >= 10
-    assert {(sample.threads, sample.files) for sample in later} == {(later[0].threads, later[0].files)}
-    print(f"{growth(later, lambda sample: sample.rss_kib):.0f} KiB more, at {later[-1].rss_kib} KiB")
-    assert growth(later, lambda sample: sample.rss_kib) <= MOST_KIB
-    assert max(sample.rss_kib for sample in later) <= 80 << 10
+@PHASES
+def test_no_memory_thread_or_file_is_gathered(samples: Sequence[Sample], recording: bool) -> None:
+    assert len({(sample.threads, sample.files) for sample in samples[WARM_UP:]}) == 1
+    # Once its file is full, a recording goes another way.
+    later = [sample for sample in samples if sample.recording == recording][WARM_UP:]
+    assert len(later) >= 5
+    print(f"{growth(later, lambda sample: sample.used_kib):.0f} KiB more, at {later[-1].used_kib} KiB")
+    assert growth(later, lambda sample: sample.used_kib) <= MOST_KIB
+    assert max(sample.rss_kib for sample in samples) <= 80 << 10
 
 
-@pytest.mark.parametrize("recording", [True, False], ids=["while recording", "once the file was full"])
+@PHASES
 def test_no_frame_does_more_than_the_ones_before(samples: Sequence[Sample], recording: bool) -> None:
     """By the calls of Python and C that a frame makes, which no other load of the machine changes."""
     later = [sample for sample in samples[WARM_UP:] if sample.recording == recording]
