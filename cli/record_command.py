@@ -80,10 +80,9 @@ def command(
         thenar record --glove glove.toml --subject me --for build/ -o mine.grasps
     """
     from thenar.compiler.recordings import check_names
-    from thenar.compiler.recordings.taxonomy import collected, known_to
-    from thenar.runtime.build import Build
+    from thenar.compiler.recordings.taxonomy import collected, tasks_of
+    from thenar.runtime import Build, Glove
     from thenar.runtime.harness.loading import load_harness
-    from thenar.runtime.live.system import LiveSystem
     from thenar.runtime.recording.guide import planned, read_journal
     from thenar.runtime.recording.session import Collection
 
@@ -101,14 +100,15 @@ def command(
     check_devices(harness, glove)
     check_names("subject", [subject])
     loaded = None if build is None else Build.load(build)
-    if loaded is not None:
-        LiveSystem.of(loaded, harness).recognizer()  # refuses a glove that does not fit the build
+    # Glove refuses a harness that does not fit the build, and opens nothing yet.
+    if loaded is not None and (lacking := Glove(loaded, harness).system.unread):
+        raise click.UsageError(lacking)
     journal = None
     if recording.exists():
         with progress(f"reading {recording.name}"):
             journal = read_journal(recording)
     if loaded is not None:
-        types, tasks = known_to(loaded.manifest)
+        types, tasks = tasks_of(loaded.manifest)
     else:
         types, tasks = collected(taxonomy or "kamakura14", objects, _with_none(journal) if none is None else none)
     drawn = secrets.randbits(32) if seed is None else seed
@@ -165,7 +165,7 @@ def _write(recording: Path, output: Path, planned: int, build: "Build | None", a
         echo(f"no trial was accepted: {output} is not written; run the same command to continue")
         return ()
     with progress(f"importing {recording.name}"):
-        grasp_set, report = import_recordings([recording], coded=None if build is None else build.manifest.codings)
+        grasp_set, report = import_recordings([recording], codings=None if build is None else build.manifest.codings)
     grasp_set.save(output)
     warnings = [finding.message for finding in report.warnings]
     for message in warnings:

@@ -21,7 +21,7 @@ from .printing import echo
 def command(
     build: Path, glove: Path, subject: str, repetitions: int, countdown: float, frames: int | None, output: Path
 ) -> None:
-    """Adapt BUILD to whoever wears the glove now, and run it: two minutes for 14 grasp types.
+    """Adapt BUILD to the person who wears the glove, and run it. 14 grasp types take two minutes.
 
     It asks for two trials of each type, and calls `thenar adapt`, `verify` and `run`. The trials are in DIR.grasps.
     However the collection ends, the same command continues it. BUILD stays as it is: to undo, run it.

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .recording.writer import LiveRecorder
 
 _REPORT_US = 1_000_000
-# More than come in a second.
+# A second brings fewer.
 _MOST_FRAMES = 20_000
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from thenar.drivers.calibration import poses_of
 from thenar.drivers.errors import SettingError
 from thenar.firmware_templates.rendering import render
-from thenar.runtime.calibration import Meaning, codes_of_bytes, load_calibration, numbers_of, place_of
+from thenar.runtime.calibration import RAW, Meaning, codes_of_bytes, load_calibration, numbers_of, place_of
 from thenar.runtime.code_line import FARTHEST, FRACTION, code_point
 from thenar.runtime.harness.wiring import Harness, Range, StreamWiring
 from thenar.runtime.manifest import Calibration, Manifest, Threshold
@@ -21,8 +21,6 @@ from thenar.runtime.taxels import TaxelCalibration, calibration_of, count_limit
 
 from . import FirmwareError
 from .words import comment, identifiers
-
-_RAW = "raw"
 
 
 class CodeGrid(NamedTuple):
@@ -110,7 +108,7 @@ def _joint(joint: Calibration, meaning: Meaning, limits: Range | None, *, known:
         return _sensor(joint, points)
     codes_of_bytes(joint, meaning)  # whether they fit
     grid = None if limits is None else _grid(joint.name, limits, *JOINT_CODES)
-    if meaning is None or unit == _RAW:  # bytes are codes
+    if meaning is None or unit == RAW:  # bytes are codes
         return _sensor(joint, points, (joint.code_a, joint.code_b), grid)
     lines = meaning if isinstance(meaning, tuple) else meaning.sensors
     own = next(line for line in lines if line.name == joint.name)
@@ -138,7 +136,7 @@ def _sensor(
     first, second = (code_point(coded, value) for value in values)
     if first == second:
         raise FirmwareError(f"{coded.name!r} has one code at both points of its calibration: calibrate the glove again")
-    unit = "code" if coded.unit == _RAW else coded.unit
+    unit = "code" if coded.unit == RAW else coded.unit
     says = [f"code {value:g}" if unit == "code" else f"{value:g} {unit}" for value in values]
     return Sensor(coded.name, (first, second), (says[0], says[1]), readings, grid)
 

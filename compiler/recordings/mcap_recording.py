@@ -113,13 +113,13 @@ def import_files(
 
 
 def import_recordings(
-    paths: Sequence[Path], stream: bool = False, coded: Mapping[str, BuildCalibration] | None = None
+    paths: Sequence[Path], stream: bool = False, codings: Mapping[str, BuildCalibration] | None = None
 ) -> tuple[GraspSet, ImportReport]:
     """Import the accepted trials of recordings of one glove and one taxonomy; subjects may differ.
 
-    As a `stream` they have a row every 10 ms, and every restart is a separate session. `coded` are joints and taxels
-    by name whose codes have this meaning, such as a build's: then they are the codes that it would get live. Raises
-    FormatError, TableError or RecordingError naming the file, SettingError if a reading has no such code, and OSError.
+    As a `stream` they have a row every 10 ms, and every restart is a separate session. With the `codings` of a build,
+    by the names of its joints and taxels, these have the codes that the build gets live. Raises FormatError,
+    TableError or RecordingError naming the file, SettingError if a reading has no such code, and OSError.
     """
     parts: list[_Part] = []
     findings: list[Oddity] = []
@@ -142,7 +142,7 @@ def import_recordings(
         raise TableError(f"{what}: no trial was accepted; `thenar record` makes recordings with labelled trials")
     # A row of a stream takes as much memory as any other.
     check_made(f"{what}: its trials", _bytes_of(grasps) // (4 if stream else 1), size)
-    grasp_set, costs = _joined(grasps, stream, coded or {})
+    grasp_set, costs = _joined(grasps, stream, codings or {})
     return grasp_set, report_of(what, grasp_set, costs, (*findings, *find_oddities(grasp_set, grasp_set.trials)))
 
 
@@ -365,17 +365,17 @@ def _bytes_of(grasps: Sequence[tuple[_Part, _Grasp]]) -> int:
 
 
 def _joined(
-    grasps: Sequence[tuple[_Part, _Grasp]], stream: bool, coded: Mapping[str, BuildCalibration]
+    grasps: Sequence[tuple[_Part, _Grasp]], stream: bool, codings: Mapping[str, BuildCalibration]
 ) -> tuple[GraspSet, tuple[CodingCost, ...]]:
     first = grasps[0][0]
     began = {id(part): grasp.time_us for part, grasp in reversed(grasps)}
     session = {part: str(number) for number, part in enumerate(dict.fromkeys(id(part) for part, _ in grasps), start=1)}
     trials = np.array([grasp.label.trial for _, grasp in grasps], np.int64)
     names = [name for name in first.session.sensors if name not in WRIST]
-    joints = [_joint(name, grasps, trials, coded.get(name)) for name in names]
+    joints = [_joint(name, grasps, trials, codings.get(name)) for name in names]
     labels = [grasp.label for _, grasp in grasps]
     closed = [0 if grasp.switches is None else grasp.switches.closed for _, grasp in grasps]
-    taxels = [_taxel(place, grasps, coded) for place in range(len(first.session.taxels))]
+    taxels = [_taxel(place, grasps, codings) for place in range(len(first.session.taxels))]
     grasp_set = GraspSet(
         switches=switch_matrix(closed, len(first.session.switches)),
         switch_names=first.session.switches,
@@ -397,13 +397,13 @@ def _joined(
 def _joint(
     name: str, grasps: Sequence[tuple[_Part, _Grasp]], trials: NDArray[np.int64], target: BuildCalibration | None
 ) -> tuple[NDArray[np.uint16], Joint, CodingCost]:
-    """Return the codes of a joint, of a given meaning if there is a `target`."""
+    """Return the codes of a joint, in the coding of `target` if there is one."""
     session = grasps[0][0].session
     points, unit = _BYTES if session.calibration is None else _HALF_DEGREES, _unit(session)
     if target is not None:
         points, unit = _points(target), target.unit
     coded = BuildCalibration(0, name, unit, *structs.astuple(points))
-    tables = {id(part): _of_bytes(coded, part) for part, _ in grasps}
+    tables = {id(part): _byte_tables(coded, part) for part, _ in grasps}
     read = [(tables[id(part)], _raw(name, part, grasp)) for part, grasp in grasps]
     values = np.array([values[byte] for (_, values), byte in read], np.float64)
     if target is not None:  # what is beyond its codes gets the nearest, as it does live
@@ -413,7 +413,7 @@ def _joint(
     return np.array([codes[byte] for (codes, _), byte in read], np.uint16), joint, cost
 
 
-def _of_bytes(coded: BuildCalibration, part: _Part) -> tuple[Sequence[int], Sequence[float]]:
+def _byte_tables(coded: BuildCalibration, part: _Part) -> tuple[Sequence[int], Sequence[float]]:
     """Return the code and the value of each byte of a joint, as they would be live."""
     meaning: Meaning = part.session.calibration
     if meaning is None and coded.unit != RAW:
@@ -432,13 +432,13 @@ def _of_bytes(coded: BuildCalibration, part: _Part) -> tuple[Sequence[int], Sequ
 
 
 def _taxel(
-    place: int, grasps: Sequence[tuple[_Part, _Grasp]], targets: Mapping[str, BuildCalibration]
+    place: int, grasps: Sequence[tuple[_Part, _Grasp]], codings: Mapping[str, BuildCalibration]
 ) -> tuple[list[int], Joint]:
-    """Return the codes of a taxel: its counts, converted to the first calibration, or to that of its target."""
+    """Return the codes of a taxel: its counts, converted to the first calibration, or to its own of the `codings`."""
     first = grasps[0][0].session
     name, line = first.taxels[place], _line(first, place)
     taxel = Joint(name, "counts", 0, 0.0, 1, 1.0)
-    if (target := targets.get(name)) is not None:
+    if (target := codings.get(name)) is not None:
         taxel, line = Joint(name, target.unit, *structs.astuple(_points(target))), None
     elif line is not None:
         taxel = Joint(name, _taxel_unit(first), line.rest, 0.0, line.press, line.value)
@@ -446,7 +446,7 @@ def _taxel(
     for part, grasp in grasps:
         count, own = grasp.counts[place], _line(part.session, place)
         assert count is not None
-        code = count if own is None or own == line or taxel.unit == "counts" else own.codes(_coded(taxel)).code(count)
+        code = count if own is None or own == line else own.codes(_coded(taxel)).code(count)
         codes.append(min(max(code, 0), CODES - 1))
     return codes, taxel
 

@@ -214,8 +214,8 @@ def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[
     return types, (*tasks.values(), *(CollectionTask(NONE, movements),) * none)
 
 
-def known_to(manifest: Manifest) -> tuple[Taxonomy, tuple[CollectionTask, ...]]:
-    """Return the taxonomy of a build, and the tasks to collect for it: its types, and nothing held if it knows that."""
+def tasks_of(manifest: Manifest) -> tuple[Taxonomy, tuple[CollectionTask, ...]]:
+    """Return the taxonomy of a build, and the tasks to collect for it: its types, and nothing held if it knows it."""
     name, grasps = manifest.source.taxonomy, manifest.grasps
     types = published(name) if name in _PUBLISHED else Taxonomy(name, tuple(grasp for grasp in grasps if grasp != NONE))
     tasks = (CollectionTask(grasp, tuple(MOVEMENTS) if grasp == NONE else (ANY,)) for grasp in grasps)

@@ -198,7 +198,7 @@ class Logit(Trainer):
 
     name = "logit"
     what = "multinomial logistic regression on a table for each input"
-    automatic = False  # in no set that we know is it better than the others
+    automatic = False  # it is better than the others in none of our sets
     settings = (
         Setting("penalty", "Pull of scores towards zero.", float, PENALTY, 1e-6, 1e6),
         Setting(

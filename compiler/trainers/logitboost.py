@@ -133,7 +133,7 @@ class LogitBoost(Trainer):
     name = "logitboost"
     what = "LogitBoost on decision stumps, as in the paper"
     rank = -1
-    automatic = False  # in no set that we know is it better than the others
+    automatic = False  # it is better than the others in none of our sets
     staged = True
     tried = (
         {"rounds": 30, "max_bins": 16},

@@ -9,33 +9,42 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
+from numpy.typing import NDArray
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.graspset import Joint
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.build import Build
+from thenar.runtime.calibration import codes_of_bytes
+from thenar.runtime.manifest import Calibration
 
 from ..sets import grasp_set_of
 from .conftest import thenar
 from .test_adapt_command import BARE
+from .test_record_command import GLOVE
 
 pytestmark = pytest.mark.slow
 
 TYPES, SWITCHES, JOINTS = ("cup", "pen", "rod"), ("s1", "s2", "s3"), ("index_mpj", "index_pij")
-GLOVE = """name = "bench"
-[cyberglove]
-port = "{folder}/glove"
-[[stream]]
-port = "{folder}/board"
-rate_hz = 200
-switches = ["s1", "s2", "s3"]
-"""
+# A tenth of a degree a code, as no recording has by itself.
+CODING = Calibration(0, "", "deg", 0, -20.0, 1000, 80.0)
+LINES = tuple(SensorCalibration(name, 40, 0.0, 200, 100.0) for name in SENSORS_18)
 # What the wearer's hand does for each type: others bend the index finger less.
 CLOSED = {"cup": ("s1", "s3"), "pen": ("s2", "s3"), "rod": ("s2", "s3")}
 BENT = {"cup": (60, 90), "pen": (150, 100), "rod": (170, 160)}
 PROMPT = re.compile(r"(\d+) of 6: (cup|pen|rod), ")
+
+
+def live_codes(raw: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the codes of bytes (n, 2) that the build gets from the calibrated glove."""
+    tables = [codes_of_bytes(replace(CODING, name=name), GloveCalibration(sensors=LINES)) for name in JOINTS]
+    columns = zip(tables, np.clip(raw, 1, 255).T, strict=True)
+    return np.column_stack([np.array(table)[column] for table, column in columns])
 
 
 @pytest.fixture
@@ -48,11 +57,13 @@ def folder(tmp_path: Path) -> Path:
         labels,
         switches=closed[labels] ^ (random.random((90, 3)) < 0.1),
         switch_names=SWITCHES,
-        codes=np.clip(bent[labels] + random.integers(-15, 16, (90, 2)), 0, 255),
-        joints=tuple(Joint(name, "raw", 1, 1.0, 255, 255.0) for name in JOINTS),
+        codes=live_codes(bent[labels] + random.integers(-15, 16, (90, 2))),
+        joints=tuple(Joint(name, "deg", 0, -20.0, 1000, 80.0) for name in JOINTS),
     )
     compile_build(crowd, tmp_path / "build", trainer="linear", folds=0, jobs=1)
-    (tmp_path / "glove.toml").write_text(GLOVE.format(folder=tmp_path))
+    calibrated = GLOVE.replace('/glove"', '/glove"\ncalibration = "hand.toml"')
+    (tmp_path / "glove.toml").write_text(calibrated.format(folder=tmp_path))
+    (tmp_path / "hand.toml").write_text(GloveCalibration(sensors=LINES).to_toml())
     return tmp_path
 
 
@@ -96,9 +107,10 @@ def test_one_command_fits_a_build_to_the_wearer(folder: Path, board: BoardSender
     assert code == 0, said
     mine = GraspSet.load(folder / "mine.grasps")
     assert sorted(mine.grasps.tolist()) == sorted(2 * TYPES)
-    for grasp, closed, codes in zip(mine.grasps.tolist(), mine.switches, mine.codes.tolist(), strict=True):
+    bent = live_codes(np.array([BENT[grasp] for grasp in mine.grasps.tolist()]))
+    assert mine.codes[:, 4:6].tolist() == bent.tolist()
+    for grasp, closed in zip(mine.grasps.tolist(), mine.switches, strict=True):
         assert {name for name, bit in zip(SWITCHES, closed, strict=True) if bit} == set(CLOSED[grasp])
-        assert tuple(codes[4:6]) == BENT[grasp]
     build = Build.load(folder / "mine")
     assert build.manifest.adapted is not None
     assert build.manifest.adapted.counts == (2, 2, 2)
@@ -123,11 +135,17 @@ def test_whoever_leaves_goes_on_later(folder: Path, board: BoardSender, glove: E
     assert len(GraspSet.load(folder / "mine.grasps")) == 6
 
 
-def test_a_glove_that_does_not_fit_is_refused_before_any_trial(folder: Path) -> None:
-    (folder / "glove.toml").write_text(GLOVE.format(folder=folder).replace('"s3"', '"s4"'))
+@pytest.mark.parametrize(
+    ("pattern", "other", "said"), [('"s3"', '"s4"', "s3"), (r"\[cyberglove\][^[]*", "", "reads the build's joints")]
+)
+def test_a_glove_that_does_not_fit_is_refused_before_any_trial(
+    folder: Path, pattern: str, other: str, said: str
+) -> None:
+    whole = re.sub(pattern, other, (folder / "glove.toml").read_text())
+    (folder / "glove.toml").write_text(whole)
     done = thenar("wear", folder / "build", "--glove", folder / "glove.toml", "-o", folder / "mine")
     assert done.returncode == 2
-    assert "s3" in done.stderr
+    assert said in done.stderr
     assert not list(folder.glob("mine*"))
 
 
