@@ -17,6 +17,8 @@ from .options import (
     asked_settings,
     fitted_hand,
     layout_option,
+    prices_of,
+    prices_option,
     recipe_options,
     trainer_option,
     warn_of_budget,
@@ -47,7 +49,7 @@ PRESETS: dict[str, dict[str, str]] = {
     "best": {"method": "elimination", "keep": "33"},
 }
 _GROUPS = {
-    "Basics": ("output", "preset", "placement", "keep", "levels", "keep_joints", "prune", "inputs"),
+    "Basics": ("output", "preset", "sensors", "placement", "keep", "levels", "keep_joints", "prune", "inputs"),
     "Limits": LIMITS,
     "Training": ("trainer", "robust", "refuse"),
     "Integer tables": ("table_bits", "width"),
@@ -115,6 +117,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 @click.option("--report/--no-report", default=True, show_default=True, help="Also write report.html and spec/.")
 @click.option("--hand-length", type=Number(100, 300), metavar="MM", help="Wearer's hand length.  [default: 190]")
 @layout_option
+@prices_option
 @click.option("--glove", type=existing_file, help="A glove.toml: add the scan map of its wiring to the build.")
 @click.option("--propose", type=OutputFile(".toml"), help="Write a glove.toml that wires the kept switches.")
 @click.option("--chip", type=OneOf("chip", _chips), cls=LazyOption, describe=_chips_help)
@@ -132,6 +135,7 @@ def command(
     hand_length: float | None,
     jobs: int,
     layout: Path | None,
+    prices: Path | None,
     glove: Path | None,
     propose: Path | None,
     chip: str | None,
@@ -148,7 +152,7 @@ def command(
     Example:
         thenar compile set.grasps -o build/
         thenar compile set.grasps -o build/ --preset smallest
-        thenar compile set.grasps -o build/ --method elimination --keep 16
+        thenar compile set.grasps -o build/ --sensors 8
         thenar compile set.grasps -o build/ --method elimination --keep 39 --robust
         thenar compile set.grasps -o build/ --method elimination --keep 16 --never palm_heel_6 --apart-mm 8
         thenar compile set.grasps -o build/ --glove glove.toml
@@ -163,7 +167,7 @@ def command(
     from thenar.runtime.harness.loading import load_harness
 
     _check(context, from_frontier, point, hand_length, report)
-    keep_apart(recordings, layout, glove, propose, from_frontier)
+    keep_apart(recordings, layout, prices, glove, propose, from_frontier)
     preset_keeps = context.get_parameter_source("keep") is ParameterSource.DEFAULT_MAP
     if preset_keeps and not METHODS[asked["placement"]].by_number:
         asked["keep"] = None  # the given --method takes no number of switches
@@ -183,6 +187,7 @@ def command(
             harness=given if chosen is None else chosen.wired(given),
             ports=ports_of_whole_glove(given, grasp_set.element_names, len(grasp_set.taxel_columns)),
             hand=hand,
+            prices=prices_of(grasp_set, prices),
             documents=Documents(hand, hand_length, **marks) if report else None,
             jobs=jobs,
             progress=report_done,

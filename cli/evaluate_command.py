@@ -18,6 +18,7 @@ from .options import (
     glove_option,
     layout_option,
     method_list,
+    prices_option,
     recipe_options,
     terms_of,
     trainer_option,
@@ -83,6 +84,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
 @trainer_option("logitboost")
 @recipe_options(*CHOOSING)
 @layout_option
+@prices_option
 @glove_option
 @click.option(
     "--prune-list",
@@ -150,6 +152,7 @@ def command(
     folder: Path | None,
     output: Path | None,
     layout: Path | None,
+    prices: Path | None,
     glove: Path | None,
     **asked: Any,
 ) -> None:
@@ -182,13 +185,13 @@ def command(
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.recipe import Recipe, changed
 
-    keep_apart(grasps, output, layout, glove)
+    keep_apart(grasps, output, layout, prices, glove)
     training = asked_settings(context, asked)
     chosen = {name: asked.pop(name) for name in (*CHOOSING, "folds", "seed")}
     recipe = changed(Recipe(), chosen | training)
     if streams or numbers:
         kind = "streams" if streams else "adapt"
-        given = {name: chosen[name] for name in LIMITS} | {"layout": layout, "glove": glove}
+        given = {name: chosen[name] for name in LIMITS} | {"layout": layout, "prices": prices, "glove": glove}
         given["adapt"] = streams and numbers
         if unused := next((name for name, value in given.items() if value), ""):
             raise click.UsageError(f"--{unused.replace('_', '-')} is not for --{kind}: leave one of them out.")
@@ -201,7 +204,7 @@ def command(
     if folder is not None and "compositions" not in design.tables:
         raise click.UsageError("--plot shows the compositions: name them in --tables")
     grasp_set = GraspSet.load(grasps)
-    run = StudyRun(grasp_set, design, **terms_of(recipe, grasp_set, layout, glove))
+    run = StudyRun(grasp_set, design, **terms_of(recipe, grasp_set, layout, glove, prices))
     for sentence in run.study.warnings:
         warning(sentence)
     study = replace(run.study, tables=tuple(_tables(run, jobs)))

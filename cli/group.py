@@ -109,7 +109,7 @@ def _is_broken_pipe(fault: BaseException) -> bool:
 
 
 def with_options(sentence: str) -> str:
-    """Return a sentence of the library with its parameters, ``keep_these``, as the options of commands."""
+    """Return a sentence of the library with its parameters, ``have``, as the options of commands."""
     return _PARAMETER.sub(lambda found: f"--{found[1].replace('_', '-')}", sentence)
 
 

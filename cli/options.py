@@ -16,6 +16,7 @@ from .printing import warning
 
 if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
+    from thenar.compiler.placement.prices import Part
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.compiler.trainers.base import Setting
     from thenar.runtime.harness.wiring import GloveWiring
@@ -53,8 +54,8 @@ def _names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str
 
 
 # Fields of a recipe: those that limit a placement, and all that it depends on but the inputs.
-LIMITS = ("keep_these", "never", "apart_mm", "at_most_taxels", "budget_us")
-CHOOSING = ("placement", "keep", "levels", "keep_joints", "prune", *LIMITS, "robust")
+LIMITS = ("have", "never", "apart_mm", "at_most_taxels", "budget_us", "price")
+CHOOSING = ("sensors", "placement", "keep", "levels", "keep_joints", "prune", *LIMITS, "robust")
 
 
 def recipe_options(*names: str, **changes: Any) -> Callable[[Command], Command]:
@@ -109,7 +110,28 @@ glove_option = click.option(
 )
 
 
-def terms_of(recipe: "Recipe", grasp_set: "GraspSet", layout: Path | None, glove: Path | None) -> dict[str, Any]:
+prices_option = click.option(
+    "--prices",
+    type=existing_file,
+    help="Parts and prices of the sensors, a .toml file; of two alike the cheaper is kept.",
+)
+
+
+def parts_of(grasp_set: "GraspSet", prices: Path | None) -> "Mapping[str, Part]":
+    """Return the part for each sensor of a set by a file; none without a file."""
+    from thenar.compiler.placement.prices import load_prices
+
+    return {} if prices is None else load_prices(prices, (*grasp_set.element_names, *grasp_set.joint_names))
+
+
+def prices_of(grasp_set: "GraspSet", prices: Path | None) -> dict[str, float]:
+    """Return the price of each sensor of a set by a file; none without a file."""
+    return {name: part.price for name, part in parts_of(grasp_set, prices).items()}
+
+
+def terms_of(
+    recipe: "Recipe", grasp_set: "GraspSet", layout: Path | None, glove: Path | None, prices: Path | None
+) -> dict[str, Any]:
     """Return the costs and the limits under which a recipe chooses elements of a set: the arguments `ports` and
     `limits` of the library.
 
@@ -132,9 +154,10 @@ def terms_of(recipe: "Recipe", grasp_set: "GraspSet", layout: Path | None, glove
         raise click.UsageError(f"{glove} does not wire {min(lacking)!r} of the set: name the whole glove's glove.toml.")
     cyberglove = None if harness is None else harness.cyberglove
     warn_of_budget(recipe.budget_us, grasp_set.joint_names if recipe.keep_joints else (), cyberglove)
+    priced = prices_of(grasp_set, prices)
     places = hand_of(layout).by_name if recipe.apart_mm else {}
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
-    return {"ports": ports if weighs else None, "limits": Limits.of(recipe, grasp_set, places, cyberglove)}
+    return {"ports": ports if weighs else None, "limits": Limits.of(recipe, grasp_set, places, cyberglove, priced)}
 
 
 def warn_of_budget(budget_us: float | None, joints: Sequence[str], glove: "GloveWiring | None") -> None:

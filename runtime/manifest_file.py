@@ -87,7 +87,7 @@ def _wrong_faults(manifest: Manifest) -> Iterator[str]:
 def _wrong_texts(manifest: Manifest) -> Iterator[str]:
     source, options, fit = manifest.source, manifest.options, manifest.fit
     texts = [manifest.thenar, source.taxonomy, options.placement, options.trainer, *options.settings]
-    texts += [*options.keep_these, *options.never]
+    texts += [*options.have, *options.never]
     texts += [fit.trainer, *fit.settings]
     texts += [text for each in fit.compared for text in (each.trainer, *each.settings)]
     yield from _wrong_names("texts", texts)

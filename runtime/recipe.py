@@ -99,7 +99,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
         bool,
         _choice("training", "Choose elements that minimise the worst single loss; train on rows with lost inputs."),
     ] = False
-    keep_these: Annotated[
+    have: Annotated[
         tuple[Name, ...], _choice("limits", "Always keep these inputs, by name: a,b.", metavar="NAMES")
     ] = ()
     never: Annotated[
@@ -119,6 +119,14 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
             "limits", "Limit the scan time of the kept elements, and the record time of the kept joints.", metavar="US"
         ),
     ] = None
+    sensors: Annotated[
+        Annotated[int, Meta(ge=1, le=2**53)] | None,
+        _choice("placement", "Keep the best N sensors: switches, pads and joints in one pool.", metavar="N"),
+    ] = None
+    price: Annotated[
+        Annotated[float, Meta(ge=0.0, le=1e12)] | None,
+        _choice("limits", "Keep the best sensors that a price pays for, by a list of prices.", metavar="PRICE"),
+    ] = None
     refuse: Annotated[
         Share,
         _choice(
@@ -133,7 +141,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     def __hash__(self) -> int:
         # Only what a search varies: settings are a dict, which has no hash.
         chosen = self.placement, self.prune, self.keep, self.inputs, self.levels, self.keep_joints, self.trainer
-        return hash((*chosen, self.rounds, self.width, self.table_bits))
+        return hash((*chosen, self.sensors, self.rounds, self.width, self.table_bits))
 
 
 def changed(recipe: Recipe, changes: Mapping[str, Any]) -> Recipe:

@@ -30,7 +30,7 @@ from ..model.compare import Comparison, compare
 from ..model.faults import count_faults, groups_of, worst_faults
 from ..placement.constraints import Limits
 from ..placement.elements import Element, names_of
-from ..placement.methods.base import METHODS
+from ..placement.methods.base import check_placement
 from ..placement.ports import PortCosts, ports_of_whole_glove
 from ..publication import check_folder, publish_folder, sweep
 from ..recogniser import Recogniser, predicted_classes
@@ -115,6 +115,7 @@ def compile_build(
     harness: Wired | None = None,
     ports: PortCosts | None = None,
     hand: HandShape | None = None,
+    prices: Mapping[str, float] | None = None,
     documents: Documents | None = None,
     jobs: int = -1,
     progress: Report | None = None,
@@ -139,6 +140,8 @@ def compile_build(
         The cost of reading each switch, for methods that use it. None: a glove with as few MCP23017 as possible.
     hand : HandShape, optional
         Switch positions, for `hand.json` and `apart_mm`. None: the hand of the documents.
+    prices : mapping, optional
+        The price of each sensor, by name, for `price`, and to prefer the cheaper of two that are nearly as good.
     documents : Documents, optional
         A report and the spec of the glove, to write into the folder.
     jobs : int
@@ -190,7 +193,7 @@ def compile_build(
     ports = ports or ports_of_whole_glove(None, grasp_set.element_names, len(grasp_set.taxel_columns))
     hand = hand or (None if documents is None else documents.hand)
     glove = harness.cyberglove if isinstance(harness, Harness) else None
-    limits = Limits.of(recipe, grasp_set, {} if hand is None else hand.by_name, glove)
+    limits = Limits.of(recipe, grasp_set, {} if hand is None else hand.by_name, glove, prices)
     groups = groups_for(grasp_set, recipe)
     recogniser = Recogniser.fit(samples, recipe, ports=ports, limits=limits, groups=groups, jobs=jobs, report=trained)
     made = BuildAssembly(grasp_set, recogniser, harness, hand)
@@ -206,7 +209,7 @@ def _sound(options: Recipe) -> Recipe:
         raise CompileError(f"width={options.width}: the sums of tables have 4 to 16 bits")
     if not 0 <= options.refuse < _MOST_REFUSED:
         raise CompileError(f"refuse={options.refuse}: give a share of grasps of at least 0 and below {_MOST_REFUSED}")
-    METHODS.named(options.placement).check_given(options.keep, options.prune)
+    check_placement(options)
     only, *others = Training.candidates(options)
     trainer, settings = options.trainer, {name: getattr(options, name) for name in SHARED} | options.settings
     if not others:

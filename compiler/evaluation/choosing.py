@@ -25,9 +25,9 @@ from ..elementary import softmax_and_loss
 from ..model.collapse import collapse
 from ..placement.constraints import Limits
 from ..placement.elements import Elements, bits_of, elements_of, ports_of
-from ..placement.methods.base import METHODS
+from ..placement.methods.base import METHODS, by_sensors
 from ..placement.methods.elimination import joint_order
-from ..placement.placement import select
+from ..placement.placement import InputSelection, select
 from ..placement.ports import PortCosts
 from ..samples import Columns, Samples, decided
 from ..trainers.base import TRAINERS, Model, Training
@@ -92,6 +92,7 @@ class InputChoices:
     _available: dict[tuple[int | None, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
     _elements: dict[tuple[Recipe, float, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
     _orders: dict[tuple[Elements, bytes], Columns] = field(default_factory=dict, init=False, repr=False)
+    _sensors: dict[tuple[Recipe, bytes], InputSelection] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def n_joints(self) -> int:
@@ -126,12 +127,21 @@ class InputChoices:
 
     def elements(self, recipe: Recipe, rows: Rows) -> Elements:
         """Return the elements that a recipe keeps by some rows."""
+        if by_sensors(recipe):
+            return self.sensors(recipe, rows).kept
         if recipe.inputs == "joints":
             return ()
         place = *_placement(recipe), rows.tobytes()
         if place not in self._elements:
             self.choose([recipe], [rows])
         return self._elements[place]
+
+    def sensors(self, recipe: Recipe, rows: Rows) -> InputSelection:
+        """Return the inputs of the sensors that a recipe chooses by some rows."""
+        same = Recipe(sensors=recipe.sensors, price=recipe.price, levels=recipe.levels), rows.tobytes()
+        if same not in self._sensors:
+            self._sensors[same] = select(self.samples.rows(rows), same[0], self.ports, self.limits)
+        return self._sensors[same]
 
     def rank(self, places: Sequence[tuple[Elements, Rows]]) -> None:
         """Rank the joints, given elements, by rows."""

@@ -12,9 +12,10 @@ from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import AUTO, Recipe, changed
 
 from ..placement.elements import Elements
-from ..placement.methods.base import METHODS, PAPERS
+from ..placement.methods.base import METHODS, PAPERS, by_sensors
 from ..placement.methods.baselines import random_placement
 from ..placement.placement import InputSelection
+from ..placement.sensors import SENSORS, SENSORS_HELP
 from ..samples import Columns, Samples
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
@@ -237,7 +238,8 @@ class Planner:
     def _baselines(self, protocol: ProtocolName) -> list[RowPlan]:
         def baseline(name: str, population: Population, fold: Fold) -> Elements:
             number = len(self.placement(protocol, population, fold))
-            return self.chosen(may_choose(protocol, population, fold), placement=name, keep=number or None, prune=0)
+            other = {"placement": name, "keep": number or None, "prune": 0, "sensors": None, "price": None}
+            return self.chosen(may_choose(protocol, population, fold), **other)
 
         def drawn(draw: int, population: Population, fold: Fold) -> Elements:
             elements, number = self.elements(fold.train), len(self.placement(protocol, population, fold))
@@ -248,10 +250,12 @@ class Planner:
             return CellPlan(population, tuple(run for cell in cells for run in cell.runs))
 
         recipe = METHODS.named(self.recipe.placement)
-        what = "the paper's placement" if recipe.name == PAPERS else recipe.help
-        baselines = [METHODS.named(name) for name in self.baselines if name != recipe.name]
+        title, what = recipe.title, "the paper's placement" if recipe.name == PAPERS else recipe.help
+        if by_sensors(self.recipe):
+            title, what = SENSORS, SENSORS_HELP
+        baselines = [METHODS.named(name) for name in self.baselines if name != title]
         return [
-            self._row(recipe.title, what, SELECTED, partial(self.placement, protocol)),
+            self._row(title, what, SELECTED, partial(self.placement, protocol)),
             *(self._row(other.title, other.help, SELECTED, partial(baseline, other.name)) for other in baselines),
             RowPlan("random", f"mean of {DRAWS} draws", tuple(map(random, self.populations))),
         ]
@@ -286,7 +290,8 @@ class Planner:
     def chosen(self, rows: Rows, **changes: Any) -> Elements:
         """Return the elements that the recipe, with other choices `changes`, keeps from these rows, in any order."""
         recipe = changed(self.recipe, changes)
-        if not self._n_switches or (METHODS.named(recipe.placement).by_number and recipe.keep is None):
+        countless = METHODS.named(recipe.placement).by_number and recipe.keep is None and not by_sensors(recipe)
+        if not self._n_switches or countless:
             return ()
         return self.choices.elements(recipe, np.sort(rows))
 
@@ -311,7 +316,10 @@ class Planner:
             placement = select(population, fold) if kind.selected != kind.others else ()
             elements = kind.elements(placement, self.elements(fold.train) if kind.others else ())
             most_joints = most or self.recipe.keep_joints
-            joints = self.choices.joints(elements, fold.train, most_joints) if kind.angle else ()
+            if kind.angle and by_sensors(self.recipe) and most is None:
+                joints = self.choices.sensors(self.recipe, np.sort(fold.train)).joints
+            else:
+                joints = self.choices.joints(elements, fold.train, most_joints) if kind.angle else ()
             return FoldFit(fold, elements, joints, population.grasps, learner)
 
         return CellPlan(population, tuple(tuple(map(fit, folds)) for folds in population.repeats))

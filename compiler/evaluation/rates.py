@@ -200,8 +200,11 @@ def interval(rate: Rate | None) -> str:
 def placement_words(options: Recipe) -> str:
     """Return a placement method with its settings and limits in words: "elimination, keep 16, the best 3 joints"."""
     words = [options.placement, f"S = {options.prune}" if options.keep is None else f"keep {options.keep}"]
+    if options.sensors is not None or options.price is not None:
+        number = "sensors" if options.sensors is None else counted(options.sensors, "sensor")
+        words = [f"the best {number}" + ("" if options.price is None else f" for a price of {options.price:g}")]
     words += [] if options.keep_joints is None else [f"the best {counted(options.keep_joints, 'joint')}"]
-    words += [f"with {list_names(options.keep_these)}"] if options.keep_these else []
+    words += [f"with {list_names(options.have)}"] if options.have else []
     words += [f"without {list_names(options.never)}"] if options.never else []
     words += [] if options.apart_mm is None else [f"{options.apart_mm:g} mm apart"]
     words += [] if options.at_most_taxels is None else [f"at most {counted(options.at_most_taxels, 'taxel')}"]

@@ -11,7 +11,7 @@ from thenar.runtime.recipe import PAPERS_TRAINER, Recipe, changed
 
 from ..pictures import painting
 from ..placement.constraints import Limits
-from ..placement.methods.base import METHODS, PAPERS
+from ..placement.methods.base import METHODS, PAPERS, by_sensors, check_placement
 from ..placement.ports import PortCosts
 from ..recordings.graspset import GraspSet
 from ..recordings.summary import check_trials
@@ -79,7 +79,7 @@ class StudyDesign:
     def __post_init__(self) -> None:
         if self.recipe.folds < _FEWEST_FOLDS:
             raise EvaluationError(f"``folds`` {self.recipe.folds}: an evaluation needs {_FEWEST_FOLDS} or more")
-        METHODS.named(self.recipe.placement).check_given(self.recipe.keep, self.recipe.prune)
+        check_placement(self.recipe)
         for name in self.baselines:
             if not METHODS.named(name).by_number:
                 raise EvaluationError(f"{name} takes S: baselines must be methods that take a number of switches")
@@ -301,7 +301,7 @@ def _why_not(
         return "a placement needs switches, and the set has none"
     if name == "generality" and len(populations) < 2:
         return "another's placement needs a second subject"
-    if name == "pruning" and design.recipe.placement != PAPERS:
+    if name == "pruning" and (design.recipe.placement != PAPERS or by_sensors(design.recipe)):
         return f"S prunes the tree of {PAPERS}, and the recipe has another method"
     if name == "generality" and design.scheme == "subject":
         return "when a subject is left out, the placement is always that of others"

@@ -33,6 +33,7 @@ class Limits:
     apart_mm     the least distance between two kept inputs, by their `places` (mm); levels of one taxel are exempt
     taxels       the most taxels to keep, with any number of levels
     budget_us    the most time for reading the ports of the kept inputs, and for a record of the kept joints meanwhile
+    price        the most that the kept sensors may cost, those of `have` excepted; prices: of every input, by name
     records_us   time of a record of one, of two, ... of the joints; empty if unknown, and then not limited
     names        of all switches, `n_switches`, and then of the taxels
     joints       names of the joints
@@ -49,46 +50,56 @@ class Limits:
     apart_mm: float = 0.0
     taxels: int | None = None
     budget_us: float | None = None
+    price: float | None = None
+    prices: Mapping[str, float] = field(default_factory=dict)
     records_us: tuple[float, ...] = ()
     places: Places = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        every_name = (*self.names, *self.joints)
         for name in (*self.keep, *self.never):
-            if name not in (every := (*self.names, *self.joints)):
-                raise TrainingError(f"there is no input {name!r} to keep or to leave out{nearest(name, every)}")
+            if name not in every_name:
+                raise TrainingError(f"there is no input {name!r} to keep or to leave out{nearest(name, every_name)}")
         if self.apart_mm and (lost := [name for name in self.names if name not in self.places]):
             raise TrainingError(
                 f"``apart_mm``: the position of {list_names(lost)} is unknown: give ``layout`` your glove"
             )
+        if self.price is not None and (lost := [name for name in every_name if name not in self.prices]):
+            raise TrainingError(f"``price``: the price of {list_names(lost)} is unknown: add it to ``prices``")
         if both := [name for name in self.keep if name in self.never]:
-            raise TrainingError(
-                f"``keep_these`` and ``never`` both name {list_names(both)}: take it out of one of them"
-            )
+            raise TrainingError(f"``have`` and ``never`` both name {list_names(both)}: take it out of one of them")
         for at, name in enumerate(self.keep):
             for other in self.keep[:at] if self.apart_mm and name in self.names else ():
                 if other in self.names and self._apart(name, other) < self.apart_mm:
                     raise TrainingError(
-                        f"``keep_these`` {other},{name} are {self._apart(name, other):.1f} mm apart, ``apart_mm`` "
+                        f"``have`` {other},{name} are {self._apart(name, other):.1f} mm apart, ``apart_mm`` "
                         f"requires {self.apart_mm:g}: drop one of them, or allow less"
                     )
 
     @classmethod
     def of(
-        cls, options: Recipe, grasp_set: GraspSet, places: Places, glove: GloveWiring | None = None
+        cls,
+        options: Recipe,
+        grasp_set: GraspSet,
+        places: Places,
+        glove: GloveWiring | None = None,
+        prices: Mapping[str, float] | None = None,
     ) -> "Limits | None":
         """Return the constraints that a build's options put on a set's elements and joints, or None."""
-        asked = (options.keep_these, options.never, options.apart_mm, options.at_most_taxels, options.budget_us)
-        if not any(each is not None and each != () for each in asked):
+        asked = (options.have, options.never, options.apart_mm, options.at_most_taxels, options.budget_us)
+        if not prices and options.price is None and not any(each is not None and each != () for each in asked):
             return None
         return cls(
             names=grasp_set.element_names,
             n_switches=len(grasp_set.switch_names),
             joints=grasp_set.joint_names,
-            keep=options.keep_these,
+            keep=options.have,
             never=options.never,
             apart_mm=options.apart_mm or 0.0,
             taxels=options.at_most_taxels,
             budget_us=options.budget_us,
+            price=options.price,
+            prices=prices or {},
             records_us=record_times_us(grasp_set.joint_names, glove),
             places=places,
         )
@@ -102,7 +113,7 @@ class Limits:
             raise TrainingError("``budget_us`` needs the cost of reading the glove: name its ``glove``")
         own = [self.names[element.column] for element in elements]
         if lost := [name for name in self.keep if name in self.names and name not in own]:
-            raise TrainingError(f"``keep_these`` names {list_names(lost)}, and ``inputs`` leaves that out")
+            raise TrainingError(f"``have`` names {list_names(lost)}, and ``inputs`` leaves that out")
         bound = Bound(
             self,
             groups=tuple(
@@ -125,13 +136,13 @@ class Limits:
             tuple(joint for joint, name in enumerate(self.joints) if name in asked) for asked in (self.keep, self.never)
         )
         if most is not None and len(keep) > most:
-            raise TrainingError(f"``keep_these`` names {len(keep)} joints, ``keep_joints`` allows {most}: name fewer")
+            raise TrainingError(f"``have`` names {len(keep)} joints, ``keep_joints`` allows {most}: name fewer")
         fit = len(self.joints)
         if self.budget_us is not None and self.records_us:
             fit = sum(us <= self.budget_us for us in self.records_us)
         if len(keep) > fit:
             raise TrainingError(
-                f"``keep_these`` names {len(keep)} joints, whose record takes {self.records_us[len(keep) - 1]:.1f} us, "
+                f"``have`` names {len(keep)} joints, whose record takes {self.records_us[len(keep) - 1]:.1f} us, "
                 f"``budget_us`` allows {self.budget_us:g}: name fewer, or allow more"
             )
         return keep, never, fit if most is None else min(most, fit)
@@ -190,14 +201,13 @@ class Bound:
         limits, kept = self.limits, self.required(())
         if limits.taxels is not None and len(set(self.taxel[kept].tolist()) - {-1}) > limits.taxels:
             raise TrainingError(
-                f"``keep_these`` names more taxels than ``at_most`` {limits.taxels} taxels allows: name fewer, or "
-                "allow more"
+                f"``have`` names more taxels than ``at_most`` {limits.taxels} taxels allows: name fewer, or allow more"
             )
         if limits.budget_us is not None and self.ports is not None:
             taken = sum(self._times[port] for port in {self.ports.port_of[one] for one in kept})
             if taken > _ns(limits.budget_us):
                 raise TrainingError(
-                    f"``keep_these`` takes {taken / 1000:.1f} us to read, ``budget_us`` allows {limits.budget_us:g}: "
+                    f"``have`` takes {taken / 1000:.1f} us to read, ``budget_us`` allows {limits.budget_us:g}: "
                     "name fewer, or allow more"
                 )
         if self.never.size and not kept and not self.addable(()).any():
@@ -212,7 +222,7 @@ class Bound:
         """Return at most `most` of `order`, required elements first, skipping each that would break a constraint."""
         kept = self.required(order)
         if len(kept) > most:
-            raise TrainingError(f"``keep_these`` names {len(kept)}, ``keep`` allows {most:g}: name fewer, or keep more")
+            raise TrainingError(f"``have`` names {len(kept)}, ``keep`` allows {most:g}: name fewer, or keep more")
         for column in order:
             if len(kept) < most and column not in kept and self.addable(kept)[column]:
                 kept.append(column)

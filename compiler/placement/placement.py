@@ -23,9 +23,10 @@ from ..trainers.logit import fit_logit
 from .constraints import Bound, Limits
 from .elements import Elements, bits_of, elements_of, names_of, ports_of
 from .gain import Cooccurrence, entropy_bits
-from .methods.base import METHODS, PAPERS, Method
+from .methods.base import METHODS, PAPERS, Method, by_sensors, check_placement
 from .methods.elimination import joint_order
 from .ports import PortCosts
+from .sensors import SENSORS, SENSORS_HELP, select_sensors
 from .tree import Tree, grow_id3
 
 Progress = Callable[[int, int], None]
@@ -90,6 +91,9 @@ def select(
     TrainingError
         If it cannot choose.
     """
+    if by_sensors(recipe):
+        elements, columns, joints = select_sensors(samples, recipe, limits)
+        return InputSelection(elements, columns, joints, information_alone(bits_of(samples, elements), columns))
     elements = elements_of(samples, recipe.levels)
     bits = bits_of(samples, elements)
     # Without switches the tree is a single leaf.
@@ -278,7 +282,7 @@ class Placement:
     @property
     def how(self) -> str:
         """How the method chooses, in a sentence."""
-        return METHODS.named(self.method).help
+        return SENSORS_HELP if self.method == SENSORS else METHODS.named(self.method).help
 
     @property
     def gain_bits(self) -> float:
@@ -367,15 +371,17 @@ def place(
     4
     """
     recipe = changed(recipe or Recipe(), changes)
-    method = METHODS.named(recipe.placement)
-    method.check_given(recipe.keep, recipe.prune)
+    check_placement(recipe)
+    method, sensors = METHODS.named(recipe.placement), by_sensors(recipe)
     fingerprint, grasp_set = grasp_set.fingerprint(), grasp_set.without_none()
     samples = _samples_of(grasp_set, recipe)
     selection = select(samples, recipe, ports, limits)
     return Placement(
-        method=method.name,
-        parameter=float(recipe.keep or 0 if method.by_number else recipe.prune),
-        joints=method.uses_joints and samples.codes.shape[1] > 0,
+        method=SENSORS if sensors else method.name,
+        parameter=float(
+            recipe.sensors or recipe.price or recipe.keep or 0 if sensors or method.by_number else recipe.prune
+        ),
+        joints=not sensors and method.uses_joints and samples.codes.shape[1] > 0,
         switches=_kept_of(grasp_set, selection),
         rows=len(grasp_set),
         fingerprint=fingerprint,
@@ -386,7 +392,7 @@ def place(
         grasps=samples.grasps,
         tree=selection.tree,
         kept_joints=()
-        if recipe.keep_joints is None
+        if recipe.keep_joints is None and not sensors
         else tuple(grasp_set.joint_names[joint] for joint in selection.joints),
     )
 
@@ -409,7 +415,7 @@ def place_by_subject(grasp_set: GraspSet, prune: int, on_done: Progress) -> list
 
 def _samples_of(grasp_set: GraspSet, recipe: Recipe) -> Samples:
     """Return the rows of a set to choose from, with the recipe's inputs."""
-    if not grasp_set.element_names or recipe.inputs == "joints":
+    if not by_sensors(recipe) and (not grasp_set.element_names or recipe.inputs == "joints"):
         why = "``inputs`` are the joints" if grasp_set.element_names else "the set holds joints only"
         raise TrainingError(f"there are no switches to place: {why}")
     if not len(grasp_set):

@@ -29,7 +29,7 @@ def layout(folder: Path) -> Path:
 
 
 def test_a_placement_obeys_its_limits(set_file: Path, tmp_path: Path) -> None:
-    asked = ["--method", "cmim", "--keep", 4, "--keep-these", "s4", "--never", "s2,s5", "--apart-mm", 6]
+    asked = ["--method", "cmim", "--keep", 4, "--have", "s4", "--never", "s2,s5", "--apart-mm", 6]
     done = thenar("place", set_file, *asked, "--layout", layout(tmp_path), "--json")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
@@ -41,8 +41,8 @@ def test_a_placement_obeys_its_limits(set_file: Path, tmp_path: Path) -> None:
 def test_what_contradicts_or_is_not_known_is_refused(set_file: Path, tmp_path: Path) -> None:
     where = ("--layout", layout(tmp_path))
     for asked, reason in (
-        (("--keep-these", "s4,s3", "--apart-mm", 6, *where), "s4,s3 are 3.0 mm apart, --apart-mm requires 6"),
-        (("--keep-these", "s4", "--never", "s4"), "--keep-these and --never both name s4"),
+        (("--have", "s4,s3", "--apart-mm", 6, *where), "s4,s3 are 3.0 mm apart, --apart-mm requires 6"),
+        (("--have", "s4", "--never", "s4"), "--have and --never both name s4"),
         (("--never", "s9"), "no input 's9'"),
         (("--apart-mm", 6), "the position of s0, s1, s2, s3, s4 and 1 more is unknown"),
         (("--budget-us", 0), "--never and --budget-us leave nothing"),
@@ -56,11 +56,11 @@ def test_what_contradicts_or_is_not_known_is_refused(set_file: Path, tmp_path: P
 
 def test_a_build_states_its_limits_and_its_report_the_command(set_file: Path, tmp_path: Path) -> None:
     build = tmp_path / "build"
-    asked = "--method elimination --keep 3 --never s2 --keep-these s5,s0 --at-most 4 taxels --budget-us 300 --robust"
+    asked = "--method elimination --keep 3 --never s2 --have s5,s0 --at-most 4 taxels --budget-us 300 --robust"
     done = thenar("compile", set_file, "-o", build, "--rounds", 4, "--folds", 2, *asked.split())
     assert done.returncode == 0, done.stderr
     options = manifest_from_bytes((build / "build.json").read_bytes()).options
-    assert (options.never, options.keep_these, options.at_most_taxels) == (("s2",), ("s5", "s0"), 4)
+    assert (options.never, options.have, options.at_most_taxels) == (("s2",), ("s5", "s0"), 4)
     assert options.robust
     assert "--budget-us limits only the scan of switches and taxels" in done.stderr
     assert {"s5", "s0"} <= {each.name for each in manifest_from_bytes((build / "build.json").read_bytes()).switches}

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thenar.drivers.members import Members
 from thenar.runtime.names import shortened
+from thenar.runtime.recipe import Recipe
 
 from ...samples import Columns, Samples, TrainingError
 from ..ports import PortCosts
@@ -137,6 +138,29 @@ class Method:
 
 
 METHODS: Members[Method] = Members("placement method", Method, "thenar.compiler.placement.methods", "thenar.methods")
+
+
+# Choices that count elements or weigh their time, where `sensors` and `price` count and pay for all sensors alike.
+_COUNTED_APART = ("keep", "keep_joints", "prune", "robust", "apart_mm", "at_most_taxels", "budget_us")
+
+
+def check_placement(recipe: Recipe) -> None:
+    """Raise SettingError or TrainingError unless the choices of a recipe's placement fit together."""
+    method = METHODS.named(recipe.placement)
+    if not by_sensors(recipe):
+        method.check_given(recipe.keep, recipe.prune)
+        return
+    given = next((name for name in _COUNTED_APART if getattr(recipe, name)), None)
+    given = given or (None if recipe.placement == PAPERS else "method")
+    if given:
+        raise TrainingError(
+            f"``sensors`` and ``price`` choose among switches, pads and joints alike: leave ``{given}`` out"
+        )
+
+
+def by_sensors(recipe: Recipe) -> bool:
+    """Return whether a recipe chooses sensors, not elements and joints."""
+    return recipe.sensors is not None or recipe.price is not None
 
 
 def usual(*, ours: bool, wired: bool = False) -> tuple[str, ...]:

@@ -105,10 +105,10 @@ def test_limits_are_obeyed_and_idle_ones_change_nothing(name: str) -> None:
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        ({"keep": ("a",), "never": ("b", "a")}, "``keep_these`` and ``never`` both name a"),
-        ({"keep": ("a", "b"), "apart_mm": 6.5}, "``keep_these`` a,b are 6.0 mm apart, ``apart_mm`` requires 6.5"),
-        ({"keep": ("p", "q"), "taxels": 1}, "``keep_these`` names more taxels than ``at_most`` 1 taxels"),
-        ({"keep": ("a", "c"), "budget_us": 12.0}, "``keep_these`` takes 15.5 us to read, ``budget_us`` allows 12"),
+        ({"keep": ("a",), "never": ("b", "a")}, "``have`` and ``never`` both name a"),
+        ({"keep": ("a", "b"), "apart_mm": 6.5}, "``have`` a,b are 6.0 mm apart, ``apart_mm`` requires 6.5"),
+        ({"keep": ("p", "q"), "taxels": 1}, "``have`` names more taxels than ``at_most`` 1 taxels"),
+        ({"keep": ("a", "c"), "budget_us": 12.0}, "``have`` takes 15.5 us to read, ``budget_us`` allows 12"),
         ({"budget_us": 5.0}, "``never`` and ``budget_us`` leave nothing"),
         ({"never": ("pp",)}, "no input 'pp'"),
         ({"apart_mm": 1.0, "places": {"a": (0.0, 0.0)}}, "``apart_mm``: the position of b, c, p, q is unknown"),
@@ -121,7 +121,7 @@ def test_contradictions_are_refused_by_both_names(asked: dict[str, object], mess
 
 def test_too_many_forced_switches_and_budgets_without_costs_are_refused() -> None:
     limits = Limits(names=NAMES, n_switches=3, keep=("a", "b", "q"), budget_us=99.0)
-    with pytest.raises(TrainingError, match="``keep_these`` names 3, ``keep`` allows 2"):
+    with pytest.raises(TrainingError, match="``have`` names 3, ``keep`` allows 2"):
         choose(samples_of(1), "cmim", 2, PORTS, limits.on(ELEMENTS, PORTS))
     with pytest.raises(TrainingError, match="``budget_us`` needs the cost of reading"):
         limits.on(ELEMENTS, None)
@@ -137,9 +137,9 @@ def test_joints_are_kept_and_left_out_by_name_as_switches_are() -> None:
     assert kept_joints(samples, 2, limits) == (1, 3)
     assert kept_joints(samples, None, limits) == (1, 2, 3)
     assert kept_joints(samples, 1, limits) == (3,)
-    with pytest.raises(TrainingError, match="``keep_these`` names 2 joints, ``keep_joints`` allows 1"):
+    with pytest.raises(TrainingError, match="``have`` names 2 joints, ``keep_joints`` allows 1"):
         kept_joints(samples, 1, Limits(**own, keep=("j3", "j1")))  # type: ignore[arg-type]
-    with pytest.raises(TrainingError, match="``keep_these`` names a, and ``inputs`` leaves that out"):
+    with pytest.raises(TrainingError, match="``have`` names a, and ``inputs`` leaves that out"):
         Limits(**own, keep=("a",)).on((), None)  # type: ignore[arg-type]
     limits.on((), None)
 
@@ -168,7 +168,7 @@ def test_no_more_joints_are_kept_than_a_record_within_the_budget_has(budget_us: 
     assert len(kept) == max(map(len, allowed))
     assert len(kept_joints(samples, 2, limits)) == min(2, len(kept))
     if len(kept) < 3:
-        with pytest.raises(TrainingError, match=r"``keep_these`` names 3 joints, whose record takes \d+\.\d us"):
+        with pytest.raises(TrainingError, match=r"``have`` names 3 joints, whose record takes \d+\.\d us"):
             kept_joints(samples, None, replace(limits, keep=joints[:3]))
 
 

@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 from sklearn.linear_model import LogisticRegression
 
 from thenar.compiler.elementary import dot
-from thenar.compiler.placement.methods.elimination import RIDGE, Logistic
+from thenar.compiler.placement.logistic import RIDGE, Logistic
 
 Bits = npt.NDArray[np.bool_]
 Labels = npt.NDArray[np.intp]
