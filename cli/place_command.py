@@ -114,8 +114,11 @@ def command(
         "budget_us",
         "show_tree",
     }:
-        grasp_set = GraspSet.load(grasps)
-        _place_sensors(grasp_set, recipe, drop, instead_of, layout, prices, jobs, draw, output)
+        if glove is not None:
+            raise click.UsageError("--glove gives scan costs, and sensors are chosen without: leave it out")
+        if layout is not None and draw is None:
+            raise click.UsageError("--layout gives positions for --draw, or for --apart-mm with a --method: add that")
+        _place_sensors(GraspSet.load(grasps), recipe, drop, instead_of, layout, prices, jobs, draw, output)
         return
     if drop or instead_of:
         raise click.UsageError("--drop and --instead-of are for sensors: leave --method and its options out")
@@ -166,7 +169,7 @@ def _place_sensors(
             raise click.UsageError("--drop says how many sensors are left: leave --sensors and --price out")
         recipe = changed(recipe, {"sensors": number_without(grasp_set, recipe, drop)})
     recipe = changed(recipe, {"folds": recipe.folds or Recipe().folds})
-    terms = terms_of(recipe, grasp_set, layout if recipe.apart_mm else None, None, prices)
+    terms = terms_of(recipe, grasp_set, None, None, prices)
     if instead_of:
         recipe = without_one(grasp_set, recipe, terms["limits"], instead_of)
         terms = terms_of(recipe, grasp_set, None, None, prices)

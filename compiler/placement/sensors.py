@@ -130,8 +130,11 @@ class SensorSearch:
     def chosen(self, number: int | None) -> SensorSet:
         """Return the chosen sensors: this many, or fewer if no more vary; None: as many as the budget pays for.
 
-        A number up to USUAL gives the set of the search up to USUAL, so curves and placements agree.
+        A number up to USUAL gives the set of the search up to USUAL, so curves and placements agree. Raises
+        TrainingError if more are always kept.
         """
+        if number is not None and len(self.have) > number:
+            raise TrainingError(f"``have`` names {len(self.have)}, ``sensors`` allows {number}: keep more")
         there = int(self._varying.sum())
         if number is not None and self.budget is None and number > max(USUAL, there // 2):
             return self._left(number)
@@ -268,10 +271,7 @@ def select_sensors(samples: Samples, recipe: Recipe, limits: Limits | None) -> t
 
     A pad is kept with all its levels. Raises TrainingError if `have` names more than are to be kept.
     """
-    search = search_of(samples, limits)
-    if recipe.sensors is not None and len(search.have) > recipe.sensors:
-        raise TrainingError(f"``have`` names {len(search.have)}, ``sensors`` allows {recipe.sensors}: keep more")
-    return read_by(samples, recipe, search.chosen(recipe.sensors).sensors)
+    return read_by(samples, recipe, search_of(samples, limits).chosen(recipe.sensors).sensors)
 
 
 def read_by(samples: Samples, recipe: Recipe, sensors: Columns) -> tuple[Elements, Columns, Columns]:

@@ -76,7 +76,7 @@ def test_a_placement_a_build_and_lists_are_drawn_side_by_side(
     glove_file: Path, glove_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     placement, listed, text = tmp_path / "a.json", tmp_path / "listed.json", tmp_path / "names.txt"
-    assert run(["place", str(glove_file), "-o", str(placement)]) == 0
+    assert run(["place", str(glove_file), "--method", "id3", "-o", str(placement)]) == 0
     build = compile_build(glove_set, tmp_path / "build", rounds=2, folds=0).folder
     listed.write_text(json.dumps([NAMES[7], NAMES[2]]))
     text.write_text(f"{NAMES[11]}\n\n  {NAMES[4]}\r\n")

@@ -28,8 +28,8 @@ def no_file_beyond(size: int) -> Iterator[None]:
         (("export", "set.grasps", "-o", "new.arff"), "new.arff"),
         (("import", "table.csv", "-o", "new.grasps", "--columns", "columns.toml"), "new.grasps"),
         (("info", "set.grasps", "--plot", "new.png"), "new.png"),
-        (("place", "set.grasps", "-o", "new.json"), "new.json"),
-        (("place", "set.grasps", "--draw", "new.svg"), "new.svg"),
+        (("place", "set.grasps", "--sensors", "2", "-o", "new.json"), "new.json"),
+        (("place", "set.grasps", "--sensors", "2", "--draw", "new.svg"), "new.svg"),
     ],
 )
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(

@@ -47,7 +47,7 @@ def test_what_contradicts_or_is_not_known_is_refused(set_file: Path, tmp_path: P
         (("--apart-mm", 6), "the position of s0, s1, s2, s3, s4 and 1 more is unknown"),
         (("--budget-us", 0), "--never and --budget-us leave nothing"),
         (("--at-most", 3, "pads"), "'pads' is not"),
-        (where, "--layout gives positions for --apart-mm: add that"),
+        (where, "--layout gives positions for --draw, or for --apart-mm with a --method"),
     ):
         done = thenar("place", set_file, *asked)
         assert (done.returncode, done.stdout) == (2, "")

@@ -1,6 +1,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from thenar.compiler import GraspSet, grow_id3
 
 
 def test_the_placement_is_printed_for_people(set_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["place", str(set_file)]) == 0
+    assert run(["place", str(set_file), "--method", "id3"]) == 0
     said = capsys.readouterr().out
     for words in ("cumulative share", "s4", "0.6008", "37.9%", "of 6 switches", "of 1.585 bits"):
         assert words in said
@@ -42,7 +43,7 @@ def test_the_tree_is_printed_with_the_names_of_switches_and_grasps(
 
 
 def test_the_tree_is_drawn(set_file: Path, tmp_path: Path) -> None:
-    assert run(["place", str(set_file), "--draw", str(tmp_path / "tree.svg")]) == 0
+    assert run(["place", str(set_file), "--method", "id3", "--draw", str(tmp_path / "tree.svg")]) == 0
     assert "<!-- s4" in (tmp_path / "tree.svg").read_text()
 
 
@@ -51,7 +52,7 @@ def test_nodes_at_which_nothing_gains_are_said(
 ) -> None:
     bits = np.array([[0, 0], [0, 1], [1, 0], [1, 1]], bool)
     replace(small_set.rows([0, 1, 4, 3]), switches=bits, switch_names=("a", "b")).save(tmp_path / "xor.grasps")
-    assert run(["place", str(tmp_path / "xor.grasps")]) == 0
+    assert run(["place", str(tmp_path / "xor.grasps"), "--method", "id3"]) == 0
     assert "at 1 node no switch gains anything alone" in capsys.readouterr().out
 
 
@@ -59,7 +60,7 @@ def test_a_set_without_switches_is_refused(
     small_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     replace(small_set, switches=small_set.switches[:, :0], switch_names=()).save(tmp_path / "joints.grasps")
-    assert run(["place", str(tmp_path / "joints.grasps")]) == 2
+    assert run(["place", str(tmp_path / "joints.grasps"), "--method", "id3"]) == 2
     assert capsys.readouterr().err == "thenar: there are no switches to place: the set holds joints only\n"
 
 
@@ -82,9 +83,9 @@ def test_a_mistake_is_one_sentence_and_code_two(
 @pytest.mark.parametrize(
     ("grasps", "options", "remark"),
     [
-        (["cup", "cup"], [], "all rows are of one grasp type: there is nothing to distinguish"),
+        (["cup", "cup"], ["--method", "id3"], "all rows are of one grasp type: there is nothing to distinguish"),
         (["cup", "pen"], ["--prune", "3"], "no decision was made: the 2 rows are fewer than S = 3"),
-        (["cup", "pen"], [], "at 1 leaf rows of several classes agree in every switch"),
+        (["cup", "pen"], ["--method", "id3"], "at 1 leaf rows of several classes agree in every switch"),
     ],
 )
 def test_a_placement_of_no_switch_says_why(
@@ -102,3 +103,93 @@ def test_a_placement_of_no_switch_says_why(
     assert "0 of 6 switches" in said
     assert remark in said
     assert sum(words in said for words in ("one grasp type:", "no decision was made", "agree in every switch")) == 1
+
+
+PRICES = """
+[[part]]
+name = "snap-action switch"
+price = 1.5
+sensors = ["s?"]
+
+[[part]]
+name = "flex sensor"
+price = 11
+sensors = ["*"]
+"""
+
+
+def sensors(capsys: pytest.CaptureFixture[str], *asked: object) -> dict[str, Any]:
+    """Return the JSON document of `thenar place` of sensors."""
+    assert run(["place", *map(str, asked), "--json", "--jobs", "1"]) == 0
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def test_the_curve_is_printed_and_drawn(set_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["place", str(set_file), "--draw", str(tmp_path / "curve.svg"), "--jobs", "1"]) == 0
+    said = capsys.readouterr()
+    for words in ("What sensors are worth", "worth of the last", "as many by ID3", "chosen in folds", "of 8 sensors"):
+        assert words in said.out
+    assert "rough, from the first of 4 folds: 1: " in said.err
+    assert (tmp_path / "curve.svg").read_text().startswith("<?xml")
+
+
+def test_what_is_there_what_is_missed_least_and_what_replaces(
+    set_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    best = [row["name"] for row in sensors(capsys, set_file, "--sensors", 3)["chosen"]]
+    kept = sensors(capsys, set_file, "--sensors", 3, "--have", "s2")
+    assert kept["chosen"][0]["name"] == "s2"
+    dropped = sensors(capsys, set_file, "--drop", 2)
+    assert len(dropped["chosen"]) == 6
+    assert len(dropped["left_out"]) == 2
+    other = sensors(capsys, set_file, "--sensors", 3, "--instead-of", best[0])
+    names = [row["name"] for row in other["chosen"]]
+    assert {*best[1:]} < {*names}
+    assert names[-1] not in best
+    alone = sensors(capsys, set_file, "--have", ",".join(best), "--instead-of", best[0])
+    assert alone["chosen"] == other["chosen"]
+
+
+def test_a_price_is_kept_to_and_parts_are_named(
+    set_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    prices = tmp_path / "prices.toml"
+    prices.write_text(PRICES)
+    found = sensors(capsys, set_file, "--price", 14, "--prices", prices)
+    assert sum(row["price"] for row in found["chosen"]) <= 14
+    assert run(["place", str(set_file), "--sensors", "2", "--prices", str(prices), "--jobs", "1"]) == 0
+    said = capsys.readouterr().out
+    assert "snap-action switch" in said or "flex sensor" in said
+    assert "2 of 8 sensors, price" in said
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--price", "5"], "--price: the price of s0, s1, s2, s3, s4 and 3 more is unknown: add it to --prices"),
+        (["--sensors", "2", "--keep", "3"], "choose among switches, pads and joints alike: leave --keep out"),
+        (["--sensors", "2", "--method", "cmim"], "leave --method out"),
+        (["--sensors", "1", "--have", "s0,s1"], "--have names 2, --sensors allows 1: keep more"),
+        (["--drop", "8"], "--drop 8: there are 8 sensors, and one has to be left"),
+        (["--drop", "1", "--sensors", "2"], "--drop says how many sensors are left"),
+        (["--sensors", "2", "--instead-of", "s9"], "s9 is not among the chosen sensors"),
+        (["--drop", "1", "--method", "id3"], "--drop and --instead-of are for sensors"),
+        (["--sensors", "2", "--prices", "prices.toml"], "prices.toml has no part for 's0'"),
+        (["--sensors", "2", "--have", "s9"], "there is no input 's9'"),
+    ],
+)
+def test_a_mistake_with_sensors_is_one_sentence(
+    set_file: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    options: list[str],
+    reason: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "prices.toml").write_text('[[part]]\nname = "flex"\nprice = 1\nsensors = ["j*"]\n')
+    assert run(["place", str(set_file), *options]) == 2
+    said = capsys.readouterr()
+    assert reason in said.err
+    assert (said.out, said.err.count("\n")) == ("", 1)
