@@ -1,4 +1,4 @@
-"""Which sensors to keep: the floating search beside other methods, on the same folds, one pool of all kinds of sensors.
+"""Which sensors to keep: the floating search and other methods, on the same folds, one pool of all kinds of sensors.
 
     thenar import examples/home_glove.csv -o home.grasps --yes
     python benchmarks/sensors.py [--sets kamakura ...] [--by trial subject] [--data FOLDER]

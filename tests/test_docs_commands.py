@@ -48,6 +48,7 @@ NOT_RUN = {
 }
 # Commands that take too long for `make test`: there a page runs up to the first of them.
 SLOW = {
+    "thenar place set.grasps --sensors 8",
     "thenar evaluate set.grasps --tables compositions --baselines none",
     "thenar compile set.grasps -o build/",
 }

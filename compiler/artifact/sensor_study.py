@@ -80,7 +80,7 @@ class SensorPoint(msgspec.Struct, frozen=True):
     added, removed     the difference to the sensors of the number before
     mean, low, high    the accuracy of trials, and its 95 % interval
     worth              the gain over the number before; None for the first
-    adapted            the mean over people after OWN trials of each type; None if nobody has so many
+    adapted            the mean over people after OWN trials of each type; None if nobody has more
     papers             the accuracy with as many switches and pads by the paper's ID3 alone; None without these
     """
 

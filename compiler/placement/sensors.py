@@ -214,7 +214,7 @@ class SensorSearch:
         return found
 
     def cost(self, sensors: Sequence[int]) -> float:
-        """Return what sensors cost, those that are always kept excepted."""
+        """Return the price of sensors together, those that are always kept excepted."""
         bought = [one for one in sensors if one not in self.have]
         return 0.0 if self.prices is None else float(self.prices[bought].sum())
 

@@ -1,6 +1,7 @@
 """What sensors are worth: measured in folds, the same on any number of cores, and what a build then keeps."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact.sensor_study import MATTERS, Worth, study_sensors
 from thenar.compiler.placement.constraints import Limits
 from thenar.runtime.manifest_file import manifest_from_bytes
-from thenar.runtime.recipe import Recipe
+from thenar.runtime.recipe import Inputs, Recipe
 
 
 def people(noise: float = 0.15, switches: int = 8) -> GraspSet:
@@ -62,17 +63,18 @@ def test_the_curve_is_measured_in_folds_and_the_same_on_any_number_of_cores() ->
 
 def test_what_tells_nothing_is_worth_nothing() -> None:
     grasp_set = people(noise=0.5, switches=40)
-    nothing = replace(grasp_set, codes=np.random.default_rng(2).integers(0, 200, grasp_set.codes.shape))
+    codes = np.random.default_rng(2).integers(0, 200, grasp_set.codes.shape).astype(np.uint16)
+    nothing = replace(grasp_set, codes=codes)
     study = study_sensors(nothing, Recipe(), jobs=1)
     # Chosen from all rows, the best 16 of 42 would seem to recognise nearly all trials.
     assert max(point.mean for point in study.points) < 0.5
 
 
 @pytest.mark.parametrize("inputs", ["both", "switches", "joints"])
-def test_a_build_keeps_the_sensors_of_the_study(inputs: str, tmp_path: object) -> None:
+def test_a_build_keeps_the_sensors_of_the_study(inputs: Inputs, tmp_path: Path) -> None:
     grasp_set, recipe = people(), Recipe(sensors=2, inputs=inputs, folds=2)
     study = study_sensors(grasp_set, recipe, jobs=1)
-    made = compile_build(grasp_set, f"{tmp_path}/build", recipe, trainer="discriminant", jobs=1)
+    made = compile_build(grasp_set, tmp_path / "build", recipe, trainer="discriminant", jobs=1)
     manifest = manifest_from_bytes((made.folder / "build.json").read_bytes())
     assert manifest.options.sensors == 2
     kept = {switch.name for switch in manifest.switches} | {joint.name for joint in manifest.joints}
