@@ -35,6 +35,10 @@ if TYPE_CHECKING:
     from thenar.runtime.recipe import Recipe
 
 
+# Options with which a method chooses switches, instead of the search among all sensors.
+_OF_METHODS = {"placement", "keep", "prune", "keep_joints", "apart_mm", "at_most_taxels", "budget_us", "show_tree"}
+
+
 @click.command("place", cls=TrainingCommand)
 @click.argument("grasps", type=existing_file)
 @recipe_options(*CHOOSING)
@@ -104,20 +108,8 @@ def command(
     recipe = changed(Recipe(), chosen | training)
     keep_apart(grasps, glove, layout, prices, draw, output)
     asked = {name for name in context.params if context.get_parameter_source(name) is ParameterSource.COMMANDLINE}
-    if not asked & {
-        "placement",
-        "keep",
-        "prune",
-        "keep_joints",
-        "apart_mm",
-        "at_most_taxels",
-        "budget_us",
-        "show_tree",
-    }:
-        if glove is not None:
-            raise click.UsageError("--glove gives scan costs, and sensors are chosen without: leave it out")
-        if layout is not None and draw is None:
-            raise click.UsageError("--layout gives positions for --draw, or for --apart-mm with a --method: add that")
+    if not asked & _OF_METHODS:
+        _check_sensors(glove, layout, draw)
         _place_sensors(GraspSet.load(grasps), recipe, drop, instead_of, layout, prices, jobs, draw, output)
         return
     if drop or instead_of:
@@ -149,6 +141,14 @@ def command(
         out().print(f"accuracy, {rate}")
 
 
+def _check_sensors(glove: Path | None, layout: Path | None, draw: Path | None) -> None:
+    """Raise UsageError for files that the choice of sensors does not use."""
+    if glove is not None:
+        raise click.UsageError("--glove gives scan costs, and sensors are chosen without: leave it out")
+    if layout is not None and draw is None:
+        raise click.UsageError("--layout gives positions for --draw, or for --apart-mm with a --method: add that")
+
+
 def _place_sensors(
     grasp_set: "GraspSet",
     recipe: "Recipe",
@@ -173,13 +173,11 @@ def _place_sensors(
     if instead_of:
         recipe = without_one(grasp_set, recipe, terms["limits"], instead_of)
         terms = terms_of(recipe, grasp_set, None, None, prices)
-    rough = _Rough()
     with progress("measuring what sensors are worth") as report:
-        study = study_sensors(grasp_set, recipe, limits=terms["limits"], jobs=jobs, report=report, rough=rough.print)
+        study = study_sensors(grasp_set, recipe, limits=terms["limits"], jobs=jobs, report=report, rough=_print_rough)
     if draw is not None:
-        hand = hand_of(layout)
-        names = [*grasp_set.element_names]
-        write_picture(draw, partial(draw_curve, study, hand if names and hand.knows(names) else None))
+        hand = hand_of(layout).fitted(grasp_set.element_names)
+        write_picture(draw, partial(draw_curve, study, hand))
     if output is not None:
         write_json(output, study)
     parts = {} if prices is None else {name: part.name for name, part in parts_of(grasp_set, prices).items()}
@@ -188,14 +186,11 @@ def _place_sensors(
         echo(f"{study.chosen[-1].name} replaces {instead_of}; the other sensors were chosen from all rows")
 
 
-class _Rough:
-    """Prints the accuracies of the first fold, long before all are measured."""
-
-    def print(self, done: int, folds: int, rates: dict[int, float]) -> None:
-        """Print them for people, once."""
-        if done == 1 < folds and len(rates) > 1:
-            shown = ", ".join(f"{number}: {100 * rate:.0f} %" for number, rate in rates.items())
-            echo(f"rough, from the first of {folds} folds: {shown}", err=True)
+def _print_rough(done: int, folds: int, rates: dict[int, float]) -> None:
+    """Print the accuracies of the first of several folds, long before all are measured."""
+    if done == 1 < folds and len(rates) > 1:
+        shown = ", ".join(f"{number}: {100 * rate:.0f} %" for number, rate in rates.items())
+        echo(f"rough, from the first of {folds} folds: {shown}", err=True)
 
 
 def _print_sensors(study: "SensorStudy", parts: "Mapping[str, str]") -> None:
