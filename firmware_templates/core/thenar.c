@@ -39,21 +39,16 @@ void thenar_init(thenar *hand, const thenar_model *model, uint16_t *memory)
     }
 }
 
-static bool is_present(const thenar *hand, uint16_t input)
-{
-    return (hand->n_lost == 0u) || !bit_of(hand->lost, input);
-}
-
 void thenar_set_switch(thenar *hand, uint16_t number, bool closed)
 {
-    if ((number < hand->model->switches) && is_present(hand, number)) {
+    if (number < hand->model->switches) {
         set_bit(hand->switches, number, closed);
     }
 }
 
 void thenar_set_code(thenar *hand, uint16_t joint, uint16_t code)
 {
-    if ((joint < hand->model->joints) && is_present(hand, (uint16_t)(hand->model->switches + joint))) {
+    if (joint < hand->model->joints) {
         hand->codes[joint] = code;
     }
 }
@@ -188,12 +183,26 @@ static void add(thenar *hand, const uint16_t *end)
     }
 }
 
-/* Missing inputs were added as open, or as code 0: add the difference to their means. */
-static void add_means(thenar *hand)
+void thenar_sum(thenar *hand)
+{
+    find_distances(hand);
+    hand->found[0] = 0u; /* the start */
+    add(hand, find_bins(hand, find_switches(hand, &hand->found[1])));
+}
+
+/* Add up with missing inputs as open, or as code 0; then add the difference to their means. */
+static void sum_with_means(thenar *hand)
 {
     const thenar_model *const model = hand->model;
     const int16_t *mean = model->means;
 
+    for (uint16_t byte = 0u; byte < ((model->switches + 7u) / 8u); byte++) {
+        hand->switches[byte] &= (uint8_t)~hand->lost[byte];
+    }
+    for (uint16_t joint = 0u; joint < model->joints; joint++) {
+        hand->codes[joint] = bit_of(hand->lost, (uint16_t)(model->switches + joint)) ? 0u : hand->codes[joint];
+    }
+    model->sum(hand);
     for (uint16_t input = 0u; input < (model->switches + model->joints); input++) {
         const bool lost = bit_of(hand->lost, input);
 
@@ -206,22 +215,16 @@ static void add_means(thenar *hand)
     }
 }
 
-void thenar_sum(thenar *hand)
-{
-    find_distances(hand);
-    hand->found[0] = 0u; /* the start */
-    add(hand, find_bins(hand, find_switches(hand, &hand->found[1])));
-}
-
 uint16_t thenar_classify(thenar *hand)
 {
     const int16_t *const scores = hand->scores;
     unsigned best = 0u;
     int16_t top;
 
-    hand->model->sum(hand);
-    if (hand->n_lost > 0u) {
-        add_means(hand);
+    if (hand->n_lost == 0u) {
+        hand->model->sum(hand);
+    } else {
+        sum_with_means(hand);
     }
     top = scores[0];
     for (unsigned k = 1u, classes = hand->model->classes; k < classes; k++) {
@@ -331,11 +334,8 @@ uint16_t thenar_name(const thenar_model *model, uint16_t grasp, char *text, uint
     const char *from = model->names;
     uint16_t length = 0u;
 
-    for (uint16_t at = 0u; (at < grasp) && (at < model->n_names); at++) {
-        while (THENAR_READ_8(from) != 0) {
-            from++;
-        }
-        from++;
+    for (uint16_t before = (grasp < model->n_names) ? grasp : 0u; before > 0u; from++) {
+        before = (uint16_t)(before - ((THENAR_READ_8(from) == 0) ? 1u : 0u));
     }
     while ((grasp < model->n_names) && (THENAR_READ_8(&from[length]) != 0)) {
         if ((length + 1u) < size) {
