@@ -41,8 +41,16 @@ void thenar_init(thenar *hand, const thenar_model *model, uint16_t *memory)
 
 void thenar_set_switch(thenar *hand, uint16_t number, bool closed)
 {
-    if (number < hand->model->switches) {
+    if ((number < hand->model->switches) && ((hand->n_lost == 0u) || !bit_of(hand->lost, number))) {
         set_bit(hand->switches, number, closed);
+    }
+}
+
+/* Called last, so that setting a code saves no registers. */
+static void clear_lost_code(thenar *hand, uint16_t joint)
+{
+    if (bit_of(hand->lost, (uint16_t)(hand->model->switches + joint))) {
+        hand->codes[joint] = 0u;
     }
 }
 
@@ -50,6 +58,9 @@ void thenar_set_code(thenar *hand, uint16_t joint, uint16_t code)
 {
     if (joint < hand->model->joints) {
         hand->codes[joint] = code;
+        if (hand->n_lost > 0u) {
+            clear_lost_code(hand, joint);
+        }
     }
 }
 
@@ -72,8 +83,8 @@ void thenar_lose_switch(thenar *hand, uint16_t number, bool lost)
 void thenar_lose_joint(thenar *hand, uint16_t joint, bool lost)
 {
     if (joint < hand->model->joints) {
-        thenar_set_code(hand, joint, 0u);
         lose(hand, (uint16_t)(hand->model->switches + joint), lost);
+        clear_lost_code(hand, joint);
     }
 }
 
@@ -183,30 +194,15 @@ static void add(thenar *hand, const uint16_t *end)
     }
 }
 
-void thenar_sum(thenar *hand)
+/* Missing inputs were added as open, or as code 0: add the difference to their means. */
+static void add_means(thenar *hand)
 {
-    find_distances(hand);
-    hand->found[0] = 0u; /* the start */
-    add(hand, find_bins(hand, find_switches(hand, &hand->found[1])));
-}
+    const int16_t *mean = hand->model->means;
 
-/* Add up with missing inputs as open, or as code 0; then add the difference to their means. */
-static void sum_with_means(thenar *hand)
-{
-    const thenar_model *const model = hand->model;
-    const int16_t *mean = model->means;
-
-    for (uint16_t byte = 0u; byte < ((model->switches + 7u) / 8u); byte++) {
-        hand->switches[byte] &= (uint8_t)~hand->lost[byte];
-    }
-    for (uint16_t joint = 0u; joint < model->joints; joint++) {
-        hand->codes[joint] = bit_of(hand->lost, (uint16_t)(model->switches + joint)) ? 0u : hand->codes[joint];
-    }
-    model->sum(hand);
-    for (uint16_t input = 0u; input < (model->switches + model->joints); input++) {
+    for (uint16_t input = 0u; input < (hand->model->switches + hand->model->joints); input++) {
         const bool lost = bit_of(hand->lost, input);
 
-        for (uint16_t k = 0u; k < model->classes; k++) {
+        for (uint16_t k = 0u; k < hand->model->classes; k++) {
             if (lost) {
                 hand->scores[k] = (int16_t)(uint16_t)((uint16_t)hand->scores[k] + (uint16_t)THENAR_READ_16(mean));
             }
@@ -215,18 +211,23 @@ static void sum_with_means(thenar *hand)
     }
 }
 
+void thenar_sum(thenar *hand)
+{
+    find_distances(hand);
+    hand->found[0] = 0u; /* the start */
+    add(hand, find_bins(hand, find_switches(hand, &hand->found[1])));
+}
+
 uint16_t thenar_classify(thenar *hand)
 {
     const int16_t *const scores = hand->scores;
     unsigned best = 0u;
-    int16_t top;
 
-    if (hand->n_lost == 0u) {
-        hand->model->sum(hand);
-    } else {
-        sum_with_means(hand);
+    hand->model->sum(hand);
+    if (hand->n_lost > 0u) {
+        add_means(hand);
     }
-    top = scores[0];
+    int16_t top = scores[0];
     for (unsigned k = 1u, classes = hand->model->classes; k < classes; k++) {
         const int16_t score = scores[k];
 
@@ -261,7 +262,6 @@ uint16_t thenar_decide(const thenar *hand, uint16_t grasp)
     const thenar_model *const model = hand->model;
     const thenar_rejection *const rejection = model->rejection;
     uint16_t closed = 0u, missing = 0u;
-    bool refused;
 
     if ((rejection == NULL) || (grasp >= model->classes)) {
         return grasp;
@@ -270,7 +270,7 @@ uint16_t thenar_decide(const thenar *hand, uint16_t grasp)
         closed = (uint16_t)(closed + (bit_of(hand->switches, number) ? 1u : 0u));
         missing = (uint16_t)(missing + (bit_of(hand->lost, number) ? 1u : 0u));
     }
-    refused = ((closed + missing) < THENAR_READ_16(&rejection->closed[2u * grasp]))
+    bool refused = ((closed + missing) < THENAR_READ_16(&rejection->closed[2u * grasp]))
         || (closed > THENAR_READ_16(&rejection->closed[(2u * grasp) + 1u])) || is_outside(hand, rejection, grasp);
     if (hand->n_lost == 0u) {
         refused = refused || (hand->scores[grasp] < (int16_t)THENAR_READ_16(&rejection->least_scores[grasp]));
