@@ -32,14 +32,14 @@ enum {
 /** The line of a sensor; private. */
 typedef struct {
     uint16_t beyond[2]; /* the codes of readings before the first and after the last one */
-    int32_t first;      /* of the readings that are converted by the line */
+    int32_t first;      /* the readings that the line converts */
     int32_t last;
-    uint32_t gain;      /* of a reading, in 2^-16 of a code */
-    uint16_t fine;      /* the rest of the gain, in 2^-32 */
-    uint16_t span;      /* from one point to the other */
-    uint32_t offset;    /* the code of reading 0, and a half, in 2^-16, and 3 more */
-    uint32_t step;      /* gain and offset times span, in 2^-24, modulo 2^32 */
-    uint32_t sum;
+    uint32_t gain;      /* what a reading adds, in 2^-16 of a code */
+    uint16_t fine;      /* the rest of it, in 2^-32 */
+    uint16_t span;      /* the readings from one point to the other */
+    uint32_t offset;    /* the code of reading 0, and a half, in 2^-16, and 3 more for what is rounded */
+    uint32_t step;      /* what a reading adds, in 2^-24 of a code by the span, modulo 2^32 */
+    uint32_t sum;       /* the code of reading 0, and a half, likewise */
     bool calibrated;
 } thenar_glove_line;
 
