@@ -12,7 +12,6 @@ rows of all forces, since a glove does not know how far a grasp has progressed. 
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -121,13 +120,13 @@ def main() -> None:
     asked = parser.parse_args()
     analog, contact = (simulate(load_scene(name)).grasp_set for name in ("kamakura-analog", "initial-contact"))
     print(f"| {KEPT} pads, read as | % |\n|---|---|")
-    kinds = [*product(READINGS, (False, True))]
+    alone, joined = ([(reading, joints) for reading in READINGS] for joints in (False, True))
     every = Samples.of(analog)
-    for kind, found in predictions(analog, np.arange(len(analog)), KEPT, kinds).items():
+    for kind, found in predictions(analog, np.arange(len(analog)), KEPT, [*alone, *joined]).items():
         rate = Rate.predicted(found, every.labels, every.trials, of="pooled")
         print(f"| {title(*kind)} | {100 * rate.mean:.1f} [{100 * rate.low:.1f}, {100 * rate.high:.1f}] |", flush=True)
 
-    at, kinds = at_forces(contact), [*kinds, ("nothing", True)]
+    at, kinds = at_forces(contact), [*alone, ("nothing", True), *joined]
     rows = np.unique(np.concatenate(at))
     every, places = Samples.of(contact).rows(rows), [np.searchsorted(rows, each) for each in at]
     print(f"\n| N on the hardest pressed pad | {' | '.join(f'{force:g}' for force in NEWTONS)} |")
