@@ -6,14 +6,14 @@
 trained on the training rows of each fold; accuracy is that of the deployed integers, in four folds and with each
 subject left out. libsimavr counts cycles over the test rows of the first fold, median and maximum. Flash and RAM are
 those of the whole program. Peers that are not installed are left out (`make bench` installs them), and those that do
-not fit an ATmega328P are measured on a larger part. On Cortex-M4 and M0+, qemu counts the instructions of thenar's C
-and of the logistic regressions in C.
+not fit are named. On Cortex-M4 and M0+, qemu counts the instructions of thenar's C and of the logistic regressions in
+C. Last, a whole pass: all joints set by calibrated readings of a converter of 10 bits, and the frame classified.
 """
 
 import argparse
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split
 from firmwarepeers import peers
+from msgspec import structs
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
@@ -32,16 +33,19 @@ from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.costs import fit_for
 from thenar.compiler.firmware.layout import Layout
-from thenar.compiler.firmware.targets import TARGETS, Target
+from thenar.compiler.firmware.sensors import Sensors, sensors_of
+from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.avr import harness
 from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
 from thenar.compiler.firmware.words import numbered
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.trainers.base import Model
+from thenar.runtime.code_line import CodeLine, Point
+from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import quantise
 
-AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
+AVR = TARGETS["avr328p"]
 CORES = ("cortex-m4", "cortex-m0plus")
 QEMU = Path(__file__).parents[1] / "tests" / "qemu"
 sys.path.append(str(QEMU))
@@ -76,7 +80,23 @@ int main(void)
     return 0;
 }
 """
-SLOW_ROWS = 20  # rows for a peer on the larger part
+# Begins on reset, before main().
+PASS = """
+#include "thenar_glove_codes.h"
+struct { int16_t readings[THENAR_GLOVE_JOINTS]; uint16_t memory[THENAR_GLOVE_MEMORY]; } input;
+static thenar hand;
+static thenar_glove_codes codes;
+__attribute__((constructor)) static void begin(void)
+{
+    thenar_init(&hand, &thenar_glove_model, input.memory);
+    thenar_glove_codes_init(&codes);
+}
+int predict(void)
+{
+    for (uint8_t i = 0; i < THENAR_GLOVE_JOINTS; i++) thenar_glove_set_reading(&hand, &codes, i, input.readings[i]);
+    return (int)thenar_classify(&hand);
+}
+"""
 CONSOLE = Console(width=170)
 COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "differing", "M4 / M0+, most")
 
@@ -134,12 +154,11 @@ def _trained(trainer: str, settings: tuple[tuple[str, Any], ...], fold: Fold, jo
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """The cost of a classifier on `part`: cycles per frame, median and maximum; bytes of flash, RAM and stack.
+    """The cost of a classifier: cycles per frame, median and maximum; bytes of flash, RAM and stack.
 
     differing  how many of `rows` predictions differ from those in Python
     """
 
-    part: str
     cycles: int
     most: int
     flash: int
@@ -161,13 +180,13 @@ class Cost:
 
 def _linked(folder: Path, sources: Mapping[str, str], part: str) -> tuple[int, int]:
     """Link `program.elf` from the sources in the folder; return bytes of flash and RAM. Ignores warnings of peers."""
-    code = sorted(path for path in sources if path.endswith((".c", ".cpp", ".S")))
+    code = sorted(path for path in sources if path.endswith((".c", ".S")))
     call([find(AVR_COMPILER), f"-mmcu={part}", *_HOW, *code, "-lm", "-o", "program.elf"], folder)
     text, data, bss = call(["avr-size", "program.elf"], folder).decode().splitlines()[1].split()[:3]
     return int(text) + int(data), int(data) + int(bss)
 
 
-def of_ours(layout: Layout, target: Target, frames: Frames, expected: NDArray[np.integer]) -> Cost:
+def of_ours(layout: Layout, frames: Frames, expected: NDArray[np.integer]) -> Cost:
     """Return the cost of thenar's classifier for frames with known scores (n, K).
 
     The bytes of a frame are written directly into its inputs: nothing has to be copied.
@@ -177,35 +196,51 @@ def of_ours(layout: Layout, target: Target, frames: Frames, expected: NDArray[np
     state = "uint16_t memory[THENAR_GLOVE_MEMORY];\nthenar hand;\n"
     program = {**files, "main.c": f'#include "thenar_glove.h"\n{state}int main(void) {{ {body} }}\n'}
     with workshop(program) as folder:
-        flash, ram = _linked(folder, program, target.part)
-    results = target.run(files, "glove", layout, frames)
+        flash, ram = _linked(folder, program, AVR.part)
+    results = AVR.run(files, "glove", layout, frames)
     assert results.cost is not None
     assert results.stack is not None
     wrong = (results.scores != expected).any(axis=1) | (results.classes != expected.argmax(axis=1))
     middle, most, differing = int(np.median(results.cost)), results.most, int(np.count_nonzero(wrong))
-    return Cost(target.part, middle, most, flash, ram, results.stack, differing, len(frames))
+    return Cost(middle, most, flash, ram, results.stack, differing, len(frames))
 
 
-def of_peer(name: str, files: Mapping[str, str], frames: Frames, expected: NDArray[np.intp], target: Target) -> Cost:
+def of_peer(name: str, files: Mapping[str, str], frames: Frames, expected: NDArray[np.intp]) -> Cost:
     """Return the cost of a peer's classifier for raw frames, including feature extraction.
 
     `expected` are its predictions in Python. Raises FirmwareError if it does not fit.
     """
     program = {**files, "main.c": "int predict(void);\nint main(void) { for (;;) predict(); }\n"}
     with workshop(program) as folder:
-        flash, ram = _linked(folder, program, target.part)
-        if flash > target.flash or ram > target.ram:
-            raise FirmwareError(f"{name} takes {flash} bytes of flash and {ram} of RAM: not on an {target.part}")
+        flash, ram = _linked(folder, program, AVR.part)
+        if flash > AVR.flash or ram > AVR.ram:
+            raise FirmwareError(f"{name} takes {flash} bytes of flash and {ram} of RAM: not on an {AVR.part}")
         words = [line.split() for line in call(["avr-nm", "-P", "program.elf"], folder).decode().splitlines()]
         at = {word[0]: f"0x{word[2]}" for word in words if len(word) > 2}
         places = [at["predict"], at["_end"], f"{at['input']}:{frames.shape[1]}", f"{at['input']}:1"]
-        command = [str(harness("simavr_classify")), target.part, str(target.clock_hz), "program.elf", *places]
+        command = [str(harness("simavr_classify")), AVR.part, str(AVR.clock_hz), "program.elf", *places]
         known = call(command, folder, frames.tobytes())
     record = np.dtype([("echo", "u1"), ("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")])
     found = np.frombuffer(known, record)
     differing = int(np.count_nonzero(found["grasp"] != expected))
     middle, most, stack = int(np.median(found["cycles"])), int(found["cycles"].max()), int(found["stack"].max())
-    return Cost(target.part, middle, most, flash, ram, stack, differing, len(found))
+    return Cost(middle, most, flash, ram, stack, differing, len(found))
+
+
+def whole_pass(tables: IntegerTables, bits: NDArray[np.bool_], *, core: bool) -> Cost:
+    """Return the cost of random readings with switches (n, s), with the core alone or with straight-line code."""
+    degrees = tuple(Calibration(n, f"j{n}", "deg", 1, 0.0, 255, 254.0) for n in range(JOINTS))
+    names, layout = structs.replace(numbered(tables), joints=degrees), fit_for(AVR, tables).layout
+    every = [replace(sensor, readings=(150 + 8 * n, 700)) for n, sensor in enumerate(sensors_of(names).every)]
+    files = Library("glove", names, layout, glove=Sensors(tuple(every), (), ())).whole | {"pass.c": PASS}
+    if core:
+        files["thenar_glove.c"] = files["thenar_glove.c"].replace("#ifdef __AVR__", "#if 0")
+    readings = np.random.default_rng(1).integers(0, 1024, (len(bits), JOINTS))
+    lines = [CodeLine(*map(Point, sensor.readings or (), sensor.codes)) for sensor in every]
+    codes = [[line.code(reading) for line, reading in zip(lines, row, strict=True)] for row in readings.tolist()]
+    switches = layout.frame_bytes(bits, np.zeros((len(bits), 0), np.uint16))
+    frames = np.hstack([readings.astype("<i2").view(np.uint8), switches])
+    return of_peer("a whole pass", files, frames, tables.scores(bits, np.array(codes, np.uint16)).argmax(axis=1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,12 +278,12 @@ def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Row:
     tables, frames = what.integers(fold), split(fold.asked, joints=what.joints)
     layout = fit_for(AVR, tables).layout
     sent = layout.frame_bytes(*frames)
-    cost = of_ours(layout, AVR, sent, tables.scores(*frames))
+    cost = of_ours(layout, sent, tables.scores(*frames))
     return Row(what.name, rates(cuts, what.predictor), cost, ours_on_cores(layout, sent))
 
 
 def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Row]:
-    """Yield the installed peers; those that do not fit the smaller part are measured on the larger one."""
+    """Yield the installed peers that fit the part."""
     fold = cuts[CUTS[0]][0]
     for peer in track([peer for peer in peers() if peer.available], "peers", console=CONSOLE):
         found = rates(cuts, peer.answers_of)
@@ -257,16 +292,9 @@ def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Row]:
         rows = raw(fold.asked)
         cores = "" if peer.in_c is None else on_cores(peer.in_c(model), rows, expected)
         try:
-            yield Row(peer.name, found, of_peer(peer.name, files, rows, expected, AVR), cores)
+            yield Row(peer.name, found, of_peer(peer.name, files, rows, expected), cores)
         except FirmwareError as lack:
             CONSOLE.print(f"{lack}"[:200], markup=False)
-            some = slice(SLOW_ROWS)
-            try:
-                cost = of_peer(peer.name, files, rows[some], expected[some], LARGER)
-            except FirmwareError as also:
-                CONSOLE.print(f"{also}"[:200], markup=False)
-            else:
-                yield Row(f"{peer.name} ({LARGER.part})", found, cost)
 
 
 def main() -> None:
@@ -275,6 +303,9 @@ def main() -> None:
     try:
         cuts = folds(CONSOLE)
         lines = [ours(cuts, what) for what in track(OURS, "thenar", console=CONSOLE)]
+        fold = cuts[CUTS[0]][0]
+        sparse, bits = Ours("linear", 8, (*LINE, ("sparsity", 0.5))).integers(fold), split(fold.asked)[0]
+        passes = [whole_pass(sparse, bits, core=core).cells for core in (False, True)]
         lines += theirs(cuts)
     except FirmwareError as lack:
         sys.exit(f"benchmarks/firmware.py: {lack}")
@@ -282,9 +313,11 @@ def main() -> None:
     table = Table(title=title, title_justify="left")
     for column in COLUMNS:
         table.add_column(column, justify="right" if column else "left")
-    for line in sorted(lines, key=lambda line: (line.cost.part != AVR.part, line.cost.most)):
+    for line in sorted(lines, key=lambda line: line.cost.most):
         table.add_row(line.name, *(f"{rate:.2f}" for rate in line.rates), *line.cost.cells, line.cores)
     CONSOLE.print(table)
+    for what, cells in zip(("straight-line code", "the core"), passes, strict=True):
+        CONSOLE.print(f"A whole pass of linear, sparsity 0.5, with {what}: cycles {cells[0]}, differing {cells[-1]}")
 
 
 if __name__ == "__main__":

@@ -2,15 +2,13 @@
 
 Scores are relative to the last class, so that 13 sums, a pointer and two operands fill the registers. A code is clamped
 to its training range, and multiplied by an immediate weight of each class (`mulsu`); a weight of 0 costs nothing, so
-the smallest may be pruned, and the others are refitted. The sums of the joints are `shift`
-bits finer than the rest. They are followed by groups of switches, fields of the bytes as read, whose rows are bytes
-above the minimum of a class. No sum exceeds 16 bits, which is checked for all possible rows.
+the smallest may be pruned, and the others are refitted. The sums of the joints are SHIFT
+bits finer than the rest. They are followed by groups of switches, halves of the bytes as read or whole ones, whose rows
+are bytes above the minimum of a class. No sum exceeds 16 bits, which is checked for all possible rows.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from itertools import product
 
 import numpy as np
 from firmwaredata import JOINTS, PORTS, SWITCHES, Fold, Labels, Rows, split
@@ -20,6 +18,7 @@ from scipy.special import logsumexp
 from sklearn.linear_model import LogisticRegression
 
 _LIMIT, _BYTE = 32767, 255
+SHIFT = 3  # by which the joints' sums are finer
 # scikit-learn's C of the refit of a pruned model: fewer weights need less of a pull. The full model has 1.
 REFIT_C = 3.0
 _SUMS = (2, 4, 6, 8, 10, 12, 14, 18, 20, 22, 24, 26, 28)  # r17:r16 are the operands, r31:r30 the pointer
@@ -27,47 +26,14 @@ Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Field:
-    """`width` bits of the byte of a port from `bit` on, which become the bits of a group from `to` on."""
-
-    port: int
-    bit: int
-    width: int
-    to: int
-
-
-@dataclass(frozen=True, slots=True)
-class Groups:
-    """Groups of at most `size` switches, as few as possible, and the number of bits by which the joints are finer."""
-
-    size: int
-    shift: int
-
-    @property
-    def numbers(self) -> list[list[int]]:
-        """The switches of each group."""
-        if 8 % self.size == 0:  # of one byte each
-            return [list(range(first, min(first + self.size, SWITCHES))) for first in range(0, SWITCHES, self.size)]
-        return [part.tolist() for part in np.array_split(np.arange(SWITCHES), -(-SWITCHES // self.size))]
-
-    @property
-    def fields(self) -> list[list[Field]]:
-        """The position of the bits of each group."""
-        found = []
-        for numbers in self.numbers:
-            parts: dict[int, list[int]] = {}
-            for number in numbers:
-                parts.setdefault(number // 8, []).append(number)
-            found.append([Field(p, held[0] % 8, len(held), held[0] - numbers[0]) for p, held in parts.items()])
-        return found
-
-
 @dataclass(frozen=True, eq=False)
 class IntegerLogit:
-    """Integers of a fitted model: bias (K - 1,), switches (s, K - 1), joints (j, K - 1), and each joint's range."""
+    """Integers of a fitted model: bias (K - 1,), switches (s, K - 1), joints (j, K - 1), and each joint's range.
 
-    groups: Groups
+    group  how many switches share a lookup: 4 or 8
+    """
+
+    group: int
     bias: Ints
     switches: Ints
     joints: Ints
@@ -78,42 +44,44 @@ class IntegerLogit:
         """Return the class of each row."""
         bits, codes = split(rows)
         held = np.clip(codes, self.low, self.high) - self.low
-        sums = (held @ self.joints) >> self.groups.shift
+        sums = (held @ self.joints) >> SHIFT
         sums += self.bias + bits @ self.switches
         predictions: Labels = np.hstack([sums, np.zeros((len(rows), 1), np.int64)]).argmax(axis=1)
         return predictions
 
     @cached_property
-    def tables(self) -> list[Ints]:
-        """The rows of each group, as sums, (2^n, K - 1)."""
+    def tables(self) -> list[tuple[int, int, Ints]]:
+        """For each group the port, the first bit, and the rows, as sums, (2^n, K - 1)."""
         found = []
-        for numbers in self.groups.numbers:
-            closed = np.arange(1 << len(numbers))[:, np.newaxis] >> np.arange(len(numbers)) & 1
-            found.append(closed @ self.switches[numbers])
+        for first in range(0, SWITCHES, self.group):
+            rows = self.switches[first : first + self.group]
+            closed = np.arange(1 << len(rows))[:, np.newaxis] >> np.arange(len(rows)) & 1
+            found.append((*divmod(first, 8), closed @ rows))
         return found
 
     @property
     def source(self) -> str:
         """The assembly: `predict` over `input`, which holds the bytes of the switches and then the codes."""
-        leasts = [table.min(axis=0) for table in self.tables]
-        starts = (self.bias + sum(leasts)) << self.groups.shift
+        leasts = [table.min(axis=0) for *_, table in self.tables]
+        starts = (self.bias + sum(leasts)) << SHIFT
         lines = _saved("push")
         for register, start in zip(_SUMS, starts.tolist(), strict=True):
             lines += [f"ldi r16, lo8({start})", f"ldi r17, hi8({start})", f"movw r{register}, r16"]
         for joint in range(JOINTS):
             lines += self._joint(joint)
         for register in _SUMS:
-            lines += [f"asr r{register + 1}", f"ror r{register}"] * self.groups.shift
+            lines += [f"asr r{register + 1}", f"ror r{register}"] * SHIFT
         lines += [f"ldi r16, {len(_SUMS)}", "ldi r17, 0"]
         first = 0
-        for fields, table in zip(self.groups.fields, self.tables, strict=True):
-            lines += _group_lines(fields)
+        for port, bit, table in self.tables:
+            lines += [f"lds r30, input + {port}", *["swap r30"] * (bit > 0)]
+            lines += [f"andi r30, {len(table) - 1}"] * (len(table) <= _BYTE)
             lines += ["mul r30, r16", "movw r30, r0"]
             lines += [f"subi r30, lo8(-(rows + {first}))", f"sbci r31, hi8(-(rows + {first}))"]
             for register in _SUMS:
                 lines += ["lpm r0, Z+", f"add r{register}, r0", f"adc r{register + 1}, r17"]
             first += table.size
-        rows = np.concatenate([(table - least).ravel() for table, least in zip(self.tables, leasts, strict=True)])
+        rows = np.concatenate([(table - least).ravel() for (*_, table), least in zip(self.tables, leasts, strict=True)])
         text = "".join(f"    {line}\n" for line in [*lines, *_best(), "clr r1", *_saved("pop"), "ret"])
         table_text = "".join(f"    .byte {', '.join(map(str, part))}\n" for part in np.array_split(rows, 40))
         return (
@@ -125,18 +93,15 @@ class IntegerLogit:
     def in_c(self) -> str:
         """The same in C, for a core of 32 bits."""
         first, rows, names = 0, [], [f"s{k}" for k in range(len(self.bias))]
-        starts = [
-            f"{name} = {start}" for name, start in zip(names, (self.bias << self.groups.shift).tolist(), strict=True)
-        ]
+        starts = [f"{name} = {start}" for name, start in zip(names, (self.bias << SHIFT).tolist(), strict=True)]
         code = [f"int32_t {', '.join(starts)}, code;", "const int16_t *row;"]
         for joint, (low, high) in enumerate(zip(self.low.tolist(), self.high.tolist(), strict=True)):
             code.append(f"code = input[{PORTS + joint}];")
             code.append(f"code = (code < {low} ? {low} : code > {high} ? {high} : code) - {low};")
             code += [f"{name} += code * {w};" for name, w in zip(names, self.joints[joint].tolist(), strict=True) if w]
-        code += [f"{name} >>= {self.groups.shift};" for name in names]
-        for fields, table in zip(self.groups.fields, self.tables, strict=True):
-            bits = (f"(input[{f.port}] >> {f.bit} & {(1 << f.width) - 1}) << {f.to}" for f in fields)
-            code.append(f"row = rows + {first} + ({' | '.join(bits)}) * {len(names)};")
+        code += [f"{name} >>= {SHIFT};" for name in names]
+        for port, bit, table in self.tables:
+            code.append(f"row = rows + {first} + (input[{port}] >> {bit} & {len(table) - 1}) * {len(names)};")
             code += [f"{name} += row[{k}];" for k, name in enumerate(names)]
             rows += table.ravel().tolist()
             first += table.size
@@ -158,45 +123,6 @@ class IntegerLogit:
                 lines += [f"ldi r16, {weight & _BYTE}", "mulsu r16, r17", f"add r{register}, r0"]
                 lines += [f"adc r{register + 1}, r1"]
         return lines
-
-
-def _group_lines(fields: Sequence[Field]) -> list[str]:
-    """Return the instructions that assemble a group's byte in r30 from its fields; they may change r31."""
-    lines: list[str] = []
-    for field in fields:
-        register = "r31" if lines else "r30"
-        moved = [line.format(register) for line in _moved(field.bit, field.width, field.to)]
-        one_by_one = register == "r31" and 2 * field.width <= len(moved) + 1
-        lines.append(f"lds {register}, input + {field.port}")
-        if one_by_one:
-            for bit in range(field.width):
-                lines += [f"sbrc r31, {field.bit + bit}", f"ori r30, {1 << (field.to + bit):#04x}"]
-        else:
-            lines += [*moved, *(["or r30, r31"] if register == "r31" else [])]
-    return lines
-
-
-def _moved(bit: int, width: int, to: int) -> tuple[str, ...]:
-    """Return the shortest instructions that move `width` bits of a register from `bit` to `to` and clear the others;
-    `{}` is the register.
-    """
-
-    def after(moves: tuple[str, ...], place: int) -> int | None:
-        for move in moves:
-            place = (place + 4) % 8 if move == "swap" else place + (1 if move == "lsl" else -1)
-            if not 0 <= place < 8:
-                return None
-        return place
-
-    wanted = dict(zip(range(bit, bit + width), range(to, to + width), strict=True))
-    found: list[tuple[str, ...]] = []
-    for moves in (each for count in range(5) for each in product(("swap", "lsl", "lsr"), repeat=count)):
-        places = {place: after(moves, place) for place in range(8)}
-        if all(places[place] == end for place, end in wanted.items()):
-            others = any(end is not None for place, end in places.items() if place not in wanted)
-            mask = (f"andi {{}}, {((1 << width) - 1) << to:#04x}",) if others else ()
-            found.append((*(f"{move} {{}}" for move in moves), *mask))
-    return min(found, key=len)
 
 
 def _saved(how: str) -> list[str]:
@@ -253,7 +179,7 @@ def pruned(fold: Fold, share: float) -> tuple[Floats, Floats, Floats]:
     return weights[0], weights[1 : 1 + SWITCHES], weights[1 + SWITCHES :]
 
 
-def integer_logit(fold: Fold, groups: Groups, share: float = 1.0) -> IntegerLogit:
+def integer_logit(fold: Fold, group: int, share: float = 1.0) -> IntegerLogit:
     """Return the integers at the finest scale at which weights, rows and sums fit, with a `share` of joint weights."""
     bias, switches, standardised = pruned(fold, share)
     _, mean, deviation = fitted(fold)
@@ -264,10 +190,10 @@ def integer_logit(fold: Fold, groups: Groups, share: float = 1.0) -> IntegerLogi
     scale = 4096.0
     while True:
         whole = IntegerLogit(
-            groups,
+            group,
             np.rint(bias * scale).astype(np.int64),
             np.rint(switches * scale).astype(np.int64),
-            np.rint(joints * scale * 2**groups.shift).astype(np.int64),
+            np.rint(joints * scale * 2**SHIFT).astype(np.int64),
             low,
             high,
         )
@@ -277,9 +203,9 @@ def integer_logit(fold: Fold, groups: Groups, share: float = 1.0) -> IntegerLogi
 
 
 def _fits(made: IntegerLogit) -> bool:
-    spans = max(int(np.ptp(table, axis=0).max()) for table in made.tables)
+    spans = max(int(np.ptp(table, axis=0).max()) for *_, table in made.tables)
     reach = np.abs(made.joints) * (made.high - made.low)[:, np.newaxis]
-    leasts = sum(table.min(axis=0) for table in made.tables)
-    begun = (np.abs(made.bias + leasts) << made.groups.shift) + reach.sum(axis=0)
-    whole = (reach.sum(axis=0) >> made.groups.shift) + 1 + np.abs(made.bias) + np.abs(made.switches).sum(axis=0)
+    leasts = sum(table.min(axis=0) for *_, table in made.tables)
+    begun = (np.abs(made.bias + leasts) << SHIFT) + reach.sum(axis=0)
+    whole = (reach.sum(axis=0) >> SHIFT) + 1 + np.abs(made.bias) + np.abs(made.switches).sum(axis=0)
     return spans <= _BYTE and np.abs(made.joints).max() <= 127 and max(begun.max(), whole.max()) <= _LIMIT

@@ -6,23 +6,22 @@ and 2, and codes are doubled, as int16; or, as uint8, they are in steps of two d
 """
 
 import importlib.util
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from firmwaredata import JOINTS, PORTS, SWITCHES, Fold, Predictor, Rows
-from firmwarelogit import Groups, fitted, integer_logit
+from firmwarelogit import fitted, integer_logit
 from numpy.typing import NDArray
 
 FEATURES = SWITCHES + JOINTS
 # Trees and leaves of the forests tried.
 FORESTS = ((10, 40), (10, 80), (15, 60), (20, 30), (20, 60), (30, 40), (60, 14))
-LOGITS = (Groups(1, 3), Groups(3, 3), Groups(4, 3), Groups(4, 4), Groups(5, 3), Groups(6, 3), Groups(8, 3))
+# How many switches of a logistic regression share a lookup.
+GROUPS = (4, 8)
 # Shares of the joints' weights.
 SHARES = (1.0, 0.4, 0.3)
 # Neurons of the networks tried.
@@ -72,10 +71,6 @@ def _filling(kind: str, bit: str = "byte & 1", code: str = "input[{0}]") -> str:
     )
 
 
-def _plain(X: Rows) -> Rows:
-    return X
-
-
 def _doubled(X: Rows) -> NDArray[np.int16]:
     return X.astype(np.int16) * 2
 
@@ -85,7 +80,7 @@ def _coarse(X: Rows) -> Rows:
 
 
 @cache
-def _forest(fold: Fold, trees: int, leaves: int, features: Callable[[Rows], Any] = _plain) -> Any:
+def _forest(fold: Fold, trees: int, leaves: int, features: Callable[[Rows], Any]) -> Any:
     from sklearn.ensemble import RandomForestClassifier
 
     return RandomForestClassifier(trees, max_leaf_nodes=leaves, random_state=1, n_jobs=1).fit(features(fold.X), fold.y)
@@ -196,54 +191,6 @@ def _levels(X: Rows) -> Rows:
     return np.hstack([X[:, :SWITCHES] * 64, X[:, SWITCHES:]])
 
 
-def _in_cpp(header: str, declared: str, call: str) -> dict[str, str]:
-    what = "#include <stdint.h>\n#include <string.h>\n#include <math.h>\n"
-    text = f"{what}{header}\n{_filling('float')}{declared}\n"
-    return {"peer.cpp": f'{text}extern "C" int predict(void) {{ fill(); return {call}; }}\n'}
-
-
-def _micromlgen(model: Any) -> dict[str, str]:
-    import micromlgen  # pyright: ignore[reportMissingImports]
-
-    code = micromlgen.port(model).replace("#include <cstdarg>", "#include <stdarg.h>").replace("#pragma once", "")
-    return _in_cpp(code, "static Eloquent::ML::Port::RandomForest forest;", "forest.predict(features)")
-
-
-def _everywhereml_forest(trees: int, leaves: int) -> Callable[[Fold], Any]:
-    def train(fold: Fold) -> Any:
-        from everywhereml.sklearn.ensemble import RandomForestClassifier  # pyright: ignore[reportMissingImports]
-
-        model = RandomForestClassifier(n_estimators=trees, max_leaf_nodes=leaves, random_state=1)
-        model.fit(fold.X, fold.y)
-        return model
-
-    return train
-
-
-def _everywhereml(model: Any) -> dict[str, str]:
-    clock = "static unsigned long micros(void) { return 0; }\n"  # it times itself by Arduino's clock
-    header = clock + model.to_arduino(instance_name="forest")
-    return _in_cpp(header, "", "forest.predict(features)")
-
-
-def _scores(code: str, classes: int) -> dict[str, str]:
-    """Return code with `score(features, scores)`, and a function that takes the best."""
-    return {
-        "peer.c": f"""#include <stdint.h>
-{code}
-{_filling("double")}
-int predict(void) {{
-    static double scores[{classes}];
-    int best = 0;
-    fill();
-    score(features, scores);
-    for (uint8_t k = 1; k < {classes}; k++) if (scores[k] > scores[best]) best = k;
-    return best;
-}}
-"""
-    }
-
-
 def _m2cgen_logit(model: Any) -> dict[str, str]:
     import m2cgen  # pyright: ignore[reportMissingImports]
 
@@ -252,7 +199,20 @@ def _m2cgen_logit(model: Any) -> dict[str, str]:
     raw.classes_, raw.n_features_in_ = logit.classes_, FEATURES
     raw.coef_ = logit.coef_ / np.hstack([np.ones(SWITCHES), deviation])
     raw.intercept_ = logit.intercept_ - raw.coef_[:, SWITCHES:] @ mean
-    return _scores(m2cgen.export_to_c(raw), len(raw.classes_))
+    return {
+        "peer.c": f"""#include <stdint.h>
+{m2cgen.export_to_c(raw)}
+{_filling("double")}
+int predict(void) {{
+    static double scores[{len(raw.classes_)}];
+    int best = 0;
+    fill();
+    score(features, scores);
+    for (uint8_t k = 1; k < {len(raw.classes_)}; k++) if (scores[k] > scores[best]) best = k;
+    return best;
+}}
+"""
+    }
 
 
 def _logit_answers(model: Any) -> Predictor:
@@ -260,73 +220,20 @@ def _logit_answers(model: Any) -> Predictor:
     return lambda X: logit.predict(np.hstack([X[:, :SWITCHES] > 0, (X[:, SWITCHES:] - mean) / deviation]))
 
 
-def _stumps(fold: Fold) -> Any:
-    from xgboost import XGBClassifier  # pyright: ignore[reportMissingImports]
-
-    return XGBClassifier(
-        n_estimators=100, max_depth=1, learning_rate=1.0, tree_method="hist", base_score=0.5, num_parallel_tree=1,
-        n_jobs=1,
-    ).fit(fold.X, fold.y)  # fmt: skip
-
-
-def _m2cgen_stumps(model: Any) -> dict[str, str]:
-    import m2cgen  # pyright: ignore[reportMissingImports]
-
-    return _scores(m2cgen.export_to_c(model), model.n_classes_)
-
-
-def _tl2cgen(model: Any) -> dict[str, str]:
-    import tl2cgen  # pyright: ignore[reportMissingImports]
-    import treelite  # pyright: ignore[reportMissingImports]
-
-    with tempfile.TemporaryDirectory() as folder:
-        tl2cgen.generate_c_code(treelite.sklearn.import_model(model), folder, params={})
-        files = {path.name: path.read_text() for path in Path(folder).glob("*.[ch]")}
-    header = files.pop("header.h").replace("void predict(", "void forest_predict(")
-    code = files.pop("main.c").replace("void predict(", "void forest_predict(")
-    classes = len(model.classes_)
-    score = f"""#include "header.h"
-static void score(const double *values, double *scores)
-{{
-    static union Entry entries[{FEATURES}];
-    for (uint8_t i = 0; i < {FEATURES}; i++) entries[i].fvalue = values[i];
-    for (uint8_t k = 0; k < {classes}; k++) scores[k] = 0;
-    forest_predict(entries, 0, scores);
-}}
-"""
-    return {"header.h": header, "forest.c": code, **files, **_scores(score, classes)}
-
-
-def _with(trees: int, leaves: int, features: Callable[[Rows], Any] = _plain) -> Callable[[Fold], Any]:
-    return lambda fold: _forest(fold, trees, leaves, features)
-
-
-def by_hand(groups: Groups, share: float) -> str:
-    """Return the name of a handwritten logistic regression with a share of the joints' weights."""
-    switches = "single switches" if groups.size == 1 else f"groups of {groups.size}"
-    kept = "" if share == 1 else f", {share:.0%} of the joints' weights"
-    return f"int8 logistic regression by hand{kept}, {switches}"
-
-
 def peers() -> Iterator[Peer]:
     """Yield the peers."""
-    for groups, share in product(LOGITS, SHARES):
-        name = f"{by_hand(groups, share)}, joints {2**groups.shift} times finer"
-        fit = partial(integer_logit, groups=groups, share=share)
+    for group, share in product(GROUPS, SHARES):
+        kept = "" if share == 1 else f", {share:.0%} of the joints' weights"
+        name = f"int8 logistic regression by hand{kept}, groups of {group}"
+        fit = partial(integer_logit, group=group, share=share)
         code, in_c = (lambda made: {"peer.S": made.source}), (lambda made: {"peer.c": made.in_c})
         yield Peer(name, fit, code, lambda made: made, in_c=in_c)
     for kind, features, what in (("uint8_t", _coarse, "uint8, 2-degree steps"), ("int16_t", _doubled, "int16")):
         for trees, leaves in FORESTS:
             name = f"emlearn, forest {trees} x {leaves}, {what}"
-            yield Peer(name, _with(trees, leaves, features), _emlearn_forest(kind), _of(features), ("emlearn",))
+            train = partial(_forest, trees=trees, leaves=leaves, features=features)
+            yield Peer(name, train, _emlearn_forest(kind), _of(features), ("emlearn",))
     for neurons in HIDDEN:
         name, network = f"int8 network by hand, {neurons} hidden", partial(Network.trained, neurons=neurons)
         yield Peer(name, network, Network.files, lambda made: made, in_c=Network.files)
-    small = (10, 40)
-    forest = f"forest {small[0]} x {small[1]}"
-    yield Peer(f"micromlgen, {forest}", _with(*small), _micromlgen, _of(_plain), ("micromlgen",))
-    train = _everywhereml_forest(*small)
-    yield Peer(f"everywhereml, {forest}", train, _everywhereml, _of(_plain), ("everywhereml",))
-    yield Peer(f"TL2cgen, {forest}", _with(*small), _tl2cgen, _of(_plain), ("tl2cgen", "treelite"))
     yield Peer("m2cgen, logistic regression", fitted, _m2cgen_logit, _logit_answers, ("m2cgen",))
-    yield Peer("m2cgen, XGBoost 100 x 14 stumps", _stumps, _m2cgen_stumps, _of(_plain), ("m2cgen", "xgboost"))

@@ -2,12 +2,11 @@
 
     python benchmarks/live.py [--seconds N]
 
-Prints four tables and the path of a frame: microseconds of CPU per frame, with all inputs changing and with a hand at
-rest; frames per second on emulated devices compared with the wire's limit; the scan of the kept switches compared with
-that of all 160; the files that a frame passes from the bytes on the wire to a published grasp, and the calls per grasp;
-the peak memory of a `thenar run` compared with 45 MiB. Emulated buses need umockdev (Debian packages umockdev,
-gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers run on the same cores as the run, so a busy or
-single-core machine gives worse numbers than a glove would.
+Prints two tables and the path of a frame: microseconds of CPU per frame, with all inputs changing and with a hand at
+rest; frames per second on emulated devices compared with the wire's limit; the files that a frame passes from the bytes
+on the wire to a published grasp, and the calls per grasp; the peak memory of a `thenar run` compared with 45 MiB.
+Emulated buses need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers
+run on the same cores as the run, so a busy or single-core machine gives worse numbers than a glove would.
 """
 
 import argparse
@@ -33,10 +32,10 @@ from liveplay import (
     played,
     read_along,
     restless,
+    wired,
     with_glove,
 )
 from liverates import Found, of_board, of_bus, of_glove
-from livescans import compared, wired
 from liveway import way
 from rich.console import Console
 from rich.table import Table
@@ -149,27 +148,6 @@ def _rate(found: Found) -> tuple[str, ...]:
     return found.what, *(f"{hz:.0f}" for hz in rates_hz), f"{found.share:.0%}", cost, split
 
 
-def scans(scene: Played) -> Table:
-    """Return a line per way to scan, and one for all 160 switches."""
-    made = table(
-        "A scan of the kept switches compared with all 160, MCP23017 at 100 kHz",
-        *("", "on the wire", "times less", "measured", "times less", "of it Python", "bytes", "system calls"),
-    )
-    every = list(compared(scene))
-    for each in every:
-        made.add_row(
-            each.what,
-            f"{each.predicted_us:.0f} us",
-            f"{every[0].predicted_us / each.predicted_us:.1f}",
-            f"{each.measured_us:.0f} us",
-            f"{every[0].measured_us / each.measured_us:.1f}",
-            f"{each.python_us:.0f} us",
-            f"{each.bytes:.1f}",
-            f"{each.ioctls:.1f}",
-        )
-    return made
-
-
 def peak_mib(scene: Played, folder: Path, seconds: float) -> float:
     """Return the peak of a `thenar run` on a CyberGlove and a bus, with recording, socket and preshape."""
     harness = wired(scene, scene.kept, 400_000)
@@ -197,7 +175,6 @@ def main() -> None:
         scenes = [played("quick", folder), played("kamakura", folder, prune=20)]
         console.print(loop_costs(scenes, folder), "")
         console.print(rates(scenes[0], options.seconds, folder), "")
-        console.print(scans(scenes[0]), "")
         passed = way(scenes[0])
         calls = ", ".join(f"{calls:.0f} in {thread}" for thread, calls in sorted(passed.calls.items()))
         console.print(f"A frame passes {len(passed.files)} files (at most {MOST_FILES}); calls a grasp: {calls}")

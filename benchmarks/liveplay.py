@@ -19,6 +19,7 @@ from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.live.sources import FrameBuffer, Snapshot
+from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.playing.performance import Performance, of_scene
 
@@ -83,6 +84,13 @@ def board(played: Played, port: str = "board", keys: int = 0, baud: int = 115_20
 def with_glove(harness: Harness, wiring: GloveWiring) -> Harness:
     """Return `harness` with a CyberGlove added."""
     return msgspec.structs.replace(harness, cyberglove=wiring)
+
+
+def wired(scene: Played, names: tuple[str, ...], clock_hz: int) -> Harness:
+    """Return a glove with these switches on MCP23017, scanned as often as the wire allows, and a CyberGlove."""
+    proposed = propose_harness(names, device="/dev/i2c-7")
+    bus = msgspec.structs.replace(proposed.buses[0], clock_hz=clock_hz, rate_hz=10_000.0)
+    return with_glove(msgspec.structs.replace(proposed, buses=(bus,)), glove(scene))
 
 
 class Memory:

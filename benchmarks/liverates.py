@@ -120,7 +120,7 @@ def _ran(
     """Run livewire.py on the emulated devices."""
     path = Path(folder, "glove.toml")
     path.write_text(harness_to_toml(harness))
-    command = [sys.executable, str(LIVEWIRE), "rate", str(build), str(path), str(seconds)]
+    command = [sys.executable, str(LIVEWIRE), str(build), str(path), str(seconds)]
     done = subprocess.run(
         command, env=os.environ | dict(environment or {}), capture_output=True, text=True, check=False
     )

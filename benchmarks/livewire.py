@@ -1,10 +1,8 @@
 """The live side of the benchmark's wires, in a separate process like `thenar run`; benchmarks/live.py starts it.
 
-    python benchmarks/livewire.py rate BUILD GLOVE.toml SECONDS    all sinks on: frames per second, and their cost
-    python benchmarks/livewire.py scans BUILD GLOVE.toml all|kept  one bus: the times of some scans a line out, for each
-                                                                   line in
+    python benchmarks/livewire.py BUILD GLOVE.toml SECONDS
 
-Both print JSON.
+With all sinks on, it prints frames per second, and their cost, as JSON.
 """
 
 import sys
@@ -20,15 +18,10 @@ import smbus2.smbus2
 from liveplay import read_along
 
 import thenar.drivers.i2c.node
-from thenar.runtime import Build, Glove
+from thenar.runtime import Glove
 from thenar.runtime.frames import SwitchFrame
-from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live.sources import Snapshot, Sources
-from thenar.runtime.live.system import LiveSystem
-from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.sources.i2c import I2cDevice
 
-SCANS = 4
 _START_S = 20.0
 
 
@@ -44,14 +37,6 @@ class Rate(msgspec.Struct):
     loop_us: float
     process_us: float
     between_us: float
-
-
-class Scanned(msgspec.Struct):
-    """Times of scans: microseconds each, and the part in Python outside system calls."""
-
-    us: list[float]
-    python_us: list[float]
-    ioctls: int
 
 
 @dataclass(eq=False)
@@ -130,7 +115,6 @@ class Ioctls:
     """Replaces ioctl in the I2C driver and in smbus2, and measures its time."""
 
     count: int = 0
-    cpu_ns: int = 0
     wall_ns: int = 0
 
     def stand_in(self) -> None:
@@ -140,39 +124,13 @@ class Ioctls:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call ioctl."""
-        start, cpu_ns = time.perf_counter_ns(), time.thread_time_ns()
+        start = time.perf_counter_ns()
         try:
             return ioctl(*arguments)
         finally:
             self.count += 1
-            self.cpu_ns += time.thread_time_ns() - cpu_ns
             self.wall_ns += time.perf_counter_ns() - start
 
 
-def scans(build: str, glove: str, which: str) -> None:
-    """Scan the only bus: all wired switches, or the kept ones."""
-    system = LiveSystem.of(Build.load(build), load_harness(glove))
-    scan = whole_scan(system.harness, system.harness.switches) if which == "all" else system.scan
-    device = I2cDevice(system.harness, 0, scan)
-    device.open()
-    ioctls = Ioctls()
-    ioctls.stand_in()
-    print(device.bus.way, flush=True)
-    for _ in sys.stdin:
-        found, before = Scanned([], [], 0), ioctls.count
-        for _ in range(SCANS):
-            start, cpu_ns, inside_ns = time.perf_counter(), time.thread_time_ns(), ioctls.cpu_ns
-            device.read(1.0)
-            python_ns = time.thread_time_ns() - cpu_ns - (ioctls.cpu_ns - inside_ns)
-            found.us.append(1e6 * (time.perf_counter() - start))
-            found.python_us.append(python_ns / 1e3)
-        found.ioctls = ioctls.count - before
-        print(msgspec.json.encode(found).decode(), flush=True)
-
-
 if __name__ == "__main__":
-    verb, *arguments = sys.argv[1:]
-    if verb == "rate":
-        print(msgspec.json.encode(rate(arguments[0], arguments[1], float(arguments[2]))).decode())
-    else:
-        scans(*arguments)
+    print(msgspec.json.encode(rate(sys.argv[1], sys.argv[2], float(sys.argv[3]))).decode())

@@ -22,9 +22,8 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-from liveplay import Played, board, glove, played, with_glove
+from liveplay import Played, board, glove, played, wired, with_glove
 from liverates import shown
-from livescans import wired
 from msgspec.structs import replace
 
 from thenar.runtime.harness.wiring import Harness

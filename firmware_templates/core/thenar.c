@@ -39,22 +39,28 @@ void thenar_init(thenar *hand, const thenar_model *model, uint16_t *memory)
     }
 }
 
-static bool is_present(const thenar *hand, uint16_t input)
-{
-    return (hand->n_lost == 0u) || !bit_of(hand->lost, input);
-}
-
 void thenar_set_switch(thenar *hand, uint16_t number, bool closed)
 {
-    if ((number < hand->model->switches) && is_present(hand, number)) {
+    if ((number < hand->model->switches) && ((hand->n_lost == 0u) || !bit_of(hand->lost, number))) {
         set_bit(hand->switches, number, closed);
+    }
+}
+
+/* Called last, so that setting a code saves no registers. */
+static void clear_lost_code(thenar *hand, uint16_t joint)
+{
+    if (bit_of(hand->lost, (uint16_t)(hand->model->switches + joint))) {
+        hand->codes[joint] = 0u;
     }
 }
 
 void thenar_set_code(thenar *hand, uint16_t joint, uint16_t code)
 {
-    if ((joint < hand->model->joints) && is_present(hand, (uint16_t)(hand->model->switches + joint))) {
+    if (joint < hand->model->joints) {
         hand->codes[joint] = code;
+        if (hand->n_lost > 0u) {
+            clear_lost_code(hand, joint);
+        }
     }
 }
 
@@ -77,8 +83,8 @@ void thenar_lose_switch(thenar *hand, uint16_t number, bool lost)
 void thenar_lose_joint(thenar *hand, uint16_t joint, bool lost)
 {
     if (joint < hand->model->joints) {
-        thenar_set_code(hand, joint, 0u);
         lose(hand, (uint16_t)(hand->model->switches + joint), lost);
+        clear_lost_code(hand, joint);
     }
 }
 
@@ -191,13 +197,12 @@ static void add(thenar *hand, const uint16_t *end)
 /* Missing inputs were added as open, or as code 0: add the difference to their means. */
 static void add_means(thenar *hand)
 {
-    const thenar_model *const model = hand->model;
-    const int16_t *mean = model->means;
+    const int16_t *mean = hand->model->means;
 
-    for (uint16_t input = 0u; input < (model->switches + model->joints); input++) {
+    for (uint16_t input = 0u; input < (hand->model->switches + hand->model->joints); input++) {
         const bool lost = bit_of(hand->lost, input);
 
-        for (uint16_t k = 0u; k < model->classes; k++) {
+        for (uint16_t k = 0u; k < hand->model->classes; k++) {
             if (lost) {
                 hand->scores[k] = (int16_t)(uint16_t)((uint16_t)hand->scores[k] + (uint16_t)THENAR_READ_16(mean));
             }
@@ -217,13 +222,12 @@ uint16_t thenar_classify(thenar *hand)
 {
     const int16_t *const scores = hand->scores;
     unsigned best = 0u;
-    int16_t top;
 
     hand->model->sum(hand);
     if (hand->n_lost > 0u) {
         add_means(hand);
     }
-    top = scores[0];
+    int16_t top = scores[0];
     for (unsigned k = 1u, classes = hand->model->classes; k < classes; k++) {
         const int16_t score = scores[k];
 
@@ -258,7 +262,6 @@ uint16_t thenar_decide(const thenar *hand, uint16_t grasp)
     const thenar_model *const model = hand->model;
     const thenar_rejection *const rejection = model->rejection;
     uint16_t closed = 0u, missing = 0u;
-    bool refused;
 
     if ((rejection == NULL) || (grasp >= model->classes)) {
         return grasp;
@@ -267,7 +270,7 @@ uint16_t thenar_decide(const thenar *hand, uint16_t grasp)
         closed = (uint16_t)(closed + (bit_of(hand->switches, number) ? 1u : 0u));
         missing = (uint16_t)(missing + (bit_of(hand->lost, number) ? 1u : 0u));
     }
-    refused = ((closed + missing) < THENAR_READ_16(&rejection->closed[2u * grasp]))
+    bool refused = ((closed + missing) < THENAR_READ_16(&rejection->closed[2u * grasp]))
         || (closed > THENAR_READ_16(&rejection->closed[(2u * grasp) + 1u])) || is_outside(hand, rejection, grasp);
     if (hand->n_lost == 0u) {
         refused = refused || (hand->scores[grasp] < (int16_t)THENAR_READ_16(&rejection->least_scores[grasp]));
@@ -331,11 +334,8 @@ uint16_t thenar_name(const thenar_model *model, uint16_t grasp, char *text, uint
     const char *from = model->names;
     uint16_t length = 0u;
 
-    for (uint16_t at = 0u; (at < grasp) && (at < model->n_names); at++) {
-        while (THENAR_READ_8(from) != 0) {
-            from++;
-        }
-        from++;
+    for (uint16_t before = (grasp < model->n_names) ? grasp : 0u; before > 0u; from++) {
+        before = (uint16_t)(before - ((THENAR_READ_8(from) == 0) ? 1u : 0u));
     }
     while ((grasp < model->n_names) && (THENAR_READ_8(&from[length]) != 0)) {
         if ((length + 1u) < size) {

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from msgspec import structs
 
 from thenar.compiler.firmware import FirmwareError
@@ -141,6 +143,59 @@ def test_readings_have_pythons_codes_by_any_calibration_set(compiled: Callable[.
         ends = (first, first + span) if random.integers(2) else (first + span, first)
         assert codes.calibrate(number, *ends)
         assert codes.sweep(number) == in_python(sensor, *ends)
+
+
+# Readings at the points, and codes there: steep and flat lines, far codes, the longest spans; many codes midway between
+# two, or next to it by the rounding of a point's code.
+_NEXT = (6.6, 33.3, 66.6, 133.2)
+HARD = [
+    *(
+        (0, 666, sign * delta, sign * round(code * 2**24) + delta)
+        for code in _NEXT
+        for sign in (1, -1)
+        for delta in (0, 1)
+    ),
+    *(
+        (begin, begin + span, 500 << 24, 680 << 24)
+        for begin, span in ((-300, 600), (0, 360), (65_175, 360), (-65_535, 720))
+    ),
+    *(
+        (0, 1, low, high)
+        for low, high in ((-(2**44) + 1, 2**44 - 1), (2**44 - 1, -(2**44) + 1), (0, 2**23), (2**23, -1))
+    ),
+    *((-32_768, 32_767, low << 24, high << 24) for low, high in ((0, 65_535), (65_535, 0), (100, 101), (-9, 65_536))),
+    *((0, FARTHEST, low, high) for low, high in ((0, 1), (1 << 24, (1 << 24) + 1), (-(2**44) + 1, 2**44 - 1), (5, -5))),
+    (-1, FARTHEST - 1, (70_000 << 24) + 3, (70_001 << 24) - 3),
+    (-7, 8, -(9 << 24), -(3 << 24)),
+]
+
+
+@pytest.mark.parametrize("turned", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["forward", "backward"])
+def test_readings_of_hard_lines_have_pythons_codes(compiled: Callable[..., Codes], turned: bool) -> None:
+    lines = [(second, first, high, low) if turned else (first, second, low, high) for first, second, low, high in HARD]
+    sensors = tuple(Sensor(f"j{n}", line[2:], ("a", "b"), line[:2]) for n, line in enumerate(lines))
+    codes = compiled(names_of([joint(sensor.name) for sensor in sensors]), Sensors(sensors, (), ()))
+    for number, (sensor, (first, second, *_)) in enumerate(zip(sensors, lines, strict=True)):
+        assert codes.sweep(number) == in_python(sensor, first, second), lines[number]
+
+
+@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_readings_of_any_line_have_pythons_codes(compiled: Callable[..., Codes], data: st.DataObject) -> None:
+    code = (
+        st.integers(-(2**44) + 1, 2**44 - 1) | st.integers(0, 2**16).map(lambda whole: whole << 24) | st.integers(-9, 9)
+    )
+    points = st.tuples(st.integers(-FARTHEST, FARTHEST), st.integers(1, FARTHEST), code, code)
+    lines = data.draw(
+        st.lists(points.filter(lambda p: p[0] + p[1] <= FARTHEST and p[2] != p[3]), min_size=1, max_size=8)
+    )
+    sensors = tuple(Sensor(f"j{n}", p[2:], ("a", "b"), (p[0], p[0] + p[1])) for n, p in enumerate(lines))
+    codes = compiled(names_of([joint(sensor.name) for sensor in sensors]), Sensors(sensors, (), ()))
+    for number, sensor in enumerate(sensors):
+        assert sensor.readings is not None
+        for begin in (sensor.readings[0] - 500, sensor.readings[1] - 500, -FARTHEST - 2, -500, FARTHEST - 998):
+            readings = range(begin, begin + 1000)
+            assert codes.sweep(number, readings) == in_python(sensor, *sensor.readings, readings), lines[number]
 
 
 def test_what_makes_no_line_is_refused_and_changes_nothing(compiled: Callable[..., Codes]) -> None:

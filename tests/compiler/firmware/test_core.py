@@ -239,6 +239,18 @@ int main(void)
         const unsigned length = thenar_name(&thenar_hand_model, 1, text, size);
         printf("%u %s%s\n", length, text, text + size);
     }
+    /* Found again, an input that was set in the meantime begins anew. */
+    const int16_t before = hands[1].scores[0];
+    thenar_lose_switch(&hands[1], 5, true);
+    thenar_lose_joint(&hands[1], 1, true);
+    (void)thenar_classify(&hands[1]);
+    printf("%d\n", hands[1].scores[0] != before);
+    thenar_set_switch(&hands[1], 5, true);
+    thenar_set_code(&hands[1], 1, 255);
+    thenar_lose_switch(&hands[1], 5, false);
+    thenar_lose_joint(&hands[1], 1, false);
+    (void)thenar_classify(&hands[1]);
+    printf("%d\n", hands[1].scores[0] == before);
     return thenar_name(&thenar_hand_model, 1, NULL, 0) != 3;
 }
 """
@@ -254,7 +266,7 @@ def test_hands_share_nothing_and_unknown_numbers_do_nothing() -> None:
         said = call([str(folder / "program")], folder).decode().splitlines()
     assert said[:3] == ["1", "1", "1"]
     assert said[3:9] == ['13 say "Ü"\\n??/', "3 abc", "0 ", "2 12", "5 three", "0 "]
-    assert said[9:] == ["3 ...", "3 a..", "3 ab."]
+    assert said[9:] == ["3 ...", "3 a..", "3 ab.", "1", "1"]
 
 
 def test_the_core_is_the_same_for_every_build() -> None:

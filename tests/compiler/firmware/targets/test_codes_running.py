@@ -131,8 +131,6 @@ def test_codes_are_python_s_on_an_avr(library: Callable[[bool], Library]) -> Non
         printed = call([str(program), target.part, "16000000", "codes.elf", *places], folder, sent)
     answers = np.frombuffer(printed, [("code", "<u2"), ("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")])
     assert answers["code"].tolist() == python_s(made.sensors, readings)
-    near = answers["cycles"].reshape(len(made.sensors.every), -1)[0, -256:]
-    print(f"{np.median(near):.0f} cycles near the points, at most {answers['cycles'].max()}")
-    # One multiplication for nearly all bytes; numbers of a stream are coded by a division first.
-    assert made.sensors.on_pins or near.max() < 500
-    assert answers["cycles"].max() < 8000  # half a millisecond: of a simulated part, the same on every machine
+    print(f"{np.median(answers['cycles']):.0f} cycles, at most {answers['cycles'].max()}")
+    # Of a simulated part, the same on every machine. Numbers of a stream are coded on their own grid first.
+    assert answers["cycles"].max() < (1000 if made.sensors.on_pins else 500)

@@ -13,7 +13,6 @@
 
 #define SENSORS THENAR_GLOVE_SENSORS
 #define FARTHEST 65535
-#define FRACTION 24u /* fractional bits of a point's code */
 
 /* The codes of the two points of each sensor. */
 typedef struct {
@@ -36,136 +35,117 @@ static const point_readings known[SENSORS] THENAR_FLASH = {
     {0, 0},
 };
 
-/* Return the nearest code on the line through two points, rounding half to even, 0 to `most`. */
-static uint16_t nearest(const point_readings *at, const point_codes *codes, int32_t reading, uint16_t most)
+/* Divide and round down. */
+static int64_t divided(int64_t sum, int64_t divisor)
 {
-    const bool rises = at->first < at->second;
-    const int32_t begin = rises ? at->first : at->second;
-    const int32_t span = (rises ? at->second : at->first) - begin;
-    const int64_t low = rises ? codes->first : codes->second;
-    const int64_t high = rises ? codes->second : codes->first;
-    const int32_t held = (reading < -FARTHEST) ? -FARTHEST : ((reading > FARTHEST) ? FARTHEST : reading);
-    /* The code, and a half, times the span. */
-    const int64_t half = (int64_t)span * 8388608;
-    const int64_t sum = (low * span) + ((high - low) * ((int64_t)held - begin)) + half;
-    uint32_t code = 0u;
-
-    if (sum >= 0) {
-        const uint64_t whole = (uint64_t)sum >> FRACTION;
-        const uint32_t divisor = (uint32_t)span;
-
-        if (whole >= ((uint64_t)divisor << 16)) {
-            code = most;
-        } else {
-            const uint32_t times = (uint32_t)whole;
-
-            code = times / divisor;
-            if (((code * divisor) == times) && ((whole << FRACTION) == (uint64_t)sum)) {
-                code -= code & 1u; /* halfway between two */
-            }
-        }
-    }
-    return (code < most) ? (uint16_t)code : most;
+    return (sum / divisor) - (((sum % divisor) < 0) ? 1 : 0);
 }
 
-#define HIGHEST_VALUE 0xFE000000u /* leaves room for an offset */
-
-/* Prepare the fast range: the code of a reading is `base` plus the upper bits of offset + gain * (reading - from).
-   Offset and gain are rounded down. Fractions that this could change, and codes midway, are left to nearest(). */
-static void prepare(thenar_glove_line *line, const point_codes *codes)
+/* Return the nearest code, 0 to 65535, where a sum of codes and a half is in units of `unit`; the even one of two. */
+static uint16_t nearest(int64_t sum, int64_t unit)
 {
-    const bool rises = line->readings[0] < line->readings[1];
-    const int32_t begin = line->readings[rises ? 0 : 1];
-    const int32_t span = line->readings[rises ? 1 : 0] - begin;
-    const int64_t low = rises ? codes->first : codes->second;
-    const int64_t step = (rises ? codes->second : codes->first) - low;
-    const uint64_t steep = (uint64_t)((step < 0) ? -step : step) / (uint64_t)span;
-    const int64_t unit = (int64_t)span * (INT64_C(1) << FRACTION);
+    const int64_t code = divided(sum, unit);
+    const int64_t even = ((code * unit) == sum) ? (code - (code % 2)) : code;
 
-    line->window = 4u;
-    while ((line->window < ((uint32_t)span * 4u)) && (line->window < 131072u)) {
-        line->window *= 2u;
-    }
-    line->falls = step < 0;
-    line->from = begin + (line->falls ? (int32_t)(line->window / 2u) : -(int32_t)(line->window / 2u));
-    line->from = (line->from < -FARTHEST) ? -FARTHEST : ((line->from > FARTHEST) ? FARTHEST : line->from);
-    const uint32_t to_end = (uint32_t)(line->falls ? (line->from + FARTHEST) : (FARTHEST - line->from));
-    line->window = (line->window > to_end) ? to_end : line->window;
-    const int64_t at_from = (low * span) + (step * ((int64_t)line->from - begin)) + (unit / 2);
-    const int64_t rest = ((at_from % unit) + unit) % unit;
-
-    line->base = (int32_t)((at_from - rest) / unit);
-    line->shift = 8u;
-    while ((line->shift > 0u) && (((steep * line->window) >> (8u - line->shift)) >= HIGHEST_VALUE)) {
-        line->shift--;
-    }
-    line->offset = (uint32_t)(((uint64_t)rest / (uint64_t)span) >> (8u - line->shift));
-    line->gain = (uint32_t)(steep >> (8u - line->shift));
-    line->mask = ((uint32_t)0x10000u << line->shift) - 1u;
-    const uint32_t inexact = (2u * line->window) + 2u;
-
-    if ((((steep * line->window) >> (8u - line->shift)) < HIGHEST_VALUE) && (line->mask > inexact)) {
-        const uint64_t dropped = (uint64_t)((1u << (8u - line->shift)) - 1u);
-
-        line->exact = ((step % span) == 0) && (((steep | ((uint64_t)rest / (uint64_t)span)) & dropped) == 0u);
-        line->safe = line->exact ? UINT32_MAX : (line->mask - inexact);
-    }
+    return (even < 0) ? 0u : ((even > UINT16_MAX) ? UINT16_MAX : (uint16_t)even);
 }
 
-static APART uint16_t nearest_on(const thenar_glove_line *line, uint16_t sensor, int32_t reading)
+/* Return the first reading, -FARTHEST to FARTHEST, whose sum has crossed a limit: that of -FARTHEST is so far above. */
+static int32_t crossing(int64_t above, int64_t step, bool rises)
 {
-    const point_readings at = {line->readings[0], line->readings[1]};
+    const int64_t after = rises ? -divided(above, step) : (divided(above, -step) + 1);
+
+    return (int32_t)((after < 0) ? 0 : ((after > (2 * FARTHEST)) ? (2 * FARTHEST) : after)) - FARTHEST;
+}
+
+/* Set the line through two points. Sums are as for nearest(); they grow by `step` with each reading. */
+static void set_line(thenar_glove_line *line, uint16_t sensor, int32_t first, int32_t second)
+{
+    const bool forward = first < second;
+    const int32_t begin = forward ? first : second;
+    const int32_t span = (forward ? second : first) - begin;
+    const int64_t unit = (int64_t)span * 16777216;
     point_codes own;
 
     COPY(own, points[sensor]);
-    return (at.first == at.second) ? 0u : nearest(&at, &own, reading, UINT16_MAX);
+    const bool rises = forward == (own.first < own.second);
+    const int64_t step = forward ? (own.second - own.first) : (own.first - own.second);
+    const int64_t sum = ((forward ? own.first : own.second) * span) + (unit / 2) - (step * begin);
+    const int64_t lowest = sum - (step * FARTHEST);
+    const int64_t above = lowest - (unit * 65536);
+    const int64_t gain = divided(step * 256, span);
+
+    line->beyond[0] = nearest(lowest, unit);
+    line->beyond[1] = nearest(sum + (step * FARTHEST), unit);
+    line->first = crossing(rises ? lowest : above, step, rises);
+    line->last = crossing(rises ? above : lowest, step, rises) - 1;
+    line->gain = (uint32_t)(((uint64_t)gain >> 16) & UINT32_MAX);
+    line->fine = (uint16_t)((uint64_t)gain & UINT16_MAX);
+    line->offset = (uint32_t)((uint64_t)(divided(sum, (int64_t)span * 256) + 3) & UINT32_MAX);
+    line->sum = (uint32_t)((uint64_t)sum & UINT32_MAX);
+    line->step = (uint32_t)((uint64_t)step & UINT32_MAX);
+    line->span = (uint16_t)span;
+    line->calibrated = true;
+}
+
+/* Return the code, or the one below: how far the sum is past midway between both decides, and 32 bits hold that. */
+static APART uint16_t settled(const thenar_glove_line *line, uint16_t reading, bool below, uint16_t code)
+{
+    const uint32_t steps = line->step * reading;
+    const uint32_t sum = below ? (line->sum - steps) : (line->sum + steps);
+    const uint32_t past = sum - ((uint32_t)(uint8_t)((uint8_t)line->span * (uint8_t)code) << 24);
+
+    return (uint16_t)(code - ((past == 0u) ? (code & 1u) : (past >> 31)));
+}
+
+/* Return the code of a reading, or of as much below 0, by the whole gain. The value is less than 5 * 2^-16 too high. */
+static APART uint16_t exact_code(const thenar_glove_line *line, uint16_t reading, bool below)
+{
+    const uint32_t product = (line->gain * reading) + (((uint32_t)line->fine * reading) >> 16);
+    const uint32_t value = below ? (line->offset - product) : (line->offset + product);
+    const uint16_t code = (uint16_t)(value >> 16);
+
+    return ((uint16_t)(value & 0xffffu) < 5u) ? settled(line, reading, below, code) : code;
+}
+
+/* Return the code of a reading of 0 or more. The value is too high by 3 * 2^-16 at most, and too low by at most as many
+   2^-16 as the reading has units; that seldom matters. */
+static APART uint16_t code_above(const thenar_glove_line *line, uint16_t reading)
+{
+    const uint32_t value = (line->gain * reading) + line->offset;
+    const bool sure = (uint16_t)((value & 0xffffu) - 4u) < (uint16_t)(UINT16_MAX - reading);
+
+    return sure ? (uint16_t)(value >> 16) : exact_code(line, reading, false);
 }
 
 /* Return the code of a reading in the units of the readings at the points. */
-static APART uint16_t code_on(const thenar_glove_line *line, uint16_t sensor, int32_t reading)
+static APART uint16_t code_on(const thenar_glove_line *line, int32_t reading)
 {
-    const uint32_t above = (uint32_t)reading - (uint32_t)line->from;
-    const uint32_t distance = line->falls ? (0u - above) : above;
+    uint16_t code;
 
-    if (distance <= line->window) {
-        const uint32_t value = line->offset + (line->gain * distance);
-        const uint32_t rest = value & line->mask;
-        const bool midway = (rest == 0u) && line->exact;
-
-        if (((rest - 1u) < line->safe) || midway) {
-            int32_t whole = line->base;
-
-            /* An AVR shifts by one bit at a time, but a byte at once. */
-            whole += (line->shift == 8u) ? (uint8_t)(value >> 24) : ((uint16_t)(value >> 16) >> line->shift);
-            whole -= midway ? (int32_t)((uint32_t)whole & 1u) : 0;
-            return (whole < 0) ? 0u : ((whole > UINT16_MAX) ? UINT16_MAX : (uint16_t)whole);
-        }
+    if (reading < line->first) {
+        code = line->beyond[0];
+    } else if (reading > line->last) {
+        code = line->beyond[1];
+    } else if (reading < 0) {
+        code = exact_code(line, (uint16_t)-reading, true);
+    } else {
+        code = code_above(line, (uint16_t)reading);
     }
-    return nearest_on(line, sensor, reading);
+    return code;
 }
-
 #define coded(sensor, reading) (reading)
-
-static void set_line(thenar_glove_codes *codes, uint16_t sensor, int32_t first, int32_t second)
-{
-    thenar_glove_line *const line = &codes->lines[sensor];
-
-    *line = (thenar_glove_line){.readings = {first, second}};
-    if (first != second) {
-        point_codes own;
-
-        COPY(own, points[sensor]);
-        prepare(line, &own);
-    }
-}
 
 void thenar_glove_codes_init(thenar_glove_codes *codes)
 {
     for (uint16_t sensor = 0u; sensor < SENSORS; ++sensor) {
         point_readings own;
 
+        codes->lines[sensor] = (thenar_glove_line){0};
         COPY(own, known[sensor]);
-        set_line(codes, sensor, own.first, own.second);
+        if (own.first != own.second) {
+            set_line(&codes->lines[sensor], sensor, own.first, own.second);
+        }
     }
 }
 
@@ -180,7 +160,7 @@ bool thenar_glove_calibrate(thenar_glove_codes *codes, uint16_t sensor, int32_t 
 
         line = near && (first != second) && ((first - second) <= FARTHEST) && ((second - first) <= FARTHEST);
         if (line) {
-            set_line(codes, sensor, first, second);
+            set_line(&codes->lines[sensor], sensor, first, second);
         }
     }
     return line;
@@ -188,19 +168,17 @@ bool thenar_glove_calibrate(thenar_glove_codes *codes, uint16_t sensor, int32_t 
 
 bool thenar_glove_calibrated(const thenar_glove_codes *codes, uint16_t sensor)
 {
-    return (sensor < SENSORS) && (codes->lines[sensor].readings[0] != codes->lines[sensor].readings[1]);
+    return (sensor < SENSORS) && (codes->lines[sensor].calibrated);
 }
 
 uint16_t thenar_glove_code_of(const thenar_glove_codes *codes, uint16_t sensor, int32_t reading)
 {
-    return (sensor < SENSORS) ? code_on(&codes->lines[sensor], sensor, coded(sensor, reading)) : 0u;
+    return (sensor < SENSORS) ? code_on(&codes->lines[sensor], coded(sensor, reading)) : 0u;
 }
 
 void thenar_glove_set_reading(thenar *hand, const thenar_glove_codes *codes, uint16_t sensor, int32_t reading)
 {
-    const uint16_t code = thenar_glove_code_of(codes, sensor, reading);
-
     if (sensor < THENAR_GLOVE_JOINTS) {
-        thenar_set_code(hand, sensor, code);
+        thenar_set_code(hand, sensor, code_on(&codes->lines[sensor], coded(sensor, reading)));
     }
 }

@@ -31,17 +31,16 @@ enum {
 
 /** The line of a sensor; private. */
 typedef struct {
-    int32_t readings[2]; /* at its two points; equal: unknown */
-    int32_t from;        /* the first reading of the fast range */
-    int32_t base;        /* the whole part of its code */
-    uint32_t offset;     /* the fraction of its code, in units of 2^-(16 + shift) */
-    uint32_t gain;       /* what the next reading adds, in these units */
-    uint32_t window;     /* how many readings follow in the fast range */
-    uint32_t mask;       /* the bits of a fraction */
-    uint32_t safe;       /* the largest fraction that no rounding changes */
-    uint8_t shift;
-    bool exact; /* nothing was rounded: all fractions are safe */
-    bool falls; /* codes rise where readings fall */
+    uint16_t beyond[2]; /* the codes of readings before the first and after the last one */
+    int32_t first;      /* the readings that the line converts */
+    int32_t last;
+    uint32_t gain;      /* what a reading adds, in 2^-16 of a code */
+    uint16_t fine;      /* the rest of it, in 2^-32 */
+    uint16_t span;      /* the readings from one point to the other */
+    uint32_t offset;    /* the code of reading 0, and a half, in 2^-16, and 3 more for what is rounded */
+    uint32_t step;      /* what a reading adds, in 2^-24 of a code by the span, modulo 2^32 */
+    uint32_t sum;       /* the code of reading 0, and a half, likewise */
+    bool calibrated;
 } thenar_glove_line;
 
 /** The calibration of each sensor. A copy is another one. */
