@@ -35,7 +35,7 @@ from ..movements.segments import (
     score_streams,
     segments_of,
 )
-from ..movements.streams import TICK_US, movements_of, streams_of
+from ..movements.streams import TICK_US, in_movements, streams_of
 from ..recogniser import Recogniser
 from ..recordings import RecordingError
 from ..recordings.graspset import GraspSet
@@ -214,7 +214,7 @@ def _inner_folds(learning: Samples, others: GraspSet, options: Recipe) -> list[F
     """Return folds that together test all rows of streams: each leaves out some subjects, or half of the movements of
     the only one.
     """
-    rows = np.flatnonzero(movements_of(others).inside)
+    rows = np.flatnonzero(in_movements(others))
     several = len(np.unique(others.subjects[rows]))
     if several > 1:
         folds = leave_groups_out(others.subjects[rows], "subject", min(several, _INNER))

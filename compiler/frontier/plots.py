@@ -1,4 +1,4 @@
-"""A frontier's pictures: accuracy against the time of a frame, the number of switches and the decision latency."""
+"""A frontier's pictures: accuracy against the time of a frame, and against the number of switches."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -48,7 +48,6 @@ class _Cost:
 
     front       the front whose points are filled and joined by a line called `best`; "": all are filled, none joined
     of_point, of_mark, of_tried  horizontal positions; None: not on this picture
-    end         right end of a line from a point; None: no line
     """
 
     title: str
@@ -58,7 +57,6 @@ class _Cost:
     of_tried: Callable[[Tried], float | None]
     front: str = ""
     best: str = ""
-    end: Callable[[FrontierPoint], float | None] = lambda _: None
 
     @property
     def is_time(self) -> bool:
@@ -69,8 +67,7 @@ class _Cost:
 _FRAME = _Cost(
     title="Accuracy against frame time",
     axis="time of a frame: the glove read, the grasp classified",
-    # The frame time does not depend on the decision: points that differ only in it would coincide.
-    of_point=lambda point: None if point.fronts == ("latency",) else point.frame.us,
+    of_point=lambda point: point.frame.us,
     of_mark=lambda mark: mark.frame_us,
     of_tried=lambda tried: tried.frame_us,
     front="frame",
@@ -83,21 +80,10 @@ _SWITCHES = _Cost(
     of_mark=lambda mark: float(mark.n_switches) or None,
     of_tried=lambda tried: float(tried.n_switches) or None,
 )
-_LATENCY = _Cost(
-    title="From the hand's arrival to the decision",
-    axis="time until a grasp is decided on: its mean, and a line to the 99th percentile",
-    # A point that misses every grasp has no mean.
-    of_point=lambda point: point.latency.mean_us if "latency" in point.fronts and point.latency.missed < 1 else None,
-    of_mark=lambda _: None,
-    of_tried=lambda _: None,
-    front="latency",
-    best="the best for its latency",
-    end=lambda point: point.latency.p99_us if point.latency.p99_us != point.latency.mean_us else None,
-)
 
 
 def pictures(frontier: Frontier, kind: Literal["svg", "png"], *, letters: bool = False) -> Mapping[str, bytes]:
-    """Return "frontier", "switches" and "latency" as files; equal frontiers give equal bytes.
+    """Return "frontier" and "switches" as files; equal frontiers give equal bytes.
 
     With `letters`, text in SVG stays text instead of outlines. Raises PictureError.
     """
@@ -110,7 +96,6 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     figure, axes = _sheet(frontier, cost.title.replace("switches", elements_of(frontier)) + machine)
     marks = [(max(x, _LOWEST), mark) for mark in frontier.marks if (x := cost.of_mark(mark)) is not None]
     points = [(max(x, _LOWEST), point) for point in frontier.points if (x := cost.of_point(point)) is not None]
-    ends = [(x, end, point) for x, point in points if (end := cost.end(point)) is not None]
     curves = () if cost.is_time else frontier.curves
     pairs = [pair for curve in curves for pair in zip(curve.sizes, curve.rates, strict=True)]
     shown = [rate for size, rate in pairs if size >= _FEW] or [rate for _, rate in pairs]
@@ -122,7 +107,7 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
         if (x := cost.of_tried(each)) is not None and each.rate.mean >= lowest
     ]
     if cost.is_time:
-        _scale_times(axes, [*(x for x, _ in (*marks, *tried, *points)), *(end for _, end, _ in ends)])
+        _scale_times(axes, [x for x, _ in (*marks, *tried, *points)])
     else:
         _scale_counts(axes, frontier.n_switches + frontier.n_levels)
     untimed = cost.is_time and any(point.transfer.how == "unknown" for _, point in points)
@@ -132,11 +117,10 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
 
     said = duration if cost.is_time else lambda _: ""
     _draw_tried(axes, tried)
-    if cost.front == "frame" and len(frontier.trainers) > 1:
+    if cost.is_time and len(frontier.trainers) > 1:
         _draw_trainers(axes, tried)
     if cost.is_time:
         _draw_best(axes, [(x, point.rate.mean) for x, point in points if cost.front in point.fronts], cost.best)
-    _draw_ends(axes, ends)
     _draw_curves(axes, curves)
     _draw_points(axes, points, cost.front, elements_of(frontier))
     _draw_whiskers(axes, [(x, mark.rate) for x, mark in marks], _INK)
@@ -164,10 +148,7 @@ def _named(name: str, cost: str, rate: Rate) -> str:
 
 # Call inside `painting`.
 PICTURES: Mapping[str, Callable[[Frontier], "Figure"]] = MappingProxyType(
-    {
-        name: partial(_draw, cost=cost)
-        for name, cost in (("frontier", _FRAME), ("switches", _SWITCHES), ("latency", _LATENCY))
-    }
+    {name: partial(_draw, cost=cost) for name, cost in (("frontier", _FRAME), ("switches", _SWITCHES))}
 )
 
 
@@ -305,14 +286,6 @@ def _draw_numbers(
             written.append((right, up))
             style: dict[str, Any] = {"textcoords": "offset points", "fontsize": FONT - 1, "color": _INK, "zorder": 6}
             axes.annotate(f"{point.number}", (x, point.rate.mean), (4, 3), **style)
-
-
-def _draw_ends(axes: "Axes", ends: Iterable[tuple[float, float, FrontierPoint]]) -> None:
-    """Draw lines from each point's mean to its end."""
-    for start, end, point in ends:
-        level = (point.rate.mean, point.rate.mean)
-        colour = _COLOURS[point.setting.inputs]
-        axes.plot((start, end), level, color=colour, lw=0.9, alpha=0.45, marker="|", ms=5, markevery=[1])
 
 
 def _draw_whiskers(axes: "Axes", shown: Sequence[tuple[float, Rate]], colour: str) -> None:

@@ -4,7 +4,7 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace as replace_rows
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.evaluation.folds import weka_folds
-from thenar.compiler.frontier import find, price
+from thenar.compiler.frontier import price
 from thenar.compiler.frontier.cache import stored
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.plots import pictures
 from thenar.compiler.frontier.points import Frontier, FrontierError, FrontierPoint, frontier_from_bytes
 from thenar.compiler.frontier.price import fit_here
-from thenar.compiler.frontier.replay import replay_of
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
 from thenar.compiler.model.collapse import collapse
@@ -49,10 +48,9 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _short_streams() -> Iterator[None]:
-    """Let latencies be those of 30 grasps, and this machine be timed once: how long either takes is no matter here."""
+def _timed_once() -> Iterator[None]:
+    """Let this machine be timed once: how long that takes is no matter here."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(find, "replay_of", partial(replay_of, grasps=30))
         patched.setattr(price, "fit_here", stored(1, here=True)(cache(fit_here)))
         yield
 
@@ -240,12 +238,6 @@ def test_what_ports_cost_is_part_of_the_question(tmp_path: Path) -> None:
         (each.placement, each.n_switches, each.rate) for each in alone.tried
     ]
     assert len(keys_in(tmp_path / "out" / "store.sqlite")) > len(keys_in(tmp_path / "alone" / "store.sqlite"))
-
-
-def test_recordings_that_are_trained_on_are_no_stream(tmp_path: Path) -> None:
-    request = asked(tmp_path, make_set())
-    with pytest.raises(FrontierError, match="equals the training set"):
-        found_of({**request, "stream": make_set()})
 
 
 def test_a_build_is_marked_with_what_it_recognises(tmp_path: Path) -> None:

@@ -152,7 +152,7 @@ def test_every_table_has_a_caption_and_heads_with_a_scope(page: Page) -> None:
 def test_every_picture_says_what_it_is(page: Page) -> None:
     pictures = [attributes for _, attributes in page.elements if attributes.get("role") in {"img", "group"}]
     ids = {attributes["id"] for _, attributes in page.elements if "id" in attributes}
-    assert len(pictures) == 6
+    assert len(pictures) == 5
     assert all(set((attributes["aria-labelledby"] or "").split()) <= ids for attributes in pictures)
 
 
