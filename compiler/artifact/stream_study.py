@@ -181,7 +181,6 @@ def _chosen(grasp_set: GraspSet, kind: Inputs, options: Recipe, subject: str) ->
     """Return the options with the trainer and settings that suit all other subjects best."""
     others, learning, some = _learning(grasp_set, kind, options, subject)
     training = Recogniser.fit(learning.rows(some), options, groups=_groups(others.rows(some))).training
-    assert training is not None
     settings: dict[str, Any] = dict(training.settings)
     return subject, replace(options, trainer=training.trainer, settings=settings, **dict.fromkeys(SHARED))
 
