@@ -77,7 +77,7 @@ def material(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
         Path("objects.toml").write_text('cup = ["mug"]\n')
         # Libraries are loaded whole before any work is interrupted.
         assert run(["info", "set.grasps", "--plot", "set.png"]) == 0
-        for library in ("sklearn", "scipy.stats", "scipy.optimize", "joblib", "threadpoolctl", "jinja2", "ezdxf"):
+        for library in ("sklearn", "scipy.stats", "scipy.optimize", "joblib", "threadpoolctl", "jinja2"):
             import_module(library)
         Path("folder").mkdir()
         Path("junk").write_bytes(bytes(range(256)))
