@@ -176,7 +176,7 @@ def command(
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
     options |= {} if chosen is None else chosen.options
     marks: dict[str, Any] = {} if chosen is None else {"frontier": chosen.frontier, "point": chosen.point.number}
-    with progress("compiling, then the paper's tables" if report and asked["folds"] else "compiling") as report_done:
+    with progress("compiling") as report_done:
         made = compile_build(
             grasp_set,
             output,
