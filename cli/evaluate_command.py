@@ -164,7 +164,7 @@ def command(
     --tables trainers compares trainers, each with hyperparameters chosen on its training rows.
 
     With --streams, GRASPS holds whole movements: placement, tables and segment costs are learnt without the subject
-    whose streams are decoded, live and afterwards. The dwell rule and a plain hidden Markov model are compared.
+    whose streams are decoded, live and afterwards, and compared with the dwell rule.
 
     --by subject --adapt leaves out each subject. It adapts the others' model to the subject's first trials, as `thenar
     adapt` does, and tests it on the rest, before and after.
