@@ -76,7 +76,7 @@ def material(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
         Path("glove.toml").write_text(f'[[stream]]\nport = "{folder}/none"\nswitches = [{names}]\n')
         Path("objects.toml").write_text('cup = ["mug"]\n')
         # Libraries are loaded whole before any work is interrupted.
-        assert run(["info", "set.grasps", "--plot", "set.png"]) == 0
+        assert run(["place", "set.grasps", "--draw", "set.png"]) == 0
         for library in ("sklearn", "scipy.stats", "scipy.optimize", "joblib", "threadpoolctl", "jinja2"):
             import_module(library)
         Path("folder").mkdir()
