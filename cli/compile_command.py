@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from thenar.runtime.recipe import AUTO, choices
+from thenar.runtime.recipe import AUTO
 
 from .options import (
     CHOOSING,
@@ -22,7 +22,6 @@ from .options import (
     warn_of_budget,
 )
 from .parameters import (
-    Number,
     OneOf,
     OutputFile,
     OutputFolder,
@@ -39,22 +38,16 @@ if TYPE_CHECKING:
 
 _BOARD = "board"
 # Options that a point of a frontier sets.
-_SETTLED = ("preset", "prune", "inputs", "table_bits", "placement", "keep", "width", "trainer")
-# Chosen by measurement: docs/reference/commands.md shows the effect of each. None sets both --keep and --prune.
-PRESETS: dict[str, dict[str, str]] = {
-    "smallest": {"method": "elimination", "keep": "8", "max-bins": "8", "table-bits": "8"},
-    "fastest": {"method": "elimination", "keep": "16", "inputs": "switches", "table-bits": "8"},
-    "best": {"method": "elimination", "keep": "33"},
-}
+_SETTLED = ("prune", "inputs", "table_bits", "placement", "keep", "width", "trainer")
 _GROUPS = {
-    "Basics": ("output", "preset", "placement", "keep", "levels", "keep_joints", "prune", "inputs"),
+    "Basics": ("output", "placement", "keep", "levels", "keep_joints", "prune", "inputs"),
     "Limits": LIMITS,
     "Training": ("trainer", "robust", "refuse"),
     "Integer tables": ("table_bits", "width"),
     "The accuracies in build.json": ("folds", "seed", "by", "jobs"),
     "A point of a frontier": ("from_frontier", "point"),
     "Wiring": ("glove", "propose", "chip"),
-    "Files": ("report", "hand_length", "layout", "overwrite", "json"),
+    "Files": ("report", "layout", "overwrite", "json"),
 }
 
 
@@ -81,29 +74,10 @@ def _chips_help() -> str:
     )
 
 
-def _preset(context: click.Context, _: click.Parameter, name: str | None) -> None:
-    """Make the preset's values the defaults: explicit options override them."""
-    names = {choice.option: choice.name for choice in choices().values()}
-    given = ((option.replace("-", "_"), value) for option, value in PRESETS.get(name or "", {}).items())
-    context.default_map = {names[option]: value for option, value in given}
-
-
 @click.command("compile", cls=TrainingCommand, groups=_GROUPS)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option(
     "-o", "--output", type=OutputFolder(), required=True, help="Build folder to write; an existing build is replaced."
-)
-@click.option(
-    "--preset",
-    type=OneOf("preset", lambda: PRESETS),
-    is_eager=True,
-    expose_value=False,
-    callback=_preset,
-    help="Set several options at once; explicit options override them. "
-    + "; ".join(
-        f"{name}: {' '.join(f'--{option} {value}' for option, value in given.items())}"
-        for name, given in PRESETS.items()
-    ),
 )
 @recipe_options(*CHOOSING, "inputs")
 @trainer_option(AUTO)
@@ -113,7 +87,6 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 @click.option("--from", "from_frontier", type=existing_file, help="A frontier.json: build one of its points.")
 @click.option("--point", type=click.IntRange(1), help="Number of the point.  [default: the picked one]")
 @click.option("--report/--no-report", default=True, show_default=True, help="Also write report.html and spec/.")
-@click.option("--hand-length", type=Number(100, 300), metavar="MM", help="Wearer's hand length.  [default: 190]")
 @layout_option
 @click.option("--glove", type=existing_file, help="A glove.toml: add the scan map of its wiring to the build.")
 @click.option("--propose", type=OutputFile(".toml"), help="Write a glove.toml that wires the kept switches.")
@@ -129,7 +102,6 @@ def command(
     from_frontier: Path | None,
     point: int | None,
     report: bool,
-    hand_length: float | None,
     jobs: int,
     layout: Path | None,
     glove: Path | None,
@@ -147,7 +119,6 @@ def command(
     \b
     Example:
         thenar compile set.grasps -o build/
-        thenar compile set.grasps -o build/ --preset smallest
         thenar compile set.grasps -o build/ --method elimination --keep 16
         thenar compile set.grasps -o build/ --method elimination --keep 39 --robust
         thenar compile set.grasps -o build/ --method elimination --keep 16 --never palm_heel_6 --apart-mm 8
@@ -157,22 +128,16 @@ def command(
     from thenar.compiler.artifact.compile import compile_build
     from thenar.compiler.artifact.documents import Documents
     from thenar.compiler.frontier.picked import picked
-    from thenar.compiler.placement.methods.base import METHODS
     from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
 
-    _check(context, from_frontier, point, hand_length, report)
+    _check(context, from_frontier, point)
     keep_apart(recordings, layout, glove, propose, from_frontier)
-    preset_keeps = context.get_parameter_source("keep") is ParameterSource.DEFAULT_MAP
-    if preset_keeps and not METHODS[asked["placement"]].by_number:
-        asked["keep"] = None  # the given --method takes no number of switches
     options = asked_settings(context, asked) | asked
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
     hand = fitted_hand(layout, grasp_set.element_names, None)
-    if hand_length is not None:
-        fitted_hand(layout, grasp_set.element_names, hand_length)  # refuses a length that does not apply
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
     options |= {} if chosen is None else chosen.options
     marks: dict[str, Any] = {} if chosen is None else {"frontier": chosen.frontier, "point": chosen.point.number}
@@ -183,7 +148,7 @@ def command(
             harness=given if chosen is None else chosen.wired(given),
             ports=ports_of_whole_glove(given, grasp_set.element_names, len(grasp_set.taxel_columns)),
             hand=hand,
-            documents=Documents(hand, hand_length, **marks) if report else None,
+            documents=Documents(hand, **marks) if report else None,
             jobs=jobs,
             progress=report_done,
             **options,
@@ -200,9 +165,7 @@ def command(
     show(made.manifest, lambda _: _print(made, output, propose))
 
 
-def _check(
-    context: click.Context, from_frontier: Path | None, point: int | None, hand_length: float | None, report: bool
-) -> None:
+def _check(context: click.Context, from_frontier: Path | None, point: int | None) -> None:
     """Raise UsageError for options that conflict, before the training."""
     from thenar.compiler.trainers.base import TRAINERS
 
@@ -211,8 +174,6 @@ def _check(
         raise click.UsageError("--chip sets the chips of a proposed harness: add --propose with a file to write.")
     if given["propose"] is not None and given["glove"] is not None:
         raise click.UsageError("--glove reads a wiring and --propose writes a new one: give one of them.")
-    if hand_length is not None and not report:
-        raise click.UsageError("--hand-length sizes the hand in spec/, which --no-report omits: give one of them.")
     if point is not None and from_frontier is None:
         raise click.UsageError("--point picks a point of a frontier: name its file with --from.")
     settings = (setting.name for trainer in TRAINERS.values() for setting in trainer.settings)

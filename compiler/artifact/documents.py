@@ -102,14 +102,11 @@ class Documents:
     ----------
     hand : HandShape, optional
         The recorded glove, laid flat: pictures show the switches on it, if it has them all.
-    hand_length : float, optional
-        The wearer's hand length for the reduced glove, mm; None: as long as `hand`.
     frontier, point : Frontier and int, optional
         The frontier from which a point is built, and the point's number.
     """
 
     hand: HandShape | None = None
-    hand_length: float | None = None
     frontier: "Frontier | None" = None
     point: int | None = None
 
@@ -119,7 +116,7 @@ class Documents:
 
         files = {REPORT_NAME: self._report(made)}
         if names := list(dict.fromkeys(switch.source for switch in made.manifest.switches)):
-            hand = None if self.hand is None else self.hand.fitted(names, self.hand_length)
+            hand = None if self.hand is None else self.hand.fitted(names)
             spec = spec_files(made.manifest, made.scan, made.harness, hand)
             files |= {f"{SPEC_FOLDER}/{name}": content for name, content in spec.items()}
         return files

@@ -110,18 +110,6 @@ def test_a_harness_without_the_kept_switches_is_told_which(set_file: Path, tmp_p
     assert "harness 'glove' has no pin or column for s" in done.stderr
 
 
-def test_a_preset_sets_options_and_explicit_ones_win(set_file: Path, tmp_path: Path) -> None:
-    given = ("compile", set_file, "-o", tmp_path / "build", "--folds", "0", "--no-report")
-    for more, expected in (
-        (("--preset", "smallest"), ("elimination", 8, None, 8)),
-        (("--preset", "smallest", "--keep", "3", "--rounds", "5"), ("elimination", 3, 5, 8)),
-        (("--preset", "smallest", "--method", "id3", "--rounds", "5"), ("id3", None, 5, 8)),
-    ):
-        assert thenar(*given, *more).returncode == 0
-        options = Build.load(tmp_path / "build").manifest.options
-        assert (options.placement, options.keep, options.rounds, options.table_bits) == expected
-
-
 def test_compile_and_run_refuse_a_glove_that_lacks_a_joint(set_file: Path, small_set: GraspSet, tmp_path: Path) -> None:
     names = list(small_set.switch_names)
     columns = ", ".join(f'"{name}"' for name in ["ms", *names, "j0"])

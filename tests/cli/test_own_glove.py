@@ -154,9 +154,6 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
     assert refused.returncode == 2
     assert "the position of switch 'pad_thumb_1' is unknown: say it with --layout" in refused.stderr
     build = tmp_path / "build"
-    refused = thenar("compile", grasps, "-o", build, *QUICK, "--hand-length", 180)
-    assert refused.returncode == 2
-    assert "use --layout instead" in refused.stderr
     layout.with_name("few.toml").write_text("[places]\npad_thumb_1 = [1, 2]\n")
     refused = thenar("compile", grasps, "-o", build, *QUICK, "--layout", layout.with_name("few.toml"))
     assert refused.returncode == 2
