@@ -159,7 +159,7 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
     assert refused.returncode == 2
     assert "'pad_thumb_2' is no switch of the glove few.toml" in refused.stderr
     assert not build.exists()
-    for options in (["--per-grasp"], ["--place"], []):
+    for options in (["--per-grasp"], []):
         worked(thenar("draw", grasps, "--layout", layout, *options, "-o", tmp_path / "a.svg", "--overwrite"))
         picture = (tmp_path / "a.svg").read_text()
         assert "pad_thumb_1" in picture
