@@ -16,7 +16,6 @@ from .parameters import (
     OneOf,
     OutputFolder,
     existing_file,
-    existing_folder,
     jobs_option,
     seed_range,
 )
@@ -57,7 +56,6 @@ def _timed() -> tuple[str, ...]:
 @click.option(
     "--rate", type=Number(0, 1, min_open=True), help="Pick the fastest point of at least this accuracy, 0 to 1."
 )
-@click.option("--build", type=existing_folder, help="Mark this build on the pictures.")
 @click.option(
     "--joint-us",
     type=Number(0, 60_000_000, min_open=True),

@@ -13,12 +13,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from msgspec.structs import replace as changed_to
 
-from thenar.runtime.build import Build
-from thenar.runtime.errors import BuildError, HarnessError
+from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.names import list_names
 
-from ..evaluation.rates import Rate
 from ..placement.methods.base import usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
@@ -42,7 +40,7 @@ from .finalists import (
     select_finalists,
 )
 from .plots import PICTURES, pictures
-from .points import SCHEMA, Frontier, FrontierError, ReferencePoint, Tried, frontier_to_bytes
+from .points import SCHEMA, Frontier, FrontierError, Tried, frontier_to_bytes
 from .price import equipment_for
 from .search import TAXEL_LEVELS, Search, placement_of
 from .survey import Cuts, Survey
@@ -70,7 +68,6 @@ def find_frontier(
     search: Search | None = None,
     budget_us: float | None = None,
     rate: float | None = None,
-    build: Path | None = None,
     joint_us: float | None = None,
     jobs: int = -1,
     report: Report | None = None,
@@ -98,8 +95,6 @@ def find_frontier(
         Size of the search. Baselines that are not installed are left out.
     budget_us, rate : float, optional
         Pick the best point within this time of a frame, or the fastest of this accuracy.
-    build : Path, optional
-        A build folder, to be marked on the pictures.
     joint_us : float, optional
         Time of reading all joints, in microseconds. By default it is that of a CyberGlove's record, as measured for
         the harness, else by the vendor's formula; of other joints it is left out of every frame, and a sentence of
@@ -117,7 +112,7 @@ def find_frontier(
     Raises
     ------
     FrontierError
-        If the recordings or the build do not fit, nothing can be built, or the folder holds other things.
+        If the recordings do not fit, there is no such target, nothing can be built, or the folder holds other things.
     StoreError
         If another run uses the folder, or the disk is full.
 
@@ -138,12 +133,10 @@ def find_frontier(
         with _remove_created_on_error(created, store):
             equipment = equipment_for(grasp_set, harness, target, cache, joint_us)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
-            marks = () if build is None else (own_build(build, survey),)
         untimed = [_UNTIMED.format(list_names(grasp_set.joint_names))] if equipment.records.how == "unknown" else []
         frontier = _found(survey)
         frontier = changed_to(
             frontier,
-            marks=(*frontier.marks, *marks),
             skipped=(*untimed, *frontier.skipped),
             picked=_picked(frontier, budget_us, rate),
             wanted=_in_words(budget_us, rate),
@@ -160,7 +153,7 @@ def _remove_created_on_error(created: Sequence[Path], store: Store) -> Iterator[
     """Remove files and folders that a run made if its request is refused; files added by others meanwhile stay."""
     try:
         yield
-    except (FrontierError, BuildError, HarnessError):
+    except (FrontierError, HarnessError):
         store.finish()
         with suppress(OSError):
             for path in created:
@@ -205,37 +198,6 @@ def kept_entries(folder: Path) -> list[str]:
 def _documents(frontier: Frontier) -> dict[str, bytes]:
     drawn = {f"{name}.svg": data for name, data in pictures(frontier, "svg").items()}
     return {FRONTIER_NAME: frontier_to_bytes(frontier), TABLE_NAME: csv_bytes(frontier), **drawn}
-
-
-def own_build(folder: Path, survey: Survey) -> ReferencePoint:
-    """Return the user's build as a mark: its recorded rate, and its frame in the fastest wiring for its switches.
-
-    Raises FrontierError if it has no rate, or is not for these recordings or this equipment.
-    """
-    build = Build.load(folder)
-    manifest = build.manifest
-    grasp_set, equipment = survey.grasp_set, survey.equipment
-    names = [switch.name for switch in manifest.switches]
-    # Comparable with the frontier's rates.
-    pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
-    if not pooled:
-        raise FrontierError(f"{folder} has no accuracy: compile it with ``folds`` 4, or leave ``build`` out")
-    cost, scans = equipment.model.cost(build.tables), equipment.scans(names)
-    if cost is None or (names and not scans):
-        raise FrontierError(
-            f"{folder} cannot be built for {equipment.model.target}: leave ``build`` out, or ``target``"
-        )
-    joints = [joint.name for joint in manifest.joints]
-    inputs = {*grasp_set.element_names, *grasp_set.joint_names}
-    for name in (*(switch.source for switch in manifest.switches), *joints):
-        if name not in inputs:
-            raise FrontierError(
-                f"{folder} reads {name!r}, which the recordings do not hold: it was compiled from others"
-            )
-    scan_us = min((scan.us for scan in scans), default=0.0)
-    rate = Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled")
-    frame_us = max(scan_us, equipment.records.of(len(joints)).us) + cost.us
-    return ReferencePoint(f"build {folder.name}", len(names), rate, frame_us)
 
 
 def _found(survey: Survey) -> Frontier:

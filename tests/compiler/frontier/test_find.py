@@ -240,26 +240,12 @@ def test_what_ports_cost_is_part_of_the_question(tmp_path: Path) -> None:
     assert len(keys_in(tmp_path / "out" / "store.sqlite")) > len(keys_in(tmp_path / "alone" / "store.sqlite"))
 
 
-def test_a_build_is_marked_with_what_it_recognises(tmp_path: Path) -> None:
-    grasp_set = make_set()
-    build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=4).folder
-    found = found_of(asked(tmp_path, grasp_set, build=build, methods=("id3",), baselines=()))
-    assert found.marks[-1].name == "build mine"
-
-
-def test_a_build_that_does_not_say_what_it_recognises_is_refused(tmp_path: Path) -> None:
-    grasp_set = make_set()
-    build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=0).folder
-    with pytest.raises(FrontierError, match="has no accuracy"):
-        found_of(asked(tmp_path / "not" / "there", grasp_set, build=build))
-    assert not (tmp_path / "not").exists()
-
-
-def test_a_build_of_other_switches_is_refused(tmp_path: Path) -> None:
-    build = compile_build(make_set(switches=40), tmp_path / "mine", rounds=5, folds=4, prune=0).folder
+def test_a_search_that_is_refused_leaves_no_folder_and_no_file(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
-    with pytest.raises(FrontierError, match="compiled from others"):
-        found_of(asked(tmp_path, make_set(switches=2), build=build))
+    for folder in (tmp_path / "not" / "there", tmp_path):
+        with pytest.raises(FrontierError, match="there is no target 'nonsense'"):
+            found_of(asked(folder, make_set(), target="nonsense"))
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
     assert list((tmp_path / "out").iterdir()) == []
 
 
