@@ -30,7 +30,7 @@ from .parameters import (
     keep_apart,
     overwrite_flag,
 )
-from .printing import json_flag, out, progress, show, table, warning
+from .printing import json_flag, out, progress, show, warning
 
 if TYPE_CHECKING:
     from thenar.compiler.artifact.documents import BuildReport
@@ -204,19 +204,9 @@ def _propose(manifest: "Manifest", path: Path | None, chip: str | None) -> None:
 
 
 def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
-    from thenar.runtime.scanning.timing import scan_us
-
     console = out()
     for fact in made.facts:
         console.print(f"{folder}: {fact.text}" if fact.label == "build" else str(fact), soft_wrap=True)
-    time = None if made.scan is None or made.harness is None else scan_us(made.scan, made.harness)
-    if time is not None and time.chips:
-        chips = table(("chip", "bus", "reads", "switches", "us"), title="Scan map")
-        for chip in time.chips:
-            chips.add_row(chip.place, chip.device, " ".join(chip.readings), str(chip.switches), f"{chip.us:.1f}")
-        if time.selects:
-            chips.add_row(f"{time.selects} writes to muxes", "", "", "", f"{time.select_us:.1f}")
-        console.print(chips)
     if propose is not None:
         console.print(
             f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
