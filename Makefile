@@ -37,7 +37,7 @@ else
 	$(BIN)/thenar draw --kept $(OUT)/kept.json -o $(OUT)/kept.svg --overwrite
 endif
 	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json --overwrite --repeats 1 $(if $(TABLE),--tables compositions)
-	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --baselines none --rounds 50 --repeats 1 --finalists 4 --budget-us 5000
+	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --rounds 50 --repeats 1 --finalists 4 --budget-us 5000
 	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --from $(OUT)/frontier/frontier.json
 	$(BIN)/thenar verify $(OUT)/build $(OUT)/set.grasps
 	$(BIN)/thenar run $(OUT)/build --replay $(OUT)/set.grasps > $(OUT)/grasps.jsonl

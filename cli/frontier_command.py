@@ -66,7 +66,6 @@ def _timed() -> tuple[str, ...]:
     type=method_list,
     help="Placement methods to build from.  [default: elimination and ID3, by cost with --glove]",
 )
-@click.option("--baselines", type=method_list, help="Methods to compare them with, or none.  [default: most]")
 @trainer_option(AUTO)
 @click.option("--rounds", type=click.IntRange(1, 300), default=100, show_default=True, help="Most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Repeats of the folds.")
@@ -91,7 +90,6 @@ def command(
     budget_us: float | None,
     rate: float | None,
     methods: tuple[str, ...] | None,
-    baselines: tuple[str, ...] | None,
     **asked: Any,
 ) -> int:
     """Show the trade-off between accuracy and time: which switches, joints, rounds, tables and wirings pay.
@@ -119,7 +117,6 @@ def command(
     rounds, training = asked["rounds"], asked_settings(context, asked)
     search = Search(
         methods=methods,
-        baselines=usual(ours=False) if baselines is None else baselines,
         rounds=rounds,
         trainer=training.pop("trainer"),
         settings={name: value for name, value in training.items() if name != "rounds"},

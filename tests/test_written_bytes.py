@@ -130,7 +130,7 @@ def test_a_search_finds_the_same_accuracies(
 ) -> None:
     """Times are the machine's: only the curves of accuracy over size are the same everywhere."""
     name = "icub"
-    limits = ["--baselines", "none", "--trainer", "logit", "--repeats", "1", "--finalists", "1"]
+    limits = ["--trainer", "logit", "--repeats", "1", "--finalists", "1"]
     assert run(["frontier", str(set_of(name)), "-o", str(tmp_path / "frontier"), *limits]) == 0
     curves = json.loads((tmp_path / "frontier" / "frontier.json").read_text())["curves"]
     found = {

@@ -92,7 +92,7 @@ def find_frontier(
     target : str
         Deployment target, one of `thenar.compiler.frontier.targets.TARGETS`.
     search : Search, optional
-        Size of the search. Baselines that are not installed are left out.
+        Size of the search.
     budget_us, rate : float, optional
         Pick the best point within this time of a frame, or the fastest of this accuracy.
     joint_us : float, optional

@@ -28,8 +28,8 @@ _COLOURS: dict[Inputs, str] = {inputs: on_paper(inputs) for inputs in ("switches
 _SHAPES: dict[Inputs, str] = {"switches": "o", "joints": "^", "both": "s"}
 _MARKS = ("X", "P", "D", "v")
 _NAMES: dict[Inputs, str] = {"switches": "switches alone", "joints": "joints alone", "both": "switches and joints"}
-# Our curves are blue, like switches alone everywhere; dashes distinguish curves of one colour.
-_BASELINES = tuple(on_paper(f"baseline-{number}") for number in (1, 2, 3))
+# Curves are blue, like switches alone everywhere; dashes distinguish curves of one colour. Trainers have other colours.
+_TRAINERS = tuple(on_paper(f"baseline-{number}") for number in (1, 2, 3))
 _DASHES: "tuple[Dash, ...]" = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 1.5)), (0, (9, 3)))
 # Ids of a point's marker and of the ring around the featured one, in SVG.
 POINT_ID, RING_ID = "point-", "featured"
@@ -233,7 +233,7 @@ def _draw_trainers(axes: "Axes", tried: Sequence[tuple[float, Tried]]) -> None:
         places = [(x, each.rate.mean) for x, each in tried if each.trainer == name]
         best = front(places, lambda place: place[0], lambda place: place[1])
         xs, ys = [*(x for x, _ in best), axes.get_xlim()[1]], [*(y for _, y in best), best[-1][1]]
-        colour, dash = _BASELINES[number % len(_BASELINES)], _DASHES[1 + number % (len(_DASHES) - 1)]
+        colour, dash = _TRAINERS[number % len(_TRAINERS)], _DASHES[1 + number % (len(_DASHES) - 1)]
         axes.step(xs, ys, where="post", color=colour, lw=1.1, ls=dash, zorder=2, label=f"{shorten(name)}, tried")
 
 
@@ -294,17 +294,12 @@ def _draw_whiskers(axes: "Axes", shown: Sequence[tuple[float, Rate]], colour: st
 
 
 def _draw_curves(axes: "Axes", curves: Sequence[Curve]) -> None:
-    """Draw ours and the baselines' curves, ours first."""
-    ours, baselines = ([curve for curve in curves if curve.ours == whether] for whether in (True, False))
-    looks = [(_COLOURS["switches"], _DASHES[number % len(_DASHES)]) for number in range(len(ours))]
-    for number in range(len(baselines)):
-        turn, place = divmod(number, len(_BASELINES))
-        looks.append((_BASELINES[place], _DASHES[turn % len(_DASHES)]))
-    for curve, (colour, dash) in zip((*ours, *baselines), looks, strict=True):
+    """Draw the curves of the methods, dashed differently."""
+    colour = _COLOURS["switches"]
+    for number, curve in enumerate(curves):
         pairs = [(size, rate) for size, rate in zip(curve.sizes, curve.rates, strict=True) if size >= 1]
         xs, rates = [size for size, _ in pairs], [rate for _, rate in pairs]
-        width, shade, above = (2.4, 0.10, 3) if curve.ours else (1.1, 0.04, 2)
-        means, name = [rate.mean for rate in rates], shorten(curve.method)
-        axes.plot(xs, means, color=colour, lw=width, ls=dash, zorder=above, label=name if pairs else None)
+        means, name, dash = [rate.mean for rate in rates], shorten(curve.method), _DASHES[number % len(_DASHES)]
+        axes.plot(xs, means, color=colour, lw=2.4, ls=dash, zorder=3, label=name if pairs else None)
         lows, highs = [rate.low for rate in rates], [rate.high for rate in rates]
-        axes.fill_between(xs, lows, highs, color=colour, alpha=shade, lw=0, zorder=1)
+        axes.fill_between(xs, lows, highs, color=colour, alpha=0.10, lw=0, zorder=1)

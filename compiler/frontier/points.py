@@ -140,11 +140,10 @@ class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True)
 
 
 class Curve(Struct, frozen=True, forbid_unknown_fields=True):
-    """Accuracy against the number of switches, switches alone: one method; `ours` or a baseline."""
+    """Accuracy against the number of switches, switches alone: one method."""
 
     method: str
     what: str
-    ours: bool
     sizes: tuple[Annotated[float, Meta(ge=0.0, le=1e12)], ...]
     rates: tuple[Rate, ...]
 

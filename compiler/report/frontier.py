@@ -39,8 +39,7 @@ _FOREIGN = "This frontier belongs to other recordings than the build."
 _CAPTIONS = {
     "frontier": "Accuracy against frame time, both in the table below.",
     "switches": (
-        "Accuracy against the number of switches. Curves use switches only: ours are blue, the baselines' are thin. "
-        "Points without switches are not shown."
+        "Accuracy against the number of switches. Curves use switches only. Points without switches are not shown."
     ),
 }
 # If a colour has two names, the first.
@@ -236,7 +235,7 @@ def _points(frontier: Frontier) -> PlainTable:
 
 
 def _tables(frontier: Frontier) -> Iterator[PlainTable]:
-    """Yield tables of reference points and of baselines, where there are any."""
+    """Yield tables of reference points and of curves, where there are any."""
     kept, trainer = elements_of(frontier).capitalize(), "".join(frontier.trainers[:1]) or "none"
     if frontier.marks:
         marks = tuple(
@@ -251,7 +250,7 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
         for curve in frontier.curves:
             rates = dict(zip(curve.sizes, curve.rates, strict=True))
             cells = (f"{100 * rates[size].mean:.1f}" if size in rates else "" for size in sizes)
-            rows.append((f"{curve.method}{' (ours)' if curve.ours else ''}", curve.what, *cells))
+            rows.append((curve.method, curve.what, *cells))
         columns = ("Method", "Description", *(f"{size:g}" for size in sizes))
         what = f"Accuracy in % ({frontier.by}, trials), {elements_of(frontier)} only, against their number"
         yield PlainTable(f"{what}; trainer: {trainer}", columns, tuple(rows), words=(0, 1))

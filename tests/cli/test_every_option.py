@@ -34,7 +34,7 @@ LINES: dict[str, tuple[str, str]] = {
     "segment": ("movements.grasps", "-b build -o new.csv"),
     "frontier": (
         "set.grasps",
-        "-o new --methods elimination --baselines none --rounds 2 --repeats 1 --finalists 1 --jobs 1"
+        "-o new --methods elimination --rounds 2 --repeats 1 --finalists 1 --jobs 1"
         # Nothing is left to choose, which takes long and says nothing.
         " --trainer logitboost --shrinkage 1 --max-bins 256 --ties first",
     ),

@@ -21,7 +21,7 @@ from .conftest import thenar
 # A trainer of which nothing is left to choose.
 SETTLED = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536)
 QUICK = (
-    *("--target", "host", "--methods", "elimination,id3", "--baselines", "cmim"),
+    *("--target", "host", "--methods", "elimination,id3"),
     *("--rounds", 6, "--finalists", 2, "--repeats", 1, "--jobs", 1, *SETTLED),
 )
 pytestmark = pytest.mark.slow

@@ -37,7 +37,7 @@ def place(small_set: GraspSet, build_folder: Path, tmp_path: Path, monkeypatch: 
         "stability --list",
         pytest.param("stability elementary --jobs 1", marks=pytest.mark.slow),
         pytest.param(
-            "frontier set.grasps -o new --methods elimination --baselines none --rounds 3 --repeats 1 --finalists 1",
+            "frontier set.grasps -o new --methods elimination --rounds 3 --repeats 1 --finalists 1",
             marks=pytest.mark.slow,
         ),
         pytest.param("simulate quick -o new.grasps --repetitions 1 --jobs 1", marks=pytest.mark.slow),

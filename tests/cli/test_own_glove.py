@@ -168,7 +168,7 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
 
 @pytest.mark.slow
 def test_a_frontier_omits_unknown_joint_times_unless_they_are_given(grasps: Path, tmp_path: Path) -> None:
-    few = ("--methods", "id3", "--baselines", "none", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)
+    few = ("--methods", "id3", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)
     # Nothing is left to choose.
     settled = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536)
     found: dict[str, list[Any]] = {}

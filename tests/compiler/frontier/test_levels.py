@@ -25,7 +25,7 @@ from thenar.compiler.samples import Samples
 from thenar.runtime.names import taxel_and_code
 
 SEARCH = Search(
-    methods=("elimination-cost",), baselines=(), rounds=4, repeats=1, finalists=2, trainer="logitboost",
+    methods=("elimination-cost",), rounds=4, repeats=1, finalists=2, trainer="logitboost",
     settings={"shrinkage": 1.0, "max_bins": 65536},
 )  # fmt: skip
 
