@@ -38,7 +38,7 @@ def gloved(grasp_set: GraspSet) -> GraspSet:
 
 def test_one_call_makes_a_build_with_its_report_and_spec(gloved: GraspSet, tmp_path: Path) -> None:
     build = tmp_path / "build"
-    for documents, drawn in ((Documents(), False), (Documents(hand_map(), 180), True)):
+    for documents, drawn in ((Documents(), False), (Documents(hand_map().scaled(180.0)), True)):
         _compile(gloved, build, documents)
         assert ('id="kept-hand"' in (build / "report.html").read_text()) == drawn
         assert (build / "spec" / "glove.toml").is_file()
