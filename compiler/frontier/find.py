@@ -52,9 +52,9 @@ _DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in P
 _WIDER = 3
 # Number of placements to try with fewer joints.
 _FEWER = 5
-# Calls of `Cache.ask`: the calibration, five to screen, four with fewer joints, three with other trainers, five for the
+# Calls of `Cache.ask`: the calibration, four to screen, four with fewer joints, three with other trainers, five for the
 # finalists, the simulations.
-_ROUNDS = 19
+_ROUNDS = 18
 _UNTIMED = "the time of reading the joints ({}) is unknown and is left out of every frame time: give it with --joint-us"
 
 
