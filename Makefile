@@ -33,10 +33,11 @@ ifdef TABLE
 else
 	$(BIN)/thenar simulate "$(SCENE)" $(PEOPLE) -o $(OUT)/set.grasps --overwrite
 	$(BIN)/thenar draw $(OUT)/set.grasps -o $(OUT)/contacts.svg --overwrite
-	$(BIN)/thenar draw $(OUT)/set.grasps --place -o $(OUT)/kept.svg --overwrite
+	$(BIN)/thenar place $(OUT)/set.grasps -o $(OUT)/kept.json --overwrite
+	$(BIN)/thenar draw --kept $(OUT)/kept.json -o $(OUT)/kept.svg --overwrite
 endif
 	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json --overwrite --repeats 1 $(if $(TABLE),--tables compositions)
-	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --baselines none --rounds 50 --repeats 1 --finalists 4 --budget-us 5000
+	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --rounds 50 --repeats 1 --finalists 4 --budget-us 5000
 	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --from $(OUT)/frontier/frontier.json
 	$(BIN)/thenar verify $(OUT)/build $(OUT)/set.grasps
 	$(BIN)/thenar run $(OUT)/build --replay $(OUT)/set.grasps > $(OUT)/grasps.jsonl

@@ -73,7 +73,6 @@ def played(asked: tuple[int, GraspSet | None, Equipment]) -> Case:
     grasp_set = recorded(seed)
     search = Search(
         methods=("id3",),
-        baselines=(),
         folds=6,
         repeats=1,
         screening=10,

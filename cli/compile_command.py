@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from thenar.runtime.recipe import AUTO, choices
+from thenar.runtime.recipe import AUTO
 
 from .options import (
     CHOOSING,
@@ -24,7 +24,6 @@ from .options import (
     warn_of_budget,
 )
 from .parameters import (
-    Number,
     OneOf,
     OutputFile,
     OutputFolder,
@@ -33,7 +32,7 @@ from .parameters import (
     keep_apart,
     overwrite_flag,
 )
-from .printing import json_flag, out, progress, show, table, warning
+from .printing import json_flag, out, progress, show, warning
 
 if TYPE_CHECKING:
     from thenar.compiler.artifact.documents import BuildReport
@@ -41,22 +40,16 @@ if TYPE_CHECKING:
 
 _BOARD = "board"
 # Options that a point of a frontier sets.
-_SETTLED = ("preset", "prune", "inputs", "table_bits", "placement", "keep", "width", "trainer")
-# Chosen by measurement: docs/reference/commands.md shows the effect of each. None sets both --keep and --prune.
-PRESETS: dict[str, dict[str, str]] = {
-    "smallest": {"method": "elimination", "keep": "8", "max-bins": "8", "table-bits": "8"},
-    "fastest": {"method": "elimination", "keep": "16", "inputs": "switches", "table-bits": "8"},
-    "best": {"method": "elimination", "keep": "33"},
-}
+_SETTLED = ("sensors", "price", "prune", "inputs", "table_bits", "placement", "keep", "width", "trainer")
 _GROUPS = {
-    "Basics": ("output", "preset", "sensors", "placement", "keep", "levels", "keep_joints", "prune", "inputs"),
+    "Basics": ("output", "sensors", "placement", "keep", "levels", "keep_joints", "prune", "inputs"),
     "Limits": LIMITS,
     "Training": ("trainer", "robust", "refuse"),
     "Integer tables": ("table_bits", "width"),
     "The accuracies in build.json": ("folds", "seed", "by", "jobs"),
     "A point of a frontier": ("from_frontier", "point"),
     "Wiring": ("glove", "propose", "chip"),
-    "Files": ("report", "hand_length", "layout", "overwrite", "json"),
+    "Files": ("report", "layout", "overwrite", "json"),
 }
 
 
@@ -83,29 +76,10 @@ def _chips_help() -> str:
     )
 
 
-def _preset(context: click.Context, _: click.Parameter, name: str | None) -> None:
-    """Make the preset's values the defaults: explicit options override them."""
-    names = {choice.option: choice.name for choice in choices().values()}
-    given = ((option.replace("-", "_"), value) for option, value in PRESETS.get(name or "", {}).items())
-    context.default_map = {names[option]: value for option, value in given}
-
-
 @click.command("compile", cls=TrainingCommand, groups=_GROUPS)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option(
     "-o", "--output", type=OutputFolder(), required=True, help="Build folder to write; an existing build is replaced."
-)
-@click.option(
-    "--preset",
-    type=OneOf("preset", lambda: PRESETS),
-    is_eager=True,
-    expose_value=False,
-    callback=_preset,
-    help="Set several options at once; explicit options override them. "
-    + "; ".join(
-        f"{name}: {' '.join(f'--{option} {value}' for option, value in given.items())}"
-        for name, given in PRESETS.items()
-    ),
 )
 @recipe_options(*CHOOSING, "inputs")
 @trainer_option(AUTO)
@@ -115,7 +89,6 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 @click.option("--from", "from_frontier", type=existing_file, help="A frontier.json: build one of its points.")
 @click.option("--point", type=click.IntRange(1), help="Number of the point.  [default: the picked one]")
 @click.option("--report/--no-report", default=True, show_default=True, help="Also write report.html and spec/.")
-@click.option("--hand-length", type=Number(100, 300), metavar="MM", help="Wearer's hand length.  [default: 190]")
 @layout_option
 @prices_option
 @click.option("--glove", type=existing_file, help="A glove.toml: add the scan map of its wiring to the build.")
@@ -132,7 +105,6 @@ def command(
     from_frontier: Path | None,
     point: int | None,
     report: bool,
-    hand_length: float | None,
     jobs: int,
     layout: Path | None,
     prices: Path | None,
@@ -151,7 +123,6 @@ def command(
     \b
     Example:
         thenar compile set.grasps -o build/
-        thenar compile set.grasps -o build/ --preset smallest
         thenar compile set.grasps -o build/ --sensors 8
         thenar compile set.grasps -o build/ --method elimination --keep 39 --robust
         thenar compile set.grasps -o build/ --method elimination --keep 16 --never palm_heel_6 --apart-mm 8
@@ -161,26 +132,20 @@ def command(
     from thenar.compiler.artifact.compile import compile_build
     from thenar.compiler.artifact.documents import Documents
     from thenar.compiler.frontier.picked import picked
-    from thenar.compiler.placement.methods.base import METHODS
     from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
 
-    _check(context, from_frontier, point, hand_length, report)
+    _check(context, from_frontier, point)
     keep_apart(recordings, layout, prices, glove, propose, from_frontier)
-    preset_keeps = context.get_parameter_source("keep") is ParameterSource.DEFAULT_MAP
-    if preset_keeps and not METHODS[asked["placement"]].by_number:
-        asked["keep"] = None  # the given --method takes no number of switches
     options = asked_settings(context, asked) | asked
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
     hand = fitted_hand(layout, grasp_set.element_names, None)
-    if hand_length is not None:
-        fitted_hand(layout, grasp_set.element_names, hand_length)  # refuses a length that does not apply
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
     options |= {} if chosen is None else chosen.options
     marks: dict[str, Any] = {} if chosen is None else {"frontier": chosen.frontier, "point": chosen.point.number}
-    with progress("compiling, then the paper's tables" if report and asked["folds"] else "compiling") as report_done:
+    with progress("compiling") as report_done:
         made = compile_build(
             grasp_set,
             output,
@@ -188,7 +153,7 @@ def command(
             ports=ports_of_whole_glove(given, grasp_set.element_names, len(grasp_set.taxel_columns)),
             hand=hand,
             prices=prices_of(grasp_set, prices),
-            documents=Documents(hand, hand_length, **marks) if report else None,
+            documents=Documents(hand, **marks) if report else None,
             jobs=jobs,
             progress=report_done,
             **options,
@@ -205,9 +170,7 @@ def command(
     show(made.manifest, lambda _: _print(made, output, propose))
 
 
-def _check(
-    context: click.Context, from_frontier: Path | None, point: int | None, hand_length: float | None, report: bool
-) -> None:
+def _check(context: click.Context, from_frontier: Path | None, point: int | None) -> None:
     """Raise UsageError for options that conflict, before the training."""
     from thenar.compiler.trainers.base import TRAINERS
 
@@ -216,8 +179,6 @@ def _check(
         raise click.UsageError("--chip sets the chips of a proposed harness: add --propose with a file to write.")
     if given["propose"] is not None and given["glove"] is not None:
         raise click.UsageError("--glove reads a wiring and --propose writes a new one: give one of them.")
-    if hand_length is not None and not report:
-        raise click.UsageError("--hand-length sizes the hand in spec/, which --no-report omits: give one of them.")
     if point is not None and from_frontier is None:
         raise click.UsageError("--point picks a point of a frontier: name its file with --from.")
     settings = (setting.name for trainer in TRAINERS.values() for setting in trainer.settings)
@@ -248,19 +209,9 @@ def _propose(manifest: "Manifest", path: Path | None, chip: str | None) -> None:
 
 
 def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
-    from thenar.runtime.scanning.timing import scan_us
-
     console = out()
     for fact in made.facts:
         console.print(f"{folder}: {fact.text}" if fact.label == "build" else str(fact), soft_wrap=True)
-    time = None if made.scan is None or made.harness is None else scan_us(made.scan, made.harness)
-    if time is not None and time.chips:
-        chips = table(("chip", "bus", "reads", "switches", "us"), title="Scan map")
-        for chip in time.chips:
-            chips.add_row(chip.place, chip.device, " ".join(chip.readings), str(chip.switches), f"{chip.us:.1f}")
-        if time.selects:
-            chips.add_row(f"{time.selects} writes to muxes", "", "", "", f"{time.select_us:.1f}")
-        console.print(chips)
     if propose is not None:
         console.print(
             f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"

@@ -5,7 +5,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import click
 import msgspec
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
     CableOf = Callable[[int], Cable | None]
 
-_ADAPTERS = ("any", "bcm2835", "designware", "i2c-gpio")
 _FRAME_US = 10_000
 _HARNESS, _CALIBRATION, _TAXELS = "glove.toml", "calibration.toml", "taxels.toml"
 _LONGEST_PATH = 4095  # of Linux
@@ -62,9 +61,6 @@ _KILLED = 128
     help="Time to rest between grasps, with an open hand.  [default: the scene's rest, or none]",
 )
 @click.option("--repeat", is_flag=True, help="Repeat until Ctrl-C, or until the command ends.")
-@click.option(
-    "--adapter", type=click.Choice(_ADAPTERS), default="any", show_default=True, help="What the I2C adapter can batch."
-)
 @click.option("--log", metavar="FILE.jsonl", type=OutputFile(".jsonl"), help="Log the time of each frame to this file.")
 @overwrite_flag
 def command(
@@ -76,7 +72,6 @@ def command(
     period_ms: float | None,
     rest_ms: float | None,
     repeat: bool,
-    adapter: Literal["any", "bcm2835", "designware", "i2c-gpio"],
     log: Path | None,
 ) -> None:
     """Emulate the devices of a harness and play on them: a SCENE (a shipped one or a .toml file), a .grasps set, or the
@@ -115,7 +110,6 @@ def command(
                 performance.switch_names,
                 folder.resolve(),
                 cable=cable,
-                adapter=adapter,
                 taxel_names=performance.taxel_names,
                 joints=tuple(zip(performance.joint_names, performance.joint_units, strict=True)),
             )

@@ -26,7 +26,6 @@ from .options import (
 from .parameters import (
     ListOf,
     OutputFile,
-    OutputFolder,
     comma_separated,
     existing_file,
     jobs_option,
@@ -131,13 +130,6 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     metavar="N,N,...",
     help="Evaluate adaptation to each subject, left out, by the first N trials of each type instead.",
 )
-@click.option(
-    "--plot",
-    "folder",
-    type=OutputFolder(fresh=True),
-    metavar="FOLDER",
-    help="Draw the confusion matrices into this folder.",
-)
 @click.option("-o", "--output", type=OutputFile(".json"), metavar="FILE", help="Write the whole result as JSON.")
 @overwrite_flag
 @json_flag
@@ -149,7 +141,6 @@ def command(
     jobs: int,
     streams: bool,
     numbers: tuple[int, ...],
-    folder: Path | None,
     output: Path | None,
     layout: Path | None,
     prices: Path | None,
@@ -167,7 +158,7 @@ def command(
     --tables trainers compares trainers, each with hyperparameters chosen on its training rows.
 
     With --streams, GRASPS holds whole movements: placement, tables and segment costs are learnt without the subject
-    whose streams are decoded, live and afterwards. The dwell rule and a plain hidden Markov model are compared.
+    whose streams are decoded, live and afterwards, and compared with the dwell rule.
 
     --by subject --adapt leaves out each subject. It adapts the others' model to the subject's first trials, as `thenar
     adapt` does, and tests it on the rest, before and after.
@@ -179,7 +170,7 @@ def command(
         thenar evaluate movements.grasps --streams --trainer logit
         thenar evaluate set.grasps --by subject --tables joints
         thenar evaluate set.grasps --by subject --adapt 1,2,3
-        thenar evaluate set.grasps --by subject --plot pictures/ -o result.json
+        thenar evaluate set.grasps --by subject -o result.json
     """
     from thenar.compiler.evaluation.study import StudyDesign, StudyRun
     from thenar.compiler.recordings.graspset import GraspSet
@@ -201,17 +192,11 @@ def command(
         return
     asked["tables"] = tuple(name for name in TABLES if name in asked["tables"])
     design = StudyDesign(recipe, **asked)
-    if folder is not None and "compositions" not in design.tables:
-        raise click.UsageError("--plot shows the compositions: name them in --tables")
     grasp_set = GraspSet.load(grasps)
     run = StudyRun(grasp_set, design, **terms_of(recipe, grasp_set, layout, glove, prices))
     for sentence in run.study.warnings:
         warning(sentence)
     study = replace(run.study, tables=tuple(_tables(run, jobs)))
-    if folder is not None:
-        from thenar.compiler.evaluation.study import draw
-
-        draw(study, folder)
     if output is not None:
         write_json(output, study)
     show(study, _print_end)

@@ -16,7 +16,6 @@ from .parameters import (
     OneOf,
     OutputFolder,
     existing_file,
-    existing_folder,
     jobs_option,
     seed_range,
 )
@@ -27,8 +26,8 @@ if TYPE_CHECKING:
 
 
 _SEARCHED = ("repeats", "finalists", "seed", "by")
-_WORDS = ("inputs", "placement", "rounds, bits", "wiring", "decision")
-_TIMES, _SIZES = ("frame", "latency, 99 %"), ("flash", "RAM")
+_WORDS = ("inputs", "placement", "rounds, bits", "wiring")
+_SIZES = ("flash", "RAM")
 
 
 def _timed() -> tuple[str, ...]:
@@ -57,26 +56,23 @@ def _timed() -> tuple[str, ...]:
 @click.option(
     "--rate", type=Number(0, 1, min_open=True), help="Pick the fastest point of at least this accuracy, 0 to 1."
 )
-@click.option("--build", type=existing_folder, help="Mark this build on the pictures.")
 @click.option(
     "--joint-us",
     type=Number(0, 60_000_000, min_open=True),
     help="Time to read all joints.  [default: a CyberGlove's record; unknown and omitted for other joints]",
 )
-@click.option("--stream", type=existing_file, help="Measure decision latency on this set of whole movements.")
 @click.option(
     "--methods",
     type=method_list,
     help="Placement methods to build from.  [default: elimination and ID3, by cost with --glove]",
 )
-@click.option("--baselines", type=method_list, help="Methods to compare them with, or none.  [default: most]")
 @trainer_option(AUTO)
 @click.option("--rounds", type=click.IntRange(1, 300), default=100, show_default=True, help="Most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(
     "--finalists", type=click.IntRange(1), default=12, show_default=True, help="Placements to refine and price."
 )
-@click.option("--seed", type=seed_range, default=1, show_default=True, help="Seed of folds and stream.")
+@click.option("--seed", type=seed_range, default=1, show_default=True, help="Seed of folds.")
 @click.option(
     "--by",
     type=click.Choice(("subject", "trial")),
@@ -91,17 +87,15 @@ def command(
     recordings: Path,
     output: Path,
     glove: Path | None,
-    stream: Path | None,
     budget_us: float | None,
     rate: float | None,
     methods: tuple[str, ...] | None,
-    baselines: tuple[str, ...] | None,
     **asked: Any,
 ) -> int:
-    """Show the trade-off between accuracy and time: which switches, joints, rounds, tables, wirings and decisions pay.
+    """Show the trade-off between accuracy and time: which switches, joints, rounds, tables and wirings pay.
 
     Every placement is screened by a nested cross-validation. Those near the front are refined, priced for the target,
-    simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, three pictures and store.sqlite,
+    simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, two pictures and store.sqlite,
     from which an interrupted run continues.
 
     \b
@@ -123,7 +117,6 @@ def command(
     rounds, training = asked["rounds"], asked_settings(context, asked)
     search = Search(
         methods=methods,
-        baselines=usual(ours=False) if baselines is None else baselines,
         rounds=rounds,
         trainer=training.pop("trainer"),
         settings={name: value for name, value in training.items() if name != "rounds"},
@@ -138,7 +131,6 @@ def command(
             search=search,
             budget_us=budget_us,
             rate=rate,
-            stream=None if stream is None else GraspSet.load(stream),
             report=report,
             **asked,
         )
@@ -165,7 +157,7 @@ def print_frontier(frontier: "Frontier") -> None:
     from thenar.compiler.frontier import words
 
     rates, elements = words.rates_of(frontier), words.elements_of(frontier)
-    numbers = (*(f"{what} %" for what in rates), *(words.of_time(frontier, what) for what in _TIMES), *_SIZES)
+    numbers = (*(f"{what} %" for what in rates), words.of_time(frontier, "frame"), *_SIZES)
     wanted = f"; {frontier.wanted}: point {frontier.picked}" if frontier.picked is not None else ""
     title = f"The best of {frontier.combinations:,} combinations, {frontier.source} on {frontier.machine}{wanted}"
     grid = table(("point", elements, *_WORDS, *numbers), ("point", elements, *numbers), title)
@@ -174,10 +166,9 @@ def print_frontier(frontier: "Frontier") -> None:
         trained = setting.rounds if setting.usual else words.training_of(setting)
         grid.add_row(
             *(str(point.number), str(len(point.switches)), setting.inputs, words.way_of(setting)),
-            *(f"{trained}, {setting.width}", words.wiring_of(setting), setting.decision),
+            *(f"{trained}, {setting.width}", words.wiring_of(setting)),
             *(interval(rate(point)) for rate in rates.values()),
             f"{duration(point.frame.us)} {point.frame.how}",
-            f"{duration(point.latency.mean_us)}, {duration(point.latency.p99_us)}",
             *(f"{point.flash:,}", f"{point.ram:,}"),
             style="bold" if point.number == frontier.picked else None,
         )

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from thenar.compiler.recordings.importer import ImportReport
     from thenar.compiler.recordings.propose import ColumnProposal
 
-# At most this many inputs are listed with their coding: a hand has no more joints.
-_MOST_CODED = 24
-
 
 def _existing(context: click.Context, argument: click.Parameter, given: tuple[str, ...]) -> tuple[Path, ...]:
     """Return the paths, each of which is there, or is a pattern of files: a path with fields in braces."""
@@ -142,14 +139,9 @@ def _print(report: "ImportReport", output: Path) -> None:
     for note in report.notes:
         echo(note)
     if rounded := [cost for cost in report.coding if cost.rounds]:
-        numbers = ("step", "largest error", "rms error", "values before", "after")
-        coding = table(("joint", "unit", *numbers), numbers, "Coding")
-        for cost in rounded[:_MOST_CODED]:
-            errors = (f"{cost.step:g}", f"{cost.largest_error:.3g}", f"{cost.rms_error:.3g}")
-            coding.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
-        out().print(coding)
-        if len(rounded) > _MOST_CODED:
-            echo(f"and {len(rounded) - _MOST_CODED:,} more: --json lists them all")
+        worst = max(rounded, key=lambda cost: cost.largest_error / abs(cost.step))
+        error = f"at most {worst.largest_error:.3g} {worst.unit} of {worst.joint}, in steps of {abs(worst.step):g}"
+        echo(f"{counted(len(rounded), 'joint')} rounded to codes, {error}: --json lists all")
     echo(
         f"{output}: {trials_of_frames(report.frames, report.trials, report.rests)}, "
         f"{counted(report.grasp_types, 'grasp type')} ({report.taxonomy}); "

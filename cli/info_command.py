@@ -1,6 +1,5 @@
 """`thenar info`: summarise a .grasps file."""
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,8 +8,8 @@ import click
 from thenar.compiler.text import INDEPENDENT, counted, inputs_read, trials_of_frames
 from thenar.runtime.published import NONE
 
-from .parameters import existing_file, keep_apart, overwrite_flag, picture_file
-from .printing import echo, json_flag, out, progress, show, table, write_picture
+from .parameters import existing_file
+from .printing import echo, json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
     from thenar.compiler.recordings.summary import JointRange, Summary
@@ -18,10 +17,8 @@ if TYPE_CHECKING:
 
 @click.command("info")
 @click.argument("grasps", type=existing_file)
-@click.option("--plot", type=picture_file, help="Also draw the summary to this .png or .svg file.")
-@overwrite_flag
 @json_flag
-def command(grasps: Path, plot: Path | None) -> None:
+def command(grasps: Path) -> None:
     """Summarise GRASPS, a .grasps file: counts, balance, and odd columns and rows.
 
     A trial is one recorded grasp or rest, a frame one reading. Rests count in no accuracy.
@@ -29,19 +26,13 @@ def command(grasps: Path, plot: Path | None) -> None:
     \b
     Example:
         thenar info set.grasps
-        thenar info set.grasps --plot set.png
     """
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.compiler.recordings.summary import summarise
 
-    keep_apart(grasps, plot)
     grasp_set = GraspSet.load(grasps)
     with progress(f"comparing the rows of {grasps.name}"):
         summary = summarise(grasp_set)
-    if plot is not None:
-        from thenar.compiler.recordings.export import draw
-
-        write_picture(plot, partial(draw, grasp_set))
     show(summary, _print, grasps)
 
 

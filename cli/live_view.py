@@ -5,7 +5,7 @@ from contextlib import suppress
 from threading import Event, Thread
 from typing import Self
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Console, RenderableType
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
@@ -26,9 +26,7 @@ class LiveView:
     It draws in a separate thread: a terminal that is held (Ctrl-S), slow or closed delays nothing else.
     """
 
-    def __init__(self, console: Console, status: bool = False) -> None:
-        """Draw health reports of the glove below the devices if `status`."""
-        self._status = status
+    def __init__(self, console: Console) -> None:
         self._live = Live(console=console, transient=True, auto_refresh=False)
         self._newest: tuple[LiveGrasp, Devices, HealthReport | None] | None = None
         self._closing = Event()
@@ -62,17 +60,15 @@ class LiveView:
                 newest = self._newest
                 if newest is not None and newest is not shown:
                     grasp, devices, health = shown = newest
-                    lines = health_lines(health) if self._status else ()
                     wrong = list[Quarantined | OutputTrouble]()
                     if health is not None:
                         wrong += [*health.quarantined, *health.outputs]
-                    self._live.update(drawn(grasp, devices(), lines, wrong), refresh=True)
+                    self._live.update(drawn(grasp, devices(), wrong), refresh=True)
 
 
 def drawn(
     grasp: LiveGrasp,
     devices: Sequence[DeviceHealth],
-    lines: Sequence[str] = (),
     wrong: Sequence[Quarantined | OutputTrouble] = (),
 ) -> RenderableType:
     """Return the view of one moment."""
@@ -91,7 +87,7 @@ def drawn(
     table.add_row("frame", str(grasp.number))
     for device in devices:
         table.add_row(device.name, Text(device.error, style="red") if device.error else "connected")
-    return Group(table, *(Text(line, style="dim") for line in lines))
+    return table
 
 
 def _segment(grasp: LiveGrasp) -> str:
@@ -108,17 +104,3 @@ def _bar(share: float) -> str:
 
 def _ms(age_us: int | None) -> str:
     return "none yet" if age_us is None else f"{age_us / 1000:.1f} ms"
-
-
-def health_lines(report: HealthReport | None) -> tuple[str, ...]:
-    """Return the glove's health in lines; the rates, and a line a device."""
-    if report is None:
-        return ()
-    rates = f"switches {report.switch_hz:.0f}/s, glove {report.glove_hz:.0f}/s; {report.frames} frames"
-    share = f", {report.changing} changing, {report.degraded} degraded, {report.unknown} unknown"
-    late = f", {report.overflowed} frames missed" if report.overflowed else ""
-    lines = [rates + share + late]
-    for device in report.devices:
-        counts = ", ".join(f"{count.name} {count.value}" for count in device.counts if count.value)
-        lines.append(f"{device.name}: {counts or 'nothing counted'}")
-    return tuple(lines)

@@ -54,14 +54,10 @@ class OutputFile(click.Path):
 
 
 class OutputFolder(click.Path):
-    """A folder to write, created if needed; its writer decides whether thenar may replace its content.
+    """A folder to write, created if needed; its writer decides whether thenar may replace its content."""
 
-    A `fresh` folder must be empty, unless `overwrite_flag` is given.
-    """
-
-    def __init__(self, *, fresh: bool = False) -> None:
+    def __init__(self) -> None:
         super().__init__(file_okay=False, writable=True, path_type=Path)
-        self._fresh = fresh
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """Return the path. Raises BadParameter if no folder can be created there."""
@@ -73,8 +69,6 @@ class OutputFolder(click.Path):
             self.fail(f"'{above}' is not a folder, so nothing can be written below it: name another.", param, ctx)
         if not os.access(above, os.W_OK):
             self.fail(f"Folder '{above}' is not writable: name another, or change its permissions.", param, ctx)
-        if self._fresh and above == path and any(path.iterdir()) and not overwrites(ctx):
-            self.fail(f"{path} is not empty: add --overwrite to replace files in it, or name another.", param, ctx)
         return path
 
 

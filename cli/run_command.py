@@ -71,7 +71,7 @@ def _sinks_help() -> str:
 )
 @overwrite_flag
 @web_options
-@click.option("--status", is_flag=True, help="Report the glove's health once a second, in the view and to all sinks.")
+@click.option("--status", is_flag=True, help="Report the glove's health to all sinks, once a second.")
 @click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop after N frames.")
 @click.option("--lead", type=Number(0), help="Lead in score units that a new grasp type needs.")
 @click.option("--dwell-ms", type=Number(0, 10_000), help="Time for which a new grasp type must keep the lead.")
@@ -212,7 +212,7 @@ def _run_live(
             if viewed:
                 from .live_view import LiveView
 
-                view = stack.enter_context(LiveView(out(), status))
+                view = stack.enter_context(LiveView(out()))
             recorder = glove.recorder
             _look_on(glove, view, page, frames)
         reports = glove.reports()

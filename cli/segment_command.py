@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from thenar.compiler.artifact.timeline import FoundSegment
 
-_ENDINGS = (".csv", ".eaf", ".mcap")
+_ENDINGS = (".csv", ".mcap")
 _SHOWN = 20
 
 
@@ -28,7 +28,7 @@ _SHOWN = 20
     "-o",
     "--output",
     type=OutputFile(*_ENDINGS),
-    help="Write the segments as a table (.csv), an ELAN document (.eaf), or annotations (.mcap).",
+    help="Write the segments as a table (.csv), or annotations (.mcap).",
 )
 @click.option(
     "--lag-ms",
@@ -56,7 +56,7 @@ def command(
     \b
     Example:
         thenar segment movements.grasps -b build/ -o segments.csv
-        thenar segment run.mcap -b build/ -o segments.eaf --lag-ms 150
+        thenar segment run.mcap -b build/ -o segments.mcap --lag-ms 150
         thenar segment movements.grasps -b build/ --picture timeline.svg --transitions graph.json
     """
     from thenar.compiler.artifact.timeline import draw, overlap_f1, segment, write

@@ -1,4 +1,4 @@
-"""`thenar simulate`: a scene in, a set of grasps out, with the effect and cost of each simulation step."""
+"""`thenar simulate`: a scene in, a set of grasps out, with the cost of each simulation step."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,11 +14,9 @@ from .parameters import OutputFile, jobs_option, keep_apart, overwrite_flag, see
 from .printing import echo, json_flag, out, progress, show, table, warning
 
 if TYPE_CHECKING:
-    from thenar.simulator.pipeline.explain import Explanation
     from thenar.simulator.pipeline.report import SimulationReport
     from thenar.simulator.scenes.scene import Rest
 
-_MODES = ("--output", "--explain", "--list")
 _SHOWN = 10  # unsettled repetitions that are listed individually
 _OWN = "dim"  # style of the scene-independent steps
 
@@ -29,7 +27,6 @@ _OWN = "dim"  # style of the scene-independent steps
     "-o", "--output", type=OutputFile(".grasps"), metavar="SET.grasps", help="Simulate, and write the set here."
 )
 @overwrite_flag
-@click.option("--explain", is_flag=True, help="Only list the steps that would run, in order, and the cost of each.")
 @click.option("--list", "listing", is_flag=True, help="Only list the shipped scenes.")
 @click.option("--repetitions", type=click.IntRange(1, 100_000), help="Trials per grasp type and subject.")
 @click.option(
@@ -56,7 +53,6 @@ _OWN = "dim"  # style of the scene-independent steps
 def command(
     scene: str | None,
     output: Path | None,
-    explain: bool,
     listing: bool,
     repetitions: int | None,
     more: int | None,
@@ -74,7 +70,6 @@ def command(
     \b
     Example:
         thenar simulate --list
-        thenar simulate quick --explain
         thenar simulate quick -o set.grasps
         thenar simulate quick --more 3 -o fresh.grasps
         thenar simulate crowd --subjects 20 --repetitions 6 -o hands.grasps
@@ -83,43 +78,28 @@ def command(
     from thenar.simulator.errors import SceneError
     from thenar.simulator.pipeline.scene_file import load_scene, located, own_file, shipped_scenes
 
-    _check_modes(scene, (output, explain, listing), keep_unsettled=keep_unsettled)
-    if scene is None:
+    if listing:
+        if scene is not None or output is not None:
+            raise click.UsageError("--list shows all shipped scenes: give it alone")
         scenes = shipped_scenes()
         listed = [{"name": name, "what": what} for name, what in scenes.items()]
         show(listed, lambda _: echo("\n".join(f"{name:<16}{what}" for name, what in scenes.items())))
         return
+    if scene is None:
+        raise click.UsageError("name a scene: a TOML file, or a shipped one (thenar simulate --list)")
     loaded = load_scene(scene).varied(repetitions, seed, names, more, rest, subjects)
+    if output is None:
+        raise click.UsageError("name the set to write: -o SET.grasps")
+    from thenar.simulator.pipeline.simulation import simulate
+
+    keep_apart(own_file(scene), output)
     try:
-        if output is not None:
-            from thenar.simulator.pipeline.simulation import simulate
-
-            keep_apart(own_file(scene), output)
-            with progress(f"simulating {loaded.name}") as report:
-                simulated = simulate(loaded, jobs, report, keep_unsettled=keep_unsettled)
-            simulated.grasp_set.save(output)
-            show(simulated.report, _print_report, output, simulated.grasp_set.size)
-        else:
-            from thenar.simulator.pipeline.explain import explain as explained
-
-            show(explained(loaded, jobs), _print_explanation)
+        with progress(f"simulating {loaded.name}") as report:
+            simulated = simulate(loaded, jobs, report, keep_unsettled=keep_unsettled)
     except SceneError as fault:
         raise located(scene, fault) from fault
-
-
-def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled: bool) -> None:
-    """Raise UsageError unless exactly one mode is given, with the options that it needs."""
-    asked = [name for name, value in zip(_MODES, given, strict=True) if value]
-    if len(asked) != 1:
-        raise click.UsageError(f"choose one mode: {', '.join(_MODES)}")
-    if (asked == ["--list"]) != (scene is None):
-        raise click.UsageError(
-            "name a scene: a TOML file, or a shipped one (thenar simulate --list)"
-            if scene is None
-            else f"--list shows all shipped scenes: leave out {scene}"
-        )
-    if keep_unsettled and asked != ["--output"]:
-        raise click.UsageError("--keep-unsettled changes the set that --output writes: name it, or leave this out")
+    simulated.grasp_set.save(output)
+    show(simulated.report, _print_report, output, simulated.grasp_set.size)
 
 
 def _print_report(report: "SimulationReport", path: Path, size: str) -> None:
@@ -174,32 +154,6 @@ def _table(title: str, *columns: str) -> Table:
     made.title_justify = "left"
     made.columns[0].no_wrap = True
     return made
-
-
-def _print_explanation(explanation: "Explanation") -> None:
-    """Print the steps of a scene in order, the function and cost of each, and the expected run time."""
-    console = out()
-    steps = _table(
-        f"Steps of scene {explanation.scene}, in order (own: a step that every scene has)",
-        *("step", "whose", "acts", "draws a grasp", "us a grasp", "share"),
-    )
-    for step in explanation.steps:
-        acts = "on bytes" if step.on_wire else "in time" if step.timed else ""
-        costs = (f"{step.draws_a_grasp:.1f}", f"{step.us_a_grasp:.1f}", f"{step.share:.1%}")
-        steps.add_row(step.name, _whose(step.own), acts, *costs, style=_OWN if step.own else "")
-    console.print(steps)
-    console.print()
-    for step in explanation.steps:
-        text = Text(f"{step.name}: {step.summary}\n", _OWN if step.own else "")
-        console.print(text.append(f"    {', '.join(step.reads) or 'nothing'} -> {', '.join(step.writes)}"))
-    frames = "every frame" if explanation.timed else "one frame per grasp, since no effect depends on time"
-    wire = ", sent and received as bytes" if explanation.on_wire else ""
-    console.print(
-        f"\nsimulated: {frames}{wire}\n"
-        f"measured here on {explanation.measured} grasps of {explanation.conditions} conditions: "
-        f"{explanation.us_a_grasp:.0f} us a grasp on one core; {explanation.repetitions} grasps on "
-        f"{explanation.workers} core(s) should take about {explanation.expected_s:.1f} s plus the start of processes"
-    )
 
 
 def _whose(own: bool) -> str:

@@ -38,7 +38,7 @@ def command(
 ) -> None:
     """Specify the reduced glove of a BUILD: switch positions, wiring, parts to buy, and expected performance.
 
-    The files are the pattern at 1:1 as SVG and DXF, lists of switches, wires and materials, a netlist for KiCad, and
+    The files are the pattern at 1:1, lists of switches, wires and materials, a netlist for KiCad, and
     glove.toml.
 
     \b

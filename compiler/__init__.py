@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from .artifact.adapting import AdaptedBuild, adapt
     from .artifact.compile import compile_build
     from .artifact.documents import BuildReport, Documents
-    from .artifact.estimator import compile, export_c  # noqa: A004
+    from .artifact.exporting import export_c
     from .artifact.verify import FaultCheck, Verification, verify, verify_faults
-    from .classifiers import AdditiveLogitClassifier, LogitBoostClassifier
+    from .classifiers import LogitBoostClassifier
     from .evaluation.folds import EvaluationError
     from .evaluation.study import Study, StudyDesign, evaluate
     from .firmware.targets import TARGETS
@@ -57,9 +57,9 @@ _HOMES = {
     ".artifact.compile": ("compile_build",),
     ".artifact.documents": ("BuildReport", "Documents"),
     ".artifact": ("CompileError",),
-    ".artifact.estimator": ("compile", "export_c"),
+    ".artifact.exporting": ("export_c",),
     ".artifact.verify": ("FaultCheck", "Verification", "verify", "verify_faults"),
-    ".classifiers": ("AdditiveLogitClassifier", "LogitBoostClassifier"),
+    ".classifiers": ("LogitBoostClassifier",),
     ".evaluation.folds": ("EvaluationError",),
     ".evaluation.study": ("Study", "StudyDesign", "evaluate"),
     ".firmware.targets": ("TARGETS",),
@@ -84,7 +84,6 @@ __all__ = [
     "TARGETS",
     "TRAINERS",
     "AdaptedBuild",
-    "AdditiveLogitClassifier",
     "Bins",
     "Bit",
     "Build",
@@ -115,7 +114,6 @@ __all__ = [
     "TrainingError",
     "Verification",
     "adapt",
-    "compile",
     "compile_build",
     "evaluate",
     "export_c",

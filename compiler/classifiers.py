@@ -1,6 +1,5 @@
-"""Trainers as scikit-learn estimators: LogitBoost on decision stumps, and the additive multinomial logit."""
+"""The paper's trainer as a scikit-learn estimator: LogitBoost on decision stumps."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Self
 
@@ -13,9 +12,7 @@ from thenar.runtime.model.tables import TIE, winners
 from .elementary import Floats, softmax
 from .samples import TrainingError
 from .trainers.base import check_weights
-from .trainers.logit import BINS, PENALTY, SMOOTHNESS, fit_logit
 from .trainers.logitboost import boost
-from .trainers.newton import TOLERANCE
 
 with optional():
     from sklearn.base import BaseEstimator, ClassifierMixin
@@ -24,120 +21,11 @@ with optional():
     from sklearn.utils.validation import check_is_fitted, validate_data
 
 
-class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[misc]
-    """A classifier whose scores are a sum over inputs. Subclasses have a parameter `classes` and implement `_learn`."""
-
-    classes: Sequence[Any] | None
-
-    def fit(
-        self,
-        X: ArrayLike,
-        y: ArrayLike,
-        sample_weight: ArrayLike | None = None,
-        progress: Callable[[int, int], None] | None = None,
-    ) -> Self:
-        """Train on X (n, d) and labels y (n,).
-
-        Parameters
-        ----------
-        X : array-like, shape (n, d)
-            Finite numbers.
-        y : array-like, shape (n,)
-            Labels.
-        sample_weight : array-like, shape (n,), optional
-            The weight of each row; 0 removes it.
-        progress : callable, optional
-            Called with (done, total) after every round, if the method has rounds.
-
-        Returns
-        -------
-        AdditiveClassifier
-            This estimator, fitted.
-
-        Raises
-        ------
-        TrainingError
-            A ValueError, if a parameter, a weight or a label is invalid.
-        ValueError
-            If X holds NaN or an infinity, here and wherever X is given.
-        """
-        inputs, targets = validate_data(self, X, y, dtype=_kept_dtypes(X))
-        if self.classes is None:
-            check_classification_targets(targets)
-        self.classes_ = np.unique(targets) if self.classes is None else np.asarray(self.classes)
-        labels, weights = self._index(targets), None
-        if sample_weight is not None:
-            weights = check_array(sample_weight, ensure_2d=False, dtype=np.float64, input_name="sample_weight")
-            check_weights(weights, len(inputs))
-            # Remove rows of zero weight: their values make no thresholds (in Weka they do).
-            kept = weights > 0
-            inputs, labels, weights = inputs[kept], labels[kept], weights[kept]
-        self._learn(inputs, labels, weights, progress)
-        return self
-
-    def decision_function(self, X: ArrayLike) -> Floats:
-        """Return the additive scores F (n, K) of X (n, d); with two classes the second's minus the first's, (n,).
-
-        The class with the largest score is predicted, the lowest number at a tie.
-        """
-        return self._decided(self._scores(X))
-
-    def predict_proba(self, X: ArrayLike) -> Floats:
-        """Return class probabilities (n, K), columns as in `classes_`."""
-        scores = self._scores(X)
-        return np.ascontiguousarray(softmax(np.ascontiguousarray(scores.T)).T)
-
-    def predict(self, X: ArrayLike) -> NDArray[Any]:
-        """Return the label (n,) with the largest score."""
-        best = winners(self._scores(X))
-        labels: NDArray[Any] = self.classes_[best]
-        return labels
-
-    @abstractmethod
-    def _learn(
-        self,
-        inputs: NDArray[Any],
-        labels: NDArray[np.intp],
-        weights: Floats | None,
-        progress: Callable[[int, int], None] | None,
-    ) -> None:
-        """Fit inputs (n, d), class numbers (n,), and weights (n,) above 0, and set the fitted attributes."""
-
-    @abstractmethod
-    def _sums(self, inputs: NDArray[Any]) -> Floats:
-        """Return the scores (n, K) of inputs (n, d)."""
-
-    def _decided(self, scores: Floats) -> Floats:
-        if len(self.classes_) != 2:
-            return scores
-        lead = scores[:, 1] - scores[:, 0]
-        # Tied scores, which go to the first class, have a lead of zero.
-        return np.where(np.abs(lead) <= TIE, 0.0, lead)
-
-    def _scores(self, X: ArrayLike) -> Floats:
-        return self._sums(self._inputs(X))
-
-    def _inputs(self, X: ArrayLike) -> NDArray[Any]:
-        check_is_fitted(self)
-        inputs: NDArray[Any] = validate_data(self, X, reset=False, dtype=_kept_dtypes(X))
-        return inputs
-
-    def _index(self, targets: NDArray[Any]) -> NDArray[np.intp]:
-        matches = targets[:, np.newaxis] == self.classes_
-        if not matches.any(axis=1).all():
-            strange = targets[~matches.any(axis=1)][0]
-            raise TrainingError(
-                f"label {str(strange)!r} of y is not among the declared classes {self.classes_.tolist()}"
-            )
-        found: NDArray[np.intp] = matches.argmax(axis=1)
-        return found
-
-
-class LogitBoostClassifier(AdditiveClassifier):
+class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     """Additive logistic regression on decision stumps, multi-class as Weka 3.6's LogitBoost computes it.
 
     Inputs are bits, integer codes or floating-point numbers, X (n, d). A threshold lies midway between two neighbouring
-    values of the training set. `compile_build` trains this classifier, and `compile` makes a build of a fitted one.
+    values of the training set. `compile_build` trains the same with `trainer="logitboost"`.
 
     Parameters
     ----------
@@ -194,18 +82,49 @@ class LogitBoostClassifier(AdditiveClassifier):
         self.max_bins = max_bins
         self.classes = classes
 
-    def staged_decision_function(self, X: ArrayLike) -> Iterator[Floats]:
-        """Yield the scores after 1, 2, ... rounds: one training gives every number of rounds."""
-        inputs = self._inputs(X)
-        return map(self._decided, self.stumps_.staged_scores(inputs))
-
-    def _learn(
+    def fit(
         self,
-        inputs: NDArray[Any],
-        labels: NDArray[np.intp],
-        weights: Floats | None,
-        progress: Callable[[int, int], None] | None,
-    ) -> None:
+        X: ArrayLike,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Self:
+        """Train on X (n, d) and labels y (n,).
+
+        Parameters
+        ----------
+        X : array-like, shape (n, d)
+            Finite numbers.
+        y : array-like, shape (n,)
+            Labels.
+        sample_weight : array-like, shape (n,), optional
+            The weight of each row; 0 removes it.
+        progress : callable, optional
+            Called with (done, total) after every round.
+
+        Returns
+        -------
+        LogitBoostClassifier
+            This estimator, fitted.
+
+        Raises
+        ------
+        TrainingError
+            A ValueError, if a parameter, a weight or a label is invalid.
+        ValueError
+            If X holds NaN or an infinity, here and wherever X is given.
+        """
+        inputs, targets = validate_data(self, X, y, dtype=_kept_dtypes(X))
+        if self.classes is None:
+            check_classification_targets(targets)
+        self.classes_ = np.unique(targets) if self.classes is None else np.asarray(self.classes)
+        labels, weights = self._index(targets), None
+        if sample_weight is not None:
+            weights = check_array(sample_weight, ensure_2d=False, dtype=np.float64, input_name="sample_weight")
+            check_weights(weights, len(inputs))
+            # Remove rows of zero weight: their values make no thresholds (in Weka they do).
+            kept = weights > 0
+            inputs, labels, weights = inputs[kept], labels[kept], weights[kept]
         self.stumps_, losses = boost(
             inputs,
             labels,
@@ -220,88 +139,56 @@ class LogitBoostClassifier(AdditiveClassifier):
         )
         self.n_rounds_ = self.stumps_.n_rounds
         self.losses_ = np.array(losses)
+        return self
 
-    def _sums(self, inputs: NDArray[Any]) -> Floats:
+    def decision_function(self, X: ArrayLike) -> Floats:
+        """Return the additive scores F (n, K) of X (n, d); with two classes the second's minus the first's, (n,).
+
+        The class with the largest score is predicted, the lowest number at a tie.
+        """
+        return self._decided(self._scores(X))
+
+    def predict_proba(self, X: ArrayLike) -> Floats:
+        """Return class probabilities (n, K), columns as in `classes_`."""
+        scores = self._scores(X)
+        return np.ascontiguousarray(softmax(np.ascontiguousarray(scores.T)).T)
+
+    def predict(self, X: ArrayLike) -> NDArray[Any]:
+        """Return the label (n,) with the largest score."""
+        best = winners(self._scores(X))
+        labels: NDArray[Any] = self.classes_[best]
+        return labels
+
+    def staged_decision_function(self, X: ArrayLike) -> Iterator[Floats]:
+        """Yield the scores after 1, 2, ... rounds: one training gives every number of rounds."""
+        inputs = self._inputs(X)
+        return map(self._decided, self.stumps_.staged_scores(inputs))
+
+    def _decided(self, scores: Floats) -> Floats:
+        if len(self.classes_) != 2:
+            return scores
+        lead = scores[:, 1] - scores[:, 0]
+        # Tied scores, which go to the first class, have a lead of zero.
+        return np.where(np.abs(lead) <= TIE, 0.0, lead)
+
+    def _scores(self, X: ArrayLike) -> Floats:
+        inputs = self._inputs(X)
         return self.stumps_.scores(inputs)
 
+    def _inputs(self, X: ArrayLike) -> NDArray[Any]:
+        check_is_fitted(self)
+        inputs: NDArray[Any] = validate_data(self, X, reset=False, dtype=_kept_dtypes(X))
+        return inputs
 
-class AdditiveLogitClassifier(AdditiveClassifier):
-    """Multinomial logistic regression on a table of scores for each input.
-
-    Inputs are bits, integer codes or floating-point numbers, X (n, d). An input of two values adds a row of scores at
-    the upper one; any other adds the row of its bin. The objective is convex, so the solution is unique. The trainer
-    `logit` fits the same model, and `compile` makes a build of a fitted classifier.
-
-    Parameters
-    ----------
-    penalty : float, default=0.5
-        Pull of scores towards zero: half of it times the sum of their squares is added to the loss. Bins have a
-        sixteenth of this pull, the bias a thousandth.
-    smoothness : float, default=2.0
-        Pull of neighbouring bins towards each other: half of it times the sum of squares of their differences is added.
-    max_bins : int, optional, default=16
-        The most bins per input (2 or more); they hold rows as evenly as possible. None: one for each value.
-    linear : bool, default=False
-        Inputs of more than two values add scores in proportion to them instead, between their minimum and maximum in
-        the training set; `smoothness` then pulls the contribution of one standard deviation.
-    tolerance : float, default=1e-7
-        No derivative of the loss is larger than this at the solution, relative to the total weight; at least 1e-12.
-    classes : sequence, optional
-        All labels, if y may lack some of them (a fold without a rare class). None: those in y.
-
-    Attributes
-    ----------
-    classes_ : ndarray, shape (K,)
-        The labels, in the order of the columns of scores and probabilities.
-    tables_ : ColumnTables
-        The rows of scores: `bias` (K,); for each column its `edges` and `rows`; and the `lines` of some columns.
-
-    Examples
-    --------
-    >>> from thenar.compiler import AdditiveLogitClassifier
-    >>> X, y = [[0, 10], [0, 200], [1, 30], [1, 220]], ["tip", "power", "tip", "power"]
-    >>> classifier = AdditiveLogitClassifier().fit(X, y)
-    >>> classifier.predict([[0, 20], [0, 215]]).tolist()
-    ['tip', 'power']
-    """
-
-    def __init__(
-        self,
-        penalty: float = PENALTY,
-        smoothness: float = SMOOTHNESS,
-        max_bins: int | None = BINS,
-        linear: bool = False,
-        tolerance: float = TOLERANCE,
-        classes: Sequence[Any] | None = None,
-    ) -> None:
-        self.penalty = penalty
-        self.smoothness = smoothness
-        self.max_bins = max_bins
-        self.linear = linear
-        self.tolerance = tolerance
-        self.classes = classes
-
-    def _learn(
-        self,
-        inputs: NDArray[Any],
-        labels: NDArray[np.intp],
-        weights: Floats | None,
-        progress: Callable[[int, int], None] | None,
-    ) -> None:
-        self.tables_ = fit_logit(
-            inputs,
-            labels,
-            len(self.classes_),
-            penalty=self.penalty,
-            smoothness=self.smoothness,
-            max_bins=self.max_bins,
-            linear=self.linear,
-            tolerance=self.tolerance,
-            weights=weights,
-        )
-
-    def _sums(self, inputs: NDArray[Any]) -> Floats:
-        return self.tables_.scores(inputs)
+    def _index(self, targets: NDArray[Any]) -> NDArray[np.intp]:
+        matches = targets[:, np.newaxis] == self.classes_
+        if not matches.any(axis=1).all():
+            strange = targets[~matches.any(axis=1)][0]
+            raise TrainingError(
+                f"label {str(strange)!r} of y is not among the declared classes {self.classes_.tolist()}"
+            )
+        found: NDArray[np.intp] = matches.argmax(axis=1)
+        return found
 
 
 def _kept_dtypes(X: ArrayLike) -> str | list[type]:

@@ -61,10 +61,10 @@ class Recogniser:
         The elements and joints that it reads.
     model : Model
         The additive model.
+    training : Training
+        How the model was trained.
     fitting : Fitting or None
-        How the fit was chosen; None for an estimator's model.
-    training : Training or None
-        How the model was trained; None for an estimator's.
+        How the fit was chosen; None if it was chosen before.
     groups : ndarray or None
         For each row (n,), what is left out where it is to generalise to new subjects, objects or sessions.
     """
@@ -73,8 +73,8 @@ class Recogniser:
     samples: Samples
     selection: InputSelection
     model: Model
+    training: Training
     fitting: Fitting | None = None
-    training: Training | None = None
     groups: Groups = None
 
     @classmethod
@@ -137,7 +137,7 @@ class Recogniser:
         training = Training.chosen(fitting, masked=recipe.robust)
         model = training.train(kept, report if len(candidates) == 1 else None)
         _check_model(model, kept, training)
-        return cls(recipe, samples, selection, model, fitting, training, groups)
+        return cls(recipe, samples, selection, model, training, fitting, groups)
 
     @classmethod
     def stages(
@@ -157,7 +157,7 @@ class Recogniser:
         models = training.stages(kept, rounds)
         for model in models:
             _check_model(model, kept, training)
-        return tuple(cls(recipe, samples, selection, model, training=training) for model in models)
+        return tuple(cls(recipe, samples, selection, model, training) for model in models)
 
     @property
     def elements(self) -> Elements:
@@ -187,13 +187,13 @@ class Recogniser:
 
     @cached_property
     def rejection(self) -> Rejection | None:
-        """The rule by which it rejects frames; None if it rejects none, and for an estimator's model.
+        """The rule by which it rejects frames; None if it rejects none.
 
         There is none either if nothing held is already a class, or if there are too few trials or only one group, so
         that the deviation of a new group cannot be estimated.
         """
         samples, recipe, groups = self.read(self.samples), self.recipe, self.groups
-        if self.training is None or not recipe.refuse or samples.has_none or NONE in samples.grasps:
+        if not recipe.refuse or samples.has_none or NONE in samples.grasps:
             return None
         several = 0 if groups is None else len(np.unique(groups))
         if several == 1:

@@ -65,15 +65,6 @@ def little(work: int, jobs: int) -> int:
     return 1 if work < _LITTLE else jobs
 
 
-def workers_of(jobs: int) -> int:
-    """Return the number of processes for `jobs`."""
-    if jobs == 1:
-        return 1
-    from joblib import effective_n_jobs
-
-    return int(effective_n_jobs(min(jobs, MOST_JOBS)))
-
-
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
     """Defer Ctrl-C and other signals that end a command. Processes started meanwhile never get these signals, so they

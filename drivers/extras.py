@@ -8,7 +8,7 @@ from .errors import ThenarError
 # The packages that the extras of pyproject.toml install, by import name.
 EXTRAS: Mapping[str, tuple[str, ...]] = {
     "compiler": (
-        *("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf", "clevercsv"),
+        *("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "clevercsv"),
         *("python_calamine", "pyarrow", "pandas", "h5py", "mcap"),
     ),
     "stability": ("mpmath",),

@@ -143,7 +143,6 @@ WORKSTATION_ONLY = {
     "threadpoolctl",
     "mpmath",
     "jinja2",
-    "ezdxf",
     "clevercsv",
     "python_calamine",
     "pyarrow",

@@ -198,7 +198,7 @@ def compile_build(
     recogniser = Recogniser.fit(samples, recipe, ports=ports, limits=limits, groups=groups, jobs=jobs, report=trained)
     made = BuildAssembly(grasp_set, recogniser, harness, hand)
     results = fold_results(grasp_set, samples, recipe, ports=ports, limits=limits, jobs=jobs, report=tested)
-    return made.publish(target, results, documents, jobs, progress)
+    return made.publish(target, results, documents)
 
 
 def _sound(options: Recipe) -> Recipe:
@@ -251,14 +251,7 @@ class BuildAssembly:
         grasps = self.kept.without_none()
         self.faults = count_faults(self.integers, grasps.switches, grasps.codes, grasps.labels, grasps.trials, groups)
 
-    def publish(
-        self,
-        target: Path,
-        tested: Tested | None,
-        documents: Documents | None,
-        jobs: int,
-        progress: Report | None,
-    ) -> BuildReport:
+    def publish(self, target: Path, tested: Tested | None, documents: Documents | None) -> BuildReport:
         """Write the build as `target`, with the requested `documents`."""
         from ..report.tryout import try_html
 
@@ -296,7 +289,7 @@ class BuildAssembly:
         )
         files |= {path: text.encode() for path, text in firmware.items()}
         if documents is not None:
-            files |= documents.files(report, jobs, progress)
+            files |= documents.files(report)
         publish(files | {MANIFEST_NAME: described}, target)
         return report
 

@@ -11,29 +11,20 @@ from numpy.typing import NDArray
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.model.integers import IntegerTables
-from thenar.runtime.recipe import Recipe, changed
 from thenar.runtime.scanning.scanmap import ScanMap
 
-from ..evaluation.folds import EvaluationError
 from ..facts import Fact, facts
 from ..hand import HandShape
 from ..model.compare import Comparison, worst_case
 from ..model.faults import FaultCounts
 from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
-from ..trainers.base import Report
-from ..workers import little
-from .training import USUAL_ROUNDS
 
 if TYPE_CHECKING:
-    from ..evaluation.study import Study
     from ..frontier.points import Frontier
     from ..movements.transitions import Transitions
 
 REPORT_NAME, TRY_NAME, SPEC_FOLDER = "report.html", "try.html", "spec"
-_TRAININGS = 40  # roughly, for the paper's tables
-# Of more subjects there are no such tables: every pair of subjects is a cell.
-_MOST_SUBJECTS = 30
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -111,33 +102,29 @@ class Documents:
     ----------
     hand : HandShape, optional
         The recorded glove, laid flat: pictures show the switches on it, if it has them all.
-    hand_length : float, optional
-        The wearer's hand length for the reduced glove, mm; None: as long as `hand`.
     frontier, point : Frontier and int, optional
         The frontier from which a point is built, and the point's number.
     """
 
     hand: HandShape | None = None
-    hand_length: float | None = None
     frontier: "Frontier | None" = None
     point: int | None = None
 
-    def files(self, made: BuildReport, jobs: int = -1, progress: Report | None = None) -> Mapping[str, bytes]:
-        """Return path in the build's folder -> content; `jobs` processes compute the paper's tables."""
+    def files(self, made: BuildReport) -> Mapping[str, bytes]:
+        """Return path in the build's folder -> content."""
         from ..glove.files import spec_files
 
-        files = {REPORT_NAME: self._report(made, jobs, progress)}
+        files = {REPORT_NAME: self._report(made)}
         if names := list(dict.fromkeys(switch.source for switch in made.manifest.switches)):
-            hand = None if self.hand is None else self.hand.fitted(names, self.hand_length)
+            hand = None if self.hand is None else self.hand.fitted(names)
             spec = spec_files(made.manifest, made.scan, made.harness, hand)
             files |= {f"{SPEC_FOLDER}/{name}": content for name, content in spec.items()}
         return files
 
-    def _report(self, made: BuildReport, jobs: int, progress: Report | None) -> bytes:
+    def _report(self, made: BuildReport) -> bytes:
         from ..report.content import ReportContent
         from ..report.page import report_html
 
-        study, no_study = _study(made, jobs, progress)
         names = [switch.name for switch in made.manifest.switches]
         return report_html(
             ReportContent(
@@ -147,8 +134,6 @@ class Documents:
                 warnings=made.warnings,
                 tree=made.recogniser.selection.tree,
                 confusion=made.confusion,
-                study=study,
-                no_study=no_study,
                 frontier=self.frontier,
                 point=self.point,
                 hand=None if self.hand is None else self.hand.fitted(made.grasp_set.element_names),
@@ -172,33 +157,3 @@ def _transitions(grasp_set: GraspSet) -> "Transitions | None":
         return Transitions.of_set(grasp_set) if grasp_set.is_none.any() else None
     except RecordingError:
         return None
-
-
-def _study(made: BuildReport, jobs: int, progress: Report | None) -> "tuple[Study | None, str]":
-    """Return the paper's tables, nested, once, with the build's folds, trainer and seed; or the reason why not.
-
-    They are computed last, when nothing else can fail any more.
-    """
-    from ..evaluation.study import StudyDesign, evaluate
-
-    options, fit = made.manifest.options, made.manifest.fit
-    settings = {name: value for name, value in fit.settings.items() if value is not None}
-    if not options.folds:
-        return None, "The build was compiled without folds."
-    if (subjects := len(np.unique(made.grasp_set.subjects))) > _MOST_SUBJECTS:
-        return None, f"The paper's tables have a column for each subject: {subjects} are too many for a page."
-    rounds = int(settings.pop("rounds", None) or USUAL_ROUNDS)
-    recipe = Recipe(
-        trainer=fit.trainer,
-        folds=options.folds,
-        seed=options.seed,
-        levels=options.levels,
-        keep_joints=options.keep_joints,
-    )
-    recipe = changed(recipe, {"rounds": rounds, **settings})
-    try:
-        design = StudyDesign(recipe, repeats=1, protocols=("nested",), tables=("compositions", "generality", "pruning"))
-        work = _TRAININGS * len(made.grasp_set) * rounds
-        return evaluate(made.grasp_set, design, little(work, jobs), progress), ""
-    except EvaluationError as reason:
-        return None, f"These recordings do not allow the paper's tables: {reason}."

@@ -1,20 +1,15 @@
 """`ensemble.bin`: the model that a build was collapsed from, kept for verification.
 
-A sealed npz (compiler/arrays.py) in one of five formats.
+A sealed npz (compiler/arrays.py) in one of two formats.
 
 Format 1, LogitBoost: columns (M, K) int32, thresholds (M, K) float64 and values (M, K, 3) float64, with a JSON header
 {"n_inputs", "shrinkage"}.
 Format 2, every other trainer: bias (K,), switch_rows (s, K), bins (j,) int64, thresholds (sum of bins - 1,) uint16 and
-joint_rows (sum of bins, K); float64 unless stated; the header is {}.
-Format 3, models with lines: format 2 plus lines (n, 3) int64, the joint and its lowest and highest code, and
-line_rows (n, K).
-Format 4, models with grids of two joints: format 2 plus pairs (n, 4) int64, both joints and the number of thresholds of
-each, pair_thresholds uint16, grid after grid, and pair_rows (sum of cells, K).
-Format 5, models with terms of other kinds: format 2 plus term_N_FIELD, the fields of further term N (`Term.arrays`),
-and the header {"kinds"}, the kinds of the further terms.
+joint_rows (sum of bins, K); float64 unless stated; term_N_FIELD, the fields of further term N (`Term.arrays`), such as
+a line or a grid; and the header {"kinds"}, the kinds of the further terms, if there are any.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 import msgspec
@@ -24,9 +19,7 @@ from msgspec import Meta
 from thenar.runtime.errors import BuildError
 from thenar.runtime.model.integers import MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
 from thenar.runtime.model.tables import ScoreTables
-from thenar.runtime.model.terms.base import HIGHEST_CODE, TERMS, CoreTerm, Term
-from thenar.runtime.model.terms.grid import Grid
-from thenar.runtime.model.terms.line import Line
+from thenar.runtime.model.terms.base import HIGHEST_CODE, TERMS, Term
 from thenar.runtime.sealed import seal, unseal
 
 from ..arrays import AnyArray, pack, unpack
@@ -35,7 +28,7 @@ from ..trainers.base import Model
 from ..trainers.stumps import Stumps
 
 KIND = b"THNRENSM"
-STUMPS, TABLES, LINES, PAIRS, OTHERS = 1, 2, 3, 4, 5  # formats
+STUMPS, TABLES = 1, 2  # formats
 MAX_BYTES = 1 << 30
 
 # This many times a column, a threshold and three values are just below a gigabyte.
@@ -45,8 +38,6 @@ _DTYPES = {
     STUMPS: {"columns": "<i4", "thresholds": "<f8", "values": "<f8"},
     TABLES: {"bias": "<f8", "switch_rows": "<f8", "bins": "<i8", "thresholds": "<u2", "joint_rows": "<f8"},
 }
-_DTYPES[LINES] = _DTYPES[TABLES] | {"lines": "<i8", "line_rows": "<f8"}
-_DTYPES[PAIRS] = _DTYPES[TABLES] | {"pairs": "<i8", "pair_thresholds": "<u2", "pair_rows": "<f8"}
 
 # Larger than any value of boosting (logitboost.LARGEST_Z_MAX); for thresholds, larger than every code.
 _LARGEST_VALUE, _LARGEST_THRESHOLD = 1e6, 1e6
@@ -68,7 +59,7 @@ def ensemble_to_bytes(model: Model) -> bytes:
         version, header = STUMPS, msgspec.json.encode(_StumpsHeader(model.n_inputs, model.shrinkage))
         arrays = {"columns": model.columns, "thresholds": model.thresholds, "values": model.values}
     else:
-        version, header = TABLES, msgspec.json.encode(_TermsHeader())
+        version, header = TABLES, msgspec.json.encode(_TermsHeader(tuple(term.name for term in model.further)))
         arrays = {
             "bias": model.bias,
             "switch_rows": model.switch_rows,
@@ -76,21 +67,9 @@ def ensemble_to_bytes(model: Model) -> bytes:
             "thresholds": np.concatenate([np.zeros(0), *model.thresholds]),
             "joint_rows": np.concatenate([np.zeros((0, model.n_classes)), *model.joint_rows]),
         }
-        if any(not isinstance(term, CoreTerm) for term in model.terms):
-            version, header = OTHERS, msgspec.json.encode(_TermsHeader(tuple(term.name for term in model.further)))
-            for number, term in enumerate(model.further):
-                arrays |= {f"term_{number}_{name}": array for name, array in term.arrays().items()}
-        elif model.lines:
-            version = LINES
-            arrays["lines"] = np.array([(line.joint, line.low, line.high) for line in model.lines])
-            arrays["line_rows"] = np.stack([line.row for line in model.lines])
-        elif model.grids:
-            version = PAIRS
-            arrays["pairs"] = np.array([(*grid.joints, *map(len, grid.thresholds)) for grid in model.grids])
-            arrays["pair_thresholds"] = np.concatenate([each for grid in model.grids for each in grid.thresholds])
-            arrays["pair_rows"] = np.concatenate([grid.cells for grid in model.grids])
-    dtypes = _DTYPES.get(version, _DTYPES[TABLES])
-    written = {name: array.astype(dtypes.get(name, array.dtype)) for name, array in arrays.items()}
+        for number, term in enumerate(model.further):
+            arrays |= {f"term_{number}_{name}": array for name, array in term.arrays().items()}
+    written = {name: array.astype(_DTYPES[version].get(name, array.dtype)) for name, array in arrays.items()}
     return seal(KIND, version, pack(header, written))
 
 
@@ -99,10 +78,10 @@ def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
 
     Raises FormatError for a file that is foreign, truncated, altered or newer, and BuildError for an inconsistent one.
     """
-    version, payload = unseal(data, KIND, OTHERS, what)
+    version, payload = unseal(data, KIND, TABLES, what)
     header_bytes, arrays = unpack(payload, what)
-    dtypes = _DTYPES.get(TABLES if version == OTHERS else version, {})
-    found = {name: array.dtype for name, array in arrays.items() if version != OTHERS or not name.startswith("term_")}
+    dtypes = _DTYPES.get(version, {})
+    found = {name: array.dtype for name, array in arrays.items() if version != TABLES or not name.startswith("term_")}
     if found != {name: np.dtype(dtype) for name, dtype in dtypes.items()}:
         raise BuildError(f"{what} is damaged: its arrays are not {', '.join(dtypes)}")
     try:
@@ -199,51 +178,24 @@ def _tables(arrays: Mapping[str, AnyArray], kinds: Sequence[str], what: str) -> 
     ends = np.cumsum(bins)[:-1]
     steps = np.split(thresholds, ends - np.arange(1, len(bins))) if len(bins) else []
     rows = np.split(joint_rows, ends) if len(bins) else []
-    further = (*_lines(arrays, what), *_grids(arrays, what), *_others(arrays, kinds, what))
-    tables = ScoreTables.of(bias, switch_rows, steps, rows, further)
+    tables = ScoreTables.of(bias, switch_rows, steps, rows, _further(arrays, kinds, what))
     if fault := model_fault(tables, len(switch_rows), len(bins), len(bias)):
         raise BuildError(f"{what} is damaged: it {fault}")
     return tables
 
 
-def _lines(arrays: Mapping[str, AnyArray], what: str) -> tuple[Line, ...]:
-    if "lines" not in arrays:
-        return ()
-    lines, rows = arrays["lines"].astype(np.int64), arrays["line_rows"].astype(np.float64)
-    if lines.ndim != 2 or rows.ndim != 2 or lines.shape != (len(rows), 3) or not len(rows):
-        raise BuildError(f"{what} is damaged: its lines do not form a table")
-    return tuple(Line(joint, low, high, row) for (joint, low, high), row in zip(lines.tolist(), rows, strict=True))
-
-
-def _grids(arrays: Mapping[str, AnyArray], what: str) -> tuple[Grid, ...]:
-    if "pairs" not in arrays:
-        return ()
-    pairs, steps = arrays["pairs"].astype(np.int64), arrays["pair_thresholds"].astype(np.uint16)
-    rows = arrays["pair_rows"].astype(np.float64)
-    if (pairs.ndim, steps.ndim, rows.ndim) != (2, 1, 2) or not pairs.size or pairs.shape[1] != 4:
-        raise BuildError(f"{what} is damaged: its grids do not form a table")
-    counts = pairs[:, 2:]
-    if (counts < 0).any() or counts.max() > HIGHEST_CODE:
-        raise BuildError(f"{what} is damaged: its grids have thresholds that are not codes")
-    cells = (counts + 1).prod(axis=1)
-    if counts.sum() != len(steps) or cells.sum() != len(rows):
-        raise BuildError(f"{what} is damaged: its grids belong to different tables")
-    own = iter(np.split(steps, np.cumsum(counts.ravel())[:-1]))
-    blocks = np.split(rows, np.cumsum(cells)[:-1])
-    found = (
-        (a, b, (next(own), next(own)), block.reshape(one + 1, other + 1, -1))
-        for (a, b, one, other), block in zip(pairs.tolist(), blocks, strict=True)
-    )
-    return tuple(Grid((a, b), thresholds, block) for a, b, thresholds, block in found)
-
-
-def _others(arrays: Mapping[str, AnyArray], kinds: Sequence[str], what: str) -> Iterator[Term]:
-    """Yield the further terms of these kinds. Raises SettingError for a kind that no installed package defines."""
+def _further(arrays: Mapping[str, AnyArray], kinds: Sequence[str], what: str) -> tuple[Term, ...]:
+    """Return the further terms of these kinds. Raises SettingError for a kind that no installed package defines."""
+    terms, names = list[Term](), set(_DTYPES[TABLES])
     for number, name in enumerate(kinds):
         prefix = f"term_{number}_"
         fields = {key.removeprefix(prefix): array for key, array in arrays.items() if key.startswith(prefix)}
         kind = TERMS.named(name)
         try:
-            yield kind.from_arrays(fields)
+            terms.append(kind.from_arrays(fields))
         except (KeyError, TypeError, ValueError, IndexError) as wrong:
             raise BuildError(f"{what} is damaged: term {number}, {name!r}, makes no sense: {wrong}") from None
+        names |= {f"{prefix}{field}" for field in terms[-1].arrays()}
+    if strange := sorted(arrays.keys() - names):
+        raise BuildError(f"{what} is damaged: {strange[0]} belongs to no term")
+    return tuple(terms)

@@ -28,14 +28,13 @@ from ..evaluation.rates import RecipeWords, student
 from ..movements.segments import (
     LAG_TICKS,
     OVERLAPS,
-    Counts,
     SegmentScore,
     announced_live,
     live_states,
     score_streams,
     segments_of,
 )
-from ..movements.streams import TICK_US, movements_of, streams_of
+from ..movements.streams import TICK_US, in_movements, streams_of
 from ..recogniser import Recogniser
 from ..recordings import RecordingError
 from ..recordings.graspset import GraspSet
@@ -53,7 +52,6 @@ METHODS = {
     "decoder, afterwards": "exact",
     "dwell 50 ms": "today's rule",
     "dwell 200 ms": "",
-    "plain HMM": "a state a frame, afterwards",
 }
 SHARES = (*(f"F1@{overlap}" for overlap in OVERLAPS), "edit", "recognised")
 TIMES = ("onset ms", "onset 90 % ms", "end ms", "end 90 % ms", "latency ms")
@@ -181,7 +179,6 @@ def _chosen(grasp_set: GraspSet, kind: Inputs, options: Recipe, subject: str) ->
     """Return the options with the trainer and settings that suit all other subjects best."""
     others, learning, some = _learning(grasp_set, kind, options, subject)
     training = Recogniser.fit(learning.rows(some), options, groups=_groups(others.rows(some))).training
-    assert training is not None
     settings: dict[str, Any] = dict(training.settings)
     return subject, replace(options, trainer=training.trainer, settings=settings, **dict.fromkeys(SHARED))
 
@@ -199,13 +196,12 @@ def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Recipe]) -> tuple[
     model = segments_for(others, learning, scores, tables.scale)
     assert model is not None
     read = recogniser.read(samples)
-    counts = Counts.of((learning.labels[stream.rows] for stream in streams_of(others)), samples.n_types)
     parts: dict[str, list[tuple[bool, Labels, Labels, Labels | None]]] = {name: [] for name in METHODS}
     for stream in streams_of(grasp_set):
         if stream.subject == subject:
             part = read.rows(stream.rows)
             whole = tables.scores(part.switches, part.codes)
-            for name, (states, announced) in _decoded(whole, model, counts, tables.scale).items():
+            for name, (states, announced) in _decoded(whole, model, tables.scale).items():
                 parts[name].append((stream.continued, part.labels, states, announced))
     return kind, subject, {name: score_streams(every, model.n_types) for name, every in parts.items()}
 
@@ -214,7 +210,7 @@ def _inner_folds(learning: Samples, others: GraspSet, options: Recipe) -> list[F
     """Return folds that together test all rows of streams: each leaves out some subjects, or half of the movements of
     the only one.
     """
-    rows = np.flatnonzero(movements_of(others).inside)
+    rows = np.flatnonzero(in_movements(others))
     several = len(np.unique(others.subjects[rows]))
     if several > 1:
         folds = leave_groups_out(others.subjects[rows], "subject", min(several, _INNER))
@@ -225,7 +221,7 @@ def _inner_folds(learning: Samples, others: GraspSet, options: Recipe) -> list[F
 
 
 def _decoded(
-    scores: NDArray[np.int32], model: SegmentModel, counts: Counts, scale: float
+    scores: NDArray[np.int32], model: SegmentModel, scale: float
 ) -> Mapping[str, tuple[Labels, Labels | None]]:
     """Return each method's result for scores (T, K + 1) of a stream: states, and announcements in time."""
     none, policy = model.n_types, Policy()
@@ -241,26 +237,7 @@ def _decoded(
         "decoder, live": (live, announced_live(live, none, LAG_TICKS)),
         "decoder, afterwards": (decode(model, emissions(scores, model)), None),
         **{name: (states := np.array(found, np.intp), states) for name, found in ruled.items()},
-        "plain HMM": (_hidden_markov(scores / scale, counts), None),
     }
-
-
-def _hidden_markov(scores: NDArray[np.float64], counts: Counts) -> Labels:
-    """Return the most probable states of a chain with the counted changes per tick and softmax scores (T, K + 1)."""
-    ticks = np.array([sum(durations) for durations in counts.durations]) + 1.0
-    changes = counts.changes + 0.5 * (1 - np.eye(len(ticks)))
-    changes = changes * (1 - np.eye(len(ticks)))
-    chain = changes / (ticks + changes.sum(axis=1))[:, np.newaxis]
-    logs = np.log(chain + np.diag(1 - chain.sum(axis=1)))
-    best, back = scores[0], np.zeros((len(scores), len(ticks)), np.intp)
-    for tick in range(1, len(scores)):
-        ways = best[:, np.newaxis] + logs
-        back[tick] = ways.argmax(axis=0)
-        best = ways.max(axis=0) + scores[tick]
-    states = [int(best.argmax())]
-    for tick in range(len(scores) - 1, 0, -1):
-        states.append(int(back[tick, states[-1]]))
-    return np.array(states[::-1], np.intp)
 
 
 def _row(scores: list[SegmentScore]) -> dict[str, SubjectMean]:

@@ -1,9 +1,7 @@
 """Timelines: the segments that a build finds in whole movements or in a recording of a live glove; written and drawn.
 
-Files are a table (.csv), an annotation document of ELAN (.eaf) or annotations in an MCAP file (.mcap). An ELAN document
-(format 3.0, www.mpi.nl/tools/elan/EAFv3.0.xsd) has a tier for each stream, and one for the truth where it is known;
-times are milliseconds from the start of the earliest stream. In MCAP the segments are JSON messages on one topic, with
-their schema, logged at their start. Files carry no date: equal segments give equal bytes.
+Files are a table (.csv) or annotations in an MCAP file (.mcap): JSON messages on one topic, with their schema, logged
+at the start of each segment. Files carry no date: equal segments give equal bytes.
 """
 
 import io
@@ -12,7 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
-from xml.etree import ElementTree
 
 import msgspec
 import numpy as np
@@ -40,9 +37,6 @@ if TYPE_CHECKING:
 _LONGEST_LAG_US = 10_000_000
 MCAP = ".mcap"
 TOPIC = "/thenar/segments"
-_EAF = "3.0"
-_XSI = "http://www.w3.org/2001/XMLSchema-instance"
-_EPOCH = "1970-01-01T00:00:00+00:00"
 _WIDTH_IN, _LINE_IN, _MOST_LINES = 11.0, 0.62, 60
 # With this many seconds per line and this font size, the name of a type fits into most grasps.
 _SECONDS, _POINTS = 10.0, 7.0
@@ -274,44 +268,6 @@ def as_csv(timelines: Sequence[Timeline]) -> bytes:
     return text.getvalue().encode()
 
 
-def as_eaf(timelines: Sequence[Timeline]) -> bytes:
-    """Return an ELAN annotation document."""
-    root = ElementTree.Element(
-        "ANNOTATION_DOCUMENT",
-        {"AUTHOR": "thenar", "DATE": _EPOCH, "FORMAT": _EAF, "VERSION": _EAF, "xmlns:xsi": _XSI}
-        | {"xsi:noNamespaceSchemaLocation": f"http://www.mpi.nl/tools/elan/EAFv{_EAF}.xsd"},
-    )
-    ElementTree.SubElement(root, "HEADER", {"MEDIA_FILE": "", "TIME_UNITS": "milliseconds"})
-    order = ElementTree.SubElement(root, "TIME_ORDER")
-    first_us = min((timeline.start_us for timeline in timelines), default=0)
-    tiers, number = list[ElementTree.Element](), 0
-    slots: dict[int, str] = {}
-
-    def slot(timeline: Timeline, tick: int) -> str:
-        after_ms = round((timeline.start_us - first_us + tick * timeline.tick_us) / 1000)
-        return slots.setdefault(after_ms, f"ts{len(slots) + 1}")
-
-    for place, timeline in enumerate(timelines):
-        before = sum(other.name == timeline.name for other in timelines[:place])
-        title = f"{timeline.name}, part {before + 1}" if before else timeline.name
-        kinds = {title: timeline.states} | ({} if timeline.truth is None else {f"{title}, true": timeline.truth})
-        for name, states in kinds.items():
-            tiers.append(ElementTree.Element("TIER", {"LINGUISTIC_TYPE_REF": "grasp", "TIER_ID": name}))
-            for one in segments_of(states, len(timeline.types)):
-                number += 1
-                ends = {f"TIME_SLOT_REF{end}": slot(timeline, tick) for end, tick in ((1, one.start), (2, one.end))}
-                outer = ElementTree.SubElement(tiers[-1], "ANNOTATION")
-                inner = ElementTree.SubElement(outer, "ALIGNABLE_ANNOTATION", {"ANNOTATION_ID": f"a{number}"} | ends)
-                ElementTree.SubElement(inner, "ANNOTATION_VALUE").text = timeline.types[one.state]
-    for after_ms, name in sorted(slots.items()):
-        ElementTree.SubElement(order, "TIME_SLOT", {"TIME_SLOT_ID": name, "TIME_VALUE": str(after_ms)})
-    root.extend(tiers)
-    kind = {"GRAPHIC_REFERENCES": "false", "LINGUISTIC_TYPE_ID": "grasp", "TIME_ALIGNABLE": "true"}
-    ElementTree.SubElement(root, "LINGUISTIC_TYPE", kind)
-    ElementTree.indent(root)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, "unicode")}\n'.encode()
-
-
 def as_mcap(timelines: Sequence[Timeline]) -> bytes:
     """Return an MCAP file with a message for each segment on TOPIC."""
     import msgspec
@@ -335,7 +291,7 @@ def as_mcap(timelines: Sequence[Timeline]) -> bytes:
     return file.getvalue()
 
 
-WRITERS: Mapping[str, Callable[[Sequence[Timeline]], bytes]] = {".csv": as_csv, ".eaf": as_eaf, ".mcap": as_mcap}
+WRITERS: Mapping[str, Callable[[Sequence[Timeline]], bytes]] = {".csv": as_csv, ".mcap": as_mcap}
 
 
 def draw(timelines: Sequence[Timeline], kind: str) -> bytes:

@@ -2,14 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
 from thenar.runtime.recipe import PAPERS_TRAINER, Recipe, changed
 
-from ..pictures import painting
 from ..placement.constraints import Limits
 from ..placement.methods.base import METHODS, PAPERS, by_sensors, check_placement
 from ..placement.ports import PortCosts
@@ -41,7 +39,7 @@ from .plan import (
     run_fits,
 )
 from .rates import RecipeWords
-from .tables import RateReader, RateTable, draw_confusions
+from .tables import RateReader, RateTable
 
 # Without the table of trainers, which takes longer than all of these.
 TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines")
@@ -240,18 +238,6 @@ class StudyRun:
         self._predicted |= run_fits(samples, todo, candidates, self._groups, jobs=jobs, progress=progress)
         reader = RateReader(samples, self._predicted, OF[design.scheme], self._groups)
         return tuple(reader.table(*name, rows, _recipe_of(name[0], design.recipe)) for name, rows in plans.items())
-
-
-def draw(study: Study, folder: Path) -> list[Path]:
-    """Write a picture for each composition and protocol, subjects side by side.
-
-    Return the files: `confusion-PROTOCOL-COMPOSITION.png` in `folder`, which is created if necessary. Raises OSError
-    from the system.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    compositions = [table for table in study.tables if table.name == "compositions"]
-    with painting(font_size=10):
-        return [draw_confusions(study.grasps, table, row, folder) for table in compositions for row in table.rows]
 
 
 def _recipe_of(name: TableName, recipe: Recipe) -> RecipeWords:

@@ -1,25 +1,19 @@
-"""The paper's tables: cells of accuracies, computed from predictions, and confusion matrices as pictures."""
+"""The paper's tables: cells of accuracies, computed from predictions."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.files import write_atomically
 from thenar.runtime.manifest import Of
 
-from ..pictures import rendered
 from ..samples import Samples, decided
 from .folds import ProtocolName, Rows
 from .plan import REFERENCE, CellPlan, FoldFit, Labels, RowPlan, TableName
 from .rates import Paired, Rate, RecipeWords, interval, rated
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Predictions = Mapping[FoldFit, Labels]
 Confusion = tuple[tuple[int, ...], ...]
@@ -207,38 +201,3 @@ class RateReader:
                 for fit in fits:
                     predicted[run, fit.fold.test] = self.predictions[fit]
         return rows, predicted[:, rows]
-
-
-def draw_confusions(grasps: tuple[str, ...], table: RateTable, row: RateRow, folder: Path) -> Path:
-    """Draw the confusion matrices of a row, subjects side by side, into `confusion-PROTOCOL-ROW.png`.
-
-    Colour is the share of the true grasp type's rows; numbers are percent of them, omitted below 1 %.
-    """
-    from matplotlib.figure import Figure
-
-    side = 1.6 + 0.42 * len(grasps)
-    figure = Figure(figsize=(side * len(row.cells) + 0.6, side + 0.4), layout="constrained", dpi=120)
-    figure.suptitle(f"{row.name}: {row.what} ({table.protocol} protocol, {row.rate.what})")
-    all_axes = figure.subplots(1, len(row.cells), squeeze=False)[0]
-    for axes, name, cell in zip(all_axes, table.columns, row.cells, strict=True):
-        if cell.confusion is not None:
-            draw_matrix(axes, grasps, cell.confusion)
-        axes.set_title(f"subject {name}: {100 * cell.rate.mean:.1f} %", fontsize=10)
-    all_axes[0].set_ylabel("true")
-    path = folder / f"confusion-{table.protocol}-{row.name}.png"
-    write_atomically(path, rendered(figure, "png"))
-    return path
-
-
-def draw_matrix(axes: "Axes", grasps: tuple[str, ...], confusion: "Confusion") -> None:
-    """Draw one matrix of counts into `axes`, as shares of its rows."""
-    counts = np.array(confusion, dtype=np.float64)
-    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    axes.imshow(shares, cmap="Blues", vmin=0, vmax=1)
-    axes.set_xticks(range(len(grasps)), grasps, rotation=90, fontsize=8)
-    axes.set_yticks(range(len(grasps)), grasps, fontsize=8)
-    axes.set_xlabel("recognised as")
-    for true, predicted in np.argwhere(shares >= 0.01):
-        share = shares[true, predicted]
-        colour = "white" if share > 0.6 else "black"
-        axes.text(predicted, true, f"{100 * share:.0f}", ha="center", va="center", fontsize=7, color=colour)

@@ -1,4 +1,4 @@
-"""From finalists to points: all designs of each finalist, their decisions, and those on a front."""
+"""From finalists to points: all designs of each finalist, and those on a front."""
 
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -13,8 +13,7 @@ from thenar.runtime.recipe import Recipe
 from ..evaluation.rates import Draws
 from ..trainers.base import TRAINERS, Training
 from .finalists import EvaluatedFinalist, Screened
-from .latency import POLICIES
-from .points import DecisionKind, FrontierPoint, Latency, PointSetting, PointTime, front
+from .points import FrontierPoint, PointSetting, PointTime, front
 from .price import Classified, PricedTables
 from .search import placement_of
 from .survey import Survey, TrialAccuracy
@@ -65,9 +64,6 @@ class Design:
     def frame(self) -> PointTime:
         """Time of reading everything, on separate lines in parallel, and classifying."""
         return PointTime(max(self.scan.us, self.transfer.us) + self.classify.us, self.classify.how)
-
-
-Latencies = Mapping[tuple[Design, DecisionKind], Latency]
 
 
 def designs_of(finalist: EvaluatedFinalist, read: PointTime = NO_TIME) -> Iterator[Design]:
@@ -130,19 +126,18 @@ def _effort(design: Design) -> tuple[float, ...]:
 
 
 def points_of(
-    designs: Sequence[Design], latencies: Latencies, luck: Mapping[TrialAccuracy, float], survey: Survey
+    designs: Sequence[Design], luck: Mapping[TrialAccuracy, float], survey: Survey
 ) -> tuple[FrontierPoint, ...]:
     """Return the points on a front, numbered from the fastest frame on; `luck` is subtracted from each rate."""
-    fronts = _fronts(designs, latencies)
-    ordered = sorted(designs, key=lambda design: (design.frame.us, design.n_switches))
-    found = [(design, kind) for design in ordered for kind in POLICIES if fronts[design, kind]]
+    fronts = dict(zip(("frame", "switches"), best_designs(designs), strict=True))
+    best = [design for design in designs if any(design in some for some in fronts.values())]
     points = []
-    for number, (design, kind) in enumerate(found, 1):
+    for number, design in enumerate(sorted(best, key=lambda design: (design.frame.us, design.n_switches)), 1):
         wired, finalist, recipe = design.wired, design.finalist, design.finalist.screened.recipe
         points.append(
             FrontierPoint(
                 number=number,
-                setting=_setting(design, kind, survey.training(recipe)),
+                setting=_setting(design, survey.training(recipe)),
                 switches=survey.names(recipe),
                 rate=design.judged.rate.corrected(luck[design.judged]),
                 luck=luck[design.judged],
@@ -152,31 +147,18 @@ def points_of(
                 transfer=design.transfer,
                 classify=design.classify,
                 frame=design.frame,
-                latency=latencies[design, kind],
                 flash=design.classified.flash,
                 ram=design.classified.ram,
                 ports=0 if wired is None else wired.ports,
                 chips=0 if wired is None else wired.chips,
-                fronts=fronts[design, kind],
+                fronts=tuple(name for name, some in fronts.items() if design in some),
                 joints=survey.some_joints(recipe),
             )
         )
     return tuple(points)
 
 
-def _fronts(designs: Sequence[Design], latencies: Latencies) -> dict[tuple[Design, DecisionKind], tuple[str, ...]]:
-    found: dict[tuple[Design, DecisionKind], tuple[str, ...]] = dict.fromkeys(latencies, ())
-    for name, best in zip(("frame", "switches"), best_designs(designs), strict=True):
-        for design in best:
-            found[design, "single"] += (name,)
-    for kind in POLICIES:
-        waiting = ((latencies[design, kind].mean_us, design) for design in designs)
-        for _, design in front(list(waiting), lambda pair: pair[0], lambda pair: pair[1].rate):
-            found[design, kind] += ("latency",)
-    return found
-
-
-def _setting(design: Design, kind: DecisionKind, training: Training) -> PointSetting:
+def _setting(design: Design, training: Training) -> PointSetting:
     """Return the choices of a point: of its recipe, and what the recipe leaves open."""
     wired, recipe, trainer = design.wired, design.tables.recipe, TRAINERS.named(training.trainer)
     usual = {setting.name: setting.default for setting in trainer.settings}
@@ -186,7 +168,6 @@ def _setting(design: Design, kind: DecisionKind, training: Training) -> PointSet
         inputs=recipe.inputs,
         rounds=recipe.rounds if trainer.staged else None,
         width=recipe.width,
-        decision=kind,
         wiring="" if wired is None else wired.wiring,
         clock_hz=0 if wired is None else wired.clock_hz,
         table_bits=recipe.table_bits,

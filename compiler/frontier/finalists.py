@@ -18,7 +18,7 @@ from ..placement.elements import Elements
 from ..placement.methods.base import BEST, METHODS, PAPERS
 from .points import STEP, By, Curve, ReferencePoint, front
 from .price import PricedTables
-from .search import CURVE_SIZES, JOINTS, PAPERS_ROUNDS, SHAPES, Search, placed, tabled
+from .search import JOINTS, PAPERS_ROUNDS, SHAPES, Search, placed, tabled
 from .survey import FoldHits, Survey, TrialAccuracy
 
 # The inputs that need a placement; without joints, only the second.
@@ -68,33 +68,26 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     """Train every placement once, on the folds of one repeat, and price it in the fastest of its wirings.
 
     Return the accuracy and frame time of every recipe that can be built, with the first trainer; and the curves of all
-    methods, including the baselines.
+    methods.
     """
     search, cuts, trainer = survey.search, survey.cuts, survey.search.trainers[0]
     sizes = {levels: survey.size(levels) for levels in survey.levels}
-    most, kinds = sizes[survey.levels[-1]], ALL_INPUTS if survey.inputs.n_joints else ALL_INPUTS[1:]
+    kinds = ALL_INPUTS if survey.inputs.n_joints else ALL_INPUTS[1:]
     recipes = [
         placed(method, number, trainer, inputs, levels)
-        for inputs in (kinds if most else ())
+        for inputs in kinds
         for levels, n_elements in sizes.items()
+        if n_elements
         for method in search.methods
         for number in METHODS[method].ladder(n_elements)
     ]
-    baselines = [
-        placed(method, number, trainer, "switches", survey.levels[-1])
-        for method in search.baselines
-        for number in CURVE_SIZES
-        if number <= most
-    ]
     survey.choose(recipes, (cuts.everything, *cuts.screening))
-    # Baselines are chosen within the folds only, and tune nothing.
-    survey.choose(baselines, cuts.screening)
     # Drop placements that keep nothing. Joints alone need no placement.
     recipes = [recipe for recipe in recipes if survey.elements(recipe)]
     recipes += [Recipe(trainer=trainer, inputs="joints")] if survey.inputs.n_joints else []
     survey.tune(recipes, (cuts.everything, *cuts.screening))
-    rates = _rates(survey, [*recipes, *baselines])
-    methods = dict.fromkeys([*search.methods, *search.baselines]) if most else ()
+    rates = _rates(survey, recipes)
+    methods = search.methods if sizes[survey.levels[-1]] else ()
     return _screened(survey, recipes, rates), tuple(_curve(survey, method, rates) for method in methods)
 
 
@@ -147,7 +140,7 @@ def _curve(survey: Survey, method: str, rates: Mapping[Recipe, TrialAccuracy]) -
         if (recipe.placement, recipe.inputs, recipe.levels) == (method, "switches", survey.levels[-1]):
             points[sum(len(survey.elements(recipe, fold)) for fold in folds) / len(folds)] = judged.rate
     sizes = tuple(sorted(points))
-    return Curve(method, METHODS[method].help, METHODS[method].ours, sizes, tuple(points[size] for size in sizes))
+    return Curve(method, METHODS[method].help, sizes, tuple(points[size] for size in sizes))
 
 
 def select_finalists(screened: Sequence[Screened], recipes: Collection[Recipe], number: int) -> tuple[Screened, ...]:

@@ -13,14 +13,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from msgspec.structs import replace as changed_to
 
-from thenar.runtime.build import Build
-from thenar.runtime.errors import BuildError, HarnessError
+from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.names import list_names
-from thenar.runtime.published import NONE
-from thenar.runtime.recipe import Recipe
 
-from ..evaluation.rates import Rate
 from ..placement.methods.base import usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
@@ -31,7 +27,7 @@ from ..samples import Samples, check_types
 from ..text import INDEPENDENT, sentence
 from ..workers import check_memory
 from .cache import Cache, Report, Store
-from .designs import Design, Latencies, best_designs, designs_of, lucks, points_of
+from .designs import best_designs, designs_of, lucks, points_of
 from .finalists import (
     EvaluatedFinalist,
     Screened,
@@ -43,11 +39,9 @@ from .finalists import (
     screen_others,
     select_finalists,
 )
-from .latency import POLICIES, latencies, movements_of
 from .plots import PICTURES, pictures
-from .points import SCHEMA, Frontier, FrontierError, ReferencePoint, Tried, frontier_to_bytes
+from .points import SCHEMA, Frontier, FrontierError, Tried, frontier_to_bytes
 from .price import equipment_for
-from .replay import Replay, replay_of
 from .search import TAXEL_LEVELS, Search, placement_of
 from .survey import Cuts, Survey
 from .words import csv_bytes
@@ -58,13 +52,10 @@ _DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in P
 _WIDER = 3
 # Number of placements to try with fewer joints.
 _FEWER = 5
-# Calls of `Cache.ask`: the calibration, five to screen, four with fewer joints, three with other trainers, five for the
-# finalists, the simulations, the latencies.
-_ROUNDS = 20
-_UNTIMED = (
-    "the time of reading the joints ({}) is unknown and is left out of every frame time and latency: give it with "
-    "--joint-us"
-)
+# Calls of `Cache.ask`: the calibration, four to screen, four with fewer joints, three with other trainers, five for the
+# finalists, the simulations.
+_ROUNDS = 18
+_UNTIMED = "the time of reading the joints ({}) is unknown and is left out of every frame time: give it with --joint-us"
 
 
 def find_frontier(
@@ -77,13 +68,11 @@ def find_frontier(
     search: Search | None = None,
     budget_us: float | None = None,
     rate: float | None = None,
-    build: Path | None = None,
     joint_us: float | None = None,
-    stream: GraspSet | None = None,
     jobs: int = -1,
     report: Report | None = None,
 ) -> Frontier:
-    """Find the trade-off of accuracy and time: the best switches, joints, rounds, tables, wirings and decisions.
+    """Find the trade-off of accuracy and time: the best switches, joints, rounds, tables and wirings.
 
     Every placement is screened by nested cross-validation; those near the front are fully evaluated, priced for the
     target, and simulated there.
@@ -91,10 +80,10 @@ def find_frontier(
     Parameters
     ----------
     grasp_set : GraspSet
-        Recordings of at least two grasp types; no fold splits a trial. Rows in which nothing is held only count in
-        decision latency.
+        Recordings of at least two grasp types; no fold splits a trial. Rows in which nothing is held are left
+        out.
     output : Path, optional
-        Folder for frontier.json, frontier.csv, three pictures, and the store, from which an interrupted run resumes.
+        Folder for frontier.json, frontier.csv, two pictures, and the store, from which an interrupted run resumes.
         By default nothing is written or stored.
     source : str
         Name of the recordings.
@@ -103,17 +92,13 @@ def find_frontier(
     target : str
         Deployment target, one of `thenar.compiler.frontier.targets.TARGETS`.
     search : Search, optional
-        Size of the search. Baselines that are not installed are left out.
+        Size of the search.
     budget_us, rate : float, optional
         Pick the best point within this time of a frame, or the fastest of this accuracy.
-    build : Path, optional
-        A build folder, to be marked on the pictures.
     joint_us : float, optional
         Time of reading all joints, in microseconds. By default it is that of a CyberGlove's record, as measured for
         the harness, else by the vendor's formula; of other joints it is left out of every frame, and a sentence of
         `skipped` says so.
-    stream : GraspSet, optional
-        Other recordings of the same glove, to measure decision latency on; usually the test rows of the first fold.
     jobs : int
         Worker processes, -1 for all cores.
     report : callable, optional
@@ -127,7 +112,7 @@ def find_frontier(
     Raises
     ------
     FrontierError
-        If the recordings, the build or the stream do not fit, nothing can be built, or the folder holds other things.
+        If the recordings do not fit, there is no such target, nothing can be built, or the folder holds other things.
     StoreError
         If another run uses the folder, or the disk is full.
 
@@ -148,13 +133,10 @@ def find_frontier(
         with _remove_created_on_error(created, store):
             equipment = equipment_for(grasp_set, harness, target, cache, joint_us)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
-            replay = _replay(survey, stream)
-            marks = () if build is None else (own_build(build, survey),)
         untimed = [_UNTIMED.format(list_names(grasp_set.joint_names))] if equipment.records.how == "unknown" else []
-        frontier = _found(survey, replay)
+        frontier = _found(survey)
         frontier = changed_to(
             frontier,
-            marks=(*frontier.marks, *marks),
             skipped=(*untimed, *frontier.skipped),
             picked=_picked(frontier, budget_us, rate),
             wanted=_in_words(budget_us, rate),
@@ -171,7 +153,7 @@ def _remove_created_on_error(created: Sequence[Path], store: Store) -> Iterator[
     """Remove files and folders that a run made if its request is refused; files added by others meanwhile stay."""
     try:
         yield
-    except (FrontierError, BuildError, HarnessError):
+    except (FrontierError, HarnessError):
         store.finish()
         with suppress(OSError):
             for path in created:
@@ -218,62 +200,8 @@ def _documents(frontier: Frontier) -> dict[str, bytes]:
     return {FRONTIER_NAME: frontier_to_bytes(frontier), TABLE_NAME: csv_bytes(frontier), **drawn}
 
 
-def _replay(survey: Survey, stream: GraspSet | None) -> Replay:
-    """Return the test rows of the first fold as a replay, or the recordings given for it."""
-    grasp_set, seed = survey.grasp_set, survey.search.seed
-    number = {grasp: label for label, grasp in enumerate(survey.samples.grasps)} | {NONE: -1}
-    if stream is None:
-        labels = np.array([number[grasp] for grasp in grasp_set.grasps.tolist()], np.intp)
-        # The test rows, and the rows of their movements in which nothing is held.
-        movements, test = grasp_set.movement_ids, np.flatnonzero(~grasp_set.is_none)[survey.cuts.screening[0].test]
-        return replay_of(grasp_set, labels, np.flatnonzero(np.isin(movements, movements[test])), seed=seed)
-    if stream.fingerprint() == grasp_set.fingerprint():
-        raise FrontierError(
-            f"the stream equals the training set, {survey.source}: name other recordings with ``stream``, or leave it "
-            "out to use held-out rows"
-        )
-    if (stream.element_names, stream.joints) != (grasp_set.element_names, grasp_set.joints):
-        raise FrontierError(f"the stream has other switches, taxels or joints than {survey.source}")
-    strange = sorted({str(grasp) for grasp in stream.grasps} - set(number))
-    if strange:
-        raise FrontierError(f"the stream holds {strange[0]!r}, which {survey.source} does not")
-    labels = np.array([number[str(grasp)] for grasp in stream.grasps], dtype=np.intp)
-    return replay_of(stream, labels, seed=seed)
-
-
-def own_build(folder: Path, survey: Survey) -> ReferencePoint:
-    """Return the user's build as a mark: its recorded rate, and its frame in the fastest wiring for its switches.
-
-    Raises FrontierError if it has no rate, or is not for these recordings or this equipment.
-    """
-    build = Build.load(folder)
-    manifest = build.manifest
-    grasp_set, equipment = survey.grasp_set, survey.equipment
-    names = [switch.name for switch in manifest.switches]
-    # Comparable with the frontier's rates.
-    pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
-    if not pooled:
-        raise FrontierError(f"{folder} has no accuracy: compile it with ``folds`` 4, or leave ``build`` out")
-    cost, scans = equipment.model.cost(build.tables), equipment.scans(names)
-    if cost is None or (names and not scans):
-        raise FrontierError(
-            f"{folder} cannot be built for {equipment.model.target}: leave ``build`` out, or ``target``"
-        )
-    joints = [joint.name for joint in manifest.joints]
-    inputs = {*grasp_set.element_names, *grasp_set.joint_names}
-    for name in (*(switch.source for switch in manifest.switches), *joints):
-        if name not in inputs:
-            raise FrontierError(
-                f"{folder} reads {name!r}, which the recordings do not hold: it was compiled from others"
-            )
-    scan_us = min((scan.us for scan in scans), default=0.0)
-    rate = Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled")
-    frame_us = max(scan_us, equipment.records.of(len(joints)).us) + cost.us
-    return ReferencePoint(f"build {folder.name}", len(names), rate, frame_us)
-
-
-def _found(survey: Survey, replay: Replay) -> Frontier:
-    """Return the frontier of a survey, without a picked point; latencies are measured on the replay."""
+def _found(survey: Survey) -> Frontier:
+    """Return the frontier of a survey, without a picked point."""
     search, equipment, n_switches = survey.search, survey.equipment, survey.samples.n_switches
     screened, curves = screen(survey)
     if not screened:
@@ -292,7 +220,7 @@ def _found(survey: Survey, replay: Replay) -> Frontier:
         design for finalist in finalists for design in designs_of(finalist, survey.transfer(finalist.screened.recipe))
     ]
     tried = _tried(screened, finalists, search)
-    combinations = len(POLICIES) * len(designs) + len(tried)
+    combinations = len(designs) + len(tried)
     luck = lucks(designs, screened, survey)
     designs = list(dict.fromkeys(design for front in best_designs(designs) for design in front))
     times = survey.measured(design.tables.content for design in designs)
@@ -319,23 +247,22 @@ def _found(survey: Survey, replay: Replay) -> Frontier:
         folds=search.folds,
         repeats=len(survey.cuts.repeats),
         combinations=combinations,
-        points=points_of(designs, _latencies(survey, replay, designs), luck, survey),
+        points=points_of(designs, luck, survey),
         tried=tried,
         curves=curves,
         marks=marks_of(recipes, finalists, survey),
-        skipped=(*claimed, *notes, replay.what),
+        skipped=(*claimed, *notes),
     )
 
 
 def _picked(frontier: Frontier, budget_us: float | None, rate: float | None) -> int | None:
     """Return the number of the selected point: the best within a time, or the fastest of an accuracy; None: none."""
-    single = [point for point in frontier.points if point.setting.decision == "single"]
     if budget_us is not None:
-        quick = [point for point in single if point.frame.us <= budget_us]
+        quick = [point for point in frontier.points if point.frame.us <= budget_us]
         # By the rates that points were chosen by, for which their luck was estimated.
         chosen = max(quick, key=lambda point: (point.rate.mean + point.luck, -point.frame.us), default=None)
     else:
-        good = [point for point in single if rate is not None and point.rate.mean >= rate]
+        good = [point for point in frontier.points if rate is not None and point.rate.mean >= rate]
         chosen = min(good, key=lambda point: (point.frame.us, -point.rate.mean), default=None)
     return None if chosen is None else chosen.number
 
@@ -345,35 +272,6 @@ def _in_words(budget_us: float | None, rate: float | None) -> str:
     if budget_us is not None:
         return f"the best within {budget_us:g} us a frame"
     return "" if rate is None else f"the fastest that recognises {100 * rate:g} %"
-
-
-def _latencies(survey: Survey, replay: Replay, designs: Sequence[Design]) -> Latencies:
-    """Return the latency of every design with every decision, by tables trained on rows outside the
-    replay of held-out rows.
-    """
-    fold, seed, grouped = survey.cuts.screening[0], survey.search.seed, dict[Recipe, list[Design]]()
-    movements = movements_of(survey.grasp_set, fold.train)
-    for design in designs:
-        grouped.setdefault(design.finalist.screened.recipe, []).append(design)
-    calls = [
-        (
-            survey.samples,
-            fold.train,
-            survey.selection(recipe, fold),
-            replay,
-            tuple((design.tables.recipe, design.frame.us) for design in alike),
-            survey.training(recipe, fold),
-            movements,
-            seed,
-        )
-        for recipe, alike in grouped.items()
-    ]
-    return {
-        (design, kind): latency
-        for alike, timed in zip(grouped.values(), survey.cache.ask(latencies, calls), strict=True)
-        for design, several in zip(alike, timed, strict=True)
-        for kind, latency in zip(POLICIES, several, strict=True)
-    }
 
 
 def _tried(screened: Sequence[Screened], finalists: Sequence[EvaluatedFinalist], search: Search) -> tuple[Tried, ...]:

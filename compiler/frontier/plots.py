@@ -1,4 +1,4 @@
-"""A frontier's pictures: accuracy against the time of a frame, the number of switches and the decision latency."""
+"""A frontier's pictures: accuracy against the time of a frame, and against the number of switches."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -28,8 +28,8 @@ _COLOURS: dict[Inputs, str] = {inputs: on_paper(inputs) for inputs in ("switches
 _SHAPES: dict[Inputs, str] = {"switches": "o", "joints": "^", "both": "s"}
 _MARKS = ("X", "P", "D", "v")
 _NAMES: dict[Inputs, str] = {"switches": "switches alone", "joints": "joints alone", "both": "switches and joints"}
-# Our curves are blue, like switches alone everywhere; dashes distinguish curves of one colour.
-_BASELINES = tuple(on_paper(f"baseline-{number}") for number in (1, 2, 3))
+# Curves are blue, like switches alone everywhere; dashes distinguish curves of one colour. Trainers have other colours.
+_TRAINERS = tuple(on_paper(f"baseline-{number}") for number in (1, 2, 3))
 _DASHES: "tuple[Dash, ...]" = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 1.5)), (0, (9, 3)))
 # Ids of a point's marker and of the ring around the featured one, in SVG.
 POINT_ID, RING_ID = "point-", "featured"
@@ -48,7 +48,6 @@ class _Cost:
 
     front       the front whose points are filled and joined by a line called `best`; "": all are filled, none joined
     of_point, of_mark, of_tried  horizontal positions; None: not on this picture
-    end         right end of a line from a point; None: no line
     """
 
     title: str
@@ -58,7 +57,6 @@ class _Cost:
     of_tried: Callable[[Tried], float | None]
     front: str = ""
     best: str = ""
-    end: Callable[[FrontierPoint], float | None] = lambda _: None
 
     @property
     def is_time(self) -> bool:
@@ -69,8 +67,7 @@ class _Cost:
 _FRAME = _Cost(
     title="Accuracy against frame time",
     axis="time of a frame: the glove read, the grasp classified",
-    # The frame time does not depend on the decision: points that differ only in it would coincide.
-    of_point=lambda point: None if point.fronts == ("latency",) else point.frame.us,
+    of_point=lambda point: point.frame.us,
     of_mark=lambda mark: mark.frame_us,
     of_tried=lambda tried: tried.frame_us,
     front="frame",
@@ -83,21 +80,10 @@ _SWITCHES = _Cost(
     of_mark=lambda mark: float(mark.n_switches) or None,
     of_tried=lambda tried: float(tried.n_switches) or None,
 )
-_LATENCY = _Cost(
-    title="From the hand's arrival to the decision",
-    axis="time until a grasp is decided on: its mean, and a line to the 99th percentile",
-    # A point that misses every grasp has no mean.
-    of_point=lambda point: point.latency.mean_us if "latency" in point.fronts and point.latency.missed < 1 else None,
-    of_mark=lambda _: None,
-    of_tried=lambda _: None,
-    front="latency",
-    best="the best for its latency",
-    end=lambda point: point.latency.p99_us if point.latency.p99_us != point.latency.mean_us else None,
-)
 
 
 def pictures(frontier: Frontier, kind: Literal["svg", "png"], *, letters: bool = False) -> Mapping[str, bytes]:
-    """Return "frontier", "switches" and "latency" as files; equal frontiers give equal bytes.
+    """Return "frontier" and "switches" as files; equal frontiers give equal bytes.
 
     With `letters`, text in SVG stays text instead of outlines. Raises PictureError.
     """
@@ -110,7 +96,6 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     figure, axes = _sheet(frontier, cost.title.replace("switches", elements_of(frontier)) + machine)
     marks = [(max(x, _LOWEST), mark) for mark in frontier.marks if (x := cost.of_mark(mark)) is not None]
     points = [(max(x, _LOWEST), point) for point in frontier.points if (x := cost.of_point(point)) is not None]
-    ends = [(x, end, point) for x, point in points if (end := cost.end(point)) is not None]
     curves = () if cost.is_time else frontier.curves
     pairs = [pair for curve in curves for pair in zip(curve.sizes, curve.rates, strict=True)]
     shown = [rate for size, rate in pairs if size >= _FEW] or [rate for _, rate in pairs]
@@ -122,7 +107,7 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
         if (x := cost.of_tried(each)) is not None and each.rate.mean >= lowest
     ]
     if cost.is_time:
-        _scale_times(axes, [*(x for x, _ in (*marks, *tried, *points)), *(end for _, end, _ in ends)])
+        _scale_times(axes, [x for x, _ in (*marks, *tried, *points)])
     else:
         _scale_counts(axes, frontier.n_switches + frontier.n_levels)
     untimed = cost.is_time and any(point.transfer.how == "unknown" for _, point in points)
@@ -132,11 +117,10 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
 
     said = duration if cost.is_time else lambda _: ""
     _draw_tried(axes, tried)
-    if cost.front == "frame" and len(frontier.trainers) > 1:
+    if cost.is_time and len(frontier.trainers) > 1:
         _draw_trainers(axes, tried)
     if cost.is_time:
         _draw_best(axes, [(x, point.rate.mean) for x, point in points if cost.front in point.fronts], cost.best)
-    _draw_ends(axes, ends)
     _draw_curves(axes, curves)
     _draw_points(axes, points, cost.front, elements_of(frontier))
     _draw_whiskers(axes, [(x, mark.rate) for x, mark in marks], _INK)
@@ -164,10 +148,7 @@ def _named(name: str, cost: str, rate: Rate) -> str:
 
 # Call inside `painting`.
 PICTURES: Mapping[str, Callable[[Frontier], "Figure"]] = MappingProxyType(
-    {
-        name: partial(_draw, cost=cost)
-        for name, cost in (("frontier", _FRAME), ("switches", _SWITCHES), ("latency", _LATENCY))
-    }
+    {name: partial(_draw, cost=cost) for name, cost in (("frontier", _FRAME), ("switches", _SWITCHES))}
 )
 
 
@@ -252,7 +233,7 @@ def _draw_trainers(axes: "Axes", tried: Sequence[tuple[float, Tried]]) -> None:
         places = [(x, each.rate.mean) for x, each in tried if each.trainer == name]
         best = front(places, lambda place: place[0], lambda place: place[1])
         xs, ys = [*(x for x, _ in best), axes.get_xlim()[1]], [*(y for _, y in best), best[-1][1]]
-        colour, dash = _BASELINES[number % len(_BASELINES)], _DASHES[1 + number % (len(_DASHES) - 1)]
+        colour, dash = _TRAINERS[number % len(_TRAINERS)], _DASHES[1 + number % (len(_DASHES) - 1)]
         axes.step(xs, ys, where="post", color=colour, lw=1.1, ls=dash, zorder=2, label=f"{shorten(name)}, tried")
 
 
@@ -307,31 +288,18 @@ def _draw_numbers(
             axes.annotate(f"{point.number}", (x, point.rate.mean), (4, 3), **style)
 
 
-def _draw_ends(axes: "Axes", ends: Iterable[tuple[float, float, FrontierPoint]]) -> None:
-    """Draw lines from each point's mean to its end."""
-    for start, end, point in ends:
-        level = (point.rate.mean, point.rate.mean)
-        colour = _COLOURS[point.setting.inputs]
-        axes.plot((start, end), level, color=colour, lw=0.9, alpha=0.45, marker="|", ms=5, markevery=[1])
-
-
 def _draw_whiskers(axes: "Axes", shown: Sequence[tuple[float, Rate]], colour: str) -> None:
     xs, lows, highs = [x for x, _ in shown], [rate.low for _, rate in shown], [rate.high for _, rate in shown]
     axes.vlines(xs, lows, highs, color=colour, lw=1.1, alpha=0.8, zorder=3)
 
 
 def _draw_curves(axes: "Axes", curves: Sequence[Curve]) -> None:
-    """Draw ours and the baselines' curves, ours first."""
-    ours, baselines = ([curve for curve in curves if curve.ours == whether] for whether in (True, False))
-    looks = [(_COLOURS["switches"], _DASHES[number % len(_DASHES)]) for number in range(len(ours))]
-    for number in range(len(baselines)):
-        turn, place = divmod(number, len(_BASELINES))
-        looks.append((_BASELINES[place], _DASHES[turn % len(_DASHES)]))
-    for curve, (colour, dash) in zip((*ours, *baselines), looks, strict=True):
+    """Draw the curves of the methods, dashed differently."""
+    colour = _COLOURS["switches"]
+    for number, curve in enumerate(curves):
         pairs = [(size, rate) for size, rate in zip(curve.sizes, curve.rates, strict=True) if size >= 1]
         xs, rates = [size for size, _ in pairs], [rate for _, rate in pairs]
-        width, shade, above = (2.4, 0.10, 3) if curve.ours else (1.1, 0.04, 2)
-        means, name = [rate.mean for rate in rates], shorten(curve.method)
-        axes.plot(xs, means, color=colour, lw=width, ls=dash, zorder=above, label=name if pairs else None)
+        means, name, dash = [rate.mean for rate in rates], shorten(curve.method), _DASHES[number % len(_DASHES)]
+        axes.plot(xs, means, color=colour, lw=2.4, ls=dash, zorder=3, label=name if pairs else None)
         lows, highs = [rate.low for rate in rates], [rate.high for rate in rates]
-        axes.fill_between(xs, lows, highs, color=colour, alpha=shade, lw=0, zorder=1)
+        axes.fill_between(xs, lows, highs, color=colour, alpha=0.10, lw=0, zorder=1)

@@ -13,7 +13,7 @@ from thenar.runtime.recipe import PAPERS_TRAINER, Inputs, Name, TableBits, Value
 
 from ..evaluation.rates import Rate
 
-SCHEMA = 3
+SCHEMA = 4
 MAX_BYTES = 64 << 20
 
 # measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: calculated from
@@ -21,7 +21,6 @@ MAX_BYTES = 64 << 20
 # formula: the vendor's, from a single source. given: by the user. guess: measured elsewhere, times an assumed factor.
 # unknown: left out of every sum.
 How = Literal["measured", "simulated", "wire", "model", "formula", "given", "guess", "unknown"]
-DecisionKind = Literal["single", "dwell", "segments"]
 # The population of a rate: left-out subjects, or rows of all subjects in random folds of whole trials.
 By = Literal["new subject", "pooled"]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -54,7 +53,7 @@ class PlacementChoice(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PointSetting(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """All choices of a point: the input of `compile --from`, and the settings of the runtime.
+    """All choices of a point: the input of `compile --from`.
 
     rounds      None for a trainer without rounds
     width       bits that every sum fits; table_bits: 8 if firmware may store a byte per entry
@@ -69,7 +68,6 @@ class PointSetting(Struct, frozen=True, forbid_unknown_fields=True, omit_default
     inputs: Inputs
     rounds: Annotated[int, Meta(ge=1, le=10**6)] | None
     width: Annotated[int, Meta(ge=4, le=16)]
-    decision: DecisionKind
     wiring: str
     clock_hz: Annotated[int, Meta(ge=0, le=12_000_000)]
     table_bits: TableBits = field(default_factory=lambda: WIDEST)
@@ -90,19 +88,6 @@ class PointSetting(Struct, frozen=True, forbid_unknown_fields=True, omit_default
         return [in_words(name, value) for name, value in self.settings.items()]
 
 
-class Latency(Struct, frozen=True, forbid_unknown_fields=True):
-    """Time from a hand's arrival in a grasp until it is decided on, at least a frame, in microseconds over a stream.
-
-    missed  the share of grasps without a right decision before their end: they are in neither number
-    wrong   the share of the held time, after the first right decision, in which another type was decided on
-    """
-
-    mean_us: Microseconds
-    p99_us: Microseconds
-    missed: Share
-    wrong: Share = 0.0
-
-
 class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A design of the glove.
 
@@ -116,7 +101,7 @@ class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     scan        reading the switches; transfer: the joints
     frame       max(scan, transfer) + classify: the two use separate lines
     flash, ram  bytes of the classifier on its target; of the tables alone on host and pi
-    fronts      the fronts that it is on: "frame", "switches", "latency"
+    fronts      the fronts that it is on: "frame", "switches"
     """
 
     number: int
@@ -130,7 +115,6 @@ class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     transfer: PointTime
     classify: PointTime
     frame: PointTime
-    latency: Latency
     flash: Count
     ram: Count
     ports: Count
@@ -156,11 +140,10 @@ class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True)
 
 
 class Curve(Struct, frozen=True, forbid_unknown_fields=True):
-    """Accuracy against the number of switches, switches alone: one method; `ours` or a baseline."""
+    """Accuracy against the number of switches, switches alone: one method."""
 
     method: str
     what: str
-    ours: bool
     sizes: tuple[Annotated[float, Meta(ge=0.0, le=1e12)], ...]
     rates: tuple[Rate, ...]
 

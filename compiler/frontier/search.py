@@ -17,8 +17,6 @@ from ..placement.methods.base import METHODS, usual
 from ..trainers.base import TRAINERS, Number, Training
 from .points import FrontierError, PlacementChoice
 
-# Baselines are only shown for comparison: their curves have few sizes.
-CURVE_SIZES = (4, 8, 16, 33, 66)
 ROUNDS = (1, 2, 3, 5, 8, 12, 20, 30, 50, 75, 100, 150, 200, 300)
 PAPERS_ROUNDS = 100  # no point of our frontiers has more
 # The shapes of integer tables: the bits that every sum fits; and one in which a byte is enough for an entry.
@@ -58,8 +56,6 @@ class Search:
     ----------
     methods : tuple of str
         Placement methods that points are built from.
-    baselines : tuple of str
-        Placement methods that are only shown as curves, for comparison.
     folds, repeats, seed : int
         The stratified folds are cut `repeats` times, with seeds seed, seed + 1, ...
     screening : int
@@ -87,7 +83,6 @@ class Search:
     """
 
     methods: tuple[str, ...] = field(default_factory=lambda: usual(ours=True))
-    baselines: tuple[str, ...] = field(default_factory=lambda: usual(ours=False))
     folds: int = 4
     repeats: int = 3
     seed: int = 1
@@ -99,7 +94,7 @@ class Search:
     settings: Mapping[str, Number] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
-        for name in (*self.methods, *self.baselines):
+        for name in self.methods:
             METHODS.named(name)
         if min(self.repeats, self.screening, self.rounds, self.finalists) < 1 or not self.methods:
             raise FrontierError("a frontier needs a method, a repeat, a round and a finalist at least")

@@ -170,11 +170,10 @@ def csv_bytes(frontier: Frontier) -> bytes:
 
 
 def _cells(point: FrontierPoint) -> dict[str, object]:
-    setting, placement, latency = point.setting, point.setting.placement, point.latency
+    setting, placement = point.setting, point.setting.placement
     row: dict[str, object] = {"number": point.number, "fronts": _list(point.fronts), "n_switches": len(point.switches)}
     row |= {"inputs": setting.inputs, "method": placement.method, "parameter": placement.parameter}
     row |= {"rounds": setting.rounds, "width": setting.width, "wiring": setting.wiring, "clock_hz": setting.clock_hz}
-    row["decision"] = setting.decision
     for name, rate in (("rate", point.rate), ("frames", point.frames), ("other_rate", point.other_rate)):
         numbers = ("", "", "", "") if rate is None else (rate.what, rate.mean, rate.low, rate.high)
         row |= zip((f"{name}_of", name, f"{name}_low", f"{name}_high"), numbers, strict=True)
@@ -183,8 +182,6 @@ def _cells(point: FrontierPoint) -> dict[str, object]:
     for name in ("scan", "transfer", "classify", "frame"):
         time: PointTime = getattr(point, name)
         row |= {f"{name}_us": time.us, f"{name}_how": time.how}
-    row |= {"latency_mean_us": latency.mean_us, "latency_p99_us": latency.p99_us}
-    row |= {"missed": latency.missed, "wrong": latency.wrong}
     row |= {"flash": point.flash, "ram": point.ram, "ports": point.ports, "chips": point.chips}
     return row | {"switches": _list(point.switches), "joints": _list(point.joints)}
 

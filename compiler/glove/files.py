@@ -20,7 +20,7 @@ from ..publication import check_folder, entries, publish_folder
 from ..text import cells, sentence
 from .circuit import BillLine, Circuit, Component, ComponentKind
 from .layout import CONTACT_MM, counted_sensors
-from .pattern import dxf_of, svg_of
+from .pattern import svg_of
 from .spec import GloveSpec, SpecSummary, glove_spec
 
 Row = Sequence[object]
@@ -135,13 +135,13 @@ def _cutting(summary: SpecSummary) -> Iterator[str]:
     printed = f"at 1:1 in millimetres, for {summary.print_on}. Print without scaling and measure the bar of 50 mm."
     if summary.hand_length_mm is None:
         yield (
-            f"cutting.svg and cutting.dxf are the glove of your layout, {printed} Layers: outline, holes (one for each "
+            f"cutting.svg is the glove of your layout, {printed} Layers: outline, holes (one for each "
             "sensor), names, scale."
         )
         yield "sensors.csv: every wired sensor with its position, as in your layout, and its pin."
         return
     yield (
-        f"cutting.svg and cutting.dxf are the right hand of {summary.hand_length_mm:g} mm length laid flat, the palm "
+        f"cutting.svg is the right hand of {summary.hand_length_mm:g} mm length laid flat, the palm "
         f"up, {printed} For a left hand, mirror it. Layers: outline, strips (the sides of the digits, unfolded), "
         f"creases, holes ({CONTACT_MM} mm, where the sensor meets the hand), names, scale."
     )
@@ -233,7 +233,7 @@ def _quoted(text: str) -> str:
 NAMES = frozenset(
     {
         *("README.txt", "bom.csv", "glove.net", "glove.toml", "sensors.csv", "spec.json", "wiring.csv"),
-        *("cutting.dxf", "cutting.svg"),
+        "cutting.svg",
     }
 )
 _MARK = "spec.json"
@@ -266,7 +266,7 @@ def files_of(spec: GloveSpec) -> Mapping[str, bytes]:
     }
     if spec.pattern is None:
         return files
-    return {**files, "cutting.dxf": dxf_of(spec.pattern), "cutting.svg": svg_of(spec.pattern)}
+    return {**files, "cutting.svg": svg_of(spec.pattern)}
 
 
 def check_output(folder: Path) -> None:

@@ -1,26 +1,17 @@
 """The cutting pattern: the flat hand with its kept switches as shapes on a page, in millimetres at 1:1.
 
 Page coordinates: x to the right, y up, from the lower left corner. The page is the smallest sheet that holds it.
-SVG and DXF are written from the same shapes.
 """
 
-import io
-import os
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..hand import HandShape
 from .layout import PlacedSensor, hole_mm
-
-if TYPE_CHECKING:
-    from ezdxf.layouts.layout import Modelspace
 
 # The margin that most printers leave white.
 MARGIN_MM = 5.0
@@ -45,8 +36,6 @@ _SVG_COLOURS = {
 _STROKE_MM = 0.2
 # The height of capitals in Helvetica and similar fonts, as a share of the font size.
 _CAPITALS = 0.72
-# AutoCAD's colour numbers: black or white, blue, grey, red.
-_DXF_COLOURS = {"outline": 7, "strips": 5, "creases": 8, "holes": 1, "names": 8, "scale": 7}
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,56 +206,3 @@ def _add_text(group: ET.Element, text: Text, height_mm: float) -> None:
     if text.centred:
         attributes["text-anchor"] = "middle"
     ET.SubElement(group, "text", attributes).text = text.text
-
-
-def dxf_of(pattern: Pattern) -> bytes:
-    """Return the DXF (AutoCAD 2000, millimetres), which cutters and CAD programs read."""
-    _load_ezdxf()
-    from ezdxf._options import options
-    from ezdxf.filemanagement import new
-    from ezdxf.units import MM
-
-    text = io.StringIO()
-    dated = options.write_fixed_meta_data_for_testing
-    # Keep dates and random identifiers out of the file.
-    options.write_fixed_meta_data_for_testing = True
-    try:
-        document = new("R2000", units=MM)
-        for layer in LAYERS:
-            document.layers.add(layer, color=_DXF_COLOURS[layer])
-        space = document.modelspace()
-        for shape in pattern[1]:
-            _add_to_dxf(space, shape)
-        document.write(text)
-    finally:
-        options.write_fixed_meta_data_for_testing = dated
-    return text.getvalue().encode(document.output_encoding, "dxfreplace")
-
-
-def _load_ezdxf() -> None:
-    """Import ezdxf, which then reads settings and a list of fonts in the user's home, also where that is unreadable."""
-    try:
-        import_module("ezdxf")
-    except OSError:
-        before = dict(os.environ)
-        with TemporaryDirectory() as empty:
-            os.environ.update(HOME=empty, XDG_CONFIG_HOME=empty, XDG_CACHE_HOME=empty)
-            try:
-                import_module("ezdxf")
-            finally:
-                os.environ.clear()
-                os.environ.update(before)
-
-
-def _add_to_dxf(space: "Modelspace", shape: Shape) -> None:
-    from ezdxf.enums import TextEntityAlignment
-
-    on_layer = {"layer": shape.layer}
-    match shape:
-        case PatternLine(points=points, closed=closed):
-            space.add_lwpolyline(points.tolist(), close=closed, dxfattribs=on_layer)
-        case Circle(x=x, y=y, radius=radius):
-            space.add_circle((x, y), radius, dxfattribs=on_layer)
-        case Text(x=x, y=y, height=height, text=text, centred=centred):
-            where = TextEntityAlignment.MIDDLE_CENTER if centred else TextEntityAlignment.LEFT
-            space.add_text(text, height=height, dxfattribs=on_layer).set_placement((x, y), align=where)

@@ -12,7 +12,6 @@ from thenar.runtime.manifest import Manifest
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.scanning.scanmap import ScanMap
 
-from ..evaluation.study import Study
 from ..facts import Fact
 from ..frontier.points import Frontier
 from ..hand import Floats, HandShape
@@ -36,7 +35,6 @@ class ReportContent:
     tree          the tree that chose the switches, over the recordings' switches; classes index manifest.grasps
     confusion     (K, K) counts of frames in the headline's folds, row: true, column: predicted; K types, with "none" if
                   the build can predict it
-    study         the paper's tables for these recordings; no_study: a sentence on why there are none
     frontier      the frontier to report; point: the number of the build's point, None if it is not on the frontier
     hand          the positions of the recordings' switches
     scan, harness the scan map and the harness that it was made for
@@ -55,8 +53,6 @@ class ReportContent:
     warnings: tuple[str, ...] = ()
     tree: Tree | None = None
     confusion: NDArray[np.intp] | None = None
-    study: Study | None = None
-    no_study: str = "They were not requested."
     frontier: Frontier | None = None
     point: int | None = None
     hand: HandShape | None = None
@@ -100,7 +96,6 @@ class PlainTable:
 
     words  columns of words; the others hold numbers, right-aligned
     head   the column with the row headings
-    note   a sentence below the table
     """
 
     caption: str
@@ -108,7 +103,6 @@ class PlainTable:
     rows: tuple[tuple[str, ...], ...]
     words: tuple[int, ...] = (0,)
     head: int = 0
-    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,17 +37,9 @@ with optional():
 
 _FOREIGN = "This frontier belongs to other recordings than the build."
 _CAPTIONS = {
-    "frontier": (
-        "Accuracy against frame time, both in the table below. Points that differ only in their decision rule are not "
-        "shown."
-    ),
+    "frontier": "Accuracy against frame time, both in the table below.",
     "switches": (
-        "Accuracy against the number of switches. Curves use switches only: ours are blue, the baselines' are thin. "
-        "Points without switches are not shown."
-    ),
-    "latency": (
-        "Accuracy against decision latency, from the hand's arrival in a grasp until the decision. Missed grasps are "
-        "not included; only the best points of each kind of decision are shown."
+        "Accuracy against the number of switches. Curves use switches only. Points without switches are not shown."
     ),
 }
 # If a colour has two names, the first.
@@ -199,10 +191,6 @@ def _facts(point: FrontierPoint, frontier: Frontier) -> Iterable[tuple[str, str]
     yield "Joints", DASH if setting.inputs == "switches" else _time(point.transfer)
     yield "Classify", _time(point.classify)
     yield "Frame", _time(point.frame)
-    yield "Decision", setting.decision
-    mean, late = _latency(point)
-    yield of_time(frontier, "Latency"), DASH if mean == DASH else f"{mean} µs, 99th percentile {late} µs"
-    yield "Grasps missed", f"{100 * point.latency.missed:.1f} %"
     yield "Flash and RAM", f"{point.flash:,} and {point.ram:,} bytes"
 
 
@@ -212,12 +200,6 @@ def _placement(point: FrontierPoint) -> str:
 
 def _wiring(point: FrontierPoint) -> str:
     return wiring_of(point.setting) or point.setting.wiring
-
-
-def _latency(point: FrontierPoint) -> tuple[str, str]:
-    """Return mean and 99th percentile of the latency, µs; dashes where no grasp was decided on correctly."""
-    latency = point.latency
-    return (DASH, DASH) if latency.missed >= 1 else (microseconds(latency.mean_us), microseconds(latency.p99_us))
 
 
 def _time(time: PointTime) -> str:
@@ -232,7 +214,8 @@ def _points(frontier: Frontier) -> PlainTable:
         "Method",
         "Trainer",
         *rates_of(frontier),
-        *(of_time(frontier, what) for what in ("Frame, µs", "Latency, µs", "99th pct., µs")),
+        of_time(frontier, "Frame, µs"),
+        "Flash, bytes",
     )
     rows = tuple(
         (
@@ -243,18 +226,16 @@ def _points(frontier: Frontier) -> PlainTable:
             trainer_of(point.setting),
             *(interval(rate(point)) for rate in rates_of(frontier).values()),
             microseconds(point.frame.us),
-            *_latency(point),
-            f"{100 * point.latency.missed:.1f}",
             f"{point.flash:,}",
         )
         for point in frontier.points
     )
     caption = f"Points of the frontier; accuracy in % with 95{NBSP}% intervals"
-    return PlainTable(caption, (*columns, "Missed, %", "Flash, bytes"), rows, words=(0, 2, 3, 4))
+    return PlainTable(caption, columns, rows, words=(0, 2, 3, 4))
 
 
 def _tables(frontier: Frontier) -> Iterator[PlainTable]:
-    """Yield tables of reference points and of baselines, where there are any."""
+    """Yield tables of reference points and of curves, where there are any."""
     kept, trainer = elements_of(frontier).capitalize(), "".join(frontier.trainers[:1]) or "none"
     if frontier.marks:
         marks = tuple(
@@ -269,7 +250,7 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
         for curve in frontier.curves:
             rates = dict(zip(curve.sizes, curve.rates, strict=True))
             cells = (f"{100 * rates[size].mean:.1f}" if size in rates else "" for size in sizes)
-            rows.append((f"{curve.method}{' (ours)' if curve.ours else ''}", curve.what, *cells))
+            rows.append((curve.method, curve.what, *cells))
         columns = ("Method", "Description", *(f"{size:g}" for size in sizes))
         what = f"Accuracy in % ({frontier.by}, trials), {elements_of(frontier)} only, against their number"
         yield PlainTable(f"{what}; trainer: {trainer}", columns, tuple(rows), words=(0, 1))

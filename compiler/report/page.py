@@ -33,7 +33,7 @@ def report_html(content: ReportContent) -> bytes:
         facts=partial(_facts, content),
         sections=sections,
         hand=_hand(content),
-        confusions=tuple(sections.confusions(content)),
+        confusion=sections.confusion_of(content),
         frontier=frontier,
         style=Markup(colour_variables()) + _file(environment, "report.css"),
         script=script,

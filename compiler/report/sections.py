@@ -14,10 +14,7 @@ from thenar.runtime.model.terms.bit import Bit
 from thenar.runtime.recipe import AUTO
 from thenar.runtime.scanning.timing import port_us, reading_of
 
-from ..evaluation.folds import PROTOCOLS
 from ..evaluation.rates import RecipeWords, placement_words
-from ..evaluation.study import Study
-from ..evaluation.tables import RateTable, both
 from ..facts import recognises
 from ..movements.transitions import Transitions
 from ..placement.gain import entropy_bits
@@ -276,34 +273,6 @@ def _plain(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
-def protocols(study: Study) -> tuple[tuple[str, str], ...]:
-    """Return the study's protocols and their meanings."""
-    return tuple((f"{name} protocol", said) for name, said in PROTOCOLS.items() if name in study.options.protocols)
-
-
-def study_tables(study: Study) -> tuple[PlainTable, ...]:
-    """Return the paper's tables."""
-    return tuple(map(_table, study.tables))
-
-
-def study_notes(study: Study) -> Iterator[str]:
-    """Yield how the rows were split, the caveats, and the missing tables with the reasons."""
-    yield sentence(str(study))
-    yield from map(sentence, study.warnings)
-    for left in study.left_out:
-        yield f"No table of {left.name}: {left.reason}."
-
-
-def _table(table: RateTable) -> PlainTable:
-    several = len(table.columns) > 1
-    columns = ("Row", "What", "Elements", *table.columns, *(["all"] * several))
-    rows = tuple(
-        (row.name, row.what, str(row.switches), *map(str, row.cells), *([both(row.rate, row.frames)] * several))
-        for row in table.rows
-    )
-    return PlainTable(table.title, columns, rows, words=(0, 1), note=table.note)
-
-
 def transition_table(found: Transitions) -> PlainTable:
     """Return the changes from type to type, the most frequent first."""
     counts, shares = found.counts, found.probabilities
@@ -339,24 +308,14 @@ def confusion_view(title: str, grasps: Sequence[str], counts: NDArray[np.intp]) 
     return ConfusionView(title, tuple(grasps), shown, tuple(_mistaken(grasps, counts)))
 
 
-def confusions(content: ReportContent) -> Iterator[ConfusionView]:
-    """Yield the build's own matrix, then those of the compositions, nested folds, all subjects together."""
-    if content.confusion is not None:
-        rate = content.manifest.headline
-        folds = "" if rate is None else f", {rate.title}, {counted(rate.folds, 'nested fold')}"
-        title = f"This build's recipe ({recipe(content.manifest)}){folds}"
-        yield confusion_view(title, content.manifest.classes[: len(content.confusion)], content.confusion)
-    if content.study is None:
-        return
-    for table in content.study.tables:
-        if (table.name, table.protocol) == ("compositions", "nested"):
-            one = len(table.columns) == 1
-            whose = f"subject {table.columns[0]}" if one else f"{len(table.columns)} subjects together"
-            for row in table.rows:
-                counts = [cell.confusion for cell in row.cells if cell.confusion is not None]
-                if counts:
-                    title = f"{row.name}: {row.what}, nested folds of {whose} ({table.recipe})"
-                    yield confusion_view(title, content.study.grasps, np.sum(counts, axis=0))
+def confusion_of(content: ReportContent) -> ConfusionView | None:
+    """Return the build's matrix; None if it was compiled without folds."""
+    if content.confusion is None:
+        return None
+    rate = content.manifest.headline
+    folds = "" if rate is None else f", {rate.title}, {counted(rate.folds, 'nested fold')}"
+    title = f"This build's recipe ({recipe(content.manifest)}){folds}"
+    return confusion_view(title, content.manifest.classes[: len(content.confusion)], content.confusion)
 
 
 def _shaded(count: int, total: int, hit: bool) -> tuple[str, str]:

@@ -61,13 +61,6 @@ class ColumnTables:
                 scores += (np.clip(x, low, high) - low)[:, np.newaxis] * row
         return scores
 
-    def columns(self, order: Sequence[int]) -> "ColumnTables":
-        """Return the tables of the columns in another order."""
-        edges, rows = (tuple(part[column] for column in order) for part in (self.edges, self.rows))
-        return ColumnTables(
-            self.bias, edges, rows, {at: self.lines[c] for at, c in enumerate(order) if c in self.lines}
-        )
-
     def score_tables(self, n_switches: int) -> ScoreTables:
         """Return the tables of [switches | joint codes], the first `n_switches` columns being switches."""
         bias, switch_rows = self.bias, np.zeros((n_switches, len(self.bias)))

@@ -59,15 +59,13 @@ def test_no_report_leaves_out_the_report_and_the_spec(gloved_file: Path, tmp_pat
     assert made == ["build.json", "ensemble.bin", "firmware", "hand.json", "tables.bin", "try.html"]
 
 
-@pytest.mark.parametrize("length", [None, 150])
-def test_the_spec_in_a_build_is_what_spec_writes_of_it(gloved_file: Path, tmp_path: Path, length: int | None) -> None:
+def test_the_spec_in_a_build_is_what_spec_writes_of_it(gloved_file: Path, tmp_path: Path) -> None:
     build, spec = tmp_path / "build", tmp_path / "spec"
-    given = () if length is None else ("--hand-length", length)
-    done(thenar("compile", gloved_file, "-o", build, *QUICK, *given))
-    done(thenar("spec", build, "-o", spec, *given))
+    done(thenar("compile", gloved_file, "-o", build, *QUICK))
+    done(thenar("spec", build, "-o", spec))
     files = [{path.name: path.read_bytes() for path in folder.iterdir()} for folder in (build / "spec", spec)]
     assert files[0] == files[1]
-    assert f"right hand of {length or 190} mm" in files[0]["cutting.svg"].decode()
+    assert "right hand of 190 mm" in files[0]["cutting.svg"].decode()
 
 
 def test_a_wiring_is_in_the_report_and_its_spec_agrees(gloved_file: Path, tmp_path: Path) -> None:
@@ -81,18 +79,6 @@ def test_a_wiring_is_in_the_report_and_its_spec_agrees(gloved_file: Path, tmp_pa
     done(thenar("spec", build, "-o", spec))
     for path in spec.iterdir():
         assert path.read_bytes() == (build / "spec" / path.name).read_bytes(), path.name
-
-
-def test_a_hand_length_needs_a_spec_to_be_used_in(gloved_file: Path, tmp_path: Path) -> None:
-    given = ("compile", gloved_file, "-o", tmp_path / "build", *QUICK, "--hand-length", 180, "--no-report")
-    assert "--no-report omits" in refused(thenar(*given))
-    assert not (tmp_path / "build").exists()
-
-
-def test_a_hand_length_needs_switches_whose_places_are_known(set_file: Path, tmp_path: Path) -> None:
-    given = ("compile", set_file, "-o", tmp_path / "build", *QUICK, "--hand-length", 180)
-    assert "these switches are not on it: use --layout instead" in refused(thenar(*given))
-    assert not (tmp_path / "build").exists()
 
 
 def test_a_method_that_takes_a_number_keeps_it(gloved_file: Path, tmp_path: Path) -> None:

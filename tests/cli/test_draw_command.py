@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from thenar.cli import run
-from thenar.compiler import GraspSet, compile_build, grow_id3
+from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.taxonomy import own
 from thenar.simulator.body.layout import murakami160
 
@@ -56,22 +56,6 @@ def test_contacts_are_drawn_together_and_by_type(
     assert f"{by_type}: 3 hands" in capsys.readouterr().out
 
 
-def test_placements_are_drawn_for_each_subject_and_pooled(
-    glove_file: Path, glove_set: GraspSet, tmp_path: Path
-) -> None:
-    picture = tmp_path / "kept.svg"
-    assert run(["draw", str(glove_file), "--place", "--prune", "5", "-o", str(picture)]) == 0
-    for hand, rows in enumerate((range(30), range(30, 60), range(60))):
-        tree = grow_id3(glove_set.switches[rows], glove_set.labels[rows], min_samples=5)
-        assert marks(picture, hand) == [NAMES[number] for number in tree.inputs]
-
-
-def test_one_subject_is_one_hand(glove_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    glove_set.rows(np.arange(30)).save(tmp_path / "a.grasps")
-    assert run(["draw", str(tmp_path / "a.grasps"), "--place", "-o", str(tmp_path / "a.svg")]) == 0
-    assert capsys.readouterr().out.endswith("a.svg: 1 hand\n")
-
-
 def test_a_placement_a_build_and_lists_are_drawn_side_by_side(
     glove_file: Path, glove_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -100,7 +84,7 @@ def test_one_list_may_be_drawn_under_two_names(tmp_path: Path) -> None:
 def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(
     set_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for options in ([], ["--place"], ["--per-grasp"]):
+    for options in ([], ["--per-grasp"]):
         assert run(["draw", str(set_file), *options, "-o", str(tmp_path / "no.svg")]) == 2
         assert "the position of switch 's0' is unknown: say it with --layout" in capsys.readouterr().err
     assert not (tmp_path / "no.svg").exists()
@@ -137,15 +121,12 @@ def test_a_folder_that_is_no_build_is_refused(tmp_path: Path, capsys: pytest.Cap
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        (["--per-grasp"], "need recordings"),
-        (["--place"], "need recordings"),
-        (["--prune", "3"], "--prune needs --place"),
+        (["--per-grasp"], "needs recordings"),
         (["--kept", "nowhere.json"], "There is no file or folder 'nowhere.json'"),
         (["--kept", "=x"], "'=x' is not NAME=PATH"),
         (["GRASPS", "--numbers"], "leave GRASPS out"),
         (["GRASPS", "--kept", "GRASPS"], "leave GRASPS out"),
         (["--numbers", "--kept", "GRASPS"], "leave out --numbers"),
-        (["GRASPS", "--place", "--per-grasp"], "give one of them"),
         (["-o", "glove.pdf"], "must end in .svg or .png"),
         (["-o", "no/such/glove.svg"], "There is no folder 'no/such'"),
     ],

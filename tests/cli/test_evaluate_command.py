@@ -112,15 +112,6 @@ def test_json_on_stdout_and_in_the_file_are_one_document(
     assert result["left_out"] == [{"name": "generality", "reason": "another's placement needs a second subject"}]
 
 
-def test_confusion_matrices_are_drawn_on_request(grasps: str, tmp_path: Path) -> None:
-    arguments = ["--tables", "compositions", "--plot", str(tmp_path / "drawn")]
-    assert run(["evaluate", grasps, *QUICK, "--protocol", "both", *arguments]) == 0
-    rows = [(protocol, name) for protocol in ("paper", "nested") for name in ("I", "II", "III", "IV", "V", "VI", "VII")]
-    drawn = {path.name: path.read_bytes() for path in (tmp_path / "drawn").iterdir()}
-    assert drawn.keys() == {f"confusion-{protocol}-{name}.png" for protocol, name in rows}
-    assert all(picture.startswith(b"\x89PNG") for picture in drawn.values())
-
-
 def test_other_cuts_say_what_they_are(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["evaluate", grasps, *QUICK, "--by", "subject", "--tables", "compositions"]) == 0
     assert "one subject left out" in capsys.readouterr().out
@@ -148,12 +139,7 @@ def test_a_grasp_type_too_rare_for_folds_warns_on_stderr(tmp_path: Path, capsys:
         (["--by", "object"], "leaving one object out needs two or more"),
         (["--folds", "100"], "24 rows cannot be cut into 100 folds"),
         (["--folds", "1"], "--folds"),
-        (
-            ["--plot", "pictures", "--tables", "baselines"],
-            "--plot shows the compositions: name them",
-        ),
         (["-o", "no/such/result.json"], "There is no folder 'no/such'"),
-        (["--plot", __file__], "is a file"),
         (["--prune-list", "0,x"], "'0,x' is not a list of whole numbers such as 0,13,62"),
         (["--tables", "composition"], "there is no table 'composition' (did you mean 'compositions'"),
     ],

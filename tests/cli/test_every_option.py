@@ -34,7 +34,7 @@ LINES: dict[str, tuple[str, str]] = {
     "segment": ("movements.grasps", "-b build -o new.csv"),
     "frontier": (
         "set.grasps",
-        "-o new --methods elimination --baselines none --rounds 2 --repeats 1 --finalists 1 --jobs 1"
+        "-o new --methods elimination --rounds 2 --repeats 1 --finalists 1 --jobs 1"
         # Nothing is left to choose, which takes long and says nothing.
         " --trainer logitboost --shrinkage 1 --max-bins 256 --ties first",
     ),
@@ -76,8 +76,8 @@ def material(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
         Path("glove.toml").write_text(f'[[stream]]\nport = "{folder}/none"\nswitches = [{names}]\n')
         Path("objects.toml").write_text('cup = ["mug"]\n')
         # Libraries are loaded whole before any work is interrupted.
-        assert run(["info", "set.grasps", "--plot", "set.png"]) == 0
-        for library in ("sklearn", "scipy.stats", "scipy.optimize", "joblib", "threadpoolctl", "jinja2", "ezdxf"):
+        assert run(["place", "set.grasps", "--draw", "set.png"]) == 0
+        for library in ("sklearn", "scipy.stats", "scipy.optimize", "joblib", "threadpoolctl", "jinja2"):
             import_module(library)
         Path("folder").mkdir()
         Path("junk").write_bytes(bytes(range(256)))

@@ -27,7 +27,6 @@ def no_file_beyond(size: int) -> Iterator[None]:
         (("export", "set.grasps", "-o", "new.csv.gz"), "new.csv.gz"),
         (("export", "set.grasps", "-o", "new.arff"), "new.arff"),
         (("import", "table.csv", "-o", "new.grasps", "--columns", "columns.toml"), "new.grasps"),
-        (("info", "set.grasps", "--plot", "new.png"), "new.png"),
         (("place", "set.grasps", "--sensors", "2", "-o", "new.json"), "new.json"),
         (("place", "set.grasps", "--sensors", "2", "--draw", "new.svg"), "new.svg"),
     ],

@@ -298,7 +298,7 @@ def test_every_command_counts_trials_grasps_rests_and_frames_alike(
     _, said, _ = import_cells(cells)
     size = "24 trials (12 grasps, 12 rests) of 120 frames"
     assert f"{path}: {size}, 3 grasp types (own); subjects 1" in said
-    assert "Coding" not in said
+    assert "rounded to codes" not in said
     for arguments in (
         ("info", path),
         ("export", path, "-o", f"{folder}/again.csv"),

@@ -41,20 +41,6 @@ def test_a_set_is_described_for_machines(grasps: Path, capsys: pytest.CaptureFix
     assert summary["grasps"] == {"mug": 2, "ball": 2}
 
 
-@pytest.mark.parametrize(("suffix", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
-def test_a_picture_is_drawn_when_asked_for(grasps: Path, suffix: str, start: bytes) -> None:
-    picture = grasps.with_name(f"set.{suffix}")
-    assert run(["info", str(grasps), "--plot", str(picture)]) == 0
-    assert picture.read_bytes().startswith(start)
-
-
-def test_a_picture_never_replaces_the_set(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    named = grasps.rename(grasps.with_name("set.png"))
-    assert run(["info", str(named), "--plot", str(named), "--overwrite"]) == 2
-    assert "set.png is named twice" in capsys.readouterr().err
-    assert GraspSet.load(named).grasps.tolist() == ["mug", "ball", "mug", "ball"]
-
-
 def test_too_little_memory_is_one_sentence(
     grasps: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -34,11 +34,10 @@ def place(small_set: GraspSet, build_folder: Path, tmp_path: Path, monkeypatch: 
         "compile set.grasps -o new --rounds 3 --folds 2 --no-report --glove glove.toml",
         "spec build",
         "doctor glove.toml",
-        pytest.param("simulate quick --explain --jobs 1", marks=pytest.mark.slow),
         "stability --list",
         pytest.param("stability elementary --jobs 1", marks=pytest.mark.slow),
         pytest.param(
-            "frontier set.grasps -o new --methods elimination --baselines none --rounds 3 --repeats 1 --finalists 1",
+            "frontier set.grasps -o new --methods elimination --rounds 3 --repeats 1 --finalists 1",
             marks=pytest.mark.slow,
         ),
         pytest.param("simulate quick -o new.grasps --repetitions 1 --jobs 1", marks=pytest.mark.slow),

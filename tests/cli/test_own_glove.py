@@ -154,15 +154,12 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
     assert refused.returncode == 2
     assert "the position of switch 'pad_thumb_1' is unknown: say it with --layout" in refused.stderr
     build = tmp_path / "build"
-    refused = thenar("compile", grasps, "-o", build, *QUICK, "--hand-length", 180)
-    assert refused.returncode == 2
-    assert "use --layout instead" in refused.stderr
     layout.with_name("few.toml").write_text("[places]\npad_thumb_1 = [1, 2]\n")
     refused = thenar("compile", grasps, "-o", build, *QUICK, "--layout", layout.with_name("few.toml"))
     assert refused.returncode == 2
     assert "'pad_thumb_2' is no switch of the glove few.toml" in refused.stderr
     assert not build.exists()
-    for options in (["--per-grasp"], ["--place"], []):
+    for options in (["--per-grasp"], []):
         worked(thenar("draw", grasps, "--layout", layout, *options, "-o", tmp_path / "a.svg", "--overwrite"))
         picture = (tmp_path / "a.svg").read_text()
         assert "pad_thumb_1" in picture
@@ -171,7 +168,7 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
 
 @pytest.mark.slow
 def test_a_frontier_omits_unknown_joint_times_unless_they_are_given(grasps: Path, tmp_path: Path) -> None:
-    few = ("--methods", "id3", "--baselines", "none", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)
+    few = ("--methods", "id3", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)
     # Nothing is left to choose.
     settled = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536)
     found: dict[str, list[Any]] = {}
@@ -188,4 +185,3 @@ def test_a_frontier_omits_unknown_joint_times_unless_they_are_given(grasps: Path
     assert {point["transfer"]["how"] for point in found["left out"]} == {"unknown"}
     assert {(point["transfer"]["how"], point["transfer"]["us"]) for point in found["given"]} == {("given", 5000.0)}
     assert all(point["frame"]["us"] >= 5000.0 for point in found["given"])
-    assert all(point["latency"]["mean_us"] >= round(point["frame"]["us"]) for point in found["given"])

@@ -109,9 +109,9 @@ def test_a_spec_is_replaced_whole_and_anything_else_is_kept(
 ) -> None:
     folder = tmp_path / "spec"
     said(thenar("spec", hand_build, "-o", folder))
-    assert (folder / "cutting.dxf").exists()
+    assert (folder / "cutting.svg").exists()
     said(thenar("spec", build_folder, "-o", folder))
-    assert not (folder / "cutting.dxf").exists()
+    assert not (folder / "cutting.svg").exists()
     other = tmp_path / "other"
     other.mkdir()
     (other / "letter.txt").write_text("dear")

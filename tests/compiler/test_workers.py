@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from thenar.compiler.workers import MOST_JOBS, BackgroundTask, in_workers, workers_of
+from thenar.compiler.workers import BackgroundTask, in_workers
 
 
 def squared_where(number: int) -> tuple[int, int]:
@@ -56,13 +56,7 @@ def test_an_end_before_the_last_answer_warns_of_nothing() -> None:
     assert complaints == []
 
 
-def test_as_many_processes_work_as_are_asked_for() -> None:
-    assert (workers_of(1), workers_of(3)) == (1, 3)
-    assert workers_of(-1) >= 1
-
-
 def test_a_slip_of_the_finger_does_not_start_a_million_processes() -> None:
-    assert workers_of(10**30) == MOST_JOBS
     assert list(in_workers(squared_where, [], 10**30)) == []
 
 

@@ -43,7 +43,7 @@ def test_a_method_of_another_package_is_listed_chosen_by_and_compared(
     settled = ("--trainer", "logitboost", "--shrinkage", "1", "--max-bins", "65536")
     found = json.loads(
         there.thenar(
-            *("frontier", str(file), "-o", str(tmp_path / "found"), "--methods", "chi2", "--baselines", "none"),
+            *("frontier", str(file), "-o", str(tmp_path / "found"), "--methods", "chi2"),
             *quick,
             *settled,
         )

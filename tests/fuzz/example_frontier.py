@@ -13,10 +13,8 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.points import (
     SCHEMA,
     Curve,
-    DecisionKind,
     Frontier,
     FrontierPoint,
-    Latency,
     PlacementChoice,
     PointSetting,
     PointTime,
@@ -38,56 +36,50 @@ TRANSFER_US = 1736.1  # 20 bytes at 115200 baud
 _PARTS = ("thumb", "index", "middle", "ring", "little", "palm")
 SWITCHES = tuple(f"{_PARTS[number * 7 % 6]}-{number:03d}" for number in range(N_SWITCHES))
 
-# inputs, switches, method, parameter, rounds, width, wiring, its clock in kHz, scan us, classify us, decision,
-# rate, latency us: mean and 99th percentile
+# inputs, switches, method, parameter, rounds, width, wiring, its clock in kHz, scan us, classify us, rate
 _POINTS: tuple[tuple[Any, ...], ...] = (
-    ("switches", 6, "elimination", 6, 20, 4, "mcp23017", 1000, 48.0, 61.5, "single", 0.712, 1450, 5900),
-    ("switches", 10, "elimination", 10, 40, 5, "mcp23017", 1000, 48.0, 97.9, "single", 0.801, 1380, 5200),
-    ("switches", 16, "elimination", 16, 60, 6, "mcp23017", 1000, 48.0, 150.6, "dwell", 0.866, 2100, 6400),
-    ("switches", 24, "id3-cost", 24, 80, 8, "tca6424a", 1000, 58.0, 231.4, "dwell", 0.918, 2650, 6900),
-    ("switches", 33, "elimination", 33, 100, 8, "mcp23017", 1000, 96, 344.0, "dwell", 0.929, 2910, 7400),
-    ("switches", 50, "id3-cost", 50, 120, 8, "mcp23017", 400, 241.0, 429.0, "dwell", 0.934, 3260, 9100),
-    ("joints", 0, "elimination", 0, 150, 8, "as wired", 0, 0.0, 298.2, "single", 0.952, 5900, 11800),
-    ("both", 8, "elimination", 8, 150, 8, "mcp23017", 1000, 48.0, 330.0, "dwell", 0.978, 6400, 12900),
-    ("both", 16, "elimination", 16, 200, 8, "as wired", 400, 118.0, 421.3, "dwell", 0.988, 7200, 15100),
-    ("both", 33, "elimination", 33, 300, 12, "board", 1000, 330.0, 905.7, "dwell", 0.9915, 9800, 24600),
-    ("both", 12, "id3-cost", 0.25, 80, 6, "pca9555", 400, 122.0, 363.0, "single", 0.961, 5200, 10400),
+    ("switches", 6, "elimination", 6, 20, 4, "mcp23017", 1000, 48.0, 61.5, 0.712),
+    ("switches", 10, "elimination", 10, 40, 5, "mcp23017", 1000, 48.0, 97.9, 0.801),
+    ("switches", 16, "elimination", 16, 60, 6, "mcp23017", 1000, 48.0, 150.6, 0.866),
+    ("switches", 24, "id3-cost", 24, 80, 8, "tca6424a", 1000, 58.0, 231.4, 0.918),
+    ("switches", 33, "elimination", 33, 100, 8, "mcp23017", 1000, 96, 344.0, 0.929),
+    ("switches", 50, "id3-cost", 50, 120, 8, "mcp23017", 400, 241.0, 429.0, 0.934),
+    ("joints", 0, "elimination", 0, 150, 8, "as wired", 0, 0.0, 298.2, 0.952),
+    ("both", 8, "elimination", 8, 150, 8, "mcp23017", 1000, 48.0, 330.0, 0.978),
+    ("both", 16, "elimination", 16, 200, 8, "as wired", 400, 118.0, 421.3, 0.988),
+    ("both", 33, "elimination", 33, 300, 12, "board", 1000, 330.0, 905.7, 0.9915),
+    ("both", 12, "id3-cost", 0.25, 80, 6, "pca9555", 400, 122.0, 363.0, 0.961),
 )  # fmt: skip
 
 # What each method recognises with so many switches.
 _SIZES = (1, 2, 4, 8, 16, 33, 64, 100, 160)
-_CURVES: tuple[tuple[str, str, bool, tuple[float, ...]], ...] = (
+_CURVES: tuple[tuple[str, str, tuple[float, ...]], ...] = (
     (
         "elimination",
         "Backward elimination on the boosted tables",
-        True,
         (0.19, 0.32, 0.571, 0.768, 0.868, 0.930, 0.935, 0.936, 0.936),
     ),
     (
         "id3-cost",
         "ID3, gain against marginal scan time",
-        True,
         (0.19, 0.30, 0.540, 0.731, 0.853, 0.924, 0.933, 0.936, 0.936),
     ),
     (
         "id3",
         "The paper's ID3, pruned by S",
-        True,
         (0.19, 0.29, 0.512, 0.690, 0.829, 0.914, 0.932, 0.935, 0.936),
     ),
     (
         "cmim",
         "Greedy by conditional mutual information",
-        False,
         (0.18, 0.30, 0.548, 0.752, 0.858, 0.925, 0.935, 0.936, 0.936),
     ),
     (
         "mutual-information",
         "The greatest mutual information, one by one",
-        False,
         (0.19, 0.25, 0.381, 0.518, 0.651, 0.802, 0.905, 0.929, 0.936),
     ),
-    ("random", "Drawn at random", False, (0.10, 0.15, 0.243, 0.389, 0.542, 0.714, 0.862, 0.917, 0.936)),
+    ("random", "Drawn at random", (0.10, 0.15, 0.243, 0.389, 0.542, 0.714, 0.862, 0.917, 0.936)),
 )  # fmt: skip
 
 
@@ -112,7 +104,7 @@ def example_frontier(**changes: object) -> Frontier:
         combinations=184_320,
         points=_points(),
         tried=_tried(),
-        curves=tuple(Curve(name, what, ours, _SIZES, tuple(map(rate, means))) for name, what, ours, means in _CURVES),
+        curves=tuple(Curve(name, what, _SIZES, tuple(map(rate, means))) for name, what, means in _CURVES),
         marks=_marks(),
         skipped=("qemu-system-arm is missing: no Cortex-M was measured.",),
         picked=5,
@@ -132,7 +124,6 @@ def _points() -> tuple[FrontierPoint, ...]:
     costs: dict[str, Callable[[FrontierPoint], float]] = {
         "frame": lambda point: point.frame.us,
         "switches": lambda point: len(point.switches),
-        "latency": lambda point: point.latency.mean_us,
     }
     return tuple(
         msgspec.structs.replace(
@@ -162,15 +153,10 @@ def _point(
     clock_khz: int,
     scan_us: float,
     classify_us: float,
-    decision: DecisionKind,
     mean: float,
-    latency_us: float,
-    p99_us: float,
 ) -> FrontierPoint:
     transfer_us = 0.0 if inputs == "switches" else TRANSFER_US
-    setting = PointSetting(
-        PlacementChoice(method, parameter), inputs, rounds, width, decision, wiring, 1000 * clock_khz
-    )
+    setting = PointSetting(PlacementChoice(method, parameter), inputs, rounds, width, wiring, 1000 * clock_khz)
     return FrontierPoint(
         number=number,
         setting=setting,
@@ -183,7 +169,6 @@ def _point(
         transfer=PointTime(transfer_us, "wire"),
         classify=PointTime(classify_us, "simulated" if number % 3 == 1 else "model"),
         frame=PointTime(max(scan_us, transfer_us) + classify_us, "simulated" if number % 3 == 1 else "model"),
-        latency=Latency(latency_us, p99_us, 0.012, 0.004),
         flash=1900 + 14 * (rounds + 12 * kept) + (2600 if inputs != "switches" else 0),
         ram=48 + 2 * kept,
         ports=-(-kept // 8),

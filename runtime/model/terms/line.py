@@ -71,7 +71,7 @@ class Line(ScoreTerm):
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "Line":
         """Return the line with these fields. Raises KeyError, TypeError or ValueError for others."""
-        joint, low, high = (int(arrays[name]) for name in ("joint", "low", "high"))
+        joint, low, high = (int(arrays[name].item()) for name in ("joint", "low", "high"))
         return cls(joint, low, high, arrays["row"])
 
     def relative(self) -> "Line":

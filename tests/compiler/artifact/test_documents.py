@@ -38,7 +38,7 @@ def gloved(grasp_set: GraspSet) -> GraspSet:
 
 def test_one_call_makes_a_build_with_its_report_and_spec(gloved: GraspSet, tmp_path: Path) -> None:
     build = tmp_path / "build"
-    for documents, drawn in ((Documents(), False), (Documents(hand_map(), 180), True)):
+    for documents, drawn in ((Documents(), False), (Documents(hand_map().scaled(180.0)), True)):
         _compile(gloved, build, documents)
         assert ('id="kept-hand"' in (build / "report.html").read_text()) == drawn
         assert (build / "spec" / "glove.toml").is_file()
@@ -65,16 +65,10 @@ def test_switches_of_nobody_knows_which_glove_have_a_spec_without_a_pattern(
     assert not list((tmp_path / "build" / "spec").glob("cutting.*"))
 
 
-def test_the_report_has_the_papers_tables_of_the_builds_own_folds(gloved: GraspSet, tmp_path: Path) -> None:
+def test_the_report_has_the_confusion_of_the_builds_own_folds(gloved: GraspSet, tmp_path: Path) -> None:
     words = _compile(gloved, tmp_path / "build", folds=3, seed=5)
-    assert "Angle + Sel-Co" in words
-    assert "3 stratified folds of whole trials, 1 repeat from seed 5; accuracies" in words
     assert re.search(r"This build's recipe \(placement: .*; trainer: .*\), within subject, 3 nested folds", words)
-
-
-def test_the_report_of_very_many_subjects_has_no_column_for_each(tmp_path: Path) -> None:
-    words = _compile(make_set(rows=640, subjects=32), tmp_path / "build", folds=2)
-    assert "have a column for each subject: 32 are too many for a page. thenar evaluate SET.grasps" in words
+    assert "thenar evaluate SET.grasps prints the paper's tables" in words
 
 
 @pytest.mark.parametrize(("types", "switches", "joints"), [(2, 1, 0), (2, 0, 1), (33, 12, 2), (33, 6, 0)])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.arrays import pack, unpack
-from thenar.compiler.artifact.ensemble import KIND, LINES, PAIRS, TABLES, ensemble_from_bytes, ensemble_to_bytes
+from thenar.compiler.artifact.ensemble import KIND, TABLES, ensemble_from_bytes, ensemble_to_bytes
 from thenar.compiler.trainers.stumps import Stumps
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.model.tables import ScoreTables
@@ -64,9 +64,8 @@ def test_what_was_written_is_read_again_bit_for_bit(model: Stumps | ScoreTables)
         assert repr(read) == repr(model)
 
 
-CONTRADICTIONS: list[tuple[int, ScoreTables, list[dict[str, np.ndarray]]]] = [
+CONTRADICTIONS: list[tuple[ScoreTables, list[dict[str, np.ndarray]]]] = [
     (
-        TABLES,
         _tables(),
         [
             {"bins": np.array([5, 0])},
@@ -86,56 +85,49 @@ CONTRADICTIONS: list[tuple[int, ScoreTables, list[dict[str, np.ndarray]]]] = [
         ],
     ),
     (
-        LINES,
         _with_lines(),
         [
-            {"lines": np.array([[1, 0, 9], [0, 0, 9]])},
-            {"lines": np.array([[0, 0, 9], [0, 0, 9]])},
-            {"lines": np.array([[0, 0, 9], [2, 0, 9]])},
-            {"lines": np.array([[-1, 0, 9], [1, 0, 9]])},
-            {"lines": np.array([[0, 9, 9], [1, 0, 9]])},
-            {"lines": np.array([[0, -1, 9], [1, 0, 9]])},
-            {"lines": np.array([[0, 0, 65536], [1, 0, 9]])},
-            {"lines": np.zeros((0, 3), np.int64), "line_rows": np.zeros((0, 3))},
-            {"lines": np.zeros((2, 2), np.int64)},
-            {"lines": np.zeros(6, np.int64)},
-            {"line_rows": np.zeros((2, 2))},
-            {"line_rows": np.zeros(3)},
-            {"line_rows": np.full((2, 3), np.nan)},
+            {"term_0_joint": np.array(1), "term_1_joint": np.array(0)},
+            {"term_0_joint": np.array(0), "term_1_joint": np.array(0)},
+            {"term_1_joint": np.array(2)},
+            {"term_0_joint": np.array(-1)},
+            {"term_0_joint": np.array([0, 1])},
+            {"term_0_low": np.array(200)},
+            {"term_0_low": np.array(-1)},
+            {"term_0_high": np.array(65536)},
+            {"term_0_row": np.zeros(2)},
+            {"term_0_row": np.zeros((2, 3))},
+            {"term_0_row": np.full(3, np.nan)},
+            {"term_0_more": np.zeros(3)},
+            {"term_2_row": np.zeros(3)},
         ],
     ),
     (
-        PAIRS,
         _with_pairs(),
         [
-            {"pairs": np.array([[1, 0, 1, 2]])},
-            {"pairs": np.array([[0, 2, 1, 2]])},
-            {"pairs": np.array([[0, 1, 2, 2]])},
-            {"pairs": np.array([[0, 1, -1, 2]])},
-            {"pairs": np.array([[0, 1, 2**62, 2**62]])},
-            {"pairs": np.array([[0, 1, 1]])},
-            {"pairs": np.zeros((0, 4), np.int64)},
-            {"pair_thresholds": np.array([4, 9, 7], np.uint16)},
-            {"pair_thresholds": np.array([4, 9], np.uint16)},
-            {"pair_rows": np.zeros((6, 2))},
-            {"pair_rows": np.zeros((5, 3))},
-            {"pair_rows": np.full((6, 3), np.nan)},
+            {"term_0_joints": np.array([1, 0])},
+            {"term_0_joints": np.array([0, 2])},
+            {"term_0_joints": np.array([0, 1, 2])},
+            {"term_0_down": np.array([4, 5], np.uint16)},
+            {"term_0_down": np.array([4])},
+            {"term_0_across": np.array([9, 7], np.uint16)},
+            {"term_0_across": np.array([7], np.uint16)},
+            {"term_0_rows": np.zeros((2, 3, 2))},
+            {"term_0_rows": np.zeros((6, 3))},
+            {"term_0_rows": np.full((2, 3, 3), np.nan)},
         ],
     ),
 ]
 
 
 @pytest.mark.parametrize(
-    ("version", "tables", "change"),
-    [(version, tables, change) for version, tables, changes in CONTRADICTIONS for change in changes],
+    ("tables", "change"), [(tables, change) for tables, changes in CONTRADICTIONS for change in changes]
 )
-def test_tables_that_contradict_themselves_are_refused(
-    version: int, tables: ScoreTables, change: dict[str, np.ndarray]
-) -> None:
-    _, payload = unseal(ensemble_to_bytes(tables), KIND, version, "ensemble.bin")
+def test_tables_that_contradict_themselves_are_refused(tables: ScoreTables, change: dict[str, np.ndarray]) -> None:
+    _, payload = unseal(ensemble_to_bytes(tables), KIND, TABLES, "ensemble.bin")
     header, arrays = unpack(payload)
     with pytest.raises(ThenarError, match=r"ensemble\.bin is damaged"):
-        ensemble_from_bytes(seal(KIND, version, pack(header, arrays | change)))
+        ensemble_from_bytes(seal(KIND, TABLES, pack(header, arrays | change)))
 
 
 @pytest.mark.parametrize(

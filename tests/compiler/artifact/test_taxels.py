@@ -11,10 +11,9 @@ import pytest
 
 from thenar.cli import run
 from thenar.cli.place_command import command as place_command
-from thenar.compiler import GraspSet, LogitBoostClassifier, compile_build
+from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact import CompileError
 from thenar.compiler.artifact.documents import Documents
-from thenar.compiler.artifact.estimator import compile as compile_estimator
 from thenar.compiler.artifact.training import cuts_of
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.placement.elements import LEVELS, bits_of, elements_of, names_of
@@ -114,12 +113,10 @@ def test_pads_of_another_scale_or_kind_are_refused(padded: GraspSet, tmp_path: P
         verify(tmp_path / "build", bits)
 
 
-def test_joints_alone_need_no_thresholds_and_estimators_take_none(padded: GraspSet, tmp_path: Path) -> None:
+def test_joints_alone_need_no_thresholds(padded: GraspSet, tmp_path: Path) -> None:
     assert not compile_build(padded, tmp_path / "joints", rounds=2, folds=2, inputs="joints").manifest.switches
     alone = replace(padded, switches=np.zeros((96, 0), bool), switch_names=())
     assert compile_build(alone, tmp_path / "pads", rounds=2, folds=2, inputs="switches").manifest.switches
-    with pytest.raises(CompileError, match="the recordings have taxels"):
-        compile_estimator(LogitBoostClassifier(), padded, tmp_path / "estimator")
 
 
 def test_the_best_joints_are_read_alone_by_name(tmp_path: Path) -> None:

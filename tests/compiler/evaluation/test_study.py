@@ -3,13 +3,12 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from thenar.compiler.evaluation.folds import PROTOCOLS, EvaluationError, Fold, Population, Scheme
 from thenar.compiler.evaluation.plan import REFERENCE, CellPlan, FoldFit, RowPlan, TableName
 from thenar.compiler.evaluation.rates import Rate, RecipeWords
 from thenar.compiler.evaluation.study import TABLES, Study, StudyDesign, evaluate
-from thenar.compiler.evaluation.tables import RateReader, RateRow, RateTable, draw_matrix
+from thenar.compiler.evaluation.tables import RateReader, RateRow, RateTable
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS
@@ -227,13 +226,3 @@ def test_trainers_are_not_compared_where_test_rows_choose() -> None:
 def test_a_set_without_rows_is_refused() -> None:
     with pytest.raises(EvaluationError, match="no rows"):
         evaluate(make_grasps().rows([]), QUICK)
-
-
-def test_numbers_and_colours_are_shares_of_the_true_types_rows() -> None:
-    axes = Figure().subplots()
-    draw_matrix(axes, ("cup", "pen", "rod"), ((150, 50, 0), (1, 199, 0), (0, 0, 0)))
-    (image,) = axes.images
-    shares = np.array([[0.75, 0.25, 0.0], [0.005, 0.995, 0.0], [0.0, 0.0, 0.0]])
-    assert np.allclose(np.asarray(image.get_array()), shares)
-    written = {text.get_position(): text.get_text() for text in axes.texts}
-    assert written == {(0, 0): "75", (1, 0): "25", (1, 1): "100"}

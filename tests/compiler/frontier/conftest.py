@@ -11,6 +11,6 @@ from thenar.compiler.samples import Samples
 
 def survey_of(grasp_set: GraspSet, cache: Cache, model: ClassifyModel | None = None) -> Survey:
     """Return the survey of a set's rows for a processor, by default an AVR, without a chip for its switches."""
-    samples, search = Samples.of(grasp_set), Search(methods=("id3",), baselines=())
+    samples, search = Samples.of(grasp_set), Search(methods=("id3",))
     equipment = Equipment(model or ClassifyModel("avr328p"), (), WIRE_ONLY)
     return Survey(grasp_set, "set", samples, None, search, Cuts.of(samples, search), equipment, cache)

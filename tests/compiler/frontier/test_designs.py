@@ -10,8 +10,7 @@ import pytest
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.designs import Design, best_designs, designs_of, lucks, points_of
 from thenar.compiler.frontier.finalists import EvaluatedFinalist, Screened
-from thenar.compiler.frontier.latency import POLICIES
-from thenar.compiler.frontier.points import Latency, PointTime
+from thenar.compiler.frontier.points import PointTime
 from thenar.compiler.frontier.price import Classified, PricedTables
 from thenar.compiler.frontier.search import Search, placed, tabled
 from thenar.compiler.frontier.survey import Cuts, TrialAccuracy
@@ -21,8 +20,6 @@ from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS, Training
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.recipe import PAPERS_TRAINER, Recipe
-
-WAIT = Latency(1000.0, 2000.0, 0.0)
 
 
 @dataclass
@@ -107,21 +104,16 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     # The model has the other one faster, the simulator the better one: so the other is beaten on time.
     assert other.frame.us < one.frame.us
     several = [simulated(one, 20.0), simulated(other, 60.0)]
-    waits = {(design, kind): WAIT for design in several for kind in POLICIES}
-    points = points_of(several, waits, {each.judged: 0.01 for each in several}, SURVEY)
+    points = points_of(several, {each.judged: 0.01 for each in several}, SURVEY)
     assert [point.frame.us for point in points] == sorted(point.frame.us for point in points)
-    fronts = {(len(point.switches), point.setting.decision): point.fronts for point in points}
-    assert fronts[20, "single"] == ("frame", "switches", "latency")
-    assert fronts[10, "single"] == ("switches",)
-    assert (20, "dwell") in fronts
-    assert (10, "dwell") not in fronts
+    fronts = {len(point.switches): point.fronts for point in points}
+    assert fronts == {20: ("frame", "switches"), 10: ("switches",)}
     assert points[0].classify == PointTime(20.0, "simulated")
 
 
 def test_luck_lowers_a_points_rate_and_its_intervals_lower_end() -> None:
     design = next(designs_of(close_of(20, 0.9)))
-    waits = dict.fromkeys(((design, kind) for kind in POLICIES), WAIT)
-    (point, *_) = points_of([design], waits, {design.judged: 0.25}, SURVEY)
+    (point,) = points_of([design], {design.judged: 0.25}, SURVEY)
     found = design.judged.rate
     assert (point.rate.mean, point.rate.low, point.rate.high) == pytest.approx(
         (found.mean - 0.25, found.low - 0.25, found.high)
@@ -131,11 +123,10 @@ def test_luck_lowers_a_points_rate_and_its_intervals_lower_end() -> None:
 
 def test_a_point_says_its_trainer_and_every_setting_that_is_no_default() -> None:
     (design,) = designs_of(close_of())
-    waits = dict.fromkeys(((design, kind) for kind in POLICIES), WAIT)
     usual = {own.name: own.default for own in TRAINERS["logit"].settings}
     chosen = Training("logit", {**usual, "penalty": 17.0, "max_bins": 8})
     surveyed: Any = Surveyed(chosen)
-    (point, *_) = points_of([design], waits, {design.judged: 0.0}, surveyed)
+    (point,) = points_of([design], {design.judged: 0.0}, surveyed)
     setting = point.setting
     assert (setting.trainer, setting.settings, setting.max_bins, setting.rounds) == (
         "logit",

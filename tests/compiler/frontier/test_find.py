@@ -4,7 +4,7 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace as replace_rows
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.evaluation.folds import weka_folds
-from thenar.compiler.frontier import find, price
+from thenar.compiler.frontier import price
 from thenar.compiler.frontier.cache import stored
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.plots import pictures
 from thenar.compiler.frontier.points import Frontier, FrontierError, FrontierPoint, frontier_from_bytes
 from thenar.compiler.frontier.price import fit_here
-from thenar.compiler.frontier.replay import replay_of
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
 from thenar.compiler.model.collapse import collapse
@@ -49,10 +48,9 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _short_streams() -> Iterator[None]:
-    """Let latencies be those of 30 grasps, and this machine be timed once: how long either takes is no matter here."""
+def _timed_once() -> Iterator[None]:
+    """Let this machine be timed once: how long that takes is no matter here."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(find, "replay_of", partial(replay_of, grasps=30))
         patched.setattr(price, "fit_here", stored(1, here=True)(cache(fit_here)))
         yield
 
@@ -61,7 +59,6 @@ def asked(folder: Path, grasp_set: GraspSet, **changes: Any) -> Request:
     """Return arguments of find_frontier; `changes` are of its search or of itself."""
     search: dict[str, Any] = {
         "methods": ("elimination", "id3"),
-        "baselines": ("cmim",),
         "rounds": 6,
         "trainer": "logitboost",
     }
@@ -146,7 +143,7 @@ def rows_recognised(grasp_set: GraspSet, point: FrontierPoint, train: Rows, test
 def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_path: Path) -> None:
     """Stratified folds, and each subject from the others; all of it done here once more, one by one."""
     grasp_set = make_set(subjects=3)
-    found = found_of(asked(tmp_path, grasp_set, repeats=2, baselines=()))
+    found = found_of(asked(tmp_path, grasp_set, repeats=2))
     labels = np.unique(grasp_set.labels, return_inverse=True)[1]
     for point in found.points:
         pooled = [rows_recognised(grasp_set, point, fold.train, fold.test) for fold in weka_folds(labels, 4, 1)]
@@ -163,7 +160,7 @@ def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_pat
 def test_frames_of_a_trial_are_on_one_side_of_every_fold(tmp_path: Path) -> None:
     """Every row ten times: with copies on both sides of a fold every rate would be 100 %, over 960 units."""
     grasp_set = make_set(subjects=2)
-    request = {"methods": ("id3",), "baselines": (), "by": "trial"}
+    request = {"methods": ("id3",), "by": "trial"}
     repeated = found_of(asked(tmp_path / "ten", grasp_set.rows(np.repeat(np.arange(96), 10)), **request))
     assert (repeated.rows, repeated.trials, repeated.by) == (960, 96, "pooled")
     assert repeated.points
@@ -183,7 +180,7 @@ def test_it_is_written_as_it_is_returned(first: tuple[Request, Frontier]) -> Non
 
 def test_without_a_folder_nothing_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert found_of(asked(tmp_path, make_set(), output=None, methods=("id3",), baselines=())).points
+    assert found_of(asked(tmp_path, make_set(), output=None, methods=("id3",))).points
     assert not list(tmp_path.iterdir())
 
 
@@ -230,7 +227,7 @@ def test_a_set_may_lack_switches_or_joints(tmp_path: Path, switches: int, joints
 
 def test_what_ports_cost_is_part_of_the_question(tmp_path: Path) -> None:
     methods = ("id3-cost",)
-    request = asked(tmp_path, make_set(), methods=methods, baselines=())
+    request = asked(tmp_path, make_set(), methods=methods)
     names = [f"s{number}" for number in range(14)]
     glove = propose_harness(names[::-1], "pca9555")
     alone = found_of({**request, "output": tmp_path / "alone", "harness": glove})
@@ -242,42 +239,22 @@ def test_what_ports_cost_is_part_of_the_question(tmp_path: Path) -> None:
     assert len(keys_in(tmp_path / "out" / "store.sqlite")) > len(keys_in(tmp_path / "alone" / "store.sqlite"))
 
 
-def test_recordings_that_are_trained_on_are_no_stream(tmp_path: Path) -> None:
-    request = asked(tmp_path, make_set())
-    with pytest.raises(FrontierError, match="equals the training set"):
-        found_of({**request, "stream": make_set()})
-
-
-def test_a_build_is_marked_with_what_it_recognises(tmp_path: Path) -> None:
-    grasp_set = make_set()
-    build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=4).folder
-    found = found_of(asked(tmp_path, grasp_set, build=build, methods=("id3",), baselines=()))
-    assert found.marks[-1].name == "build mine"
-
-
-def test_a_build_that_does_not_say_what_it_recognises_is_refused(tmp_path: Path) -> None:
-    grasp_set = make_set()
-    build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=0).folder
-    with pytest.raises(FrontierError, match="has no accuracy"):
-        found_of(asked(tmp_path / "not" / "there", grasp_set, build=build))
-    assert not (tmp_path / "not").exists()
-
-
-def test_a_build_of_other_switches_is_refused(tmp_path: Path) -> None:
-    build = compile_build(make_set(switches=40), tmp_path / "mine", rounds=5, folds=4, prune=0).folder
+def test_a_search_that_is_refused_leaves_no_folder_and_no_file(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
-    with pytest.raises(FrontierError, match="compiled from others"):
-        found_of(asked(tmp_path, make_set(switches=2), build=build))
+    for folder in (tmp_path / "not" / "there", tmp_path):
+        with pytest.raises(FrontierError, match="there is no target 'nonsense'"):
+            found_of(asked(folder, make_set(), target="nonsense"))
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_an_unknown_baseline_is_told(tmp_path: Path) -> None:
+def test_an_unknown_method_is_told(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match="there is no placement method 'nonsense'"):
-        found_of(asked(tmp_path, make_set(), baselines=("nonsense",)))
+        found_of(asked(tmp_path, make_set(), methods=("nonsense",)))
 
 
 def test_compile_makes_what_a_point_of_each_trainer_says(tmp_path: Path) -> None:
-    request = asked(tmp_path, make_set(subjects=2), methods=("id3",), baselines=(), trainer="auto", settings={})
+    request = asked(tmp_path, make_set(subjects=2), methods=("id3",), trainer="auto", settings={})
     found = found_of(request)
     assert set(found.trainers) == {"logitboost", *(name for name, trainer in TRAINERS.items() if trainer.automatic)}
     drawn = (tmp_path / "out" / "frontier.svg").read_text()
@@ -328,7 +305,7 @@ def with_sensors(grasp_set: GraspSet, sensors: int) -> GraspSet:
 
 def test_builds_of_points_with_some_joints_read_these_joints(tmp_path: Path) -> None:
     grasp_set = with_sensors(make_set(switches=3, subjects=2), 5)
-    found = found_of(asked(tmp_path, grasp_set, finalists=6, baselines=(), methods=("elimination",)))
+    found = found_of(asked(tmp_path, grasp_set, finalists=6, methods=("elimination",)))
     fewer = [point for point in found.points if point.joints]
     assert fewer
     for point in found.points:

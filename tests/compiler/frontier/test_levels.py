@@ -13,7 +13,6 @@ from thenar.compiler.frontier.find import FRONTIER_NAME, find_frontier
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.points import Frontier, FrontierPoint
 from thenar.compiler.frontier.price import ClassifyModel, Equipment
-from thenar.compiler.frontier.replay import replay_of
 from thenar.compiler.frontier.search import TAXEL_LEVELS, Search, placed
 from thenar.compiler.frontier.survey import Cuts, Survey
 from thenar.compiler.frontier.wirings import WIRE_ONLY
@@ -26,7 +25,7 @@ from thenar.compiler.samples import Samples
 from thenar.runtime.names import taxel_and_code
 
 SEARCH = Search(
-    methods=("elimination-cost",), baselines=(), rounds=4, repeats=1, finalists=2, trainer="logitboost",
+    methods=("elimination-cost",), rounds=4, repeats=1, finalists=2, trainer="logitboost",
     settings={"shrinkage": 1.0, "max_bins": 65536},
 )  # fmt: skip
 
@@ -112,16 +111,3 @@ def test_levels_of_a_fold_come_from_its_training_rows_alone(pressed: GraspSet, t
         assert elements != elements_of(samples, 3)
         choose: Any = METHODS["elimination-cost"].chooser(bits_of(alone, elements), ports and ports_of(ports, elements))
         assert survey.elements(choice, fold) == tuple(elements[column] for column in choose(5.0))
-
-
-def test_a_composed_stream_presses_taxels_as_trials_do(pressed: GraspSet) -> None:
-    replay = replay_of(pressed, pressed.labels, seed=1, grasps=9)
-    held = replay.taxels[[grasp.start for grasp in replay.grasps]]
-    assert all(any((row == trial).all() for trial in pressed.taxels) for row in held)
-    rest = np.sort(pressed.taxels, axis=0)[int(0.05 * (len(pressed) - 1))]
-    assert (replay.taxels.min(axis=0) <= rest).all()
-    elements = elements_of(Samples.of(pressed), 3)
-    bits = replay.reading(elements, ()).bits
-    assert bits.shape == (len(replay.stream), len(elements))
-    # Levels of one taxel are nested: above a higher threshold is above a lower one.
-    assert not (bits[:, 3] & ~bits[:, 2]).any()

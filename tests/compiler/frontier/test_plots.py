@@ -30,18 +30,14 @@ def _key(figure: Figure) -> list[str]:
 
 def _is_shown(point: FrontierPoint, name: str) -> bool:
     """Return whether a picture has anything to say of a point."""
-    return {
-        "frontier": point.fronts != ("latency",),
-        "switches": bool(point.switches),
-        "latency": "latency" in point.fronts,
-    }[name]
+    return name == "frontier" or bool(point.switches)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_equal_frontiers_give_equal_bytes(examples: Any, kind: Any) -> None:
     first, second = (pictures(examples.example_frontier(), kind) for _ in range(2))
-    assert list(first) == ["frontier", "switches", "latency"]
+    assert list(first) == ["frontier", "switches"]
     assert first == second
 
 
@@ -54,8 +50,7 @@ def test_every_point_and_mark_is_named(examples: Any, name: str) -> None:
     assert len(shown) - 2 <= len(set(numbers)) == len(numbers)
     assert {frontier.picked} <= set(numbers) <= {point.number for point in shown}
     for mark in frontier.marks:
-        # A mark has no latency.
-        assert sum(mark.name in text for text in _key(figure)) == (name != "latency")
+        assert sum(mark.name in text for text in _key(figure)) == 1
     assert any(text.startswith(f"point {frontier.picked}: ") for text in _key(figure))
 
 
@@ -87,8 +82,7 @@ def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:
     )
     for name, svg in pictures(frontier, "svg").items():
         ElementTree.fromstring(svg)
-        # Marks are not on the picture of latencies.
-        assert name == "latency" or any(NASTY in text for text in _key(_drawn(frontier, name)))
+        assert any(NASTY in text for text in _key(_drawn(frontier, name)))
 
 
 def test_zero_costs_and_strange_names_are_drawn(examples: Any) -> None:

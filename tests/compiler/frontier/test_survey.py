@@ -34,7 +34,7 @@ def kept(columns: tuple[int, ...], joints: int = 0) -> InputSelection:
     return InputSelection.of(tuple(map(Element, columns)), tuple(range(joints)))
 
 
-SEARCH = Search(methods=("id3",), baselines=(), repeats=2)
+SEARCH = Search(methods=("id3",), repeats=2)
 
 
 @pytest.fixture(scope="module")

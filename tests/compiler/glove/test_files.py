@@ -43,7 +43,7 @@ def rows(data: bytes) -> list[dict[str, str]]:
 
 
 def test_there_is_a_pattern_where_the_places_are_known(hand: HandShape) -> None:
-    assert spec_files(manifest_of(hand.names[:5]), hand=hand).keys() == NAMES == ALWAYS | {"cutting.svg", "cutting.dxf"}
+    assert spec_files(manifest_of(hand.names[:5]), hand=hand).keys() == NAMES == ALWAYS | {"cutting.svg"}
     assert spec_files(manifest_of(["a"]), hand=hand).keys() == ALWAYS
 
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from thenar.compiler.artifact.compile import compile_build
-from thenar.compiler.evaluation.study import StudyDesign, evaluate
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.hand import HandShape
 from thenar.compiler.model.compare import worst_case
@@ -19,11 +18,10 @@ from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.report.content import ReportContent
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.harness.wiring import GloveWiring
-from thenar.runtime.recipe import Recipe
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator.handmaps.handmap import hand_map
 
-from ...sets import grasp_set_of, single_settings
+from ...sets import grasp_set_of
 
 TYPES = ("cup", "pen", "plate", "rod")
 # What a name in a recording may hold, and a page must not run, close or break.
@@ -79,10 +77,6 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
     glove = GloveWiring(port="/dev/ttyUSB0", joints=sensors) if joints else None
     harness = propose_harness(names, cyberglove=glove)
     made = compile_build(grasp_set, folder, prune=8, rounds=4, folds=2, harness=harness)
-    recipe = Recipe(trainer="logitboost", rounds=2, folds=2, prune=8)
-    asked = StudyDesign(recipe, repeats=1, prune_list=(0, 8))
-    with single_settings():
-        study = evaluate(grasp_set, asked, jobs=1)
     return ReportContent(
         manifest=made.manifest,
         tables=made.tables,
@@ -90,7 +84,6 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
         warnings=made.warnings,
         tree=tree,
         confusion=made.confusion,
-        study=study,
         hand=hand,
         scan=made.scan,
         harness=harness,

@@ -75,7 +75,7 @@ def switches(frontier: Frontier, number: int) -> list[str]:
 
 def test_the_report_opens_with_all_its_charts_and_the_picked_point(opened: Reader, frontier: Frontier) -> None:
     drawn = opened.driver.find_elements(By.CSS_SELECTOR, "figure:has(.scroll > svg)")
-    charts = ["terms", "by-frontier", "by-switches", "by-latency"]
+    charts = ["terms", "by-frontier", "by-switches"]
     assert [chart.get_attribute("id") for chart in drawn] == charts
     assert all(chart.find_element(By.TAG_NAME, "svg").size["height"] > 100 for chart in drawn)
     assert frontier.picked is not None
@@ -83,7 +83,7 @@ def test_the_report_opens_with_all_its_charts_and_the_picked_point(opened: Reade
     assert opened.kept_on_hand() == switches(frontier, frontier.picked)
 
 
-@pytest.mark.parametrize("chart", ["by-frontier", "by-switches", "by-latency"])
+@pytest.mark.parametrize("chart", ["by-frontier", "by-switches"])
 def test_a_click_on_a_point_shows_its_switches_on_the_hand(opened: Reader, frontier: Frontier, chart: str) -> None:
     opened.marker(chart, 2).find_element(By.CSS_SELECTOR, ".target").click()
     opened.wait(lambda: opened.said().startswith("Point 2:"))

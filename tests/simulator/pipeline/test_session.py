@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.simulator.errors import SceneError
-from thenar.simulator.pipeline.explain import middle_session, sample
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import SubjectSession, sessions
 from thenar.simulator.planning.postures import Postures
@@ -100,12 +99,3 @@ def test_fresh_repetitions_have_trials_beyond_the_session() -> None:
         assert np.sort(np.concatenate([batch.trials for batch in batches])).tolist() == list(range(14 * 12, 14 * 15))
         for batch, trials in zip(batches, old.trials, strict=True):
             assert batch.repetitions.tolist() == list(range(len(trials), len(trials) + len(batch)))
-
-
-def test_samples_are_the_first_repetitions_of_all_conditions_of_the_middle_subject() -> None:
-    session = middle_session(QUICK)
-    found = sample(session, 84)
-    assert [batch.condition for batch in found] == list(session.conditions)
-    assert {batch.condition.subject for batch in found} == {QUICK.subjects[1].name}
-    assert all(batch.repetitions.tolist() == [0, 1, 2] for batch in found)
-    assert [len(sample(session, most)[0]) for most in (1, 100_000)] == [1, 6]
