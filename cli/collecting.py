@@ -11,7 +11,6 @@ from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING
 
 import click
 from rich.console import Group, RenderableType
@@ -41,11 +40,6 @@ from thenar.runtime.toml_source import read_source
 from . import ended_by_signals
 from .printing import err, of_device
 
-if TYPE_CHECKING:
-    from .guided_web import StudiedPage
-
-    ServePage = Callable[[Session, Taxonomy, Path], StudiedPage]
-
 _WAIT_US = 50_000
 # Time for a device that is just being plugged in.
 _PATIENCE_US = 3_000_000
@@ -64,24 +58,21 @@ def collect(
     recording: Path,
     journal: Journal | None,
     countdown_s: float,
-    write: Callable[[int], Sequence[str]],
-    serve_page: "ServePage | None" = None,
+    write: Callable[[int], None],
 ) -> None:
     """Lead through the `trials` that the journal lacks, then call `write` with the total number of accepted trials: it
-    writes their set and returns warnings, which the page shows.
+    writes their set.
 
-    Keys come from stdin, or from the page that `serve_page` makes alone if stdin is not a terminal. Raises SettingError
-    or DeviceError if a device cannot serve, SinkError if the page cannot be served, click.ClickException if the
+    Keys come from stdin. Raises SettingError or DeviceError if a device cannot serve, click.ClickException if the
     recording cannot go on.
     """
-    typed = serve_page is None or (sys.stdin is not None and sys.stdin.isatty())
-    if sys.stdin is None and typed:
+    if sys.stdin is None:
         raise click.UsageError("stdin is closed, but a collection is led by keys typed there: run it in a terminal")
-    if typed and any(stream.port == "-" for stream in harness.streams):
+    if any(stream.port == "-" for stream in harness.streams):
         raise click.UsageError("the keys that lead a collection come from stdin: send rows by udp: instead")
     switches, sensors = harness.switches, harness.sensor_names
     check_names("column", (*switches, *harness.taxel_names, *sensors))
-    scan, shown, recorder = whole_scan(harness, switches, every_taxel=True), None, None
+    scan, recorder = whole_scan(harness, switches, every_taxel=True), None
     session = Session(
         thenar=version("thenar"),
         switches=switches,
@@ -96,26 +87,19 @@ def collect(
         _check_same_glove(journal, session)
     accepted, tail = ((), None) if journal is None else (journal.accepted, journal.tail)
     taxonomy, done = Taxonomy(collection.taxonomy, collection.types), len(accepted)
-    with ExitStack() as served:
-        with ended_by_signals() as stop, Sources(harness, switches, scan) as sources, ExitStack() as entered:
-            _meet(sources, len(switches), stop)
-            if not stop.is_set():
-                if serve_page is not None:
-                    # Before the recording begins: an address that cannot be served leaves no file.
-                    shown = served.enter_context(serve_page(session, taxonomy, recording))
-                recorder = entered.enter_context(Recorder(recording, session, tail=tail))
-                faces: list[Terminal | StudiedPage] = [] if shown is None else [shown]
-                if typed:
-                    faces.append(entered.enter_context(Terminal(taxonomy, sys.stdin.fileno())))
-                old_us = old_after_us(sources.switch_period_us, sources.glove_period_us)
-                guide = CollectionGuide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
-                _lead(guide, sources, recorder, faces, stop)
-                done = guide.done
-        if recorder is not None and (recorder.failure is not None or recorder.lost):
-            why = recorder.failure or f"{recording}: {recorder.lost} messages were lost"
-            raise click.ClickException(f"{why}; free some space, and the same command goes on")
-        if (warnings := write(done)) and shown is not None:
-            shown.warn(warnings)
+    with ended_by_signals() as stop, Sources(harness, switches, scan) as sources, ExitStack() as entered:
+        _meet(sources, len(switches), stop)
+        if not stop.is_set():
+            recorder = entered.enter_context(Recorder(recording, session, tail=tail))
+            terminal = entered.enter_context(Terminal(taxonomy, sys.stdin.fileno()))
+            old_us = old_after_us(sources.switch_period_us, sources.glove_period_us)
+            guide = CollectionGuide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
+            _lead(guide, sources, recorder, terminal, stop)
+            done = guide.done
+    if recorder is not None and (recorder.failure is not None or recorder.lost):
+        why = recorder.failure or f"{recording}: {recorder.lost} messages were lost"
+        raise click.ClickException(f"{why}; free some space, and the same command goes on")
+    write(done)
 
 
 def _meet(sources: Sources, switches: int, stop: Event) -> None:
@@ -267,21 +251,14 @@ def _keys(guide: CollectionGuide) -> str:
     return "   ".join(f"{_LETTERS[key]}: {what}" for key, what in guide.offered().items())
 
 
-def _lead(
-    guide: CollectionGuide, devices: Sources, recorder: Recorder, faces: "Sequence[Terminal | StudiedPage]", stop: Event
-) -> None:
+def _lead(guide: CollectionGuide, devices: Sources, recorder: Recorder, terminal: Terminal, stop: Event) -> None:
     """Lead through the guide's trials until all are done, the user leaves, `stop` is set, or the recording fails."""
     while guide.stage != "over" and not recorder.lost and recorder.failure is None and not stop.is_set():
         arrived = devices.take(_WAIT_US).arrived
         devices.raise_settings()
         guide.take(now_us(), arrived, [device.name for device in devices.devices() if not device.connected])
-        for face in faces:
-            face.press(now_us(), guide)
-            face.show(now_us(), guide, devices.devices())
-    # However it ended, the page shows that it has.
-    guide.press(now_us(), "quit")
-    for face in faces:
-        face.show(now_us(), guide, devices.devices())
+        terminal.press(now_us(), guide)
+        terminal.show(now_us(), guide, devices.devices())
 
 
 def _check_same_glove(journal: Journal, session: Session) -> None:
