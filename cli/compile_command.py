@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from thenar.runtime.recipe import AUTO, choices
+from thenar.runtime.recipe import AUTO
 
+from .choices import choices
 from .options import (
     CHOOSING,
     LIMITS,

@@ -13,8 +13,7 @@ pressed or shortly after. The movement of the baseline is subtracted from every 
 from bisect import bisect_left
 from collections.abc import Sequence
 from math import isfinite
-from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 from msgspec import Meta, Struct
@@ -27,6 +26,9 @@ from .frames import Mask
 from .manifest import Calibration, Switch, Threshold
 from .names import fault, list_names, shortened
 from .scanning.scanmap import ScanMap, StreamLevel
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 COUNTS = 65536
 Raw = Annotated[int, Meta(ge=0, lt=COUNTS)]
@@ -133,10 +135,12 @@ class TaxelSettings(Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
 
 def calibration_of(settings: TaxelSettings) -> TaxelCalibration | None:
     """Return the calibration that the settings name, or None. Raises as `load_taxel_calibration`."""
+    from pathlib import Path
+
     return None if settings.calibration is None else load_taxel_calibration(Path(settings.calibration))
 
 
-def load_taxel_calibration(path: Path) -> TaxelCalibration:
+def load_taxel_calibration(path: "Path") -> TaxelCalibration:
     """Return the calibration that `thenar calibrate --taxels` wrote. Raises SettingError with file, line and key."""
     from .toml_source import read_source  # not every glove has taxels
     from .toml_struct import convert

@@ -1,6 +1,5 @@
 """`WriterThread`: calls that may block, carried out in order on a separate thread."""
 
-import logging
 from collections.abc import Callable
 from queue import SimpleQueue
 from threading import Thread
@@ -12,7 +11,6 @@ HANGING_US = 500_000
 # How often closing looks whether the call under way hangs.
 _LOOK_S = 0.05
 
-_log = logging.getLogger("thenar")
 Call = Callable[[], object]
 
 
@@ -83,5 +81,7 @@ class WriterThread:
         except BaseException as reason:  # nothing may end this thread
             if (fault := f"{type(reason).__name__}: {reason}") != self._fault:
                 self._fault = fault
-                _log.exception("%s: a bug in the program", self._thread.name)
+                from logging import getLogger  # for bugs only
+
+                getLogger("thenar").exception("%s: a bug in the program", self._thread.name)
         self._since_us = None

@@ -11,8 +11,7 @@ from ..calibration import Joints, Meaning
 from ..frames import PERIODS, GloveFrame, Mask, Newest, SwitchFrame
 from ..model.integers import IntegerTables
 from ..policy import Policy
-from ..preshape import Preshape
-from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
+from ..published import UNKNOWN, Health, JointAngles, LiveGrasp, Preshape
 from ..scores import LiveScores
 from ..segmenting.decoder import LiveSegments, Segment
 from .decision import Decision, Ranking

@@ -1,7 +1,6 @@
 """A build and a harness combined: the devices, and the recogniser of their frames."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from msgspec import Struct
 
@@ -11,7 +10,6 @@ from ..build import Build
 from ..calibration import Meaning, load_calibration, numbers_of, place_of
 from ..harness.wiring import Harness, StreamWiring
 from ..policy import Policy
-from ..scanning.plan import check_harness, plan_scan
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
 from ..taxels import calibration_of, in_counts
@@ -50,6 +48,8 @@ class LiveSystem(Struct, frozen=True, eq=False):
 
         Raises HarnessError if they do not fit, SettingError if the CyberGlove's calibration does not.
         """
+        from pathlib import Path
+
         calibration = None if harness.calibration is None else load_calibration(Path(harness.calibration))
         # A user's own source sends the codes of the build's joints, in order.
         names = harness.sensor_names or tuple(joint.name for joint in build.manifest.joints)
@@ -58,6 +58,8 @@ class LiveSystem(Struct, frozen=True, eq=False):
     @staticmethod
     def map_of(build: Build, harness: Harness) -> ScanMap:
         """Return the build's own scan map, or one that is planned now. Raises HarnessError if the two do not fit."""
+        from ..scanning.plan import check_harness, plan_scan  # it needs the chips, a replay of frames does not
+
         names = [switch.name for switch in build.manifest.switches]
         if build.scan is not None:
             check_harness(build.scan, harness, names)

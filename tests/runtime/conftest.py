@@ -18,8 +18,7 @@ from thenar.runtime.manifest import Calibration, Manifest
 from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.model.terms.line import Slope
-from thenar.runtime.preshape import Preshape
-from thenar.runtime.published import Count, DeviceHealth, HealthReport, JointAngles, LiveGrasp, Quarantined
+from thenar.runtime.published import Count, DeviceHealth, HealthReport, JointAngles, LiveGrasp, Preshape, Quarantined
 
 from ..tables import describe as _describe
 

@@ -24,7 +24,8 @@ from thenar.compiler.movements.segments import levenshtein
 from thenar.compiler.movements.transitions import Transitions
 from thenar.compiler.recordings import RecordingError
 from thenar.runtime import Build
-from thenar.runtime.preshape import Preshape, PreshapeTable
+from thenar.runtime.preshape import PreshapeTable
+from thenar.runtime.published import Preshape
 from thenar.runtime.task import Task
 
 from .conftest import make_movements
