@@ -94,8 +94,8 @@ class DeviceHealth(msgspec.Struct, frozen=True):
 
 
 class Quarantined(msgspec.Struct, frozen=True):
-    """An input that is read but wrong, why ("stuck closed", "stuck open", "chattering", "drifting"), and whether it is
-    still `used`: because too much would be lost without it, or because the policy says so.
+    """A switch that is read but wrong, why ("stuck closed", "stuck open", "chattering"), and whether it is still
+    `used`: because too much would be lost without it, or because the policy says so.
     """
 
     name: str

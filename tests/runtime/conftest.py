@@ -142,5 +142,5 @@ def angles() -> JointAngles:
 @pytest.fixture(scope="session")
 def health() -> HealthReport:
     glove = DeviceHealth("cyberglove", True, "", (Count("resyncs", 2),))
-    wrong = Quarantined("s001", "stuck open"), Quarantined("index_mpj", "drifting", used=True)
+    wrong = Quarantined("s001", "stuck open"), Quarantined("s002", "chattering", used=True)
     return HealthReport(7, 100.0, 99.5, 600, 25, 10, 1, 0, (glove,), wrong)

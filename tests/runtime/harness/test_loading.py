@@ -55,11 +55,11 @@ def test_stored_text_is_read_with_its_calibration_path_unchanged(full_text: str)
 
 
 def test_the_calibration_of_taxels_counts_from_the_folder_too(load: Load, tmp_path: Path) -> None:
-    settings = load('[taxels]\ncalibration = "pads.toml"\nbaseline = false').taxel_settings
-    assert settings == TaxelSettings(calibration=str(tmp_path / "pads.toml"), baseline=False)
+    settings = load('[taxels]\ncalibration = "pads.toml"').taxel_settings
+    assert settings == TaxelSettings(calibration=str(tmp_path / "pads.toml"))
     assert load('[taxels]\ncalibration = "/pads.toml"').taxel_settings.calibration == "/pads.toml"
     with pytest.raises(HarnessError, match="drift"):
-        load("[taxels]\ndrift = 2")
+        load("[taxels]\ndrift = 0.2")
 
 
 def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> None:
