@@ -14,11 +14,11 @@ from liveplay import Played, glove, with_glove
 from liverates import LIVEWIRE
 from livewire import SCANS, Scanned
 
+from thenar.compiler.glove.propose import propose_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
 from thenar.simulator.playing.bench import Bench
 

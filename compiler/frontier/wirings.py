@@ -13,11 +13,11 @@ from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.scanning.plan import plan_scan, unwired
-from thenar.runtime.scanning.propose import CONVERTER, propose_board, propose_cyberglove, propose_harness
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us
 
 from ..firmware.targets import TARGETS
+from ..glove.propose import CONVERTER, propose_board, propose_cyberglove, propose_harness
 from ..placement.ports import WireTimes
 from .points import How, PointTime
 

@@ -12,10 +12,10 @@ from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.scanning.plan import Room, rooms_of, units_of, unwired
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.scanmap import Port
 from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, select_us, selections
 
+from ..glove.propose import propose_harness
 from ..samples import TrainingError
 
 

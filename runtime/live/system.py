@@ -9,6 +9,7 @@ from thenar.drivers.calibration import GloveCalibration
 from ..build import Build
 from ..calibration import Meaning, load_calibration, numbers_of, place_of
 from ..harness.wiring import Harness, StreamWiring
+from ..names import list_names
 from ..policy import Policy
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
@@ -26,10 +27,20 @@ def unread_joints(harness: Harness, scan: ScanMap, joints: Sequence[str]) -> str
         for joint in joints if harness.joint_device is not None else ():
             place_of(joint, harness.sensor_names)
         return ""
-    from ..scanning.propose import own_joints
-
     how = own_joints(list(joints)) or "add the [cyberglove] that measures them"
     return f"nothing in {harness.name!r} reads the build's joints, and every grasp is degraded: {how}"
+
+
+def own_joints(joints: Sequence[str]) -> str:
+    """Return a sentence on how to read joints that no CyberGlove measures; "" for others, and without joints."""
+    from thenar.drivers.cyberglove_protocol import sensors_with
+
+    if not joints or sensors_with(joints) is not None:
+        return ""
+    return (
+        f"joints {list_names(joints)} need a source of your own: a board that prints them ([[stream]] of glove.toml), "
+        "or a source that you add (docs/how-to/extend.md)"
+    )
 
 
 class LiveSystem(Struct, frozen=True, eq=False):

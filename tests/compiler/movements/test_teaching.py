@@ -14,6 +14,7 @@ from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.teaching import (
     DemonstratedGrasp,
     Demonstration,
+    Task,
     aligned,
     behaviour_tree,
     demonstrations,
@@ -26,7 +27,6 @@ from thenar.compiler.recordings import RecordingError
 from thenar.runtime import Build
 from thenar.runtime.preshape import PreshapeTable
 from thenar.runtime.published import Preshape
-from thenar.runtime.task import Task
 
 from .conftest import make_movements
 

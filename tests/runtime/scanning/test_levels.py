@@ -5,6 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from thenar.compiler.glove.propose import propose_board, propose_harness
 from thenar.compiler.placement.ports import WireTimes
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import parse_harness
@@ -12,7 +13,6 @@ from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, SpiWir
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.plan import check_harness, plan_scan
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import propose_board, propose_harness
 from thenar.runtime.scanning.scanmap import check_switches, scanmap_from_bytes, scanmap_to_bytes
 from thenar.runtime.scanning.timing import scan_us
 
