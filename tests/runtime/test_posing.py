@@ -19,7 +19,6 @@ def test_no_pose_is_taken_of_a_glove_that_is_silent(guide: PoseGuide) -> None:
     guide.take(0, bytes([60] * 18))
     guide.press(OLD_US + 1, "accept")
     assert guide.offered(OLD_US + 1) == set()
-    assert guide.stage == "ready"
     assert "accept" in guide.offered(OLD_US)
     guide.press(OLD_US, "accept")
     assert guide.stage == "held"
