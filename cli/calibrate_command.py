@@ -11,14 +11,13 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.live import Live
-from rich.table import Table
 
 from thenar.drivers.names import shortened
 from thenar.drivers.ports import port_fault
 
+from .consoles import Live, Table
 from .parameters import Number, OutputFile, existing_file, keep_apart, overwrite_flag
-from .printing import echo, err
+from .printing import echo, err, table
 
 if TYPE_CHECKING:
     from thenar.drivers.calibration import GloveCalibration
@@ -210,10 +209,10 @@ def _lead(guide: "PoseGuide", take: Callable[[], None]) -> None:
     typed = TypedLines(sys.stdin.fileno())
 
     def drawn() -> Table:
-        table = Table("sensor", "byte", "this pose's", "")
+        shown = table(("sensor", "byte", "this pose's", ""))
         for name, byte, state in zip(guide.names, guide.raw or b"", guide.states(), strict=False):
-            table.add_row(name, str(byte), "yes" if name in guide.pose.degrees else "", state)
-        return table
+            shown.add_row(name, str(byte), "yes" if name in guide.pose.degrees else "", state)
+        return shown
 
     while guide.stage != "done":
         if guide.stage == "held":
@@ -257,11 +256,11 @@ def _pressed(
         return codes
 
     def drawn() -> Table:
-        table = Table("taxel", "counts", "at rest")
+        shown = table(("taxel", "counts", "at rest"))
         columns = (frames[-1] if frames else (None,) * len(names) for frames in (codes, rested))
         for name, *counts in zip(names, *columns, strict=True):
-            table.add_row(name, *("" if count is None else str(count) for count in counts))
-        return table
+            shown.add_row(name, *("" if count is None else str(count) for count in counts))
+        return shown
 
     _await(sources, take, "taxels")
     echo("Leave every taxel alone, the hand open: press nothing.", err=True)
@@ -295,11 +294,11 @@ class TypedLines:
         while True:
             echo(question, err=True)
             shown_s = 0.0
-            with Live(console=console, transient=True, auto_refresh=False) as live:
+            with Live(console) as live:
                 while (reply := self.take()) is None:
                     take()
                     if console.is_terminal and monotonic() - shown_s > _REFRESH_S:
-                        live.update(drawn(), refresh=True)
+                        live.update(drawn())
                         shown_s = monotonic()
             if reply == "q":
                 raise click.Abort

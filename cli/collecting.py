@@ -13,11 +13,6 @@ from pathlib import Path
 from threading import Event
 
 import click
-from rich.console import Group, RenderableType
-from rich.live import Live
-from rich.progress_bar import ProgressBar
-from rich.table import Table
-from rich.text import Text
 
 from thenar.compiler.recordings import check_names
 from thenar.compiler.recordings.taxonomy import MOVEMENTS, Taxonomy
@@ -38,6 +33,7 @@ from thenar.runtime.taxels import calibration_of
 from thenar.runtime.toml_source import read_source
 
 from . import ended_by_signals
+from .consoles import Live, Printed, Text, bar, grid
 from .printing import err, of_device
 
 _WAIT_US = 50_000
@@ -148,9 +144,7 @@ class Terminal(Closing):
             self._opened.callback(termios.tcsetattr, descriptor, termios.TCSADRAIN, termios.tcgetattr(descriptor))
             # Ctrl-C keeps its meaning, and keys pressed a moment too early count as well.
             tty.setcbreak(descriptor, termios.TCSADRAIN)
-        self._live = Live(console=self._console, auto_refresh=False, transient=True)
-        if self._console.is_terminal:
-            self._opened.enter_context(self._live)
+        self._live = self._opened.enter_context(Live(self._console))
 
     def close(self) -> None:
         """Leave the terminal as it was."""
@@ -188,7 +182,7 @@ class Terminal(Closing):
             self._say(guide, devices)
         elif now_us >= self._due_us or self._shown != guide.step:
             self._due_us, self._shown = now_us + _REDRAW_US, guide.step
-            self._live.update(self._drawn(now_us, guide, devices), refresh=True)
+            self._live.update(*self._drawn(now_us, guide, devices))
 
     def _say(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> None:
         errors = "; ".join(device.error for device in devices if not device.connected)
@@ -200,15 +194,15 @@ class Terminal(Closing):
             self._said = line
             self._console.print(line, soft_wrap=True)
 
-    def _drawn(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> RenderableType:
-        table = Table.grid(padding=(0, 2))
+    def _drawn(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> Sequence[Printed]:
+        table = grid(3)
         skipped = f", {guide.skipped} skipped" if guide.skipped else ""
-        bar = ProgressBar(guide.total, guide.done, width=40)
-        table.add_row("done", Text(f"{guide.done} of {guide.total}{skipped}"), bar)
+        share = guide.done / max(guide.total, 1)
+        table.add_row("done", f"{guide.done} of {guide.total}{skipped}", bar(share, width=40))
         for device in devices:
-            table.add_row(device.name, Text("connected") if device.connected else Text(device.error, style="red"))
-        stage = Text(self._standing(now_us, guide), style="bold")
-        return Group(table, Text(), Text(self._task(guide), style="bold cyan"), stage, Text(_keys(guide)))
+            table.add_row(device.name, "connected" if device.connected else Text(device.error, "red"), "")
+        stage = Text(self._standing(now_us, guide), "bold")
+        return table, "", Text(self._task(guide), "bold cyan"), stage, _keys(guide)
 
     def _task(self, guide: CollectionGuide) -> str:
         trial = guide.trial
