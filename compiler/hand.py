@@ -316,14 +316,9 @@ def drawn_joints(
     found = []
     for number, joint in enumerate(joints):
         codes = (joint.code_a, joint.code_b) if ranges is None else ranges[number]
-        low, high = sorted(round(_value(joint, code), 3) for code in codes)
+        low, high = sorted(round(joint.value(code), 3) for code in codes)
         found.append(DrawnJoint(joint.name, number, joint.unit, low, high, *moved_by(joint.name)))
     return tuple(found)
-
-
-def _value(joint: Calibration, code: int) -> float:
-    step = (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a)
-    return joint.value_a + (code - joint.code_a) * step
 
 
 def moved_by(name: str) -> tuple[str, str]:

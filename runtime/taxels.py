@@ -61,10 +61,6 @@ class TaxelLine(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=T
         if not (isfinite(self.value) and 1e-9 <= self.value <= 1e9):
             raise SettingError(f"{self.name!r}: the value of a press must be a number above 0, not {self.value}")
 
-    def at(self, raw: int) -> float:
-        """Return the value at a count."""
-        return (raw - self.rest) * (self.value / (self.press - self.rest))
-
     def codes(self, coded: Calibration) -> CodeLine:
         """Return the line from counts to the codes of a build. Raises SettingError if none exists."""
         return code_line(coded, (self.rest, 0.0), (self.press, self.value))
