@@ -1,7 +1,6 @@
 """`WriterThread`: calls that may block, carried out in order on a separate thread."""
 
 from collections.abc import Callable
-from queue import SimpleQueue
 from threading import Thread
 
 from .frames import now_us
@@ -22,6 +21,8 @@ class WriterThread:
     """
 
     def __init__(self, name: str, limit: int) -> None:
+        from queue import SimpleQueue  # loads a library that a glove without outputs does not need
+
         self._limit = limit
         self._calls: SimpleQueue[tuple[int | None, Call] | None] = SimpleQueue()
         self._refused = self._late = 0

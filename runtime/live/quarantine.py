@@ -63,16 +63,6 @@ STUCK_CLOSED, STUCK_OPEN, CHATTERING = "stuck closed", "stuck open", "chattering
 Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 
-# exp(-i / 16), in 65535ths; the last is 0.
-_WEIGHTS = np.array([round(65535 * math.exp(-i / _NAT)) for i in range(200)])
-# Evidence of being stuck if a switch shows the state of a stuck one, and if it does not, by the share of grasps, in
-# 255ths, in which a working one would show the former.
-_SHOWN, _ALONE = (
-    np.array([max(round(_NAT * math.log((1 - _SLIPS) / max(q / 255, least))), 0) for q in range(256)])
-    for least in (_LEAST, _LEAST_ALONE)
-)
-_MOVED = np.array([min(round(_NAT * math.log(_SLIPS / max(1 - q / 255, _SLIPS))), 0) for q in range(256)])
-
 
 class StuckTest:
     """The sums of all switches, and the faults found by them.
@@ -94,6 +84,16 @@ class StuckTest:
         self._contacts: Ints = (least + most).sum(axis=0)
         self._rows, self._means = (rows.astype(np.int64) for rows in (tables.switch_rows, tables.switch_means))
         self._gain = round(65536 * _NAT / tables.scale)
+        # exp(-i / 16), in 65535ths; the last is 0.
+        self._weights = np.array([round(65535 * math.exp(-i / _NAT)) for i in range(200)])
+        # Evidence of being stuck if a switch shows the state of a stuck one, and if it does not, by the share of
+        # grasps, in 255ths, in which a working one would show the former.
+        self._shown, self._alone = (
+            np.array([max(round(_NAT * math.log((1 - _SLIPS) / max(q / 255, least))), 0) for q in range(256)])
+            for least in (_LEAST, _LEAST_ALONE)
+        )
+        moved = (_NAT * math.log(_SLIPS / max(1 - q / 255, _SLIPS)) for q in range(256))
+        self._moved = np.array([min(round(evidence), 0) for evidence in moved])
         self.limit = math.ceil(_NAT * math.log(2 * len(switches) * 2 * GRASPS))
         self.sums = np.zeros((2, len(switches)), np.int64)
         self.stuck: dict[int, int] = {}
@@ -143,7 +143,7 @@ class StuckTest:
         own = np.where(grasp.lost[:, np.newaxis], 0, self._means - self._rows * grasp.closed[:, np.newaxis])
         scores = grasp.biased_scores + own
         behind = (scores.max(axis=1, keepdims=True) - scores) * self._gain >> 16
-        weights = _WEIGHTS[np.minimum(behind, len(_WEIGHTS) - 1)]
+        weights = self._weights[np.minimum(behind, len(self._weights) - 1)]
         found: Ints = (self._shares * weights).sum(axis=2) // weights.sum(axis=1)
         return found
 
@@ -160,8 +160,8 @@ class StuckTest:
         shares = np.stack([shares[0], 255 - closes])
         shown = np.stack([grasp.closed, ~grasp.closed])
         alone = np.count_nonzero(grasp.closed & ~grasp.lost) <= 1
-        sticks = np.stack([(_ALONE if alone else _SHOWN)[shares[0]], _SHOWN[shares[1]]])
-        evidence = np.where(shown, sticks, _MOVED[shares])
+        sticks = np.stack([(self._alone if alone else self._shown)[shares[0]], self._shown[shares[1]]])
+        evidence = np.where(shown, sticks, self._moved[shares])
         evidence[1] *= held | grasp.closed
         return evidence * grasp.read
 
