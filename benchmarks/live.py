@@ -2,11 +2,12 @@
 
     python benchmarks/live.py [--seconds N]
 
-Prints two tables and the path of a frame: microseconds of CPU per frame, with all inputs changing and with a hand at
-rest; frames per second on emulated devices compared with the wire's limit; the files that a frame passes from the bytes
-on the wire to a published grasp, and the calls per grasp; the peak memory of a `thenar run` compared with 45 MiB.
-Emulated buses need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers
-run on the same cores as the run, so a busy or single-core machine gives worse numbers than a glove would.
+Prints three tables and the path of a frame: microseconds of CPU per frame, with all inputs changing and with a hand at
+rest, and of a row by UDP from its datagram on; frames per second on emulated devices compared with the wire's limit; the
+files that a frame passes from the bytes on the wire to a published grasp, and the calls per grasp; the peak memory of a
+`thenar run` compared with 45 MiB. Emulated buses need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0,
+python3-gi). Emulated devices and readers run on the same cores as the run, so a busy or single-core machine gives worse
+numbers than a glove would.
 """
 
 import argparse
@@ -36,6 +37,7 @@ from liveplay import (
     with_glove,
 )
 from liverates import Found, of_board, of_bus, of_glove
+from liverows import COLUMNS, row_us
 from liveway import way
 from rich.console import Console
 from rich.table import Table
@@ -46,7 +48,7 @@ from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.live.system import LiveSystem
 from thenar.simulator.playing.bench import Bench
 
-MOST_US, REST_US, LEAST_SHARE, MOST_MIB, MOST_FILES = 60, 25, 0.9, 45, 20
+MOST_US, REST_US, ROW_US, LEAST_SHARE, MOST_MIB, MOST_FILES = 60, 25, 200, 0.9, 45, 20
 FRAMES, TURNS = 500, 8
 # A clock so slow that the overhead of the emulation does not matter.
 SLOW_HZ = 10_000
@@ -174,6 +176,12 @@ def main() -> None:
         folder = Path(name)
         scenes = [played("quick", folder), played("kamakura", folder, prune=20)]
         console.print(loop_costs(scenes, folder), "")
+        (folder / "few").mkdir()
+        way_us, loop_us = row_us(played("quick", folder / "few", prune=60), folder)
+        console.print(
+            f"A row of {COLUMNS} columns by UDP, from its datagram to a grasp: {way_us + loop_us:.0f} us (at most "
+            f"{ROW_US}), of which {loop_us:.0f} are the live thread's\n"
+        )
         console.print(rates(scenes[0], options.seconds, folder), "")
         passed = way(scenes[0])
         calls = ", ".join(f"{calls:.0f} in {thread}" for thread, calls in sorted(passed.calls.items()))

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import track
 
 from thenar.compiler.evaluation.folds import Fold
+from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.placement.methods.base import METHODS, PAPERS, Chooser
 from thenar.compiler.placement.ports import port_costs
 from thenar.compiler.samples import Columns, Samples
@@ -16,7 +17,6 @@ from thenar.compiler.trainers.logitboost import boost
 from thenar.compiler.workers import in_workers
 from thenar.runtime.model.tables import winners
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
 
 # With joints, the size of 33 switches is left out, which saves a fifth of the time.

@@ -11,15 +11,13 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.live import Live
-from rich.table import Table
 
 from thenar.drivers.names import shortened
 from thenar.drivers.ports import port_fault
 
-from . import ended_by_signals
-from .parameters import Number, OutputFile, existing_file, keep_apart, overwrite_flag, web_options
-from .printing import echo, err, say_page
+from .consoles import Live, Table
+from .parameters import Number, OutputFile, existing_file, keep_apart, overwrite_flag
+from .printing import echo, err, table
 
 if TYPE_CHECKING:
     from thenar.drivers.calibration import GloveCalibration
@@ -55,7 +53,6 @@ def _device(context: click.Context, argument: click.Parameter, text: str) -> str
 @click.option("--taxels", is_flag=True, is_eager=True, help="Calibrate the taxels of a glove.toml, not a CyberGlove.")
 @click.option("--newtons", type=Number(0.001, 1000), help="Force of the presses, if known; with --taxels.")
 @click.option("--hold", type=Number(0.05, 60), default=1.0, show_default=True, help="Time to hold each pose, seconds.")
-@web_options
 def command(
     port: str,
     output: Path,
@@ -64,8 +61,6 @@ def command(
     taxels: bool,
     newtons: float | None,
     hold: float,
-    web: str | None,
-    web_token: str | None,
 ) -> None:
     """Calibrate the CyberGlove at PORT (/dev/ttyUSB0, socket://HOST:PORT, ...) for its wearer. Given a glove.toml,
     calibrate the joints of its [[stream]], or its taxels with --taxels.
@@ -79,37 +74,26 @@ def command(
         thenar calibrate /dev/ttyUSB0 -o anna.toml
         thenar calibrate glove.toml --taxels -o pads.toml
         thenar calibrate glove.toml -o anna.toml
-        thenar calibrate /dev/ttyUSB0 -o anna.toml --web
     """
     from thenar.runtime.names import fault
 
     wearer = subject or output.stem
     if reason := fault(wearer):
         raise click.UsageError(f"subject {shortened(repr(wearer))} {reason}: give another with --subject")
-    if taxels and web is not None:
-        raise click.UsageError("--web shows poses of joints, not taxels: leave out --web or --taxels")
     if newtons is not None and not taxels:
         raise click.UsageError("--newtons is the force of presses on taxels: add --taxels")
     if port.endswith(".toml"):
         keep_apart(Path(port), output)
     if taxels:
-        with _sources(Path(port), web, taxels=True) as (harness, sources):
+        with _sources(Path(port), taxels=True) as (harness, sources):
             pads = _pressed(harness.taxel_names, sources, hold, wearer, newtons)
         said = _written(output, "taxel", [line.name for line in pads.taxels], harness.taxel_names, pads)
         echo(f"{said}; name it under [taxels] of {Path(port).name}")
         return
-    with _posing(port, baud, hold, web) as (guide, take):
-
-        def write() -> str:
-            lines = guide.calibration(wearer)
-            return _written(output, "sensor", [line.name for line in lines.sensors], guide.names, lines)
-
-        if web is None:
-            _lead(guide, take)
-            said = write()
-        else:
-            said = _lead_on_page(guide, take, wearer, web, web_token, write)
-    echo(said)
+    with _posing(port, baud, hold) as (guide, take):
+        _lead(guide, take)
+    lines = guide.calibration(wearer)
+    echo(_written(output, "sensor", [line.name for line in lines.sensors], guide.names, lines))
 
 
 def _written(
@@ -131,7 +115,7 @@ def _written(
 
 
 @contextmanager
-def _sources(glove: Path, web: str | None, *, taxels: bool) -> "Iterator[tuple[Harness, Sources]]":
+def _sources(glove: Path, *, taxels: bool) -> "Iterator[tuple[Harness, Sources]]":
     """Yield the harness that is calibrated, and its open devices: those with taxels, or the stream with joints.
 
     Raises UsageError if there are none, or if they use stdin, where the user types.
@@ -152,7 +136,7 @@ def _sources(glove: Path, web: str | None, *, taxels: bool) -> "Iterator[tuple[H
         if not isinstance(device, StreamWiring):
             raise click.UsageError(f"{glove.name} has no [[stream]] with joints: name the port of the CyberGlove")
         harness = replace(harness, buses=(), spi=(), streams=(device,))
-    if web is None and "-" in [stream.port for stream in harness.streams]:
+    if "-" in [stream.port for stream in harness.streams]:
         raise click.UsageError("the keys that lead a calibration come from stdin: send rows by udp: instead")
     with Sources(harness, (), whole_scan(harness, (), every_taxel=taxels)) as sources:
         yield harness, sources
@@ -171,7 +155,7 @@ def _await(sources: "Sources", read: Callable[[], Any], what: str) -> None:
 
 
 @contextmanager
-def _posing(port: str, baud: int, hold_s: float, web: str | None) -> "Iterator[tuple[PoseGuide, Callable[[], None]]]":
+def _posing(port: str, baud: int, hold_s: float) -> "Iterator[tuple[PoseGuide, Callable[[], None]]]":
     """Yield a guide through the poses of a CyberGlove, or of the stream of a glove.toml, and a function that waits for
     the next bytes and passes them to it.
     """
@@ -199,7 +183,7 @@ def _posing(port: str, baud: int, hold_s: float, web: str | None) -> "Iterator[t
 
     hold_us = round(hold_s * 1e6)
     if port.endswith(".toml"):
-        with _sources(Path(port), web, taxels=False) as (harness, sources):
+        with _sources(Path(port), taxels=False) as (harness, sources):
             _await(sources, row, "joints")
             guide = PoseGuide(harness.sensor_names, hold_us, old_after_us(sources.glove_period_us))
             yield guide, partial(take, row, guide)
@@ -225,10 +209,10 @@ def _lead(guide: "PoseGuide", take: Callable[[], None]) -> None:
     typed = TypedLines(sys.stdin.fileno())
 
     def drawn() -> Table:
-        table = Table("sensor", "byte", "this pose's", "")
+        shown = table(("sensor", "byte", "this pose's", ""))
         for name, byte, state in zip(guide.names, guide.raw or b"", guide.states(), strict=False):
-            table.add_row(name, str(byte), "yes" if name in guide.pose.degrees else "", state)
-        return table
+            shown.add_row(name, str(byte), "yes" if name in guide.pose.degrees else "", state)
+        return shown
 
     while guide.stage != "done":
         if guide.stage == "held":
@@ -252,40 +236,6 @@ def _lead(guide: "PoseGuide", take: Callable[[], None]) -> None:
         guide.press(now_us(), keys.get(reply, "accept"))
 
 
-def _lead_on_page(
-    guide: "PoseGuide",
-    take: Callable[[], None],
-    subject: str,
-    address: str,
-    token: str | None,
-    write: Callable[[], str],
-) -> str:
-    """Lead through the poses on a page, then call `write` and return its result.
-
-    Raises click.Abort if the user leaves, SettingError or SinkError if the page cannot be served, and the errors of
-    `take` and `write`.
-    """
-    from thenar.runtime.frames import now_us
-    from thenar.runtime.web.guided import pose_page
-
-    page = pose_page(address, token=token, names=guide.names, subject=subject)
-    with ended_by_signals() as stop, page:
-        say_page(page.url)
-        try:
-            while guide.stage != "over" and not stop.is_set():
-                take()
-                page.press(now_us(), guide)
-                page.show(now_us(), guide)
-            if guide.left or stop.is_set():
-                raise click.Abort
-            said = write()
-        except Exception as fault:
-            page.end("left; nothing is written" if isinstance(fault, click.Abort) else str(fault))
-            raise
-        page.end(said)
-    return said
-
-
 def _pressed(
     names: Sequence[str], sources: "Sources", hold_s: float, subject: str, newtons: float | None
 ) -> "TaxelCalibration":
@@ -306,11 +256,11 @@ def _pressed(
         return codes
 
     def drawn() -> Table:
-        table = Table("taxel", "counts", "at rest")
+        shown = table(("taxel", "counts", "at rest"))
         columns = (frames[-1] if frames else (None,) * len(names) for frames in (codes, rested))
         for name, *counts in zip(names, *columns, strict=True):
-            table.add_row(name, *("" if count is None else str(count) for count in counts))
-        return table
+            shown.add_row(name, *("" if count is None else str(count) for count in counts))
+        return shown
 
     _await(sources, take, "taxels")
     echo("Leave every taxel alone, the hand open: press nothing.", err=True)
@@ -344,11 +294,11 @@ class TypedLines:
         while True:
             echo(question, err=True)
             shown_s = 0.0
-            with Live(console=console, transient=True, auto_refresh=False) as live:
+            with Live(console) as live:
                 while (reply := self.take()) is None:
                     take()
                     if console.is_terminal and monotonic() - shown_s > _REFRESH_S:
-                        live.update(drawn(), refresh=True)
+                        live.update(drawn())
                         shown_s = monotonic()
             if reply == "q":
                 raise click.Abort

@@ -11,14 +11,8 @@ from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING
 
 import click
-from rich.console import Group, RenderableType
-from rich.live import Live
-from rich.progress_bar import ProgressBar
-from rich.table import Table
-from rich.text import Text
 
 from thenar.compiler.recordings import check_names
 from thenar.compiler.recordings.taxonomy import MOVEMENTS, Taxonomy
@@ -39,12 +33,8 @@ from thenar.runtime.taxels import calibration_of
 from thenar.runtime.toml_source import read_source
 
 from . import ended_by_signals
+from .consoles import Live, Printed, Text, bar, grid
 from .printing import err, of_device
-
-if TYPE_CHECKING:
-    from .guided_web import StudiedPage
-
-    ServePage = Callable[[Session, Taxonomy, Path], StudiedPage]
 
 _WAIT_US = 50_000
 # Time for a device that is just being plugged in.
@@ -64,24 +54,21 @@ def collect(
     recording: Path,
     journal: Journal | None,
     countdown_s: float,
-    write: Callable[[int], Sequence[str]],
-    serve_page: "ServePage | None" = None,
+    write: Callable[[int], None],
 ) -> None:
     """Lead through the `trials` that the journal lacks, then call `write` with the total number of accepted trials: it
-    writes their set and returns warnings, which the page shows.
+    writes their set.
 
-    Keys come from stdin, or from the page that `serve_page` makes alone if stdin is not a terminal. Raises SettingError
-    or DeviceError if a device cannot serve, SinkError if the page cannot be served, click.ClickException if the
+    Keys come from stdin. Raises SettingError or DeviceError if a device cannot serve, click.ClickException if the
     recording cannot go on.
     """
-    typed = serve_page is None or (sys.stdin is not None and sys.stdin.isatty())
-    if sys.stdin is None and typed:
+    if sys.stdin is None:
         raise click.UsageError("stdin is closed, but a collection is led by keys typed there: run it in a terminal")
-    if typed and any(stream.port == "-" for stream in harness.streams):
+    if any(stream.port == "-" for stream in harness.streams):
         raise click.UsageError("the keys that lead a collection come from stdin: send rows by udp: instead")
     switches, sensors = harness.switches, harness.sensor_names
     check_names("column", (*switches, *harness.taxel_names, *sensors))
-    scan, shown, recorder = whole_scan(harness, switches, every_taxel=True), None, None
+    scan, recorder = whole_scan(harness, switches, every_taxel=True), None
     session = Session(
         thenar=version("thenar"),
         switches=switches,
@@ -96,26 +83,19 @@ def collect(
         _check_same_glove(journal, session)
     accepted, tail = ((), None) if journal is None else (journal.accepted, journal.tail)
     taxonomy, done = Taxonomy(collection.taxonomy, collection.types), len(accepted)
-    with ExitStack() as served:
-        with ended_by_signals() as stop, Sources(harness, switches, scan) as sources, ExitStack() as entered:
-            _meet(sources, len(switches), stop)
-            if not stop.is_set():
-                if serve_page is not None:
-                    # Before the recording begins: an address that cannot be served leaves no file.
-                    shown = served.enter_context(serve_page(session, taxonomy, recording))
-                recorder = entered.enter_context(Recorder(recording, session, tail=tail))
-                faces: list[Terminal | StudiedPage] = [] if shown is None else [shown]
-                if typed:
-                    faces.append(entered.enter_context(Terminal(taxonomy, sys.stdin.fileno())))
-                old_us = old_after_us(sources.switch_period_us, sources.glove_period_us)
-                guide = CollectionGuide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
-                _lead(guide, sources, recorder, faces, stop)
-                done = guide.done
-        if recorder is not None and (recorder.failure is not None or recorder.lost):
-            why = recorder.failure or f"{recording}: {recorder.lost} messages were lost"
-            raise click.ClickException(f"{why}; free some space, and the same command goes on")
-        if (warnings := write(done)) and shown is not None:
-            shown.warn(warnings)
+    with ended_by_signals() as stop, Sources(harness, switches, scan) as sources, ExitStack() as entered:
+        _meet(sources, len(switches), stop)
+        if not stop.is_set():
+            recorder = entered.enter_context(Recorder(recording, session, tail=tail))
+            terminal = entered.enter_context(Terminal(taxonomy, sys.stdin.fileno()))
+            old_us = old_after_us(sources.switch_period_us, sources.glove_period_us)
+            guide = CollectionGuide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
+            _lead(guide, sources, recorder, terminal, stop)
+            done = guide.done
+    if recorder is not None and (recorder.failure is not None or recorder.lost):
+        why = recorder.failure or f"{recording}: {recorder.lost} messages were lost"
+        raise click.ClickException(f"{why}; free some space, and the same command goes on")
+    write(done)
 
 
 def _meet(sources: Sources, switches: int, stop: Event) -> None:
@@ -164,9 +144,7 @@ class Terminal(Closing):
             self._opened.callback(termios.tcsetattr, descriptor, termios.TCSADRAIN, termios.tcgetattr(descriptor))
             # Ctrl-C keeps its meaning, and keys pressed a moment too early count as well.
             tty.setcbreak(descriptor, termios.TCSADRAIN)
-        self._live = Live(console=self._console, auto_refresh=False, transient=True)
-        if self._console.is_terminal:
-            self._opened.enter_context(self._live)
+        self._live = self._opened.enter_context(Live(self._console))
 
     def close(self) -> None:
         """Leave the terminal as it was."""
@@ -204,7 +182,7 @@ class Terminal(Closing):
             self._say(guide, devices)
         elif now_us >= self._due_us or self._shown != guide.step:
             self._due_us, self._shown = now_us + _REDRAW_US, guide.step
-            self._live.update(self._drawn(now_us, guide, devices), refresh=True)
+            self._live.update(*self._drawn(now_us, guide, devices))
 
     def _say(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> None:
         errors = "; ".join(device.error for device in devices if not device.connected)
@@ -216,15 +194,15 @@ class Terminal(Closing):
             self._said = line
             self._console.print(line, soft_wrap=True)
 
-    def _drawn(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> RenderableType:
-        table = Table.grid(padding=(0, 2))
+    def _drawn(self, now_us: int, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> Sequence[Printed]:
+        table = grid(3)
         skipped = f", {guide.skipped} skipped" if guide.skipped else ""
-        bar = ProgressBar(guide.total, guide.done, width=40)
-        table.add_row("done", Text(f"{guide.done} of {guide.total}{skipped}"), bar)
+        share = guide.done / max(guide.total, 1)
+        table.add_row("done", f"{guide.done} of {guide.total}{skipped}", bar(share, width=40))
         for device in devices:
-            table.add_row(device.name, Text("connected") if device.connected else Text(device.error, style="red"))
-        stage = Text(self._standing(now_us, guide), style="bold")
-        return Group(table, Text(), Text(self._task(guide), style="bold cyan"), stage, Text(_keys(guide)))
+            table.add_row(device.name, "connected" if device.connected else Text(device.error, "red"), "")
+        stage = Text(self._standing(now_us, guide), "bold")
+        return table, "", Text(self._task(guide), "bold cyan"), stage, _keys(guide)
 
     def _task(self, guide: CollectionGuide) -> str:
         trial = guide.trial
@@ -267,21 +245,14 @@ def _keys(guide: CollectionGuide) -> str:
     return "   ".join(f"{_LETTERS[key]}: {what}" for key, what in guide.offered().items())
 
 
-def _lead(
-    guide: CollectionGuide, devices: Sources, recorder: Recorder, faces: "Sequence[Terminal | StudiedPage]", stop: Event
-) -> None:
+def _lead(guide: CollectionGuide, devices: Sources, recorder: Recorder, terminal: Terminal, stop: Event) -> None:
     """Lead through the guide's trials until all are done, the user leaves, `stop` is set, or the recording fails."""
     while guide.stage != "over" and not recorder.lost and recorder.failure is None and not stop.is_set():
         arrived = devices.take(_WAIT_US).arrived
         devices.raise_settings()
         guide.take(now_us(), arrived, [device.name for device in devices.devices() if not device.connected])
-        for face in faces:
-            face.press(now_us(), guide)
-            face.show(now_us(), guide, devices.devices())
-    # However it ended, the page shows that it has.
-    guide.press(now_us(), "quit")
-    for face in faces:
-        face.show(now_us(), guide, devices.devices())
+        terminal.press(now_us(), guide)
+        terminal.show(now_us(), guide, devices.devices())
 
 
 def _check_same_glove(journal: Journal, session: Session) -> None:

@@ -190,10 +190,10 @@ def _check(context: click.Context, from_frontier: Path | None, point: int | None
 
 def _propose(manifest: "Manifest", path: Path | None, chip: str | None) -> None:
     """Write a harness for the kept switches, if that was requested."""
+    from thenar.compiler.glove.propose import propose_board, propose_cyberglove, propose_harness
     from thenar.runtime.files import write_atomically
     from thenar.runtime.harness.writing import harness_to_toml
     from thenar.runtime.names import sound_name
-    from thenar.runtime.scanning.propose import propose_board, propose_cyberglove, propose_harness
 
     if path is None:
         return

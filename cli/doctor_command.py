@@ -111,10 +111,10 @@ def _listen(port: str, baud: int, seconds: float, columns: "Sequence[str]", prop
     if not found.stream.used:
         raise click.ClickException(f"{port}: no column is a switch, a joint or a taxel, so no glove.toml is proposed")
     for _, reason in faults(harness):
-        err().print(f"fix this before using it: {reason}", highlight=False)
+        err().print(f"fix this before using it: {reason}")
     if propose is not None:
         write_atomically(propose, text.encode())
-        err().print(f"{propose}: review it, then run `thenar doctor {propose}`", highlight=False)
+        err().print(f"{propose}: review it, then run `thenar doctor {propose}`")
 
 
 def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[CheckResult]":

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.text import Text
 
 from thenar.compiler.text import DASH, counted
 
+from .consoles import Table, Text
 from .options import (
     CHOOSING,
     LIMITS,
@@ -35,8 +35,6 @@ from .parameters import (
 from .printing import json_flag, out, progress, show, table, wants_json, warning, write_json
 
 if TYPE_CHECKING:
-    from rich.table import Table as Grid
-
     from thenar.compiler.artifact.stream_study import StreamStudy, SubjectMean
     from thenar.compiler.artifact.wearers import WearerStudy
     from thenar.compiler.evaluation.study import Study, StudyRun
@@ -263,7 +261,7 @@ def _cell(value: "SubjectMean", times: int) -> str:
     return f"{times * value.mean:.1f}" + (f" [{', '.join(ends)}]" if ends else "")
 
 
-def _print_grid(title: str, grid: "Grid", note: str = "") -> None:
+def _print_grid(title: str, grid: Table, note: str = "") -> None:
     console = out()
     console.print()
     console.print(Text(title, "bold"))
@@ -297,7 +295,7 @@ def _print_end(study: "Study") -> None:
     console.print(str(study))
 
 
-def _rates(rated: "RateTable") -> "Grid":
+def _rates(rated: "RateTable") -> Table:
     from thenar.compiler.evaluation.tables import both
 
     averaged = ["all"] if len(rated.columns) > 1 else []

@@ -4,12 +4,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.text import Text
 
 from thenar.compiler.text import duration
 from thenar.drivers.names import printable
 from thenar.runtime.recipe import AUTO
 
+from .consoles import Text
 from .options import TrainingCommand, asked_settings, method_list, trainer_option
 from .parameters import (
     Number,
@@ -170,7 +170,7 @@ def print_frontier(frontier: "Frontier") -> None:
             *(interval(rate(point)) for rate in rates.values()),
             f"{duration(point.frame.us)} {point.frame.how}",
             *(f"{point.flash:,}", f"{point.ram:,}"),
-            style="bold" if point.number == frontier.picked else None,
+            style="bold" if point.number == frontier.picked else "",
         )
     console, folds = out(), words.folds_of(frontier)
     console.print(grid)

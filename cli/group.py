@@ -4,9 +4,9 @@ Each sub-command is loaded only when it is called. If the reader of a pipe goes 
 silently with click's exit code 1.
 """
 
-import errno
 import os
 import re
+import sys
 import tempfile
 import traceback
 from collections.abc import Sequence
@@ -104,8 +104,8 @@ def run_group(arguments: Sequence[str]) -> int:
 
 def _is_broken_pipe(fault: BaseException) -> bool:
     """Return whether this is how click ends when the reader of standard output has gone, such as `head`."""
-    reason = fault.__context__
-    return isinstance(fault, SystemExit) and isinstance(reason, OSError) and reason.errno == errno.EPIPE
+    # click wraps the streams then, in a class that was renamed.
+    return isinstance(fault, SystemExit) and type(sys.stdout).__name__.endswith("PacifyFlushWrapper")
 
 
 def with_options(sentence: str) -> str:

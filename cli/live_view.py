@@ -5,18 +5,14 @@ from contextlib import suppress
 from threading import Event, Thread
 from typing import Self
 
-from rich.console import Console, RenderableType
-from rich.live import Live
-from rich.table import Table
-from rich.text import Text
-
 from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, OutputTrouble, Quarantined
+
+from .consoles import Console, Live, Printed, Text, bar, grid
 
 Devices = Callable[[], Sequence[DeviceHealth]]
 
 _REDRAW_S = 0.1
 _STYLES = {"ok": "bold green", "changing": "bold cyan", "degraded": "bold yellow", "unknown": "bold red"}
-_BAR = 30
 _SHOWN = 6
 
 
@@ -27,13 +23,12 @@ class LiveView:
     """
 
     def __init__(self, console: Console) -> None:
-        self._live = Live(console=console, transient=True, auto_refresh=False)
+        self._live = Live(console)
         self._newest: tuple[LiveGrasp, Devices, HealthReport | None] | None = None
         self._closing = Event()
         self._thread = Thread(target=self._draw, name="thenar view", daemon=True)
 
     def __enter__(self) -> Self:
-        self._live.start()
         self._thread.start()
         return self
 
@@ -41,7 +36,7 @@ class LiveView:
         self._closing.set()
         self._thread.join()
         with suppress(OSError):
-            self._live.stop()
+            self._live.__exit__()
 
     def show(
         self,
@@ -63,30 +58,30 @@ class LiveView:
                     wrong = list[Quarantined | OutputTrouble]()
                     if health is not None:
                         wrong += [*health.quarantined, *health.outputs]
-                    self._live.update(drawn(grasp, devices(), wrong), refresh=True)
+                    self._live.update(drawn(grasp, devices(), wrong))
 
 
 def drawn(
     grasp: LiveGrasp,
     devices: Sequence[DeviceHealth],
     wrong: Sequence[Quarantined | OutputTrouble] = (),
-) -> RenderableType:
+) -> Printed:
     """Return the view of one moment."""
-    table = Table.grid(padding=(0, 2))
-    table.add_row("grasp", Text(grasp.grasp, style=_STYLES[grasp.health]))
-    table.add_row("", f"{_bar(grasp.probability)} {grasp.probability:5.1%}")
+    table = grid(2)
+    table.add_row("grasp", Text(grasp.grasp, _STYLES[grasp.health]))
+    table.add_row("", f"{bar(grasp.probability)} {grasp.probability:5.1%}")
     table.add_row("this frame", f"{grasp.candidate}, ahead by {grasp.margin} steps")
     table.add_row("segment", _segment(grasp))
-    table.add_row("health", Text(grasp.health, style=_STYLES[grasp.health]))
+    table.add_row("health", Text(grasp.health, _STYLES[grasp.health]))
     if grasp.lost:
         more = f" and {len(grasp.lost) - _SHOWN} more" if len(grasp.lost) > _SHOWN else ""
         table.add_row("missing", ", ".join(grasp.lost[:_SHOWN]) + more)
     for one in wrong:
-        table.add_row(one.name, Text(one.what, style="yellow"))
+        table.add_row(one.name, Text(one.what, "yellow"))
     table.add_row("age", f"switches {_ms(grasp.switch_age_us)}, glove {_ms(grasp.glove_age_us)}")
     table.add_row("frame", str(grasp.number))
     for device in devices:
-        table.add_row(device.name, Text(device.error, style="red") if device.error else "connected")
+        table.add_row(device.name, Text(device.error, "red") if device.error else "connected")
     return table
 
 
@@ -95,11 +90,6 @@ def _segment(grasp: LiveGrasp) -> str:
     if grasp.segment_us is None:
         return f"none, {grasp.segment} so far"
     return f"{grasp.segment}, {grasp.segment_type}: {grasp.state}, {(grasp.time_us - grasp.segment_us) / 1e6:.1f} s"
-
-
-def _bar(share: float) -> str:
-    full = round(share * _BAR)
-    return "█" * full + "░" * (_BAR - full)
 
 
 def _ms(age_us: int | None) -> str:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from thenar.runtime.recipe import AUTO, Choice, choices
+from thenar.runtime.recipe import AUTO
 
+from .choices import Choice, choices
 from .parameters import Command, ListOf, Number, OneOf, comma_separated, existing_file
 from .printing import warning
 

@@ -8,19 +8,18 @@ import sys
 from collections.abc import Callable, Container, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
+from time import monotonic
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import click
 import msgspec
 
 from thenar.drivers.names import shown
 
-if TYPE_CHECKING:
-    from rich.console import Console, RenderableType
-    from rich.table import Table
-    from rich.text import TextType
+from .consoles import Column, Console, Live, Table, Text, bar
 
 _JSON = "thenar.json"
+_REDRAW_S = 0.1
 Found = TypeVar("Found")
 Rest = ParamSpec("Rest")
 # Left unescaped by JSON, but perhaps unsafe for a terminal or an encoding.
@@ -66,27 +65,20 @@ def say_page(url: str) -> None:
     echo(f"thenar: the page is at {url}", err=True)
 
 
-def out() -> "Console":
+def out() -> Console:
     """Return the console for results; its lines are 200 characters wide outside a terminal."""
-    console = _console()
-    return console if console.is_terminal else _console(width=200)
+    console = Console()
+    return console if console.is_terminal else Console(width=200)
 
 
-def err() -> "Console":
+def err() -> Console:
     """Return the console for warnings and progress."""
-    return _console(stderr=True)
+    return Console(stderr=True)
 
 
 def warning(sentence: str) -> None:
     """Print a warning on stderr."""
     echo(f"warning: {sentence}", err=True)
-
-
-def _console(stderr: bool = False, width: int | None = None) -> "Console":
-    from .consoles import SafeConsole  # a run without a terminal needs no rich
-
-    # Names of the user's columns and files may hold brackets and colons: they are not markup.
-    return SafeConsole(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
 
 
 def wants_json() -> bool:
@@ -133,16 +125,11 @@ def _json(found: Any) -> bytes:
 def table(
     columns: Iterable[str],
     numbers: Container[str] = (),
-    title: "TextType | None" = None,
-    rows: "Iterable[Iterable[RenderableType]]" = (),
-) -> "Table":
+    title: str | None = None,
+    rows: Iterable[Iterable[str | Text]] = (),
+) -> Table:
     """Return a table of these columns, with `numbers` aligned right."""
-    from .consoles import WholeTable
-
-    made = WholeTable(title=title)
-    for column in columns:
-        is_number = column in numbers
-        made.add_column(column, justify="right" if is_number else "left", no_wrap=is_number, overflow="fold")
+    made = Table([Column(column, right=column in numbers, no_wrap=column in numbers) for column in columns], title)
     for row in rows:
         made.add_row(*row)
     return made
@@ -153,30 +140,23 @@ def progress(what: str, *, lines: bool = False) -> Iterator[Callable[[int, int],
     """Yield report(done, total), which draws a bar on stderr if that is a terminal, and does nothing otherwise; with
     `lines`, for work of minutes, it prints a line for each step then.
     """
-    console = err()
+    console, began_s, drawn_s = err(), monotonic(), 0.0
     if lines and not console.is_terminal:
         echo(f"{what} ...", err=True)
         yield lambda done, total: echo(f"{what}: {done} of {total} steps", err=True)
         return
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
 
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+    def report(done: int, total: int) -> None:
+        nonlocal drawn_s
+        now_s = monotonic()
+        if now_s - drawn_s > _REDRAW_S:
+            drawn_s, passed_s = now_s, now_s - began_s
+            left = f", {passed_s * (total - done) / done:.0f} s left" if done else ""
+            live.update(f"{what} {bar(done / max(total, 1))} {done}/{total} {passed_s:.0f} s{left}")
+
+    with Live(console) as live:
+        live.update(f"{what} ...")
+        yield report
 
 
 def of_device(name: str, state: str) -> str:

@@ -1,7 +1,6 @@
 """`thenar record`: collect labelled grasps, with guidance."""
 
 import secrets
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +15,6 @@ from .parameters import (
     existing_folder,
     keep_apart,
     seed_range,
-    web_options,
 )
 from .printing import echo, progress, warning
 
@@ -46,7 +44,6 @@ if TYPE_CHECKING:
     help="Also record the empty hand: open, approaching, releasing, moving idly.  [default: none, or as the build]",
 )
 @click.option("--seed", type=seed_range, help="Seed of the trial order.  [default: random]")
-@web_options
 @click.option(
     "-o", "--output", type=OutputFile(".grasps", goes_on=True), required=True, help="The .grasps file to write."
 )
@@ -60,8 +57,6 @@ def command(
     countdown: float,
     none: bool | None,
     seed: int | None,
-    web: str | None,
-    web_token: str | None,
     output: Path,
 ) -> None:
     """Record labelled grasps: the command shows which grasp to take, in random order, with a countdown.
@@ -76,7 +71,6 @@ def command(
     \b
     Example:
         thenar record --glove glove.toml --subject A --objects objects.toml -o anna.grasps
-        thenar record --glove glove.toml --subject A -o anna.grasps --web
         thenar record --glove glove.toml --subject me --for build/ -o mine.grasps
     """
     from thenar.compiler.recordings import check_names
@@ -119,12 +113,7 @@ def command(
     accepted = 0 if journal is None else len(journal.accepted)
     write = partial(_write, recording, output, len(trials), loaded)
     if accepted < len(trials):
-        page = None
-        if web is not None:
-            from .guided_web import StudiedPage
-
-            page = partial(StudiedPage, web, web_token)
-        collect(harness, glove, wanted, trials, recording, journal, countdown, write, page)
+        collect(harness, glove, wanted, trials, recording, journal, countdown, write)
     else:
         write(accepted)
 
@@ -157,19 +146,17 @@ def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Col
     return wanted
 
 
-def _write(recording: Path, output: Path, planned: int, build: "Build | None", accepted: int) -> Sequence[str]:
-    """Write the set of all accepted trials, say so, and return the warnings."""
+def _write(recording: Path, output: Path, planned: int, build: "Build | None", accepted: int) -> None:
+    """Write the set of all accepted trials, and say so."""
     from thenar.compiler.recordings.mcap_recording import import_recordings
 
     if not accepted:
         echo(f"no trial was accepted: {output} is not written; run the same command to continue")
-        return ()
+        return
     with progress(f"importing {recording.name}"):
         grasp_set, report = import_recordings([recording], codings=None if build is None else build.manifest.codings)
     grasp_set.save(output)
-    warnings = [finding.message for finding in report.warnings]
-    for message in warnings:
-        warning(message)
+    for finding in report.warnings:
+        warning(finding.message)
     rest = "" if accepted == planned else "; run the same command to continue"
     echo(f"{output}: {grasp_set.size}; {accepted} of {planned} trials are done{rest}")
-    return warnings

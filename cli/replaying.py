@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from thenar.runtime import Build
     from thenar.runtime.live.recogniser import Moment
     from thenar.runtime.policy import Policy
-    from thenar.runtime.preshape import Preshape, PreshapeSelector
-    from thenar.runtime.published import LiveGrasp
+    from thenar.runtime.preshape import PreshapeSelector
+    from thenar.runtime.published import LiveGrasp, Preshape
     from thenar.runtime.sinks import SinkReport
 
 

@@ -81,7 +81,7 @@ def _sinks_help() -> str:
     type=Number(0, 10_000),
     help="Maximum age of a late CyberGlove record.  [default: four periods, at least 60]",
 )
-@click.option("--no-quarantine", is_flag=True, help="Use inputs even if they are stuck, chatter or drift.")
+@click.option("--no-quarantine", is_flag=True, help="Use switches even if they are stuck or chatter.")
 @click.option(
     "--lag-ms", type=Number(0, 10_000), help="Time after which the state of a segment is final.  [default: 150]"
 )

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from rich.text import Text
 
 from thenar.compiler.text import counted
 
@@ -83,7 +82,7 @@ def _print(segments: "Sequence[FoundSegment]", length: str, f1: "Sequence[float]
     grid = table(("start s", "end s", "type", "confidence", "stream"), ("start s", "end s", "confidence"))
     for one in segments[:_SHOWN]:
         stream = one.subject if one.session == "1" else f"{one.subject} {one.session}"
-        grid.add_row(f"{one.start_s:.2f}", f"{one.end_s:.2f}", Text(one.type), f"{one.confidence:.3f}", Text(stream))
+        grid.add_row(f"{one.start_s:.2f}", f"{one.end_s:.2f}", one.type, f"{one.confidence:.3f}", stream)
     if segments:
         out().print(grid)
     more = len(segments) - _SHOWN

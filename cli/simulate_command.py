@@ -4,11 +4,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from rich.table import Table
-from rich.text import Text
 
 from thenar.compiler.text import counted
 
+from .consoles import Table
 from .options import complete_scene
 from .parameters import OutputFile, jobs_option, keep_apart, overwrite_flag, seed_range
 from .printing import echo, json_flag, out, progress, show, table, warning
@@ -133,7 +132,6 @@ def _print_report(report: "SimulationReport", path: Path, size: str) -> None:
         counts = (step.calls, step.grasps, step.draws)
         times = (f"{step.seconds:.3f}", f"{step.us_a_grasp:.1f}", f"{step.share:.1%}")
         costs.add_row(step.name, _whose(step.own), *map(str, counts), *times, style=_OWN if step.own else "")
-    costs.add_section()
     draws, us = sum(step.draws for step in report.steps), sum(step.us_a_grasp for step in report.steps)
     total = sum(step.seconds for step in report.steps)
     costs.add_row("all", "", "", "", str(draws), f"{total:.3f}", f"{us:.1f}", "")
@@ -150,8 +148,7 @@ def _print_report(report: "SimulationReport", path: Path, size: str) -> None:
 
 def _table(title: str, *columns: str) -> Table:
     """Return a table whose first column is a name and never truncated."""
-    made = table(columns, columns[1:], Text(title, "bold"))
-    made.title_justify = "left"
+    made = table(columns, columns[1:], title)
     made.columns[0].no_wrap = True
     return made
 

@@ -5,9 +5,8 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import click
-from rich.console import Console
-from rich.text import Text
 
+from .consoles import Console, Text
 from .parameters import OneOf, jobs_option
 from .printing import json_flag, out, progress, show, table
 
@@ -71,7 +70,6 @@ def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int) -> int
 
 def _print_list(cases: list[dict[str, str]]) -> None:
     shown = table(("case", "subject", "what could go wrong"), rows=(tuple(case.values()) for case in cases))
-    shown.show_lines = True
     out().print(shown)
 
 
@@ -88,7 +86,7 @@ def _print(report: "Report") -> None:
             console.print(line)
         console.print()
     for unit, meaning in legend(report):
-        console.print(Text.assemble((unit, "bold"), f": {meaning}"), style="dim")
+        console.print(Text(f"{unit}: {meaning}", "dim"))
     console.print()
     for failure in failures(report):
         console.print(Text(failure, "red"))
@@ -98,11 +96,10 @@ def _print(report: "Report") -> None:
 def _print_case(console: Console, case: "CaseReport") -> None:
     from thenar.stability.report import figure, verdict
 
-    console.print(Text.assemble((case.name, "bold"), f": {case.about.title}"))
+    console.print(Text(f"{case.name}: {case.about.title}", "bold"))
     if case.about.danger:
         console.print(Text(f"What could go wrong: {case.about.danger}", "dim"))
     checks = table(_HEADS, _NUMBERS)
-    checks.box, checks.padding, checks.pad_edge = None, (0, 2, 0, 0), False
     for finding in case.findings:
         style = "green" if finding.holds else "bold red"
         error = (f"{finding.tried:,}", figure(finding.error), f"{figure(finding.bound)} {finding.unit}")

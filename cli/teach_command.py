@@ -11,7 +11,7 @@ from .parameters import OutputFile, existing_file, existing_folder, keep_apart, 
 from .printing import echo, json_flag, out, progress, show, table, warning
 
 if TYPE_CHECKING:
-    from thenar.runtime.task import Task
+    from thenar.compiler.artifact.teaching import Task
 
 
 @click.command("teach")

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import Literal, Self
 
 from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.live.system import own_joints
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.published import NONE
-from thenar.runtime.scanning.propose import own_joints, propose_cyberglove
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us
 
+from .glove.propose import propose_cyberglove
 from .text import INDEPENDENT, counted, listed, microseconds, percent
 
 Topic = Literal["kept", "inputs", "fit", "compared", "accuracy", "caution", "integers", "faults", "scan", "wiring"]

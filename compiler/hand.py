@@ -4,6 +4,7 @@ The positions come from a hand map (simulator/handmaps) or from a user's layout,
 nothing here depends on how hands are simulated.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,26 +16,37 @@ from numpy.typing import NDArray
 
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.hand import (
-    GRID_RADIUS_MM,
+    DrawnJoint,
     DrawnSwitch,
     DrawnTaxel,
     HandDrawing,
     Line,
     Spot,
-    drawn_joints,
-    drawn_switches,
-    drawn_taxels,
-    grid_hand,
-    grid_places,
 )
 from thenar.runtime.manifest import Calibration, Manifest
 from thenar.runtime.names import fault, nearest, shortened
-from thenar.runtime.recording.session import Session
 from thenar.runtime.toml_source import read_source
 from thenar.runtime.toml_struct import check_finite, convert
 
 Floats = NDArray[np.float64]
 _LARGEST_DOT_MM, _SMALLEST_DOT_MM = 4.0, 0.5
+# Spacing of the grid: it leaves room for a name under each place.
+_COLUMNS, _PITCH_MM, _GRID_RADIUS_MM = 4, (50.0, 22.0), 3.0
+_DIGITS = {name: name for name in ("thumb", "index", "middle", "ring", "little")}
+_DIGITS |= {"pinky": "little", "pinkie": "little"}
+_OUTWARD = ("middle", "index", "ring", "thumb", "little")
+# Words in a joint's name, and the movement each means; the first match counts.
+_MOVES = {
+    **dict.fromkeys(("abduction", "adduction", "abd", "spread"), "abduction"),
+    **dict.fromkeys(("rotation", "roll", "opposition", "cmc", "tmj", "tm"), "rotation"),
+    **dict.fromkeys(("mpj", "mcp", "mp"), "mcp"),
+    **dict.fromkeys(("pij", "pip"), "pip"),
+    **dict.fromkeys(("dij", "dip"), "dip"),
+    **dict.fromkeys(("ij", "ip"), "ip"),
+    **dict.fromkeys(("flexion", "flex", "bend", "curl"), "curl"),
+}
+_WRIST = dict.fromkeys(("pitch", "flexion", "extension"), "pitch") | dict.fromkeys(("yaw", "deviation"), "yaw")
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _WHOLE = "glove"  # the part of switches that are on no part
 Length = Annotated[float, Meta(ge=-10_000.0, le=10_000.0)]
 Place = tuple[Length, Length]
@@ -232,30 +244,6 @@ def drawn_hand(
     )
 
 
-def drawn_glove(session: Session, hand: HandShape) -> HandDrawing:
-    """Return the drawing of a recorded glove: every switch as the bit that it has in a frame.
-
-    Switches with the names of those on `hand` are drawn there, others in a grid. Calibrated sensors are in degrees,
-    others show their bytes.
-    """
-    names, n = (*session.switches, *session.taxels), len(session.switches)
-    fits = hand.fitted(names) is not None
-    places = _places(hand, names) if fits else grid_places(names)
-    lines = {} if session.calibration is None else {line.name: line for line in session.calibration.sensors}
-    joints = []
-    for number, name in enumerate(session.sensors):
-        line = lines.get(name)
-        ends = (1, 1.0, 255, 255.0) if line is None else (line.raw_a, line.value_a, line.raw_b, line.value_b)
-        joints.append(Calibration(number, name, "raw" if line is None else "deg", *ends))
-    return HandDrawing(
-        **(_shape(hand) if fits else {"view": "", "placed": False, "radius_mm": GRID_RADIUS_MM}),
-        switches=tuple(DrawnSwitch(name, *places[name], bit) for bit, name in enumerate(session.switches)),
-        # One level each: hand.js draws how far a taxel is pressed, and no frame has a bit for it.
-        taxels=tuple(DrawnTaxel(name, *places[name], ((0, n + at),)) for at, name in enumerate(session.taxels)),
-        joints=drawn_joints(joints),
-    )
-
-
 def _shape(hand: HandShape) -> dict[str, Any]:
     """Return the fields of a drawing that show the hand."""
     return {
@@ -286,3 +274,68 @@ def _thinned(points: Floats) -> Line:
 def _rounded(points: Floats) -> list[tuple[float, float]]:
     # Adding 0 turns a rounded -0 into 0.
     return [(x, y) for x, y in (np.round(points, 1) + 0.0).tolist()]
+
+
+def grid_hand(manifest: Manifest, ranges: Sequence[tuple[int, int]] | None = None) -> HandDrawing:
+    """Return the kept switches and taxels of a build in a grid, and its joints: `ranges` of their codes, if known."""
+    names = list(dict.fromkeys(switch.source for switch in manifest.switches))
+    wide, high = _PITCH_MM
+    places = {name: (wide * (at % _COLUMNS), -high * (at // _COLUMNS)) for at, name in enumerate(names)}
+    taxels = tuple(switch.source for switch in manifest.switches if switch.threshold is not None)
+    return HandDrawing(
+        view="switches and taxels in the order of the build; their positions on the hand are unknown" if names else "",
+        placed=False,
+        radius_mm=_GRID_RADIUS_MM,
+        switches=drawn_switches(manifest, {name: at for name, at in places.items() if name not in taxels}),
+        taxels=drawn_taxels(manifest, {name: places[name] for name in dict.fromkeys(taxels)}),
+        joints=drawn_joints(manifest.joints, ranges),
+    )
+
+
+def drawn_switches(manifest: Manifest, places: dict[str, tuple[float, float]]) -> tuple[DrawnSwitch, ...]:
+    """Return switches at their positions, by name, and which of them the build keeps."""
+    bits = {switch.name: bit for bit, switch in enumerate(manifest.switches) if switch.threshold is None}
+    return tuple(DrawnSwitch(name, x, y, bits.get(name)) for name, (x, y) in places.items())
+
+
+def drawn_taxels(manifest: Manifest, places: dict[str, tuple[float, float]]) -> tuple[DrawnTaxel, ...]:
+    """Return taxels at their positions, by name, with the levels that the build keeps."""
+    levels: dict[str, list[tuple[int, int]]] = {name: [] for name in places}
+    for bit, switch in enumerate(manifest.switches):
+        if switch.threshold is not None:
+            levels[switch.source].append((switch.threshold.code, bit))
+    return tuple(DrawnTaxel(name, x, y, tuple(sorted(levels[name]))) for name, (x, y) in places.items())
+
+
+def drawn_joints(
+    joints: Sequence[Calibration], ranges: Sequence[tuple[int, int]] | None = None
+) -> tuple[DrawnJoint, ...]:
+    """Return joints with the movements that their names mean, from the lowest to the highest observed value: `ranges`
+    of codes; without them, the codes of the two points of their calibration.
+    """
+    found = []
+    for number, joint in enumerate(joints):
+        codes = (joint.code_a, joint.code_b) if ranges is None else ranges[number]
+        low, high = sorted(round(joint.value(code), 3) for code in codes)
+        found.append(DrawnJoint(joint.name, number, joint.unit, low, high, *moved_by(joint.name)))
+    return tuple(found)
+
+
+def moved_by(name: str) -> tuple[str, str]:
+    """Return the digit of a joint of this name, and its movement; ("", "") if the name does not say.
+
+    An abduction between two digits moves the one that is further from the middle finger.
+    """
+    words = [word.lower() for word in _WORD.findall(name)]
+    if "wrist" in words:
+        return next((("wrist", _WRIST[word]) for word in words if word in _WRIST), ("", ""))
+    if "arch" in words:
+        return "palm", "arch"
+    digits = [_DIGITS[word] for word in words if word in _DIGITS]
+    if not digits:
+        return "", ""
+    digit = max(digits, key=_OUTWARD.index)
+    moves = next((kind for word, kind in _MOVES.items() if word in words), "curl" if len(words) == 1 else "")
+    if moves == "ip" and digit != "thumb":
+        moves = "pip"
+    return (digit, moves) if moves else ("", "")

@@ -1,5 +1,5 @@
-"""What this machine can do: independent tasks on all cores, with each result as soon as it is available; a single
-background task; and trainings that fit into its memory.
+"""What this machine can do: independent tasks on all cores, with each result as soon as it is available; and
+trainings that fit into its memory.
 """
 
 import os
@@ -9,8 +9,8 @@ import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import BrokenExecutor
-from contextlib import ExitStack, contextmanager, suppress
-from typing import Any, Generic, TypeVar
+from contextlib import ExitStack, contextmanager
+from typing import TypeVar
 
 from thenar.drivers.errors import ThenarError
 
@@ -140,69 +140,6 @@ def _end_with_parent(parent: int) -> None:
         os._exit(1)
 
     threading.Thread(target=wait, name="thenar parent", daemon=True).start()
-
-
-class BackgroundTask(Generic[Result]):
-    """A background process for one task at a time, which yields to everything else on the machine.
-
-    It ends when this process does, however this process ends.
-    """
-
-    def __init__(self) -> None:
-        self._process: Any = None
-        self._results: Any = None
-
-    @property
-    def busy(self) -> bool:
-        """Whether a task is running, or its result has not been fetched."""
-        return self._process is not None
-
-    def start(self, work: Callable[[Task], Result], task: Task) -> None:
-        """Begin; must not be busy. `work` and `task` are pickled; an exception of `work` is reported by its name."""
-        from multiprocessing import get_context
-
-        assert not self.busy
-        context = get_context("spawn")
-        self._results, there = context.Pipe(duplex=False)
-        # Block its signals before it exists: a Ctrl-C is for this process.
-        with _safe_paths(), _interrupts_held():
-            self._process = context.Process(target=_background, args=(os.getpid(), there, work, task), daemon=True)
-            self._process.start()
-        there.close()
-
-    def fetch(self) -> Result | None:
-        """Return the result, or None if it is not available yet. Raises BrokenExecutor if the work has failed."""
-        if self._process is None or not self._results.poll():
-            return None
-        try:
-            failure, result = self._results.recv()
-        except EOFError:
-            failure, result = "its process ended, perhaps for lack of memory", None
-        self.close()
-        if failure:
-            raise BrokenExecutor(failure)
-        found: Result = result
-        return found
-
-    def close(self) -> None:
-        """End the running task."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.join()
-            self._process.close()
-            self._results.close()
-            self._process = None
-
-
-def _background(parent: int, there: Any, work: Callable[[Task], Result], task: Task) -> None:
-    _end_with_parent(parent)
-    with suppress(OSError):
-        os.nice(10)
-    try:
-        result = "", work(task)
-    except Exception as fault:
-        result = f"{type(fault).__name__}: {fault}", None  # type: ignore[assignment]
-    there.send(result)
 
 
 def check_memory(rows: int, n_classes: int, raises: type[ThenarError], switches: int = 0, joints: int = 0) -> None:

@@ -4,8 +4,8 @@ import click
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
+from thenar.cli.choices import choices
 from thenar.cli.group import COMMANDS, thenar
-from thenar.runtime.recipe import choices
 
 PAGE = "reference/all-commands.md"
 BEFORE = """# All commands and options

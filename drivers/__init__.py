@@ -2,7 +2,3 @@
 
 Imports no other package of thenar. Logs wire events to the loggers `thenar.drivers...`, which are silent by default.
 """
-
-import logging
-
-logging.getLogger(__name__).addHandler(logging.NullHandler())

@@ -7,7 +7,6 @@
 Where the sources of the protocol disagree, each variant is accepted or selectable: docs/reference/devices.md.
 """
 
-import logging
 from collections import deque
 from collections.abc import Collection
 from contextlib import ExitStack, suppress
@@ -38,9 +37,10 @@ from .cyberglove_protocol import (
     shortest_us,
 )
 from .errors import DeviceError, SettingError
+from .logs import logger
 from .serial_line import SerialLine
 
-_LOG = logging.getLogger(__name__)
+_LOG = logger(__name__)
 
 # Longest wait for the next byte of a reply: 16 ms in an FTDI adapter, 1 ms a byte at 9600 baud, the box's own time.
 _REPLY_S = 0.2

@@ -22,7 +22,6 @@ trouble inserts 'es' (records requested faster than it can send them) or 'eg' (g
 byte is always 1. Time stamps, which may hold zeros, are left switched off.
 """
 
-import logging
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -30,9 +29,10 @@ from math import ceil, isfinite
 from typing import Literal
 
 from .errors import SettingError
+from .logs import logger
 from .serial_line import sending_us
 
-_LOG = logging.getLogger(__name__)
+_LOG = logger(__name__)
 
 _FINGER_SLOTS = ("mpj", "pij", "dij")
 # In slot order; a mask's bit is the slot's place, the lowest bit of the first byte first. "" is never sent.

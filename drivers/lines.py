@@ -36,6 +36,8 @@ from .transports import Datagrams, Transport, line_port_fault, open_transport
 
 # Long enough for two thousand columns of five digits.
 LONGEST = 16_384
+# Most rows: finite numbers with commas between.
+_PLAIN = re.compile(r"-?\d{1,20}(?:\.\d{1,20})?(?:,-?\d{1,20}(?:\.\d{1,20})?)*", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 _NO_NUMBER = re.compile(r"|[+-]?nan|[+-]?inf(inity)?|null|none|na|-", re.IGNORECASE)
 _NAME = re.compile(r"[^\W\d][^,;:\t\"{}]*")
@@ -96,6 +98,8 @@ def parsed(line: bytes, columns: int = 0) -> Row | ColumnHeader | Damaged | None
     except UnicodeDecodeError:
         return None
     text = text.strip("\ufeff \r\t\0")
+    if _PLAIN.fullmatch(text):
+        return Row(None, tuple(map(float, text.split(","))))
     if text[:1] in ("{", "["):
         return _of_json(text)
     fields = _fields(text)

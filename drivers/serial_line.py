@@ -5,7 +5,6 @@ every error of pySerial or the kernel about a lost line becomes a `DeviceError`.
 """
 
 import errno
-import logging
 import os
 import select
 from time import monotonic
@@ -13,13 +12,14 @@ from typing import TYPE_CHECKING
 
 from .closing import Closing
 from .errors import DeviceError, SettingError
+from .logs import logger
 from .names import shortened
 from .ports import check_node, port_fault
 
 if TYPE_CHECKING:
     from serial import Serial
 
-_LOG = logging.getLogger(__name__)
+_LOG = logger(__name__)
 
 BITS_A_BYTE = 10  # a start bit, 8 data bits, a stop bit
 _CHUNK = 4096

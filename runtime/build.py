@@ -1,10 +1,8 @@
 """A loaded build folder: `build.json` describes the tables, `tables.bin` holds them, `scan.json` the reading order."""
 
-import hashlib
 from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from msgspec import Struct
@@ -22,7 +20,11 @@ from .published import NONE
 from .scanning import scanmap as scan_file
 from .scanning.scanmap import ScanMap, check_switches, scanmap_from_bytes
 from .scores import LANE_OFFSET, Rejector, Scorer, none_leads, softmax
+from .sealed import sha256
 from .softmax import Softmax
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME = "build.json", "tables.bin", "ensemble.bin", "scan.json"
 
@@ -95,6 +97,8 @@ class Build:
         Raises BuildError or FormatError, naming the file, if one is missing, damaged, truncated, oversized, from
         another build, or newer than this thenar.
         """
+        from pathlib import Path  # of Python 3.11, it takes longer to load than this package
+
         where = Path(folder)
         manifest = load_manifest(where)
         path = where / TABLES_NAME
@@ -172,25 +176,25 @@ class Build:
         return Recognition(self.classes[winner], probability, best - second, degraded)
 
 
-def load_manifest(folder: Path) -> Manifest:
+def load_manifest(folder: "Path") -> Manifest:
     """Return the content of the `build.json` in `folder`. Raises BuildError."""
     path = folder / MANIFEST_NAME
     return manifest_from_bytes(read_member(path, manifest_file.MAX_BYTES), str(path))
 
 
-def _load_scan(folder: Path, manifest: Manifest) -> ScanMap | None:
+def _load_scan(folder: "Path", manifest: Manifest) -> ScanMap | None:
     if manifest.scan_sha256 is None:
         return None
     path = folder / SCAN_NAME
     return scanmap_from_bytes(read_member(path, scan_file.MAX_BYTES, manifest.scan_sha256), str(path))
 
 
-def read_member(path: Path, largest: int, sha256: str | None = None) -> bytes:
-    """Return the bytes of one file of a build, at most `largest` of them, whose SHA-256 must be `sha256` if given."""
+def read_member(path: "Path", largest: int, checksum: str | None = None) -> bytes:
+    """Return the bytes of one file of a build, at most `largest` of them, whose SHA-256 must be `checksum` if given."""
     try:
         data = read_file(path, largest, BuildError)
     except OSError as wrong:
         raise BuildError(f"{path} cannot be read: {wrong.strerror}; is {path.parent} a build?") from None
-    if sha256 is not None and hashlib.sha256(data).hexdigest() != sha256:
+    if checksum is not None and sha256(data).hex() != checksum:
         raise BuildError(f"{path} is not the one that {MANIFEST_NAME} describes: damaged, or from another build")
     return data

@@ -12,7 +12,7 @@ code that a recorded one got.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from operator import getitem, itemgetter
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError
@@ -24,6 +24,9 @@ from .manifest import Calibration
 from .names import nearest
 from .published import JointAngles
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
 _BYTES = 256
 # The unit of recorded bytes that are not calibrated.
 RAW = "raw"
@@ -31,7 +34,7 @@ RAW = "raw"
 _RAW_CODES = range(1, _BYTES)
 
 
-def load_calibration(path: Path) -> GloveCalibration:
+def load_calibration(path: "Path") -> GloveCalibration:
     """Return the calibration written by `thenar calibrate`. Raises SettingError with file, line and key."""
     from .toml_source import read_source  # not every glove is calibrated
     from .toml_struct import convert

@@ -5,15 +5,17 @@ import os
 import re
 import stat
 from contextlib import suppress
-from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from .errors import ThenarError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 _PIECE = 1 << 20
 
 
-def write_atomically(path: Path, data: bytes, mode: int = 0o666) -> None:
+def write_atomically(path: "Path", data: bytes, mode: int = 0o666) -> None:
     """Write `data` to `path`: temporary file in the same folder, fsync, rename, fsync of the folder.
 
     A reader sees the old file or the new one, never a part; after a kill or a full disk the old one is still there, and
@@ -30,7 +32,7 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666) -> None:
         raise OSError(reason.errno, reason.strerror, str(path)) from reason
 
 
-def _write_beside_and_rename(path: Path, data: bytes, mode: int) -> None:
+def _write_beside_and_rename(path: "Path", data: bytes, mode: int) -> None:
     _sweep(path)
     temporary, descriptor = _new_part(path, mode)
     try:
@@ -45,7 +47,7 @@ def _write_beside_and_rename(path: Path, data: bytes, mode: int) -> None:
     sync_folder(path.parent)
 
 
-def _new_part(path: Path, mode: int) -> tuple[Path, int]:
+def _new_part(path: "Path", mode: int) -> "tuple[Path, int]":
     """Return a new temporary file next to `path`, and its descriptor, which locks it while it is open."""
     while True:
         part = path.with_name(f".{path.name}.{os.urandom(4).hex()}.part")
@@ -57,7 +59,7 @@ def _new_part(path: Path, mode: int) -> tuple[Path, int]:
         os.close(descriptor)  # a concurrent sweep was faster than the lock
 
 
-def _sweep(path: Path) -> None:
+def _sweep(path: "Path") -> None:
     """Delete the temporary files that killed writers of `path` left next to it: nobody has locked them."""
     name = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{8}}\.part")
     for part in path.parent.iterdir():
@@ -82,12 +84,12 @@ def _lock(descriptor: int) -> bool:
     return True
 
 
-def is_special(path: Path) -> bool:
+def is_special(path: "Path") -> bool:
     """Return whether the path is neither a file nor a folder, such as /dev/null."""
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
-def sync_folder(folder: Path) -> None:
+def sync_folder(folder: "Path") -> None:
     """Make renames inside `folder` durable (POSIX: fsync of the directory)."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
@@ -96,7 +98,7 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def open_file(path: Path, raises: type[ThenarError]) -> BinaryIO:
+def open_file(path: "Path", raises: type[ThenarError]) -> BinaryIO:
     """Open a regular file for reading bytes. The caller closes it.
 
     Raises `raises` if `path` is a device, a pipe or a socket, which may never end; OSError from the operating system,
@@ -116,7 +118,7 @@ def open_file(path: Path, raises: type[ThenarError]) -> BinaryIO:
         raise
 
 
-def read_file(path: Path, limit: int, raises: type[ThenarError]) -> bytes:
+def read_file(path: "Path", limit: int, raises: type[ThenarError]) -> bytes:
     """Return the content of a regular file of at most `limit` bytes.
 
     Raises `raises` if the file is larger or not regular; OSError from the operating system.

@@ -4,7 +4,6 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from os import PathLike
-from pathlib import Path
 from threading import Event
 from time import time_ns
 from typing import TYPE_CHECKING, Self
@@ -115,6 +114,8 @@ class Glove:
     ) -> None:
         loaded = build if isinstance(build, Build) else Build.load(build)
         if not isinstance(harness, Harness):
+            from pathlib import Path
+
             from .harness.loading import load_harness
 
             harness = load_harness(Path(harness))
@@ -158,6 +159,8 @@ class Glove:
             opening.callback(self._fanout.close)
             self._fanout.begin(self.system.build)
             if self._record is not None:
+                from pathlib import Path
+
                 from .recording.writer import LiveRecorder
 
                 self.recorder = opening.enter_context(LiveRecorder(Path(self._record), self._session()))

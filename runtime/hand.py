@@ -6,8 +6,7 @@ canonical: fields in the order of the structs below, without spaces, one newline
 SHA-256.
 """
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -17,37 +16,19 @@ from msgspec import Meta, Struct
 from .build import read_member
 from .errors import BuildError
 from .json_document import decode_document
-from .manifest import Calibration, Code, Manifest
+from .manifest import Code, Manifest
 from .names import fault, shortened
 from .recipe import Count, Name, Value
 
 HAND_NAME = "hand.json"
 SCHEMA = 1
 MAX_BYTES = 4 << 20
-# Spacing of the grid: it leaves room for a name under each place.
-_COLUMNS, _PITCH_MM, GRID_RADIUS_MM = 4, (50.0, 22.0), 3.0
 _MOST_POINTS = 1 << 16
 
 Length = Annotated[float, Meta(ge=-20_000.0, le=20_000.0)]
 Point = tuple[Length, Length]
 Line = Annotated[tuple[Point, ...], Meta(max_length=_MOST_POINTS)]
 Lines = Annotated[tuple[Line, ...], Meta(max_length=1024)]
-
-_DIGITS = {name: name for name in ("thumb", "index", "middle", "ring", "little")}
-_DIGITS |= {"pinky": "little", "pinkie": "little"}
-_OUTWARD = ("middle", "index", "ring", "thumb", "little")
-# Words in a joint's name, and the movement each means; the first match counts.
-_MOVES = {
-    **dict.fromkeys(("abduction", "adduction", "abd", "spread"), "abduction"),
-    **dict.fromkeys(("rotation", "roll", "opposition", "cmc", "tmj", "tm"), "rotation"),
-    **dict.fromkeys(("mpj", "mcp", "mp"), "mcp"),
-    **dict.fromkeys(("pij", "pip"), "pip"),
-    **dict.fromkeys(("dij", "dip"), "dip"),
-    **dict.fromkeys(("ij", "ip"), "ip"),
-    **dict.fromkeys(("flexion", "flex", "bend", "curl"), "curl"),
-}
-_WRIST = dict.fromkeys(("pitch", "flexion", "extension"), "pitch") | dict.fromkeys(("yaw", "deviation"), "yaw")
-_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
 
 class Spot(Struct, frozen=True, forbid_unknown_fields=True):
@@ -158,78 +139,3 @@ def _contradictions(hand: HandDrawing, manifest: Manifest) -> Iterator[str]:
         (number, joint.name) for number, joint in enumerate(manifest.joints)
     ]:
         yield "draws other joints than the build has"
-
-
-def grid_hand(manifest: Manifest, ranges: Sequence[tuple[int, int]] | None = None) -> HandDrawing:
-    """Return the kept switches and taxels of a build in a grid, and its joints: `ranges` of their codes, if known."""
-    names = list(dict.fromkeys(switch.source for switch in manifest.switches))
-    places = grid_places(names)
-    taxels = tuple(switch.source for switch in manifest.switches if switch.threshold is not None)
-    return HandDrawing(
-        view="switches and taxels in the order of the build; their positions on the hand are unknown" if names else "",
-        placed=False,
-        radius_mm=GRID_RADIUS_MM,
-        switches=drawn_switches(manifest, {name: at for name, at in places.items() if name not in taxels}),
-        taxels=drawn_taxels(manifest, {name: places[name] for name in dict.fromkeys(taxels)}),
-        joints=drawn_joints(manifest.joints, ranges),
-    )
-
-
-def grid_places(names: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return a place in a grid for each name, for inputs whose positions are unknown."""
-    wide, high = _PITCH_MM
-    return {name: (wide * (at % _COLUMNS), -high * (at // _COLUMNS)) for at, name in enumerate(names)}
-
-
-def drawn_switches(manifest: Manifest, places: dict[str, tuple[float, float]]) -> tuple[DrawnSwitch, ...]:
-    """Return switches at their positions, by name, and which of them the build keeps."""
-    bits = {switch.name: bit for bit, switch in enumerate(manifest.switches) if switch.threshold is None}
-    return tuple(DrawnSwitch(name, x, y, bits.get(name)) for name, (x, y) in places.items())
-
-
-def drawn_taxels(manifest: Manifest, places: dict[str, tuple[float, float]]) -> tuple[DrawnTaxel, ...]:
-    """Return taxels at their positions, by name, with the levels that the build keeps."""
-    levels: dict[str, list[tuple[int, int]]] = {name: [] for name in places}
-    for bit, switch in enumerate(manifest.switches):
-        if switch.threshold is not None:
-            levels[switch.source].append((switch.threshold.code, bit))
-    return tuple(DrawnTaxel(name, x, y, tuple(sorted(levels[name]))) for name, (x, y) in places.items())
-
-
-def drawn_joints(
-    joints: Sequence[Calibration], ranges: Sequence[tuple[int, int]] | None = None
-) -> tuple[DrawnJoint, ...]:
-    """Return joints with the movements that their names mean, from the lowest to the highest observed value: `ranges`
-    of codes; without them, the codes of the two points of their calibration.
-    """
-    found = []
-    for number, joint in enumerate(joints):
-        codes = (joint.code_a, joint.code_b) if ranges is None else ranges[number]
-        low, high = sorted(round(_value(joint, code), 3) for code in codes)
-        found.append(DrawnJoint(joint.name, number, joint.unit, low, high, *moved_by(joint.name)))
-    return tuple(found)
-
-
-def _value(joint: Calibration, code: int) -> float:
-    step = (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a)
-    return joint.value_a + (code - joint.code_a) * step
-
-
-def moved_by(name: str) -> tuple[str, str]:
-    """Return the digit of a joint of this name, and its movement; ("", "") if the name does not say.
-
-    An abduction between two digits moves the one that is further from the middle finger.
-    """
-    words = [word.lower() for word in _WORD.findall(name)]
-    if "wrist" in words:
-        return next((("wrist", _WRIST[word]) for word in words if word in _WRIST), ("", ""))
-    if "arch" in words:
-        return "palm", "arch"
-    digits = [_DIGITS[word] for word in words if word in _DIGITS]
-    if not digits:
-        return "", ""
-    digit = max(digits, key=_OUTWARD.index)
-    moves = next((kind for word, kind in _MOVES.items() if word in words), "curl" if len(words) == 1 else "")
-    if moves == "ip" and digit != "thumb":
-        moves = "pip"
-    return (digit, moves) if moves else ("", "")

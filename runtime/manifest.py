@@ -130,6 +130,10 @@ class Calibration(Struct, frozen=True, forbid_unknown_fields=True):
     code_b: Code
     value_b: Value
 
+    def value(self, code: int) -> float:
+        """Return the value of a code."""
+        return self.value_a + (code - self.code_a) * ((self.value_b - self.value_a) / (self.code_b - self.code_a))
+
 
 class Threshold(Struct, frozen=True, forbid_unknown_fields=True):
     """A level of a taxel, which makes it a switch: closed at codes above `code`. `value`, in the unit of `taxel`, is

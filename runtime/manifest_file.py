@@ -4,7 +4,6 @@ Its bytes are canonical: fields in the order of the manifest's structs, indented
 date, no path, no host. `checksum` is the SHA-256 of those bytes with that field empty.
 """
 
-import hashlib
 from collections.abc import Iterable, Iterator
 
 from msgspec.structs import replace
@@ -14,6 +13,7 @@ from .json_document import decode_document, encode_document
 from .manifest import SCHEMA, Calibration, Manifest
 from .names import LONGEST_NAME, fault, shortened
 from .published import NONE
+from .sealed import sha256
 
 MAX_BYTES = 16 << 20
 
@@ -37,7 +37,7 @@ def manifest_from_bytes(data: bytes, what: str = "build.json") -> Manifest:
 
 
 def _checksum(manifest: Manifest) -> str:
-    return hashlib.sha256(encode_document(replace(manifest, checksum=""))).hexdigest()
+    return sha256(encode_document(replace(manifest, checksum=""))).hex()
 
 
 def _contradictions(manifest: Manifest) -> Iterator[str]:

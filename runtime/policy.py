@@ -24,7 +24,7 @@ class Policy(Struct, frozen=True):
     max_lost    the largest share of the tables' weight (recogniser.py) that may be lost before "unknown" is reported
     grace_us    maximum age of a late record of the glove, used with health "degraded", before its joints are lost;
                 None: four of its periods, at least 60 ms
-    quarantine  whether inputs that are read but wrong (quarantine.py) are treated as lost
+    quarantine  whether switches that are read but wrong (quarantine.py) are treated as lost
     lag_us      segments: time after which the state of a moment is final; None: no segments are sought
     """
 

@@ -5,7 +5,7 @@ the lines from them.
 """
 
 from collections.abc import Sequence
-from typing import Literal, get_args
+from typing import Literal
 
 from thenar.drivers.calibration import (
     CalibrationPose,
@@ -25,21 +25,19 @@ SETTLE_US = 150_000
 _ENDS = (1, 255)
 
 
-# Before a pose, holding it, in doubt about it, all taken, or over.
-PoseStage = Literal["ready", "held", "doubted", "done", "over"]
-# Continue, take the previous pose again, keep a doubtful one, leave.
-PoseKey = Literal["accept", "back", "keep", "quit"]
-POSE_KEYS: tuple[PoseKey, ...] = get_args(PoseKey)
+# Before a pose, holding it, in doubt about it, or all taken.
+PoseStage = Literal["ready", "held", "doubted", "done"]
+# Continue, take the previous pose again, keep a doubtful one.
+PoseKey = Literal["accept", "back", "keep"]
 
 
 class PoseGuide:
     """Leads through the poses of sensors called `names`.
 
-    stage     the current stage; `left`: whether it is over because the user left
+    stage     the current stage
     raw       the newest bytes of the sensors, read at `raw_us`; None before the first
     problems  the objections to the last pose, in sentences
     taken     the results of the poses
-    step      counts every change of stage
     """
 
     def __init__(self, names: Sequence[str], hold_us: int, old_us: int = OLD_US) -> None:
@@ -47,8 +45,6 @@ class PoseGuide:
         self.names = tuple(names)
         self.poses = poses_of(self.names)
         self.stage: PoseStage = "ready"
-        self.left = False
-        self.step = 0
         self.raw: bytes | None = None
         self.raw_us: int | None = None
         self.problems: list[str] = []
@@ -68,20 +64,14 @@ class PoseGuide:
         """Return whether there is no record of now: then no pose can be taken."""
         return self.raw_us is None or now_us - self.raw_us > self._old_us
 
-    def offered(self, now_us: int) -> dict[PoseKey, str]:
-        """Return the keys that are active now, and their effects."""
-        words: dict[PoseStage, dict[PoseKey, str]] = {
-            "ready": {"accept": "I hold it: take it"},
-            "doubted": {"accept": "hold it again", "keep": "keep it anyway"},
-            "done": {"accept": "write the calibration"},
-        }
-        waits = self.stage == "ready" and self.silent(now_us)
-        found = {} if waits else dict(words.get(self.stage, {}))
-        if self.taken and self.stage in ("ready", "done"):
-            found["back"] = "back to the previous pose"
-        if self.stage != "over":
-            found["quit"] = "leave, and write nothing"
-        return found
+    def offered(self, now_us: int) -> set[PoseKey]:
+        """Return the keys that are active now."""
+        keys: set[PoseKey] = {"accept", "keep"} if self.stage == "doubted" else set()
+        if self.stage == "ready" and not self.silent(now_us):
+            keys.add("accept")
+        if self.stage in ("ready", "done") and self.taken:
+            keys.add("back")
+        return keys
 
     def take(self, now_us: int, raw: bytes) -> None:
         """Take a record, one byte per sensor; if the pose has been held long enough, judge it."""
@@ -96,7 +86,7 @@ class PoseGuide:
         self._found = held(self._samples)
         self.problems = problems(self.names, self.taken[0] if self.taken else None, self.pose, self._found)
         if self.problems:
-            self._become("doubted")
+            self.stage = "doubted"
         else:
             self._keep()
 
@@ -104,19 +94,16 @@ class PoseGuide:
         """Carry out `key`, if it is active now."""
         if key not in self.offered(now_us):
             return
-        if key == "quit":
-            self.left = True
-            self._become("over")
-        elif key == "keep":
+        if key == "keep":
             self._keep()
         elif key == "back":
             self.taken.pop()
-            self._become("ready")
+            self.stage = "ready"
         elif self.stage == "ready":
             self._samples, self.problems, self._settled_us = [], [], now_us + SETTLE_US
-            self._become("held")
+            self.stage = "held"
         else:
-            self._become("ready" if self.stage == "doubted" else "over")
+            self.stage = "ready"
 
     def states(self) -> list[str]:
         """Return the fault of each sensor now, in a few words; "" if there is none.
@@ -142,8 +129,4 @@ class PoseGuide:
     def _keep(self) -> None:
         assert self._found is not None
         self.taken.append(self._found)
-        self._become("done" if len(self.taken) == len(self.poses) else "ready")
-
-    def _become(self, stage: PoseStage) -> None:
-        self.stage = stage
-        self.step += 1
+        self.stage = "done" if len(self.taken) == len(self.poses) else "ready"

@@ -62,6 +62,21 @@ class JointAngles(msgspec.Struct, frozen=True):
     positions_rad: tuple[float, ...]
 
 
+class Preshape(msgspec.Struct, frozen=True):
+    """One point of a trajectory, as in trajectory_msgs/JointTrajectory.
+
+    name               its name in the table; several grasp types may share a preshape
+    joint_names        the robot's joints, in the table's order
+    positions          one per joint: rad for a joint that turns, m for one that slides, as usual in ROS
+    time_from_start_s  when the hand must arrive, counted from the moment of sending
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    positions: tuple[float, ...]
+    time_from_start_s: float
+
+
 class Count(msgspec.Struct, frozen=True):
     """The number of times that something happened: CRC errors, resynchronisations, frames lost."""
 
@@ -79,8 +94,8 @@ class DeviceHealth(msgspec.Struct, frozen=True):
 
 
 class Quarantined(msgspec.Struct, frozen=True):
-    """An input that is read but wrong, why ("stuck closed", "stuck open", "chattering", "drifting"), and whether it is
-    still `used`: because too much would be lost without it, or because the policy says so.
+    """A switch that is read but wrong, why ("stuck closed", "stuck open", "chattering"), and whether it is still
+    `used`: because too much would be lost without it, or because the policy says so.
     """
 
     name: str

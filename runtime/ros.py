@@ -16,8 +16,7 @@ from typing import Any
 from thenar.drivers.errors import SettingError
 from thenar.drivers.extras import optional
 
-from .preshape import Preshape
-from .published import Health, JointAngles, LiveGrasp
+from .published import Health, JointAngles, LiveGrasp, Preshape
 
 with optional():
     from cyclonedds.core import DDSException

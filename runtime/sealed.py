@@ -11,7 +11,6 @@
 The payload is not read before kind, version, length and checksum have been checked.
 """
 
-import hashlib
 import struct
 
 from .errors import FormatError
@@ -20,10 +19,17 @@ HEADER = struct.Struct("<8sH6xQ32s")
 _UNSIGNED = struct.Struct("<8sH6xQ")
 
 
+def sha256(data: bytes) -> bytes:
+    """Return the SHA-256 of `data`."""
+    import hashlib  # loads OpenSSL, which takes half as long as msgspec
+
+    return hashlib.sha256(data).digest()
+
+
 def seal(kind: bytes, version: int, payload: bytes) -> bytes:
     """Return `payload` in its envelope. `kind` is 8 bytes long."""
     start = _UNSIGNED.pack(kind, version, len(payload))
-    return start + hashlib.sha256(start + payload).digest() + payload
+    return start + sha256(start + payload) + payload
 
 
 def unseal(data: bytes, kind: bytes, newest: int, what: str) -> tuple[int, bytes]:
@@ -43,6 +49,6 @@ def unseal(data: bytes, kind: bytes, newest: int, what: str) -> tuple[int, bytes
         raise FormatError(f"{what} is truncated: {len(data) - HEADER.size} of {length} payload bytes")
     if len(data) - HEADER.size > length:
         raise FormatError(f"{what} is altered: {len(data) - HEADER.size - length} bytes too many")
-    if hashlib.sha256(data[: _UNSIGNED.size] + data[HEADER.size :]).digest() != digest:
+    if sha256(data[: _UNSIGNED.size] + data[HEADER.size :]) != digest:
         raise FormatError(f"{what} is altered: its checksum does not match; copy it again from its source")
     return version, data[HEADER.size :]

@@ -1,20 +1,15 @@
-"""Live taxels: convert raw counts to levels, as bits; the calibration of taxels, and their baselines.
+"""Live taxels: convert raw counts to levels, as bits; the calibration of taxels.
 
 A calibration gives a taxel's counts at rest and when pressed, and so the value of any count. A build codes values by
 the two points by which its recordings were coded. Both are straight lines, so every level, closed at codes above a
 threshold, is closed above (or below) one count of this glove. `count_limit` finds that count once; live, only integers
 are compared, and a level is decided as in the recordings.
-
-The counts of resistive rubber and fabric pads drift with temperature, moisture and wear. While a taxel is at rest, its
-baseline follows its counts at a bounded rate, within bounds of the calibrated rest, and never while the taxel is
-pressed or shortly after. The movement of the baseline is subtracted from every count.
 """
 
 from bisect import bisect_left
 from collections.abc import Sequence
 from math import isfinite
-from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 from msgspec import Meta, Struct
@@ -28,9 +23,11 @@ from .manifest import Calibration, Switch, Threshold
 from .names import fault, list_names, shortened
 from .scanning.scanmap import ScanMap, StreamLevel
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
 COUNTS = 65536
 Raw = Annotated[int, Meta(ge=0, lt=COUNTS)]
-Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 TaxelFault = Literal["", "silent", "open wire", "saturated"]
 # A level: the limit of its counts (see `count_limit`), and the number of its switch in the build.
 Level = tuple[int, int]
@@ -38,11 +35,9 @@ Level = tuple[int, int]
 # Number of counts whose median is a press; a taxel that moves by fewer counts was not pressed.
 _IN_A_ROW, _LEAST_TRAVEL = 5, 10
 
-# Units in which a baseline moves, as fractions of a count: a span's thousandths, a minute's microseconds.
-_MINUTE_US = 60_000_000
-_PARTS = 1000 * _MINUTE_US
-# A taxel that was not read for longer was not watched: its baseline moves no further than in this time.
-_LONGEST_US = 100_000
+# A sound taxel's counts are this share of its span from rest to press below its rest at most, and this one above its
+# press.
+_BELOW_REST, _ABOVE_PRESS = 0.35, 0.1
 # Converters miss their ends by a few counts: 1 of 1023, 7 of 4095.
 _END_SHIFT = 9
 
@@ -65,10 +60,6 @@ class TaxelLine(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=T
             raise SettingError(f"{self.name!r}: rest and press are both {self.rest} counts: calibrate it again")
         if not (isfinite(self.value) and 1e-9 <= self.value <= 1e9):
             raise SettingError(f"{self.name!r}: the value of a press must be a number above 0, not {self.value}")
-
-    def at(self, raw: int) -> float:
-        """Return the value at a count."""
-        return (raw - self.rest) * (self.value / (self.press - self.rest))
 
     def codes(self, coded: Calibration) -> CodeLine:
         """Return the line from counts to the codes of a build. Raises SettingError if none exists."""
@@ -104,39 +95,25 @@ class TaxelCalibration(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class TaxelSettings(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
-    """`[taxels]` of glove.toml: the calibration, and how baselines are followed. Shares are of a taxel's span, from
-    rest to press.
+    """`[taxels]` of glove.toml.
 
     Parameters
     ----------
     calibration : str, optional
         Path of the file written by `thenar calibrate --taxels`, relative to the folder of glove.toml.
-    baseline : bool
-        Whether baselines are followed; without a calibration none is.
-    window : float
-        A taxel within this share of its baseline, or below it, is at rest.
-    drift : float
-        Maximum distance of a baseline from the calibrated rest.
-    per_minute : float
-        Maximum movement of a baseline per minute.
-    settle_s : float
-        Time for which a taxel must have rested before its baseline moves: pads creep back after a press.
     """
 
     calibration: Annotated[str, Meta(min_length=1)] | None = None
-    baseline: bool = True
-    window: Share = 0.1
-    drift: Share = 0.25
-    per_minute: Annotated[float, Meta(ge=0.001, le=10.0)] = 0.05
-    settle_s: Annotated[float, Meta(ge=0.0, le=3600.0)] = 1.0
 
 
 def calibration_of(settings: TaxelSettings) -> TaxelCalibration | None:
     """Return the calibration that the settings name, or None. Raises as `load_taxel_calibration`."""
+    from pathlib import Path
+
     return None if settings.calibration is None else load_taxel_calibration(Path(settings.calibration))
 
 
-def load_taxel_calibration(path: Path) -> TaxelCalibration:
+def load_taxel_calibration(path: "Path") -> TaxelCalibration:
     """Return the calibration that `thenar calibrate --taxels` wrote. Raises SettingError with file, line and key."""
     from .toml_source import read_source  # not every glove has taxels
     from .toml_struct import convert
@@ -229,53 +206,19 @@ def _check_counts(coded: Calibration, others: bool) -> None:
     )
 
 
-class _Baseline:
-    """The baseline of one taxel, in parts of a count above its calibrated rest, towards the press."""
-
-    __slots__ = ("_bound", "_moved", "_per_us", "_press", "_read_us", "_rest", "_rested_us", "_settle_us", "_window")
-
-    def __init__(self, line: TaxelLine, settings: TaxelSettings) -> None:
-        span = abs(line.press - line.rest)
-        self._rest, self._press = line.rest, 1 if line.press > line.rest else -1
-        self._per_us = span * round(1000 * settings.per_minute)
-        self._bound, self._window = (round(span * share) * _PARTS for share in (settings.drift, settings.window))
-        self._settle_us = round(1e6 * settings.settle_s)
-        self._moved = 0
-        self._read_us: int | None = None
-        self._rested_us = 0
-
-    def follow(self, time_us: int, raw: int) -> int:
-        """Take a valid count; return by how many counts the baseline has left the calibrated rest."""
-        if self._read_us is None:
-            self._read_us = self._rested_us = time_us
-        passed = min(max(time_us - self._read_us, 0), _LONGEST_US)
-        self._read_us = max(time_us, self._read_us)
-        off = self._press * (raw - self._rest) * _PARTS - self._moved
-        if off > self._window:
-            self._rested_us = self._read_us
-        elif self._read_us - self._rested_us > self._settle_us:
-            step = passed * self._per_us
-            self._moved += min(max(off, -step), step)
-            self._moved = min(max(self._moved, -self._bound), self._bound)
-        return self._press * ((self._moved + _PARTS // 2) // _PARTS)
-
-
 class Taxels:
     """The taxels of one device: converts its channels to levels of a build. For one thread.
 
     names        of the taxels, channel by channel
     levels       of each taxel: limits of its counts (see `count_limit`), with the numbers of the build's switches
-    calibration  rest and press of each taxel, in counts. Without it, a taxel's baseline is not followed, and no end of
-                 the converter is a fault, since its rest may be at either end
-    settings     how baselines are followed
+    calibration  rest and press of each taxel, in counts. Without it, no end of the converter is a fault, since the rest
+                 may be at either end
     highest      the converter's highest count; None: its ends are not checked
 
     owned   the switches of all levels
-    counts  the last count of each taxel, minus the movement of its baseline; None: it has a fault
-    faults  the fault of each taxel at its last reading. An end of the converter is a fault if neither the rest, with
-            its maximum drift, nor the press of the calibration is near it: an open wire on the side of the rest,
-            saturation on the side of the press
-    drifts  by how many counts each baseline has left the calibrated rest
+    faults  the fault of each taxel at its last reading. An end of the converter is a fault if neither the rest nor the
+            press of the calibration is near it: an open wire on the side of the rest, saturation on the side of the
+            press
     """
 
     def __init__(
@@ -283,55 +226,43 @@ class Taxels:
         names: Sequence[str],
         levels: Sequence[Sequence[Level]],
         calibration: TaxelCalibration | None = None,
-        settings: TaxelSettings | None = None,
         highest: int | None = None,
     ) -> None:
-        settings = settings or TaxelSettings()
         self.names, self.highest = tuple(names), highest
         self._levels = [[(limit, 1 << switch) for limit, switch in each] for each in levels]
         self._masks = [sum(bit for _, bit in each) for each in self._levels]
         self.owned: Mask = sum(self._masks)
         lines = [None if calibration is None else calibration.line(name) for name in names]
-        self._follows = [_Baseline(line, settings) if line and settings.baseline else None for line in lines]
-        self._ends = [_ends(line, settings, highest) for line in lines]
-        self.counts: list[int | None] = [None] * len(self.names)
+        self._ends = [_ends(line, highest) for line in lines]
         self.faults: list[TaxelFault] = [""] * len(self.names)
-        self.drifts = [0] * len(self.names)
 
-    def read(self, time_us: int, codes: Sequence[int | None]) -> tuple[Mask, Mask]:
+    def read(self, codes: Sequence[int | None]) -> tuple[Mask, Mask]:
         """Take the counts of all channels (None: unreadable); return the closed levels and the lost ones."""
         closed = lost = 0
-        for place, raw in enumerate(codes):
+        for place, count in enumerate(codes):
             low, high, at_low, at_high = self._ends[place]
-            if raw is None:
+            if count is None:
                 found: TaxelFault = "silent"
-            elif low < raw < high:
+            elif low < count < high:
                 found = ""
             else:
-                found = at_low if raw <= low else at_high
+                found = at_low if count <= low else at_high
             self.faults[place] = found
-            if found or raw is None:
+            if found or count is None:
                 lost |= self._masks[place]
-                self.counts[place] = None
                 continue
-            if (baseline := self._follows[place]) is not None:
-                self.drifts[place] = baseline.follow(time_us, raw)
-            self.counts[place] = count = raw - self.drifts[place]
             for limit, bit in self._levels[place]:
                 if (count if limit >= 0 else ~count) > limit:
                     closed |= bit
         return closed, lost
 
 
-def _ends(
-    line: TaxelLine | None, settings: TaxelSettings, highest: int | None
-) -> tuple[int, int, TaxelFault, TaxelFault]:
+def _ends(line: TaxelLine | None, highest: int | None) -> tuple[int, int, TaxelFault, TaxelFault]:
     """Return the count at and below which, and the one at and above which, a taxel has a fault, and the faults."""
     if line is None or highest is None:
         return -1, COUNTS, "", ""
     span, margin, rising = abs(line.press - line.rest), highest >> _END_SHIFT, line.press > line.rest
-    # The range of a sound taxel: drifted from its rest, pressed as firmly as it was calibrated.
-    below_rest, above_press = round(span * (settings.drift + settings.window)), round(span * settings.window)
+    below_rest, above_press = round(span * _BELOW_REST), round(span * _ABOVE_PRESS)
     least, most = (
         (line.rest - below_rest, line.press + above_press)
         if rising

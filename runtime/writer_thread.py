@@ -1,8 +1,6 @@
 """`WriterThread`: calls that may block, carried out in order on a separate thread."""
 
-import logging
 from collections.abc import Callable
-from queue import SimpleQueue
 from threading import Thread
 
 from .frames import now_us
@@ -12,7 +10,6 @@ HANGING_US = 500_000
 # How often closing looks whether the call under way hangs.
 _LOOK_S = 0.05
 
-_log = logging.getLogger("thenar")
 Call = Callable[[], object]
 
 
@@ -24,6 +21,8 @@ class WriterThread:
     """
 
     def __init__(self, name: str, limit: int) -> None:
+        from queue import SimpleQueue  # loads a library that a glove without outputs does not need
+
         self._limit = limit
         self._calls: SimpleQueue[tuple[int | None, Call] | None] = SimpleQueue()
         self._refused = self._late = 0
@@ -83,5 +82,7 @@ class WriterThread:
         except BaseException as reason:  # nothing may end this thread
             if (fault := f"{type(reason).__name__}: {reason}") != self._fault:
                 self._fault = fault
-                _log.exception("%s: a bug in the program", self._thread.name)
+                from logging import getLogger  # for bugs only
+
+                getLogger("thenar").exception("%s: a bug in the program", self._thread.name)
         self._since_us = None

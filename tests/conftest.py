@@ -170,7 +170,6 @@ LONGEST = (
     "runtime/recording/test_reader.py",
     "cli/test_narrow.py",
     "cli/test_compile_documents.py",
-    "live/guided/test_collection_page.py",
     "simulator/pipeline/test_simulation.py",
 )
 

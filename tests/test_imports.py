@@ -51,6 +51,7 @@ ALLOWED = {
         "drivers.members",
         "compiler.elementary",
         "compiler.facts",
+        "compiler.glove.propose",
         "compiler.pictures",
         "compiler.placement",
         "compiler.recordings",

@@ -15,13 +15,13 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet, place
+from thenar.compiler.glove.propose import propose_cyberglove, propose_harness
 from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording import writer
 from thenar.runtime.recording.session import Session
-from thenar.runtime.scanning.propose import propose_cyberglove, propose_harness
 
 GOLDEN = Path(__file__).parent / "golden" / "written-bytes.json"
 COLUMNS = Path(__file__).resolve().parents[1] / "examples" / "columns"

@@ -12,18 +12,18 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple
+from typing import Annotated, Literal, NamedTuple
 from xml.etree import ElementTree
 
 import msgspec
 import numpy as np
+from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from thenar.runtime.build import Build
 from thenar.runtime.live.replay import recognised
 from thenar.runtime.policy import Policy
 from thenar.runtime.preshape import PreshapeTable
-from thenar.runtime.task import Task, TaskStep
 
 from ..movements.segments import levenshtein, segments_of
 from ..movements.streams import streams_of
@@ -39,6 +39,53 @@ Column = tuple[int | None, ...]
 Codes = tuple[NDArray[np.int64], NDArray[np.uint16]]
 # Of the action Grasp.
 _PORTS = ("grasp", "preshape", "joints", "median_s", "limit_s")
+
+
+_Name = Annotated[str, Meta(min_length=1, max_length=200)]
+_Seconds = Annotated[float, Meta(ge=0.0, le=1e9)]
+
+
+class TaskStep(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A grasp of a task.
+
+    grasp      its type
+    shown      how many demonstrations have it here
+    preshape   the preshape of the robot's hand, by its name in the table of preshapes; None: the table has none, or no
+               table was given
+    joints     the reading of each joint, by name: the median of the demonstrations' medians
+    median_s, spread_s  how long it was held: the median, and the median distance from it
+    limit_s    the longest that it is expected to last; as taught, twice the longest shown
+    then       types that may follow, as shown, the next step's first; none after the last
+    """
+
+    grasp: _Name
+    shown: Annotated[int, Meta(ge=1)]
+    preshape: _Name | None
+    joints: dict[_Name, float]
+    median_s: _Seconds
+    spread_s: _Seconds
+    limit_s: _Seconds
+    then: tuple[_Name, ...]
+
+
+class Task(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The content of task.json, written by `thenar teach`.
+
+    build           checksum of the build that recognised the demonstrations; the steps have its types
+    demonstrations  names of their files, or of the subjects and sessions of a set
+    preshapes       the table with the steps' preshapes
+    units           of the joints, by name
+    first           types with which demonstrations begin, the first step's first
+    """
+
+    schema: Literal[1] = 1
+    name: _Name
+    build: str
+    demonstrations: tuple[str, ...]
+    preshapes: str | None
+    units: dict[_Name, str]
+    first: tuple[_Name, ...]
+    steps: Annotated[tuple[TaskStep, ...], Meta(min_length=1)]
 
 
 class DemonstratedGrasp(NamedTuple):

@@ -9,8 +9,8 @@ from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.runtime.files import read_file
 from thenar.runtime.harness.wiring import SLOWEST_HZ, Harness
 from thenar.runtime.names import shortened, taxel_and_code
-from thenar.runtime.scanning.propose import CONVERTER
 
+from ..glove.propose import CONVERTER
 from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
 from ..trainers.base import TRAINERS

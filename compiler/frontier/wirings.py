@@ -12,12 +12,13 @@ from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.scanning.plan import Costs, plan_scan, unwired
-from thenar.runtime.scanning.propose import CONVERTER, propose_board, propose_cyberglove, propose_harness
+from thenar.runtime.scanning.plan import plan_scan, unwired
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us
 
 from ..firmware.targets import TARGETS
+from ..glove.propose import CONVERTER, propose_board, propose_cyberglove, propose_harness
+from ..placement.ports import WireTimes
 from .points import How, PointTime
 
 AS_WIRED, BOARD = "as wired", "board"
@@ -212,11 +213,11 @@ def _bus_us(scan: ScanMap, harness: Harness, call_us: float) -> float:
     """Return the time of a scan of the chips, if there are any."""
     if not scan.ports:
         return 0.0
-    costs, read, us = Costs(scan.ports, harness), 0, list[float]()
+    times, read, us = WireTimes(scan.ports, harness), 0, list[float]()
     for number in range(len(scan.ports)):
         # Selecting a channel is a transaction as well.
-        wire_ns = costs.after(read, number)
-        selected = wire_ns > costs.after(read | 1 << number, number)
+        wire_ns = times.after(read, number)
+        selected = wire_ns > times.after(read | 1 << number, number)
         us.append(wire_ns / 1000 + call_us * (1 + selected))
         read |= 1 << number
     return fsum(us)

@@ -8,11 +8,11 @@ from msgspec.structs import replace
 
 from thenar.runtime.errors import BuildError, HarnessError
 from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.live.system import own_joints
 from thenar.runtime.manifest import Detected, Faults, Manifest, Recognised, Switch
 from thenar.runtime.names import list_names
 from thenar.runtime.scanning.plan import check_harness, unwired
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import own_joints, propose_cyberglove, propose_harness
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us
 
@@ -32,6 +32,7 @@ from .layout import (
     wires_of,
 )
 from .pattern import Pattern, pattern_of
+from .propose import propose_cyberglove, propose_harness
 
 
 class ExpectedPerformance(Struct, frozen=True):

@@ -10,12 +10,48 @@ from numpy.typing import NDArray
 from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.scanning.plan import Costs, unwired
+from thenar.runtime.scanning.plan import Room, rooms_of, units_of, unwired
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import propose_harness
-from thenar.runtime.scanning.timing import glove_us
+from thenar.runtime.scanning.scanmap import Port
+from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, select_us, selections
 
+from ..glove.propose import propose_harness
 from ..samples import TrainingError
+
+
+class WireTimes:
+    """The times of `ports` on the wire, by their numbers: integer nanoseconds, so that sums do not depend on order."""
+
+    def __init__(self, ports: Sequence[Port], harness: Harness) -> None:
+        self._ns, rooms = list[int](), set(selections(ports, harness))
+        opened: dict[Room, tuple[int, int]] = {}
+        for number, port in enumerate(ports):
+            clock_hz = harness.line_of(port.bus).clock_hz
+            for room in rooms.intersection(rooms_of(port, harness)):
+                opened[room] = (opened.get(room, (0, 0))[0] | 1 << number, round(1000 * select_us(clock_hz)))
+            self._ns.append(round(1000 * port_us(reading_of(port, harness), clock_hz)))
+        self._rooms, self._units = tuple(opened.values()), units_of(ports, harness)
+
+    def after(self, read: int, port: int) -> int:
+        """Return the time to read `port` after the ports `read`: the first behind a channel must select it."""
+        return self._ns[port] + sum(ns for room, ns in self._rooms if room >> port & 1 and not read & room)
+
+    def of(self, unit: Sequence[int]) -> int:
+        """Return the time to read some ports, with the selections that they alone need."""
+        inside = sum(1 << port for port in unit)
+        return sum(self._ns[port] for port in unit) + sum(ns for room, ns in self._rooms if not room & ~inside)
+
+    def shares(self) -> list[float]:
+        """Return the nanoseconds of each port: its time, and its share of the common time of its unit."""
+        shares = [0.0] * len(self._ns)
+        for unit in self._units:
+            # Read after all other ports, a port of a shared channel costs only its own time.
+            everything = sum(1 << port for port in unit)
+            alone = [self.after(everything, port) for port in unit]
+            common = (self.of(unit) - sum(alone)) / len(unit)
+            for port, ns in zip(unit, alone, strict=True):
+                shares[port] = ns + common
+        return shares
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +135,7 @@ def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
     """
     scan = whole_scan(harness, names)
     ports = scan.ports
-    us = [ns / 1000 for ns in Costs(ports, harness).shares()]
+    us = [ns / 1000 for ns in WireTimes(ports, harness).shares()]
     port_of: dict[int, int] = {}
     for number, port in enumerate(ports):
         port_of |= dict.fromkeys(port.elements, number)

@@ -29,7 +29,7 @@ from thenar.runtime.recording.guide import FRESH_US
 from thenar.runtime.recording.layout import switch_matrix
 from thenar.runtime.recording.reader import Oddity, Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
-from thenar.runtime.taxels import TaxelLine, Taxels
+from thenar.runtime.taxels import TaxelLine
 
 from . import TableError, list_rows
 from .columns import CalibrationPoints, JointColumns
@@ -192,7 +192,7 @@ class _Watch:
         self.undone: set[int] = set()
         self._path, self._size = reader.path, reader.path.stat().st_size
         self._stream, self._tick_us = stream, _TICK_US if stream else _MOVING_TICK_US
-        self._taxels = _taxels(reader)
+        self._counts: tuple[int | None, ...] = ()
         self._switches: SwitchFrame | None = None
         self._glove: GloveFrame | None = None
         self._label: Label | None = None
@@ -208,7 +208,7 @@ class _Watch:
         self._tick(frame.time_us)
         if isinstance(frame, SwitchFrame):
             self._switches = frame
-            self._taxels.read(frame.time_us, frame.taxels or [None] * len(self.session.taxels))
+            self._counts = frame.taxels or (None,) * len(self.session.taxels)
         else:
             self._glove = frame
 
@@ -264,7 +264,7 @@ class _Watch:
         return not lacks and not (session.sensors and (glove is None or time_us - glove.time_us > FRESH_US))
 
     def _row(self, label: Label, time_us: int) -> _Grasp:
-        return _Grasp(label, self._switches, self._glove, tuple(self._taxels.counts), time_us)
+        return _Grasp(label, self._switches, self._glove, self._counts, time_us)
 
 
 def _streamed(watch: _Watch, collection: Collection) -> tuple[_Grasp, ...]:
@@ -322,13 +322,6 @@ def _held(closed: NDArray[np.bool_], codes: NDArray[np.int32], time: NDArray[np.
             end = row if near[row] else end
         ends.append(end)
     return ends[0], ends[1] + 1
-
-
-def _taxels(reader: Reader) -> Taxels:
-    """Return the taxels of the current session, whose baselines are tracked as in a live run."""
-    session = reader.session
-    settings = parse_harness(session.harness, reader.path.name).taxel_settings if session.taxels else None
-    return Taxels(session.taxels, [[]] * len(session.taxels), session.taxel_calibration, settings)
 
 
 def _check_alike(parts: Sequence[_Part]) -> None:

@@ -1,18 +1,18 @@
 """Supervises the chips of a bus: set-up, retries and pauses, detection of resets and stuck lines."""
 
 import errno
-import logging
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from time import monotonic
 from typing import TypeVar
 
+from ..logs import logger
 from .chips import CHIPS, Chip, Write
 from .node import NOBODY, NOBODY_THERE, STUCK, BatchMode, DeviceNode, Query, failure, stuck
 from .tca9548a import control
 
-_LOG = logging.getLogger(__name__)
+_LOG = logger(__name__)
 T = TypeVar("T")
 
 TRIES = 3

@@ -3,17 +3,18 @@
 The structs are the tables of `glove.toml`, field by field; a loaded harness is known to be valid.
 """
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 from msgspec import Meta, Struct, field
 
-from thenar.drivers.i2c.chips import CHIPS, Chip, Converter
-from thenar.drivers.spi.chips import SPI_CHIPS, SpiChip
-
+from ..sealed import sha256
 from ..taxels import TaxelSettings
+
+if TYPE_CHECKING:
+    from thenar.drivers.i2c.chips import Chip
+    from thenar.drivers.spi.chips import SpiChip
 
 # A line has no room for more.
 MOST_COLUMNS = 2000
@@ -83,18 +84,22 @@ class ChipWiring(_Table, frozen=True):
     closed: Literal["low", "high"] = "low"
 
     @property
-    def chip(self) -> Chip:
+    def chip(self) -> "Chip":
         """The driver's description of the chip."""
+        from thenar.drivers.i2c.chips import CHIPS  # not every glove has one
+
         return CHIPS[self.kind]
 
     @property
     def numbered_pins(self) -> dict[int, str]:
         """The switches, or taxels, by the numbers of their pins, in the order of the numbers."""
-        return _numbered(CHIPS[self.kind].pins, self.pins)
+        return _numbered(self.chip.pins, self.pins)
 
     @property
     def measures(self) -> bool:
         """Whether it reads taxels, not switches."""
+        from thenar.drivers.i2c.chips import Converter
+
         return isinstance(self.chip, Converter)
 
     @property
@@ -218,8 +223,10 @@ class SpiWiring(_Table, frozen=True):
     pins: dict[str, str] = {}
 
     @property
-    def chip(self) -> SpiChip:
+    def chip(self) -> "SpiChip":
         """The driver's description of the chip."""
+        from thenar.drivers.spi.chips import SPI_CHIPS
+
         return SPI_CHIPS[self.kind]
 
     @property
@@ -314,7 +321,7 @@ class Harness(_Table, frozen=True):
 
         It does not cover ports, device files and clocks: a map of the switches stays valid when they change.
         """
-        return hashlib.sha256(msgspec.json.encode(list(self._where()))).hexdigest()
+        return sha256(msgspec.json.encode(list(self._where()))).hex()
 
     def _where(self) -> Iterator[object]:
         for bus in self.buses:

@@ -1,4 +1,4 @@
-"""Inputs that are read but wrong: found live, treated as lost while they are, and used again when they recover.
+"""Switches that are read but wrong: found live, treated as lost while they are, and used again when they recover.
 
 **Stuck switches.** Each switch has two cumulative sums (E. S. Page, Biometrika 41, 1954), one for "stuck closed", one
 for "stuck open". A grasp adds to each the logarithm of
@@ -30,16 +30,11 @@ working switch is assumed to stay closed in no less than 1/100 of the cases.
 **Chatter.** A change of a switch costs 1/20 s, paid off as time passes. A switch that is a second in debt changes
 faster than a hand, which is typical of a loose contact; it recovers once the debt is paid, at the latest 2 s after the
 last change.
-
-**Drift.** A joint's codes drift when a glove slips or a sensor ages. The hand opens and closes again and again, so a
-joint's lowest and highest code come back. When both have moved the same way since the first minute, the sensor's zero
-has moved by at least the smaller of both; grasps that merely use less of the range move them towards each other.
 """
 
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from operator import gt, lt
 
 import numpy as np
 from msgspec import Struct
@@ -48,8 +43,6 @@ from numpy.typing import NDArray
 
 from ..build import Build
 from ..frames import Mask, SwitchFrame
-from ..model.integers import IntegerTables
-from ..model.terms.base import HIGHEST_CODE
 from ..published import Quarantined
 
 # Time for which contacts must stay the same before a grasp is evaluated.
@@ -66,23 +59,9 @@ _DOUBT = 255
 
 # Nobody presses and releases a switch ten times a second; a loose contact does.
 MOST_CHANGES = 20
-DRIFT_US = 60_000_000
-# Share of a joint's range in the first window by which both ends must have moved.
-LARGEST = 0.2
-
-STUCK_CLOSED, STUCK_OPEN, CHATTERING, DRIFTING = "stuck closed", "stuck open", "chattering", "drifting"
+STUCK_CLOSED, STUCK_OPEN, CHATTERING = "stuck closed", "stuck open", "chattering"
 Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
-
-# exp(-i / 16), in 65535ths; the last is 0.
-_WEIGHTS = np.array([round(65535 * math.exp(-i / _NAT)) for i in range(200)])
-# Evidence of being stuck if a switch shows the state of a stuck one, and if it does not, by the share of grasps, in
-# 255ths, in which a working one would show the former.
-_SHOWN, _ALONE = (
-    np.array([max(round(_NAT * math.log((1 - _SLIPS) / max(q / 255, least))), 0) for q in range(256)])
-    for least in (_LEAST, _LEAST_ALONE)
-)
-_MOVED = np.array([min(round(_NAT * math.log(_SLIPS / max(1 - q / 255, _SLIPS))), 0) for q in range(256)])
 
 
 class StuckTest:
@@ -105,6 +84,16 @@ class StuckTest:
         self._contacts: Ints = (least + most).sum(axis=0)
         self._rows, self._means = (rows.astype(np.int64) for rows in (tables.switch_rows, tables.switch_means))
         self._gain = round(65536 * _NAT / tables.scale)
+        # exp(-i / 16), in 65535ths; the last is 0.
+        self._weights = np.array([round(65535 * math.exp(-i / _NAT)) for i in range(200)])
+        # Evidence of being stuck if a switch shows the state of a stuck one, and if it does not, by the share of
+        # grasps, in 255ths, in which a working one would show the former.
+        self._shown, self._alone = (
+            np.array([max(round(_NAT * math.log((1 - _SLIPS) / max(q / 255, least))), 0) for q in range(256)])
+            for least in (_LEAST, _LEAST_ALONE)
+        )
+        moved = (_NAT * math.log(_SLIPS / max(1 - q / 255, _SLIPS)) for q in range(256))
+        self._moved = np.array([min(round(evidence), 0) for evidence in moved])
         self.limit = math.ceil(_NAT * math.log(2 * len(switches) * 2 * GRASPS))
         self.sums = np.zeros((2, len(switches)), np.int64)
         self.stuck: dict[int, int] = {}
@@ -154,7 +143,7 @@ class StuckTest:
         own = np.where(grasp.lost[:, np.newaxis], 0, self._means - self._rows * grasp.closed[:, np.newaxis])
         scores = grasp.biased_scores + own
         behind = (scores.max(axis=1, keepdims=True) - scores) * self._gain >> 16
-        weights = _WEIGHTS[np.minimum(behind, len(_WEIGHTS) - 1)]
+        weights = self._weights[np.minimum(behind, len(self._weights) - 1)]
         found: Ints = (self._shares * weights).sum(axis=2) // weights.sum(axis=1)
         return found
 
@@ -171,8 +160,8 @@ class StuckTest:
         shares = np.stack([shares[0], 255 - closes])
         shown = np.stack([grasp.closed, ~grasp.closed])
         alone = np.count_nonzero(grasp.closed & ~grasp.lost) <= 1
-        sticks = np.stack([(_ALONE if alone else _SHOWN)[shares[0]], _SHOWN[shares[1]]])
-        evidence = np.where(shown, sticks, _MOVED[shares])
+        sticks = np.stack([(self._alone if alone else self._shown)[shares[0]], self._shown[shares[1]]])
+        evidence = np.where(shown, sticks, self._moved[shares])
         evidence[1] *= held | grasp.closed
         return evidence * grasp.read
 
@@ -222,75 +211,24 @@ class Chattering:
             self._next_us = min((self._paid_us[number] for number in in_debt), default=0)
 
 
-class JointDrift:
-    """Compares the lowest and highest code of every joint in the last whole window with those of the first window in
-    which it moved over a third of the codes that the tables distinguish.
-    """
-
-    def __init__(self, tables: IntegerTables) -> None:
-        self._least = [_span(tables, joint) / 3 for joint in range(tables.n_joints)]
-        self._first: list[tuple[int, int] | None] = [None] * tables.n_joints
-        self._began_us: int | None = None
-        self._low: list[int] = []
-        self._high: list[int] = []
-        self.codes: tuple[int, ...] = ()
-
-    def frame(self, time_us: int, codes: Sequence[int]) -> None:
-        """Take the codes of all joints; `codes` then holds the drift of each, 0 if it is within bounds."""
-        if self._began_us is not None and time_us - self._began_us >= DRIFT_US:
-            self._end()
-            self._began_us = None
-        if self._began_us is None:
-            self._began_us, self._low, self._high = time_us, list(codes), list(codes)
-        # This seldom happens: after a few grasps a joint has covered its range.
-        if any(map(lt, codes, self._low)):
-            self._low = list(map(min, self._low, codes))
-        if any(map(gt, codes, self._high)):
-            self._high = list(map(max, self._high, codes))
-
-    def _end(self) -> None:
-        ends = list(zip(self._low, self._high, strict=True))
-        self._first = [
-            last if first is None and last[1] - last[0] >= least else first
-            for first, last, least in zip(self._first, ends, self._least, strict=True)
-        ]
-        self.codes = tuple(_drift(first or last, last) for first, last in zip(self._first, ends, strict=True))
-
-
-def _drift(first: tuple[int, int], last: tuple[int, int]) -> int:
-    low, high = last[0] - first[0], last[1] - first[1]
-    if low * high <= 0:
-        return 0
-    shift = min(low, high, key=abs)
-    return shift if abs(shift) > LARGEST * (first[1] - first[0]) else 0
-
-
-def _span(tables: IntegerTables, joint: int) -> int:
-    codes = tables.choices(joint)[0]
-    inner = codes[(codes > 0) & (codes < HIGHEST_CODE)]
-    return int(np.ptp(inner)) if inner.size else 0
-
-
 class Quarantine:
-    """The inputs that are left out of the scores, though they are read.
+    """The switches that are left out of the scores, though they are read.
 
-    found  every wrong input, and whether it is still used
-    out    the switches and joints that are left out now
+    found  every wrong switch, and whether it is still used
     """
 
     def __init__(self, build: Build, fits: Callable[[Mask, Mask], bool], *, active: bool = True) -> None:
         """Take the test whether these switches and joints may be lost together; not `active`: leave nothing out."""
-        switches, joints = build.manifest.switches, build.manifest.joints
-        self._names = {False: [switch.name for switch in switches], True: [joint.name for joint in joints]}
+        switches = build.manifest.switches
+        self._names = [switch.name for switch in switches]
         self._fits, self._active, self._all = fits, active, (1 << len(switches)) - 1
         # Only compiled builds say how often their switches are closed.
         self._stuck = StuckTest(build) if switches and switches[0].closed_least else None
-        self._chattering, self._drift = Chattering(len(switches)), JointDrift(build.tables)
-        self._wrong: dict[tuple[bool, int], str] = {}
-        self._chosen: dict[tuple[Mask, Mask], tuple[tuple[Mask, Mask], tuple[Quarantined, ...]]] = {}
-        self.out: tuple[Mask, Mask] = 0, 0
+        self._chattering = Chattering(len(switches))
+        self._wrong: dict[int, str] = {}
+        self._chosen: dict[tuple[Mask, Mask], tuple[Mask, tuple[Quarantined, ...]]] = {}
         self.found: tuple[Quarantined, ...] = ()
-        self._seen_us = self._joints_us = self._since_us = -1
+        self._seen_us = self._since_us = -1
         # The last known state of the switches, the contacts of the grasp, and the switches read as it began.
         self._shown: Mask = 0
         self._contacts: Mask = 0
@@ -302,28 +240,27 @@ class Quarantine:
         self._stayed: Mask = self._all
         self._fewest: tuple[Mask, Mask, Mask, Sequence[int], Mask] | None = None
 
-    def left_out(self, lost: Mask, joints_lost: Mask) -> tuple[Mask, Mask]:
-        """Return the switches and joints to leave out, when these are lost as well: in the order of detection, as long
-        as the result does not become unknown because of them.
+    def left_out(self, lost: Mask, joints_lost: Mask) -> Mask:
+        """Return the switches to leave out, when these and these joints are lost as well: in the order of detection, as
+        long as the result does not become unknown because of them.
         """
         if (chosen := self._chosen.get((lost, joints_lost))) is None:
             chosen = self._chosen[lost, joints_lost] = self._choose(lost, joints_lost)
-        self.out, self.found = chosen
-        return self.out
+        out, self.found = chosen
+        return out
 
-    def _choose(self, lost: Mask, joints_lost: Mask) -> tuple[tuple[Mask, Mask], tuple[Quarantined, ...]]:
+    def _choose(self, lost: Mask, joints_lost: Mask) -> tuple[Mask, tuple[Quarantined, ...]]:
         if len(self._chosen) >= _KEPT:
             self._chosen.clear()
-        out, found = [0, 0], list[Quarantined]()
+        out, found = 0, list[Quarantined]()
         # If too much is lost anyway, using any of them would not help.
         unknown = not self._fits(lost, joints_lost)
-        for (is_joint, number), reason in self._wrong.items():
-            more = list(out)
-            more[is_joint] |= 1 << number
-            fits = self._active and (unknown or self._fits(lost | more[0], joints_lost | more[1]))
+        for number, reason in self._wrong.items():
+            more = out | 1 << number
+            fits = self._active and (unknown or self._fits(lost | more, joints_lost))
             out = more if fits else out
-            found.append(Quarantined(self._names[is_joint][number], reason, not fits))
-        return (out[0], out[1]), tuple(found)
+            found.append(Quarantined(self._names[number], reason, not fits))
+        return out, tuple(found)
 
     def look(self, frame: SwitchFrame, biased_scores: Sequence[int], lost: Mask) -> None:
         """Take a frame, its scores, and the switches that are scored as lost."""
@@ -358,20 +295,11 @@ class Quarantine:
             self._before, self._stayed, self._fewest = contacts, self._all, None
             self._sort()
 
-    def look_at_joints(self, time_us: int, codes: Sequence[int]) -> None:
-        """Take the codes of a record of the glove."""
-        if time_us > self._joints_us:
-            self._joints_us, before = time_us, self._drift.codes
-            self._drift.frame(time_us, codes)
-            if before != self._drift.codes:
-                self._sort()
-
     def _sort(self) -> None:
-        """Update the list of wrong inputs, in the order of detection."""
+        """Update the list of wrong switches, in the order of detection."""
         stuck = {} if self._stuck is None else self._stuck.stuck
-        now = {(False, number): (STUCK_CLOSED, STUCK_OPEN)[kind] for number, kind in stuck.items()}
-        now |= {(False, number): CHATTERING for number in numbers(self._chattering.switches)}
-        now |= {(True, number): DRIFTING for number, codes in enumerate(self._drift.codes) if codes}
+        now = {number: (STUCK_CLOSED, STUCK_OPEN)[kind] for number, kind in stuck.items()}
+        now |= dict.fromkeys(numbers(self._chattering.switches), CHATTERING)
         if now != self._wrong:
             self._wrong = {which: now[which] for which in (*(each for each in self._wrong if each in now), *now)}
             self._chosen.clear()

@@ -11,8 +11,7 @@ from ..calibration import Joints, Meaning
 from ..frames import PERIODS, GloveFrame, Mask, Newest, SwitchFrame
 from ..model.integers import IntegerTables
 from ..policy import Policy
-from ..preshape import Preshape
-from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
+from ..published import UNKNOWN, Health, JointAngles, LiveGrasp, Preshape
 from ..scores import LiveScores
 from ..segmenting.decoder import LiveSegments, Segment
 from .decision import Decision, Ranking
@@ -49,7 +48,7 @@ class LiveRecognizer:
     A frame is current for two of its periods. An older record of the glove is used until `policy.grace_us`, with health
     "degraded". Inputs that are older still, or lost, or of a glove that is not plugged into its box, are replaced by
     their mean contribution, with health "degraded"; health is "unknown" when the lost share of the tables' weight
-    exceeds `policy.max_lost`, and when no input of the build is left. An input that is read but wrong is treated as
+    exceeds `policy.max_lost`, and when no input of the build is left. A switch that is read but wrong is treated as
     lost (`quarantine`). A device whose kind the build does not use is ignored. The result depends only on the given
     frames and their times, so a replay of the same calls gives the same results.
     """
@@ -91,7 +90,7 @@ class LiveRecognizer:
 
     def _trusted(self, frame: SwitchFrame | None, joints_lost: Mask) -> SwitchFrame | None:
         """Return the frame with the quarantined switches marked as lost."""
-        out = self.quarantine.left_out(self._all_switches if frame is None else frame.lost, joints_lost)[0]
+        out = self.quarantine.left_out(self._all_switches if frame is None else frame.lost, joints_lost)
         return replace(frame, lost=frame.lost | out) if out and frame is not None else frame
 
     def step(self, now_us: int, unix_us: int, switches: SwitchFrame | None, glove: GloveFrame | None) -> Moment:
@@ -105,11 +104,9 @@ class LiveRecognizer:
         read = newest.frame if now_us <= newest.expires_us else None
         codes = self._joints.codes(now_us, glove if read is None or read.glove is None else read.glove)
         late = codes is not None and self._joints.late(now_us)
-        if codes:
-            self.quarantine.look_at_joints(self._joints.newest.time_us, codes)
         joints_lost = self._all_joints if codes is None else 0
         frame = self._trusted(read, joints_lost)
-        lost_joints = self.quarantine.out[1] | (self._joints.lost if codes else 0)
+        lost_joints = self._joints.lost if codes else 0
         if codes is not self._scored[0] or lost_joints != self._scored[1]:
             self._scores.joints(codes, lost_joints)
             self._scored = codes, lost_joints

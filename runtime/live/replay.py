@@ -163,13 +163,13 @@ class _Inputs:
                 "of the recorded inputs, or record all inputs of the build"
             )
         self._turn = BitRemap(pairs)
-        self._taxels = Taxels(session.taxels, list(levels.values()), session.taxel_calibration, harness.taxel_settings)
+        self._taxels = Taxels(session.taxels, list(levels.values()), session.taxel_calibration)
         self._levels = 0, self._taxels.owned
 
     def of(self, frame: SwitchFrame) -> SwitchFrame:
         """Return a recorded frame with the bits of the build's switches; levels come from the newest counts."""
         if frame.taxels is not None:
-            self._levels = self._taxels.read(frame.time_us, frame.taxels)
+            self._levels = self._taxels.read(frame.taxels)
         turn, (closed, lost) = self._turn, self._levels
         return replace(frame, closed=turn(frame.closed) | closed, lost=turn(frame.lost) | lost)
 

@@ -1,12 +1,11 @@
 """Every device of a harness, each kept open in a separate thread, and their newest frames, joined."""
 
-import logging
 from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 from threading import Condition, Event, Thread
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -18,6 +17,9 @@ from ..harness.wiring import Harness
 from ..published import Count, DeviceHealth
 from ..scanning.scanmap import ScanMap
 from ..sources.base import SOURCES, Source
+
+if TYPE_CHECKING:
+    from logging import Logger
 
 # The state of a device before the first attempt to open it.
 NOT_YET = "not opened yet"
@@ -34,8 +36,6 @@ _LONGEST_WAIT_US = 250_000
 
 # Faults of one device that are logged with their traces; changing messages must not fill a disk.
 _MOST_FAULTS = 20
-
-_log = logging.getLogger("thenar")
 
 
 class DeviceThread:
@@ -100,7 +100,7 @@ class DeviceThread:
         try:
             self._device.close()
         except OSError as gone:
-            _log.debug("%s: closing it: %s", self.state.name, gone)
+            self._log().debug("%s: closing it: %s", self.state.name, gone)
         except BaseException as fault:  # as above
             self._blame(f"{type(fault).__name__}: {fault}")
 
@@ -114,14 +114,19 @@ class DeviceThread:
         """Count an exception, and log it with its trace, once: a device that opens and then fails does so for hours."""
         if fault not in self._logged and len(self._logged) < _MOST_FAULTS:
             self._logged.add(fault)
-            _log.exception("%s: a bug in the program", self.state.name)
+            self._log().exception("%s: a bug in the program", self.state.name)
         self.faults += 1
         self._become(connected=False, error=fault)
+
+    def _log(self) -> "Logger":
+        from logging import getLogger  # a thread of a device waits for it, not the import of a glove
+
+        return getLogger("thenar")
 
     def _become(self, *, connected: bool, error: str) -> None:
         old = self.state
         if (old.connected, old.error) != (connected, error):
-            _log.info("%s: %s", old.name, error or "connected")
+            self._log().info("%s: %s", old.name, error or "connected")
             self.opened += connected
             self.state = DeviceHealth(old.name, connected, error)
             self._changed()

@@ -1,7 +1,6 @@
 """A build and a harness combined: the devices, and the recogniser of their frames."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from msgspec import Struct
 
@@ -10,8 +9,8 @@ from thenar.drivers.calibration import GloveCalibration
 from ..build import Build
 from ..calibration import Meaning, load_calibration, numbers_of, place_of
 from ..harness.wiring import Harness, StreamWiring
+from ..names import list_names
 from ..policy import Policy
-from ..scanning.plan import check_harness, plan_scan
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
 from ..taxels import calibration_of, in_counts
@@ -28,10 +27,20 @@ def unread_joints(harness: Harness, scan: ScanMap, joints: Sequence[str]) -> str
         for joint in joints if harness.joint_device is not None else ():
             place_of(joint, harness.sensor_names)
         return ""
-    from ..scanning.propose import own_joints
-
     how = own_joints(list(joints)) or "add the [cyberglove] that measures them"
     return f"nothing in {harness.name!r} reads the build's joints, and every grasp is degraded: {how}"
+
+
+def own_joints(joints: Sequence[str]) -> str:
+    """Return a sentence on how to read joints that no CyberGlove measures; "" for others, and without joints."""
+    from thenar.drivers.cyberglove_protocol import sensors_with
+
+    if not joints or sensors_with(joints) is not None:
+        return ""
+    return (
+        f"joints {list_names(joints)} need a source of your own: a board that prints them ([[stream]] of glove.toml), "
+        "or a source that you add (docs/how-to/extend.md)"
+    )
 
 
 class LiveSystem(Struct, frozen=True, eq=False):
@@ -50,6 +59,8 @@ class LiveSystem(Struct, frozen=True, eq=False):
 
         Raises HarnessError if they do not fit, SettingError if the CyberGlove's calibration does not.
         """
+        from pathlib import Path
+
         calibration = None if harness.calibration is None else load_calibration(Path(harness.calibration))
         # A user's own source sends the codes of the build's joints, in order.
         names = harness.sensor_names or tuple(joint.name for joint in build.manifest.joints)
@@ -58,6 +69,8 @@ class LiveSystem(Struct, frozen=True, eq=False):
     @staticmethod
     def map_of(build: Build, harness: Harness) -> ScanMap:
         """Return the build's own scan map, or one that is planned now. Raises HarnessError if the two do not fit."""
+        from ..scanning.plan import check_harness, plan_scan  # it needs the chips, a replay of frames does not
+
         names = [switch.name for switch in build.manifest.switches]
         if build.scan is not None:
             check_harness(build.scan, harness, names)

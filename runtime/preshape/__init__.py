@@ -29,7 +29,7 @@ from msgspec import Meta
 from thenar.drivers.errors import SettingError
 
 from ..names import fault, nearest, shortened
-from ..published import NONE, UNKNOWN, LiveGrasp
+from ..published import NONE, UNKNOWN, LiveGrasp, Preshape
 from ..toml_source import Place, TomlText, read_source
 from ..toml_struct import check_finite, convert
 
@@ -37,21 +37,6 @@ if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
     from ..build import Build
-
-
-class Preshape(msgspec.Struct, frozen=True):
-    """One point of a trajectory, as in trajectory_msgs/JointTrajectory.
-
-    name               its name in the table; several grasp types may share a preshape
-    joint_names        the robot's joints, in the table's order
-    positions          one per joint: rad for a joint that turns, m for one that slides, as usual in ROS
-    time_from_start_s  when the hand must arrive, counted from the moment of sending
-    """
-
-    name: str
-    joint_names: tuple[str, ...]
-    positions: tuple[float, ...]
-    time_from_start_s: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -145,7 +145,7 @@ class CollectionGuide:
         self.total = len(trials)
         self.problem = self.lost = ""
         self.step = 0
-        self.old_us = old_us
+        self._old_us = old_us
         by_number, before = {trial.number: trial for trial in trials}, frozenset(accepted)
         self._past = [(by_number[number], True) for number in accepted]
         self._left = [trial for trial in reversed(trials) if trial.number not in before]
@@ -177,11 +177,6 @@ class CollectionGuide:
     def captured(self) -> tuple[SwitchFrame | None, GloveFrame | None]:
         """The newest frames; in review, those that were captured."""
         return self._captured if self.stage == "review" else (self._switches, self._glove)
-
-    @property
-    def newest_us(self) -> int | None:
-        """When the newest frame was read; None before the first."""
-        return max((frame.time_us for frame in (self._switches, self._glove) if frame is not None), default=None)
 
     def offered(self) -> dict[Key, str]:
         """Return the keys that are active now, and their effects."""
@@ -314,12 +309,12 @@ class CollectionGuide:
         """Return the devices or inputs that count as lost."""
         if disconnected:
             return f"{list_names(disconnected)} not connected"
-        lack = self._lack(now_us, self.old_us)
+        lack = self._lack(now_us, self._old_us)
         if not lack or self._whole_us is None:
             self._whole_us = min(
                 (frame.time_us for frame in (self._switches, self._glove) if frame is not None), default=now_us
             )
-        return lack if now_us - self._whole_us > self.old_us else ""
+        return lack if now_us - self._whole_us > self._old_us else ""
 
     def _label(self, now_us: int, event: Event) -> None:
         trial = self._left[-1]

@@ -1,11 +1,7 @@
-"""From a harness to the scan map of a build: the fewest transactions, and their costs.
-
-Units stay together, such as the ports behind one channel of a mux. A unit is a port, or a row of units without anything
-in between. Costs are wire times in integer nanoseconds, so that sums do not depend on order.
-"""
+"""From a harness to the scan map of a build: the fewest transactions."""
 
 from collections.abc import Sequence
-from typing import Union
+from itertools import chain
 
 from msgspec.structs import replace
 
@@ -14,67 +10,27 @@ from ..harness.wiring import Harness
 from ..names import list_names
 from .ports import whole_scan
 from .scanmap import Port, ScanMap
-from .timing import mux_of, port_us, reading_of, select_us, selections
+from .timing import mux_of, reading_of, selections
 
-Unit = Union[int, Sequence["Unit"]]  # noqa: UP007 (an alias of itself has to be quoted)
-
-
-def ports_in(unit: Unit) -> tuple[int, ...]:
-    """Return the ports of a unit, in order."""
-    return (unit,) if isinstance(unit, int) else tuple(port for each in unit for port in ports_in(each))
+Room = tuple[int, ...]
 
 
-# A channel of a mux, a whole mux, or a port that needs none.
-_Room = tuple[int, ...]
+def rooms_of(port: Port, harness: Harness) -> tuple[Room, ...]:
+    """Return the mux that a port is behind, (bus, address), and the channel, (bus, address, channel), if any."""
+    mux = mux_of(port, harness)
+    return () if mux is None else ((port.bus, mux.address), (port.bus, mux.address, mux.channel))
 
 
-class Costs:
-    """The costs of `ports`, by their numbers.
-
-    units holds all of them as nested tuples: the ports behind one channel stay together, and if a bus has several
-    muxes, those behind one mux.
+def units_of(ports: Sequence[Port], harness: Harness) -> tuple[tuple[int, ...], ...]:
+    """Return the numbers of ports that are read one after the other: those behind one channel, and if a bus has several
+    muxes, those behind one mux; a port that needs no selection is alone.
     """
-
-    def __init__(self, ports: Sequence[Port], harness: Harness) -> None:
-        self._ns, rooms = list[int](), set(selections(ports, harness))
-        opened: dict[_Room, tuple[int, int]] = {}
-        nested: dict[_Room, dict[_Room, list[int]]] = {}
-        for number, port in enumerate(ports):
-            clock_hz, reading = harness.line_of(port.bus).clock_hz, reading_of(port, harness)
-            mux = mux_of(port, harness)
-            channel = (port.bus, mux.address, mux.channel) if mux else ()
-            way: list[_Room] = [room for room in (channel[:2], channel) if room in rooms]
-            for room in way:
-                opened[room] = (opened.get(room, (0, 0))[0] | 1 << number, round(1000 * select_us(clock_hz)))
-            outer, inner = (way[0], way[-1]) if way else ((number,), (number,))
-            nested.setdefault(outer, {}).setdefault(inner, []).append(number)
-            self._ns.append(round(1000 * port_us(reading, clock_hz)))
-        self._rooms = tuple(opened.values())
-        self.units: tuple[Unit, ...] = tuple(tuple(map(tuple, inside.values())) for inside in nested.values())
-
-    def after(self, read: int, port: int) -> int:
-        """Return the time to read `port` after the ports `read`: the first behind a channel must select it."""
-        return self._ns[port] + sum(ns for room, ns in self._rooms if room >> port & 1 and not read & room)
-
-    def of(self, unit: Unit) -> int:
-        """Return the time to read a unit, with the selections that it alone needs."""
-        ports = ports_in(unit)
-        inside = sum(1 << port for port in ports)
-        own = sum(self._ns[port] for port in ports)
-        return own + sum(ns for room, ns in self._rooms if not room & ~inside)
-
-    def shares(self) -> list[float]:
-        """Return the nanoseconds of each port: its time, and its share of the common time of its unit."""
-        shares = [0.0] * len(self._ns)
-        for unit in self.units:
-            ports = ports_in(unit)
-            # Read after all other ports, a port of a shared channel costs only its own time.
-            everything = sum(1 << port for port in ports)
-            alone = [self.after(everything, port) for port in ports]
-            common = (self.of(unit) - sum(alone)) / len(ports)
-            for port, ns in zip(ports, alone, strict=True):
-                shares[port] = ns + common
-        return shares
+    rooms = set(selections(ports, harness))
+    nested: dict[Room, dict[Room, list[int]]] = {}
+    for number, port in enumerate(ports):
+        way = [room for room in rooms_of(port, harness) if room in rooms] or [(number,)]
+        nested.setdefault(way[0], {}).setdefault(way[-1], []).append(number)
+    return tuple(tuple(chain(*inside.values())) for inside in nested.values())
 
 
 def plan_scan(switch_names: Sequence[str], harness: Harness) -> ScanMap:
@@ -89,7 +45,7 @@ def plan_scan(switch_names: Sequence[str], harness: Harness) -> ScanMap:
             "add what is missing to its file, or let ``propose`` write one"
         )
     scan = whole_scan(harness, switch_names)
-    return replace(scan, ports=tuple(scan.ports[port] for port in ports_in(Costs(scan.ports, harness).units)))
+    return replace(scan, ports=tuple(scan.ports[port] for port in chain(*units_of(scan.ports, harness))))
 
 
 def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) -> None:

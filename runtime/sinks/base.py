@@ -1,10 +1,8 @@
 """The interface of all sinks, their kinds, and several sinks as one."""
 
-import logging
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -15,15 +13,13 @@ from thenar.drivers.errors import SettingError, ThenarError
 from thenar.drivers.members import Members
 
 from ..names import shortened
-from ..preshape import Preshape
-from ..published import HealthReport, JointAngles, LiveGrasp, OutputTrouble
+from ..published import HealthReport, JointAngles, LiveGrasp, OutputTrouble, Preshape
 from ..writer_thread import WriterThread
 
 if TYPE_CHECKING:
     from ..build import Build
     from ..live.recogniser import Moment
 
-_log = logging.getLogger("thenar")
 # What has waited for longer is not published as now.
 LATE_US = 500_000
 # More than come in that time.
@@ -93,8 +89,7 @@ class Sink(ABC):
         """Release everything; may be called twice."""
 
 
-@dataclass(frozen=True, slots=True)
-class SinkPlace:
+class SinkPlace(msgspec.Struct, frozen=True):
     """The place where a sink is to be opened.
 
     text     as the user wrote it: "ros:/thenar?public&rate=50"
@@ -109,8 +104,7 @@ class SinkPlace:
     wait: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class SinkKind:
+class SinkKind(msgspec.Struct, frozen=True):
     """A kind of sink, as chosen by `--sink NAME:PLACE`.
 
     A module of `thenar.runtime.sinks` defines one as `MEMBER`, or a tuple of several; another package registers one
@@ -282,7 +276,9 @@ class _Receiver:
             if self._thread is None and isinstance(reason, KeyboardInterrupt):
                 raise
             self._fault = f"{type(reason).__name__}: {reason}"
-            _log.error("sink %s: a bug in the program", self._nothing.where, exc_info=reason)
+            from logging import getLogger  # for bugs only
+
+            getLogger("thenar").error("sink %s: a bug in the program", self._nothing.where, exc_info=reason)
             return False
         return True
 

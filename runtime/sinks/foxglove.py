@@ -24,8 +24,7 @@ import msgspec
 
 from thenar.drivers.extras import optional
 
-from ..preshape import Preshape
-from ..published import HealthReport, JointAngles, LiveGrasp
+from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 from .sockets import check_readers, resolve
 

@@ -12,14 +12,12 @@ import stat
 import sys
 from contextlib import suppress
 from io import UnsupportedOperation
-from pathlib import Path
 from typing import BinaryIO
 
 import msgspec
 from msgspec import json, structs
 
-from ..preshape import Preshape
-from ..published import HealthReport, JointAngles, LiveGrasp
+from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 
@@ -159,6 +157,8 @@ def _open(place: SinkPlace) -> JsonLines:
         # A named pipe without a reader would block the open forever.
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK, 0o666)
     except OSError as reason:
+        from pathlib import Path
+
         hint = ": is its reader running?" if Path(path).is_fifo() else ""
         raise SinkError(f"{where} cannot be written: {reason.strerror}{hint}") from None
     try:
@@ -175,6 +175,8 @@ def _finish_line(descriptor: int, path: str) -> None:
     found = os.fstat(descriptor)
     if not (stat.S_ISREG(found.st_mode) and found.st_size):
         return
+    from pathlib import Path
+
     with Path(path).open("rb") as file:
         file.seek(-1, os.SEEK_END)
         whole = file.read(1) == b"\n"

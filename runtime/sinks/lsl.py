@@ -14,8 +14,7 @@ from thenar.drivers.errors import SettingError
 from thenar.drivers.lsl import load_pylsl
 from thenar.drivers.names import fault
 
-from ..preshape import Preshape
-from ..published import JointAngles, LiveGrasp
+from ..published import JointAngles, LiveGrasp, Preshape
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 

@@ -18,8 +18,7 @@ from msgspec import json
 
 from thenar.drivers.extras import optional
 
-from ..preshape import Preshape
-from ..published import HealthReport, JointAngles, LiveGrasp
+from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 _RATE_HZ = 20

@@ -19,8 +19,7 @@ from typing import Any
 
 from thenar.drivers.errors import SettingError
 
-from ..preshape import Preshape
-from ..published import HealthReport, JointAngles, LiveGrasp
+from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
 from .base import Sink, SinkError, SinkKind, SinkReport
 from .jsonl import encode, encode_header, encode_health
 

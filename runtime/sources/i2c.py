@@ -46,16 +46,15 @@ class PortLevels:
         self.name = wired.numbered_pins[channel]
         self.place = harness.taxel_names.index(self.name)
         highest = wired.chip.highest if isinstance(wired.chip, Converter | SpiChip) else None
-        self.taxels = Taxels([self.name], [port.levels], calibration, harness.taxel_settings, highest)
+        self.taxels = Taxels([self.name], [port.levels], calibration, highest)
         self.targets = self.taxels.owned
 
     def states(self, reply: int | None) -> tuple[Mask, Mask]:
         """Return the closed and the lost switches from a reply that came now; None: none came."""
-        time_us = now_us()
-        closed, lost = self.taxels.read(time_us, (reply,))
+        closed, lost = self.taxels.read((reply,))
         if self._debouncer is None or reply is None:
             return closed, lost
-        return self._debouncer.update(time_us, closed, self.targets & ~lost) & ~lost, lost
+        return self._debouncer.update(now_us(), closed, self.targets & ~lost) & ~lost, lost
 
 
 class PortScanner(Source):

@@ -234,7 +234,7 @@ class RowSource(Source):
         levels: dict[int, list[Level]] = {}
         for place, limit, switch in read.levels:
             levels.setdefault(place, []).append((limit, switch))
-        self._settings, self._calibration = harness.taxel_settings, calibration_of(harness.taxel_settings)
+        self._calibration = calibration_of(harness.taxel_settings)
         self._levels = [levels.get(place, []) for place in range(len(self._taxel_names))]
         self.owned: Mask = sum(bit for *_, bit in self._switches)
         self.owned |= sum(1 << switch for each in self._levels for _, switch in each)
@@ -259,7 +259,7 @@ class RowSource(Source):
         self.watch.begin()
         self._debouncer = debouncer_of(self._debounce)
         self.taxels = [
-            Taxels([name], [levels], self._calibration, self._settings, grid.last)
+            Taxels([name], [levels], self._calibration, grid.last)
             for name, levels, grid in zip(self._taxel_names, self._levels, self._grids, strict=True)
         ]
 
@@ -368,7 +368,7 @@ class RowSource(Source):
         measured = values[self._first_taxel : self._first_taxel + len(self._grids)]
         for taxels, grid, place, value in zip(self.taxels, self._grids, self._places, measured, strict=True):
             row[place] = code = self._code(grid, value)
-            pressed, lost = taxels.read(time_us, (code,))
+            pressed, lost = taxels.read((code,))
             closed, known = closed | pressed, known | taxels.owned & ~lost
         if self._debouncer is not None:
             closed = self._debouncer.update(time_us, closed, known) & known

@@ -127,10 +127,7 @@ class Details:
     def __init__(self, build: Build) -> None:
         self._switches, self._scale = build.tables.n_switches, build.tables.scale
         self._none_leads = None if build.rejector is None else build.none_leads
-        self._joints = [
-            (joint.value_a, joint.code_a, (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a))
-            for joint in build.manifest.joints
-        ]
+        self._joints = build.manifest.joints
 
     def __call__(self, moment: Moment) -> Detail:
         """Return the details of a moment."""
@@ -145,8 +142,7 @@ class Details:
         return f"{mask:0{self._switches}b}"[::-1] if self._switches else ""
 
     def _values(self, codes: Sequence[int]) -> tuple[float, ...]:
-        pairs = zip(codes, self._joints, strict=True)
-        return tuple(round(value + (code - at) * step, 2) for code, (value, at, step) in pairs)
+        return tuple(round(joint.value(code), 2) for joint, code in zip(self._joints, codes, strict=True))
 
     def _probabilities(self, scores: Sequence[int], refused: bool) -> tuple[float, ...]:
         best = max(scores)

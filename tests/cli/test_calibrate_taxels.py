@@ -9,7 +9,6 @@ from threading import Event
 import click
 import pytest
 
-from thenar.cli import run
 from thenar.cli.calibrate_command import TypedLines
 from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
@@ -77,14 +76,6 @@ def test_where_nothing_moves_nothing_is_written(tmp_path: Path) -> None:
     code, said = calibrated(tmp_path, [REST])
     assert code == 2
     assert "no taxel moved" in said
-    assert not (tmp_path / "pads.toml").exists()
-
-
-def test_presses_have_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "glove.toml").write_text('[[stream]]\nport = "nowhere"\ntaxels = { p0 = [0, 1] }\n')
-    asked = ["calibrate", str(tmp_path / "glove.toml"), "--taxels", "-o", str(tmp_path / "pads.toml"), "--web"]
-    assert run([*asked, "127.0.0.1:0"]) == 2
-    assert "leave out --web or --taxels" in capsys.readouterr().err
     assert not (tmp_path / "pads.toml").exists()
 
 

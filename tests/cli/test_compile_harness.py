@@ -4,10 +4,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from thenar.compiler import GraspSet
+from thenar.compiler.glove.propose import propose_harness
 from thenar.runtime import Build
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.scanning.propose import propose_harness
 
 from .conftest import thenar
 

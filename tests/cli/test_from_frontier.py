@@ -16,8 +16,8 @@ from thenar.compiler.frontier.points import (
     frontier_from_bytes,
     frontier_to_bytes,
 )
+from thenar.compiler.glove.propose import propose_harness
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.scanning.propose import propose_harness
 
 Captured = pytest.CaptureFixture[str]
 Change = Callable[[FrontierPoint], FrontierPoint]

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rich.table import Table
-from rich.text import Text
 
-from thenar.cli.printing import echo, err, json_shown, out, print_json
+from thenar.cli.consoles import Text
+from thenar.cli.printing import echo, err, json_shown, out, print_json, table
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.taxonomy import own
 from thenar.drivers.names import shown
@@ -37,11 +36,11 @@ def test_shown_text_keeps_its_meaning_and_holds_no_terminal_commands(text: str) 
 
 @pytest.mark.parametrize("text", HOSTILE)
 def test_no_way_to_print_a_text_lets_a_terminal_obey_it(text: str, capsys: pytest.CaptureFixture[str]) -> None:
-    table = Table(text, title=text)
-    table.add_row(text)
-    table.add_row(Text(text, style="bold"))
+    hostile = table([text], title=text)
+    hostile.add_row(text)
+    hostile.add_row(Text(text, "bold"))
     for console in (out(), err()):
-        for printed in (text, Text(text), table):
+        for printed in (text, Text(text), hostile):
             console.print(printed, soft_wrap=True)
     echo(text)
     echo(text, err=True)
@@ -55,15 +54,15 @@ def test_styles_are_still_seen_on_a_terminal(
 ) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm-256color")
-    out().print(Text("\x1b[2Jred", style="red"))
+    out().print(Text("\x1b[2Jred", "red"))
     assert capsys.readouterr().out == "\x1b[31m\\x1b[2Jred\x1b[0m\n"
 
 
 def test_a_table_is_as_wide_as_what_is_escaped_in_it(capsys: pytest.CaptureFixture[str]) -> None:
-    table = Table("name")
-    table.add_row("\x1b[2J")
-    table.add_row("plain")
-    out().print(table)
+    escaped = table(["name"])
+    escaped.add_row("\x1b[2J")
+    escaped.add_row("plain")
+    out().print(escaped)
     lines = capsys.readouterr().out.splitlines()
     assert len({len(line) for line in lines}) == 1
     assert r"\x1b[2J" in "".join(lines)

@@ -5,8 +5,8 @@ from threading import Event
 from typing import get_args
 
 from msgspec.structs import replace
-from rich.console import Console
 
+from thenar.cli.consoles import Console
 from thenar.cli.live_view import LiveView, drawn
 from thenar.runtime.published import DeviceHealth, Health, HealthReport, LiveGrasp, OutputTrouble, Quarantined
 
@@ -51,14 +51,14 @@ class Terminal(StringIO):
 
 
 def view_on(terminal: Terminal) -> LiveView:
-    return LiveView(Console(file=terminal, force_terminal=True, width=80))
+    return LiveView(Console(terminal, width=80))
 
 
 def picture(grasp: LiveGrasp, devices: Sequence[DeviceHealth] = ()) -> list[str]:
     """Return the lines of what is drawn, with one blank between the words."""
-    console = Console(file=StringIO(), width=80, record=True)
-    console.print(drawn(grasp, devices))
-    return [" ".join(line.split()) for line in console.export_text().splitlines()]
+    file = StringIO()
+    Console(file, width=80).print(drawn(grasp, devices))
+    return [" ".join(line.split()) for line in file.getvalue().splitlines()]
 
 
 def test_the_picture_says_which_segment_it_is_and_since_when() -> None:
@@ -102,7 +102,7 @@ def test_quarantined_switches_and_stalled_sinks_are_drawn_with_their_reason() ->
     terminal = Terminal()
     health = HealthReport(0, 100.0, 90.0, 120, 0, 0, 0, quarantined=wrong)
     health = replace(health, outputs=(OutputTrouble("recording", "the disk is full"),))
-    with LiveView(Console(file=terminal, force_terminal=True, width=80)) as view:
+    with LiveView(Console(terminal, width=80)) as view:
         view.show(grasp("first"), nobody, health)
         terminal.until("palm", "stuck closed, treated as lost", "chattering, still used", "the disk is full")
 
@@ -110,7 +110,7 @@ def test_quarantined_switches_and_stalled_sinks_are_drawn_with_their_reason() ->
 def test_the_newest_grasp_is_drawn() -> None:
     terminal = Terminal()
     health = HealthReport(0, 100.0, 90.0, 120, 0, 0, 0)
-    with LiveView(Console(file=terminal, force_terminal=True, width=80)) as view:
+    with LiveView(Console(terminal, width=80)) as view:
         view.show(grasp("first"), nobody)
         terminal.until("first")
         view.show(grasp("second"), lambda: (DeviceHealth("glove", False, "no such port"),), health)

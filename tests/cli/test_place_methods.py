@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from thenar.cli import run
+from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.placement.drawing import kept_names
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.scanning.propose import propose_harness
 
 from ..sets import grasp_set_of
 

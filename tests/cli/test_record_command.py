@@ -1,6 +1,5 @@
 """A collection from end to end: the real command on a terminal of its own, real drivers, emulated devices on ptys."""
 
-import json
 import os
 import pty
 import re
@@ -16,8 +15,6 @@ from time import monotonic
 
 import numpy as np
 import pytest
-from websockets.sync.client import connect
-from websockets.typing import Origin
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
@@ -251,29 +248,6 @@ def test_pads_are_recorded_with_the_rest(
     assert grasp_set.taxel_columns == (Joint("p0", "N", 100, 0.0, 900, 2.0), Joint("p1", "counts", 0, 0.0, 1, 1.0))
     assert run(["import", str(folder / "set.mcap"), "-o", str(folder / "again.grasps")]) == 0
     assert (folder / "again.grasps").read_bytes() == (folder / "set.grasps").read_bytes()
-
-
-def test_the_page_ends_with_the_warnings_of_the_set(folder: Path, start: Start) -> None:
-    terminal = start("--no-none", "--web", "127.0.0.1:0")
-    place = terminal.until(rb"the page is at http://127.0.0.1:\d+/").decode().rpartition("http://")[2].strip("/")
-    terminal.until(rb"Enter: start the countdown")
-    terminal.press(b"\r")
-    reviewed(terminal, 1)
-    with connect(f"ws://{place}/live", origin=Origin(f"http://{place}"), proxy=None, compression=None) as page:
-        terminal.press(b"\rq")
-        code, said = terminal.finish()
-        told = [json.loads(message) for message in page]
-    assert code == 0, said
-    warnings = re.findall(r"warning: (.*?)\r\n", said)
-    assert warnings
-    assert [message for message in told if message["topic"] == "study"][-1]["problem"] == "; ".join(warnings)
-
-
-def test_a_page_that_cannot_be_served_leaves_no_file(folder: Path, start: Start) -> None:
-    code, said = start("--no-none", "--web", "0.0.0.0:0").finish()
-    assert code == 2
-    assert "add --web-token" in " ".join(said.split())
-    assert not list(folder.glob("set.*"))
 
 
 def test_a_port_without_anybody_at_its_other_end_is_no_device(folder: Path) -> None:

@@ -11,10 +11,10 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.glove.files import spec_files
+from thenar.compiler.glove.propose import propose_harness
 from thenar.runtime import Build
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator.handmaps.handmap import hand_map
 
 from ..sets import grasp_set_of

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from thenar.compiler.workers import BackgroundTask, in_workers
+from thenar.compiler.workers import in_workers
 
 
 def squared_where(number: int) -> tuple[int, int]:
@@ -125,47 +125,3 @@ def test_the_environment_is_as_it_was_after_the_work(monkeypatch: pytest.MonkeyP
             monkeypatch.setenv("PYTHONSAFEPATH", before)
         list(in_workers(squared_where, range(3), 2))
         assert os.environ.get("PYTHONSAFEPATH") == before
-
-
-def failed(number: int) -> int:
-    raise ValueError(f"{number} is too many")
-
-
-def fetched(aside: BackgroundTask[Any]) -> Any:
-    while (answer := aside.fetch()) is None:
-        time.sleep(0.01)
-    return answer
-
-
-def test_work_aside_is_done_in_another_process_one_piece_after_the_other() -> None:
-    aside = BackgroundTask[tuple[int, int]]()
-    assert (aside.busy, aside.fetch()) == (False, None)
-    for number in (3, 4):
-        aside.start(squared_where, number)
-        assert aside.busy
-        squared, process = fetched(aside)
-        assert (squared, aside.busy) == (number * number, False)
-        assert process != os.getpid()
-
-
-@pytest.mark.parametrize(("work", "said"), [(failed, "ValueError: 7 is too many"), (killed, "its process ended")])
-def test_what_is_wrong_with_work_aside_is_told(work: Any, said: str) -> None:
-    aside = BackgroundTask[Any]()
-    aside.start(work, 7)
-    with pytest.raises(BrokenExecutor, match=said):
-        fetched(aside)
-    assert not aside.busy
-
-
-def slept(number: int) -> None:
-    time.sleep(number)
-
-
-def test_work_aside_that_is_not_wanted_any_more_is_ended() -> None:
-    aside = BackgroundTask[None]()
-    aside.start(slept, 3600)
-    process = aside._process.pid
-    aside.close()
-    aside.close()
-    with pytest.raises(ProcessLookupError):
-        os.kill(process, 0)

@@ -18,8 +18,7 @@ from thenar.runtime.manifest import Calibration, Manifest
 from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.model.terms.line import Slope
-from thenar.runtime.preshape import Preshape
-from thenar.runtime.published import Count, DeviceHealth, HealthReport, JointAngles, LiveGrasp, Quarantined
+from thenar.runtime.published import Count, DeviceHealth, HealthReport, JointAngles, LiveGrasp, Preshape, Quarantined
 
 from ..tables import describe as _describe
 
@@ -143,5 +142,5 @@ def angles() -> JointAngles:
 @pytest.fixture(scope="session")
 def health() -> HealthReport:
     glove = DeviceHealth("cyberglove", True, "", (Count("resyncs", 2),))
-    wrong = Quarantined("s001", "stuck open"), Quarantined("index_mpj", "drifting", used=True)
+    wrong = Quarantined("s001", "stuck open"), Quarantined("s002", "chattering", used=True)
     return HealthReport(7, 100.0, 99.5, 600, 25, 10, 1, 0, (glove,), wrong)

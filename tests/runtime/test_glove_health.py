@@ -7,7 +7,7 @@ from msgspec.structs import replace as changed
 from thenar.runtime import Build
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.glove import GloveHealth
-from thenar.runtime.live.quarantine import Chattering, JointDrift, Quarantine
+from thenar.runtime.live.quarantine import Chattering, Quarantine
 from thenar.runtime.published import UNKNOWN, Count, DeviceHealth, HealthReport, LiveGrasp
 
 MakeBuild = Callable[..., Build]
@@ -59,37 +59,14 @@ def test_a_closed_switch_read_now_and_then_does_not_chatter() -> None:
     assert chattering.switches == 0
 
 
-def moving(drift: JointDrift, minutes: int, first: int, shift: int, narrow: int = 0) -> None:
-    """Move joint 0 between two ends, and joint 1 between 50 and 150, a frame a second."""
-    for second in range(minutes * 60 + 1):
-        up = second % 2
-        codes = [100 + shift + 100 * up + (-narrow if up else narrow), 50 + 100 * up]
-        drift.frame((first * 60 + second) * SECOND, codes)
-
-
-@pytest.mark.parametrize(
-    ("shift", "narrow", "drifting"),
-    [(0, 0, 0), (20, 0, 0), (21, 0, 21), (-40, 0, -40), (0, 30, 0), (0, -30, 0)],
-)
-def test_a_joint_drifts_when_both_ends_move_the_same_way(build: Build, shift: int, narrow: int, drifting: int) -> None:
-    drift = JointDrift(build.tables)
-    moving(drift, 1, 0, 0)
-    assert not any(drift.codes)
-    moving(drift, 3, 1, shift, narrow)
-    assert drift.codes == (drifting, 0)
-
-
 def test_faults_are_those_of_the_quarantine(build: Build) -> None:
     quarantine = Quarantine(build, lambda _switches, _joints: True)
     health = GloveHealth(quarantine)
     for number in range(120):
         quarantine.look(SwitchFrame(number * SECOND // 100, number % 2 << 1), (0, 0, 0, 0), 0)
-    for second in range(181):
-        code = 100 * (second % 2) + (0 if second < 60 else 30)
-        quarantine.look_at_joints(second * SECOND, [100, code])
     quarantine.left_out(0, 0)
     report = health.report(0)
-    assert [(one.name, one.reason) for one in report.quarantined] == [("s1", "chattering"), ("j1", "drifting")]
+    assert [(one.name, one.reason) for one in report.quarantined] == [("s1", "chattering")]
 
 
 @pytest.mark.parametrize("hz", [10, 100, 333])

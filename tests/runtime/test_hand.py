@@ -8,6 +8,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from thenar.compiler.hand import drawn_joints, grid_hand, moved_by
 from thenar.drivers.cyberglove_protocol import SENSORS_22
 from thenar.runtime.errors import BuildError
 from thenar.runtime.hand import (
@@ -15,12 +16,9 @@ from thenar.runtime.hand import (
     MAX_BYTES,
     HandDrawing,
     Spot,
-    drawn_joints,
-    grid_hand,
     hand_from_bytes,
     hand_to_bytes,
     load_hand,
-    moved_by,
 )
 from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
 from thenar.runtime.model.integers import IntegerTables

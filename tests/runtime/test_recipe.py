@@ -4,8 +4,9 @@ import click
 import msgspec
 import pytest
 
+from thenar.cli.choices import choices
 from thenar.cli.group import thenar
-from thenar.runtime.recipe import Recipe, changed, choices
+from thenar.runtime.recipe import Recipe, changed
 
 
 def test_every_choice_says_what_it_is() -> None:

@@ -11,7 +11,6 @@ from thenar.runtime.taxels import (
     TaxelCalibration,
     TaxelLine,
     Taxels,
-    TaxelSettings,
     count_limit,
     in_counts,
     learnt_lines,
@@ -21,8 +20,6 @@ from thenar.runtime.taxels import (
 COUNTS = Calibration(0, "pad", "counts", 0, 0.0, 1, 1.0)
 NEWTONS = Calibration(0, "pad", "N", 10, 0.0, 210, 2.0)
 RISING, FALLING = TaxelLine("pad", 100, 900), TaxelLine("pad", 900, 100)
-SECOND, MINUTE = 1_000_000, 60_000_000
-HARD = TaxelSettings(per_minute=0.1)
 
 counts = st.integers(0, 65535)
 
@@ -34,14 +31,14 @@ def lines(name: str = "pad") -> st.SearchStrategy[TaxelLine]:
     )
 
 
-def taxels(line: TaxelLine | None, *limits: int, settings: TaxelSettings | None = None) -> Taxels:
+def taxels(line: TaxelLine | None, *limits: int) -> Taxels:
     calibration = None if line is None else TaxelCalibration(taxels=(line,))
     levels = [(limit, number) for number, limit in enumerate(limits)]
-    return Taxels(["pad"], [levels], calibration, settings, highest=1023)
+    return Taxels(["pad"], [levels], calibration, highest=1023)
 
 
 def closes(limit: int, raw: int) -> bool:
-    return taxels(None, limit).read(0, [raw])[0] == 1
+    return taxels(None, limit).read([raw])[0] == 1
 
 
 @given(
@@ -80,59 +77,6 @@ def test_codes_that_are_no_counts_need_a_calibration() -> None:
         count_limit(threshold, TaxelCalibration(taxels=(RISING,)))
 
 
-@given(
-    line=lines().filter(lambda line: abs(line.press - line.rest) > 100),
-    readings=st.lists(st.tuples(st.integers(0, 500_000), counts), max_size=200),
-)
-def test_a_baseline_is_slow_and_bounded(line: TaxelLine, readings: list[tuple[int, int]]) -> None:
-    pad, time_us, before = taxels(line), 0, 0
-    span, settings = abs(line.press - line.rest), TaxelSettings()
-    for passed_us, raw in readings:
-        time_us += passed_us
-        pad.read(time_us, [raw])
-        moved = abs(pad.drifts[0] - before)
-        assert moved <= span * settings.per_minute * min(passed_us, 100_000) / MINUTE + 1
-        assert abs(pad.drifts[0]) <= span * settings.drift + 1
-        before = pad.drifts[0]
-
-
-@pytest.mark.parametrize("line", [RISING, FALLING])
-def test_a_baseline_follows_a_pad_at_rest_and_levels_move_with_it(line: TaxelLine) -> None:
-    towards_press = 1 if line is RISING else -1
-    pad = taxels(line, 140 if line is RISING else ~860, settings=HARD)
-    at_rest = line.rest + 50 * towards_press
-    assert pad.read(0, [at_rest]) == (1, 0)
-    for tenth in range(1, 601):
-        pad.read(tenth * SECOND // 10, [at_rest])
-    assert pad.drifts == [50 * towards_press]
-    assert pad.read(MINUTE, [at_rest]) == (0, 0)
-    assert pad.read(MINUTE, [at_rest + 41 * towards_press]) == (1, 0)
-
-
-@given(st.lists(st.integers(190, 900), min_size=1, max_size=300))
-def test_a_baseline_never_moves_while_pressed_nor_shortly_after(pressed: list[int]) -> None:
-    pad = taxels(RISING, settings=HARD)
-    for place, raw in enumerate(pressed):
-        pad.read(place * SECOND, [raw])
-    for tenth in range(10):
-        pad.read((len(pressed) - 1) * SECOND + tenth * SECOND // 10, [60])
-    assert pad.drifts == [0]
-
-
-def test_what_is_not_watched_does_not_move() -> None:
-    pad = taxels(RISING, settings=HARD)
-    for hour in range(4):
-        pad.read(hour * 60 * MINUTE, [50])
-    assert pad.drifts == [0]  # a tenth of a second each, of 80 counts a minute
-
-
-def test_following_can_be_switched_off() -> None:
-    pad = taxels(RISING, settings=TaxelSettings(baseline=False, per_minute=10.0))
-    for tenth in range(3000):
-        pad.read(tenth * SECOND // 10, [50])
-    assert pad.drifts == [0]
-
-
 @pytest.mark.parametrize(
     ("rest", "press", "raw", "found"),
     [
@@ -149,7 +93,7 @@ def test_following_can_be_switched_off() -> None:
 )
 def test_ends_of_the_converter(rest: int, press: int, raw: int, found: str) -> None:
     pad = taxels(TaxelLine("pad", rest, press), 500)
-    closed, lost = pad.read(0, [raw])
+    closed, lost = pad.read([raw])
     assert (pad.faults, lost) == ([found], 1 if found else 0)
     assert not closed & lost
 
@@ -157,9 +101,9 @@ def test_ends_of_the_converter(rest: int, press: int, raw: int, found: str) -> N
 def test_what_could_not_be_read_is_lost_and_the_rest_is_not() -> None:
     both = Taxels(["one", "two"], [[(10, 0), (20, 2)], [(10, 1)]])
     assert both.owned == 0b111
-    assert both.read(0, [None, 11]) == (0b010, 0b101)
+    assert both.read([None, 11]) == (0b010, 0b101)
     assert both.faults == ["silent", ""]
-    assert both.read(1, [15, None]) == (0b001, 0b010)
+    assert both.read([15, None]) == (0b001, 0b010)
 
 
 def test_a_calibration_is_read_as_it_was_written(tmp_path: Path) -> None:

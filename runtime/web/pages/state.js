@@ -40,12 +40,12 @@ export class State {
     this.#look();
   }
 
-  /** Take the state of the connection to the server; `ended`: it closed because the command is complete. */
-  link(up, ended = false) {
-    const words = up ? "connected" : ended ? "ended" : "not connected";
-    if (this.#link?.words !== words) this.#link = { words, up, ended, since: performance.now() };
+  /** Take the state of the connection to the server. */
+  link(up) {
+    const words = up ? "connected" : "not connected";
+    if (this.#link?.up !== up) this.#link = { up, since: performance.now() };
     const link = document.getElementById("link");
-    link.dataset.is = up || ended ? "good" : "bad";
+    link.dataset.is = up ? "good" : "bad";
     say(link, `page: ${words} since ${clock(this.#link.since)}`);
     this.#look();
   }
@@ -67,7 +67,7 @@ export class State {
     const silent = age > Math.max(LEAST_MS, PERIODS * middle), old = !up || silent;
     const since = this.#readAt === null ? "" : ` since ${clock(this.#readAt)}`;
     const words = this.#link === null ? "" : !up ? `no data${since || " yet"}` : silent ? `this is ${(age / 1000).toFixed(1)} s old` : "";
-    say(document.getElementById("age"), this.#link?.ended ? "" : words);
+    say(document.getElementById("age"), words);
     this.#glove(up, silent ? since : "");
     document.documentElement.classList.toggle("old", old);
     if (old === this.old) return;

@@ -15,6 +15,7 @@ from thenar.compiler.artifact.compile import MEMBERS
 from thenar.compiler.artifact.documents import REPORT_NAME
 from thenar.compiler.artifact.ensemble import ensemble_from_bytes
 from thenar.compiler.artifact.verify import Verification, verify
+from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.trainers.base import Training
 from thenar.runtime import Build, BuildError
@@ -23,7 +24,6 @@ from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_from_bytes, tables_to_bytes
 from thenar.runtime.scanning.plan import check_harness
-from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 
 from ...conftest import calls

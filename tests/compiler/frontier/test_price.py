@@ -10,6 +10,7 @@ from thenar.compiler.frontier.cache import Cache, Store, question
 from thenar.compiler.frontier.price import ClassifyModel, Equipment, price, random_tables
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.wirings import WIRE_ONLY, ReadingCost, wirings
+from thenar.compiler.glove.propose import propose_board, propose_harness
 from thenar.compiler.placement.elements import Element, names_of
 from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.recogniser import Recogniser
@@ -17,7 +18,6 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.runtime.model.integers import tables_to_bytes
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.scanning.propose import propose_board, propose_harness
 
 from ...conftest import tool
 from .conftest import survey_of

@@ -14,13 +14,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.glove.files import NAMES, spec_files
+from thenar.compiler.glove.propose import propose_board, propose_harness
 from thenar.compiler.glove.spec import SpecSummary
 from thenar.compiler.hand import HandShape
 from thenar.compiler.text import text_of
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import BoardMatrix, BoardWiring, ChipWiring, GloveWiring, Harness, StreamWiring
 from thenar.runtime.names import fault
-from thenar.runtime.scanning.propose import propose_board, propose_harness
 
 from .conftest import manifest_of, read_netlist
 

@@ -5,9 +5,9 @@ from math import dist
 
 import pytest
 
+from thenar.compiler.glove.propose import propose_board, propose_harness
 from thenar.compiler.glove.spec import SpecSummary, glove_spec
 from thenar.compiler.hand import HandShape
-from thenar.runtime.scanning.propose import propose_board, propose_harness
 
 from .conftest import manifest_of
 

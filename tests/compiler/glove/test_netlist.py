@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.compiler.glove.files import spec_files
+from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.glove.spec import glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.drivers.i2c.chips import CHIPS, expanders
@@ -16,7 +17,6 @@ from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, StreamWiring
 from thenar.runtime.manifest import Calibration, Switch, Threshold
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import propose_harness
 
 from .conftest import manifest_of, read_netlist
 

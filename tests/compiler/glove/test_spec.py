@@ -3,13 +3,13 @@
 import pytest
 from msgspec.structs import replace
 
+from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.glove.spec import glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.drivers.i2c.chips import expanders
 from thenar.runtime.errors import BuildError, HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness, StreamWiring
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
 
 from .conftest import manifest_of

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import compare
-from thenar.runtime.model.integers import FINEST_SCALE, IntegerTables, tables_to_bytes
-from thenar.runtime.model.proof import Rounding
-from thenar.runtime.model.quantise import (
+from thenar.compiler.model.proof import Rounding
+from thenar.compiler.model.quantise import (
     GROUP_SIZE,
     TRIED,
     balance,
@@ -20,6 +19,7 @@ from thenar.runtime.model.quantise import (
     reach,
     span,
 )
+from thenar.runtime.model.integers import FINEST_SCALE, IntegerTables, tables_to_bytes
 from thenar.runtime.model.tables import ScoreTables, winners
 
 from .conftest import make_rows, make_stumps

@@ -14,6 +14,7 @@ from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.teaching import (
     DemonstratedGrasp,
     Demonstration,
+    Task,
     aligned,
     behaviour_tree,
     demonstrations,
@@ -24,8 +25,8 @@ from thenar.compiler.movements.segments import levenshtein
 from thenar.compiler.movements.transitions import Transitions
 from thenar.compiler.recordings import RecordingError
 from thenar.runtime import Build
-from thenar.runtime.preshape import Preshape, PreshapeTable
-from thenar.runtime.task import Task
+from thenar.runtime.preshape import PreshapeTable
+from thenar.runtime.published import Preshape
 
 from .conftest import make_movements
 

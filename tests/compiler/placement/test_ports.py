@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.compiler.glove.propose import propose_board, propose_harness
 from thenar.compiler.placement.ports import PortCosts, port_costs, ports_of_whole_glove
 from thenar.compiler.samples import TrainingError
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import propose_board, propose_harness
 from thenar.runtime.scanning.timing import scan_us
 
 sizes = st.integers(1, 200)

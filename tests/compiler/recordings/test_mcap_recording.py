@@ -317,7 +317,7 @@ def test_codes_of_another_calibration_are_those_that_the_live_recogniser_gives_i
     first = PADS.taxels[0]
     coded = Calibration(0, "p", "N", first.rest, 0.0, first.press, first.value)
     limit = count_limit(Threshold(code, 0.0, coded), TaxelCalibration(unit="N", taxels=(own,)))
-    closed, _ = Taxels(["p"], [[(limit, 0)]]).read(0, [raw])
+    closed, _ = Taxels(["p"], [[(limit, 0)]]).read([raw])
     grasps = [
         (
             _Part("", replace(ANALOG, taxel_calibration=TaxelCalibration(unit="N", taxels=(line,))), COLLECTION, ()),
@@ -362,14 +362,3 @@ def test_a_recording_for_a_build_has_the_codes_that_it_gets_live(
     live = CodeTables([coded], ["index_mpj"], meaning)
     assert grasp_set.codes.ravel().tolist() == [live.codes(bytes((byte,)))[0] for byte in range(1, 256)]
     assert grasp_set.joints == (Joint("index_mpj", "deg", codes[0], values[0], codes[1], values[1]),)
-
-
-def test_baselines_are_taken_off_as_they_are_live(tmp_path: Path) -> None:
-    session = replace(ANALOG, harness="[taxels]\nper_minute = 10.0\n")
-    with Recorder(tmp_path / "a.mcap", session) as recorder:
-        for tenth in range(100):
-            recorder.frame(SwitchFrame(tenth * 100_000, 1, taxels=(110, 910)))
-        for what in ("captured", "accepted"):
-            recorder.label(Label(10**7, what, 1, "PoS", "A", "jar"))
-    grasp_set, _ = import_recordings([recorder.path])
-    assert grasp_set.taxels.tolist() == [[100, 900]]

@@ -11,6 +11,7 @@ import pytest
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.frontier.points import Frontier
+from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.hand import HandShape
 from thenar.compiler.model.compare import worst_case
 from thenar.compiler.placement.tree import grow_id3
@@ -18,7 +19,6 @@ from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.report.content import ReportContent
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.harness.wiring import GloveWiring
-from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator.handmaps.handmap import hand_map
 
 from ...sets import grasp_set_of

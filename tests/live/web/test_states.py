@@ -189,26 +189,3 @@ def test_a_recordings_wrong_predictions_are_marked_by_sign_and_words(browser: An
         whole = browser.script("return document.getElementById('whole').getAttribute('aria-label')")
         assert whole.endswith("2 labelled spans, 4 predictions, wrong in 2 spans")
         browser.driver.get("about:blank")
-
-
-def test_a_calibration_whose_glove_falls_silent_is_grey_and_says_its_age(browser: Any) -> None:
-    pose = {
-        **{"step": 1, "stage": "ready", "count": "pose 1 of 2", "done": 0, "total": 2, "title": "Flat hand"},
-        **{"detail": "Lay it flat.", "pose": None, "says": "", "number": "", "problems": [], "offered": {}},
-        **{"devices": [], "sees": "all 1 sensors are measured"},
-        "rows": [{"byte": 80, "flat": None, "state": "", "concerned": True, "faulty": False}],
-    }
-    about = {"what": "Calibration of", "subject": "anna", "leave": "", "table": ["thumb_mcp"], "study": False}
-    first = [message("about", about), message("hands", pose=HAND)]
-    with Server("guided", "127.0.0.1:0", token=None, hello=lambda: first) as server:
-        browser.open(server.url)
-        for number in range(5):
-            server.publish("guide", message("guide", pose, time_us=10_000 * number, age_us=1_000))
-        browser.wait(lambda: browser.text("sees") == "all 1 sensors are measured")
-        # Nothing more comes: the run has stopped.
-        old = "return document.documentElement.classList.contains('old')"
-        browser.wait(lambda: browser.script(old) and browser.text("age").startswith("this is "))
-        assert browser.text("glove-state").startswith("glove: silent since ")
-        server.publish("guide", message("guide", pose, time_us=9_000_000, age_us=1_000))
-        browser.wait(lambda: not browser.script(old))
-        browser.driver.get("about:blank")

@@ -5,10 +5,11 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.drivers.errors import ThenarError
+from thenar.drivers.i2c import chips
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.i2c.chips.pcf8574 import Pcf8574
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.harness import checks, wiring
+from thenar.runtime.harness import checks
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import Debounce, GloveWiring, Harness, MuxChannel
 from thenar.runtime.taxels import TaxelSettings
@@ -54,11 +55,11 @@ def test_stored_text_is_read_with_its_calibration_path_unchanged(full_text: str)
 
 
 def test_the_calibration_of_taxels_counts_from_the_folder_too(load: Load, tmp_path: Path) -> None:
-    settings = load('[taxels]\ncalibration = "pads.toml"\nbaseline = false').taxel_settings
-    assert settings == TaxelSettings(calibration=str(tmp_path / "pads.toml"), baseline=False)
+    settings = load('[taxels]\ncalibration = "pads.toml"').taxel_settings
+    assert settings == TaxelSettings(calibration=str(tmp_path / "pads.toml"))
     assert load('[taxels]\ncalibration = "/pads.toml"').taxel_settings.calibration == "/pads.toml"
     with pytest.raises(HarnessError, match="drift"):
-        load("[taxels]\ndrift = 2")
+        load("[taxels]\ndrift = 0.2")
 
 
 def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> None:
@@ -199,7 +200,7 @@ def test_a_chip_at_the_address_of_a_mux_is_refused(load: Load, monkeypatch: pyte
         addresses = range(0x70, 0x71)
 
     kinds = {**CHIPS, "odd": Odd()}
-    for module in (checks, wiring):
+    for module in (checks, chips):
         monkeypatch.setattr(module, "CHIPS", kinds)
     text = BUS + "[[bus.chip]]\nkind = 'odd'\naddress = 0x70\n" + place(0x20, 0)
     assert "bus[0].chip[0].address: 0x70 is also the address of a mux on this bus" in complaint(load, text)

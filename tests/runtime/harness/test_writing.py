@@ -69,11 +69,7 @@ def harnesses(draw: st.DrawFn) -> Harness:
         streams=(stream,),
         buses=(BusWiring(device="/dev/i2c-1", chips=tuple(chips)),),
         debounce=Debounce(enabled=draw(st.booleans()), release_ms=draw(st.floats(0.0, 1000.0))),
-        taxel_settings=TaxelSettings(
-            calibration=draw(st.none() | st.just("/a/c.toml")),
-            baseline=draw(st.booleans()),
-            drift=draw(st.floats(0, 1)),
-        ),
+        taxel_settings=TaxelSettings(calibration=draw(st.none() | st.just("/a/c.toml"))),
     )
 
 

@@ -9,11 +9,9 @@ import pytest
 from msgspec.structs import replace as changed
 
 from thenar.runtime import Build
-from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.live.quarantine import (
     CHATTERING,
-    DRIFT_US,
-    DRIFTING,
     GRASPS,
     SETTLED_US,
     STUCK_CLOSED,
@@ -282,31 +280,3 @@ def test_a_chattering_switch_is_lost_until_it_is_quiet(make_build: MakeBuild, ev
     quiet = chattering(live, 4_000_000, 1000, 2000)
     assert not quiet[-1]
     assert quiet.index(False) <= 2_000_000 // 5000 + 1
-
-
-def test_a_drifting_joint_alone_is_lost_until_it_returns(make_build: MakeBuild) -> None:
-    build = make_build()
-    live = LiveRecognizer(build, sensor_names=SENSORS, glove_period_us=1_000_000, policy=Policy(max_lost=1.0))
-    said: list[tuple[str, ...]] = []
-    for second, shift in enumerate(shift for shift in (0, 0, 60, 60, 0, 0) for _ in range(DRIFT_US // 1_000_000)):
-        now_us = second * 1_000_000
-        codes = bytes([10 + shift + 180 * (second % 2), 20 + 200 * (second % 2), 20 + 200 * (second % 2)])
-        moment = live.step(now_us, 0, None, GloveFrame(now_us, codes))
-        named = tuple(name for name in moment.grasp.lost if name.startswith("j"))
-        if not said or said[-1] != named:
-            said.append(named)
-        if named:
-            found = build.scorer.biased_scores_without(
-                np.zeros(6, bool), list(codes), np.ones(6, bool), np.array([True, False, False])
-            )
-            assert build.grasps[found.index(max(found))] == moment.grasp.candidate
-            assert live.quarantine.found == (Quarantined("j0", DRIFTING),)
-    assert said == [(), ("j0",), ()]
-
-
-def test_a_resting_first_minute_causes_no_drift_later(make_build: MakeBuild) -> None:
-    live = LiveRecognizer(make_build(), sensor_names=SENSORS, glove_period_us=1_000_000)
-    for second in range(5 * 60):
-        now_us, at = second * 1_000_000, 30 if second < 60 else 120
-        live.step(now_us, 0, None, GloveFrame(now_us, bytes([at + second % 2] * 3)))
-    assert live.quarantine.found == ()

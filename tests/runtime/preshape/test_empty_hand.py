@@ -11,8 +11,8 @@ from thenar.compiler import GraspSet, compile_build
 from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.recogniser import LiveRecognizer
-from thenar.runtime.preshape import Preshape, PreshapeSelector, PreshapeTable
-from thenar.runtime.published import NONE, LiveGrasp
+from thenar.runtime.preshape import PreshapeSelector, PreshapeTable
+from thenar.runtime.published import NONE, LiveGrasp, Preshape
 from thenar.simulator.body.cyberglove import SENSORS
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import simulate

@@ -11,8 +11,8 @@ from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime import Build
-from thenar.runtime.preshape import Preshape, PreshapeSelector, PreshapeTable, preshape_selector
-from thenar.runtime.published import NONE, UNKNOWN, Health, LiveGrasp, State
+from thenar.runtime.preshape import PreshapeSelector, PreshapeTable, preshape_selector
+from thenar.runtime.published import NONE, UNKNOWN, Health, LiveGrasp, Preshape, State
 
 WRAP = Preshape("wrap", ("a",), (0.0,), 1.0)
 PINCH = Preshape("pinch", ("a",), (1.0,), 1.0)

@@ -13,8 +13,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from thenar.runtime.preshape import Preshape
-from thenar.runtime.published import Health, LiveGrasp
+from thenar.runtime.published import Health, LiveGrasp, Preshape
 
 # As they stand in builtin_interfaces, std_msgs, sensor_msgs, trajectory_msgs and diagnostic_msgs, without comments and
 # constants, which are no part of a type's description.

@@ -20,8 +20,7 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
-from thenar.runtime.preshape import Preshape
-from thenar.runtime.published import HealthReport, LiveGrasp
+from thenar.runtime.published import HealthReport, LiveGrasp, Preshape
 from thenar.runtime.sinks import JointAngles, Sink, SinkError, open_sink
 
 MakeGrasp = Callable[..., LiveGrasp]

@@ -5,13 +5,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from thenar.compiler.glove.propose import propose_board, propose_harness
+from thenar.compiler.placement.ports import WireTimes
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, SpiWiring, StreamWiring
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.scanning.plan import Costs, check_harness, plan_scan
+from thenar.runtime.scanning.plan import check_harness, plan_scan
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import propose_board, propose_harness
 from thenar.runtime.scanning.scanmap import check_switches, scanmap_from_bytes, scanmap_to_bytes
 from thenar.runtime.scanning.timing import scan_us
 
@@ -131,9 +132,9 @@ def test_converters_and_expanders_are_read_one_after_the_other() -> None:
     )
     kept = [*(f"{taxel}{number}>1" for number in range(4) for taxel in "ab"), "s0"]
     scan = whole_scan(harness, kept)
-    time, costs = scan_us(scan, harness), Costs(scan.ports, harness)
+    time, times = scan_us(scan, harness), WireTimes(scan.ports, harness)
     assert time.us == pytest.approx(8 * (START + WAIT + READ) + time.chips[-1].us)
-    assert sum(costs.after(0, port) for port in range(len(scan.ports))) == pytest.approx(1000 * time.us, abs=10)
+    assert sum(times.after(0, port) for port in range(len(scan.ports))) == pytest.approx(1000 * time.us, abs=10)
 
 
 # Proposals.

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from thenar.compiler.glove.propose import propose_board
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness, MuxChannel
 from thenar.runtime.scanning.plan import check_harness, plan_scan
-from thenar.runtime.scanning.propose import propose_board
 from thenar.runtime.scanning.scanmap import Port, ScanMap, check_switches, scanmap_from_bytes, scanmap_to_bytes
 from thenar.runtime.scanning.timing import reading_of, scan_us
 

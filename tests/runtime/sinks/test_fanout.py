@@ -5,8 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from thenar.runtime.preshape import Preshape
-from thenar.runtime.published import HealthReport, LiveGrasp
+from thenar.runtime.published import HealthReport, LiveGrasp, Preshape
 from thenar.runtime.sinks import Fanout, JointAngles, JsonLines, Sink, SinkReport
 
 MakeGrasp = Callable[..., LiveGrasp]

@@ -26,8 +26,7 @@ from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.recogniser import LiveRecognizer, Moment
 from thenar.runtime.policy import Policy
-from thenar.runtime.preshape import Preshape
-from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp
+from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp, Preshape
 from thenar.runtime.sinks import SinkError, open_sink
 
 from ...conftest import tool

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 from msgspec import json
 
-from thenar.runtime.preshape import Preshape
-from thenar.runtime.published import LiveGrasp
+from thenar.runtime.published import LiveGrasp, Preshape
 from thenar.runtime.sinks import Fanout, GraspLine, JsonLines, SinkError, open_sink
 
 MakeGrasp = Callable[..., LiveGrasp]

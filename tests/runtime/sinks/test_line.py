@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from msgspec import json as typed_json
 from msgspec.structs import asdict, replace
 
-from thenar.runtime.preshape import Preshape
-from thenar.runtime.published import HealthReport, LiveGrasp
+from thenar.runtime.published import HealthReport, LiveGrasp, Preshape
 from thenar.runtime.sinks import GraspLine, HeaderLine, HealthLine, JointAngles, JsonLines
 from thenar.runtime.sinks.jsonl import encode, encode_health
 from thenar.runtime.sinks.sockets import SocketLines, open_tcp

@@ -9,8 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
-from thenar.runtime.preshape import Preshape
-from thenar.runtime.published import Health, HealthReport, LiveGrasp
+from thenar.runtime.published import Health, HealthReport, LiveGrasp, Preshape
 from thenar.runtime.sinks import Fanout, JsonLines, open_sink
 from thenar.runtime.sinks.base import PublishPace
 from thenar.runtime.sinks.sockets import SocketLines

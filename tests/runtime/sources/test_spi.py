@@ -74,7 +74,7 @@ def test_where_no_converter_answers_levels_are_lost_and_it_says_so(answers: list
 def test_a_saturated_taxel_is_lost_and_named(answers: list[list[int | None]], tmp_path: Path) -> None:
     lines = tuple(TaxelLine(name, rest=50, press=600) for name in ("t1", "t2"))
     (tmp_path / "taxels.toml").write_text(TaxelCalibration(taxels=lines).to_toml())
-    settings = TaxelSettings(calibration=str(tmp_path / "taxels.toml"), baseline=False)
+    settings = TaxelSettings(calibration=str(tmp_path / "taxels.toml"))
     device = SpiConverter(replace(HARNESS, taxel_settings=settings), 1, whole_scan(HARNESS, NAMES))
     answers.append([1023, 400])
     found = device.read(0.1)

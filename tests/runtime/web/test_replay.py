@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from thenar.compiler.hand import grid_hand
 from thenar.drivers.errors import SettingError
 from thenar.runtime import Build
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME
 from thenar.runtime.frames import SwitchFrame
-from thenar.runtime.hand import HAND_NAME, grid_hand, hand_to_bytes
+from thenar.runtime.hand import HAND_NAME, hand_to_bytes
 from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.model.integers import tables_to_bytes
 from thenar.runtime.recording.session import Label, Session

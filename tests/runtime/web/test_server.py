@@ -1,5 +1,6 @@
 """The server of the pages: what it serves, to whom, and what becomes of those who do not keep up."""
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -50,3 +51,19 @@ def test_a_closed_server_says_so_to_its_pages(serve: Callable[..., Any]) -> None
         client.server.close()
         assert list(live) == []
         assert live.close_code == 1001
+
+
+def test_the_last_that_is_published_before_the_end_is_shown(
+    serve: Callable[..., Any], hear: Callable[..., Any]
+) -> None:
+    """A page says how it ended, however soon the server ends then."""
+    client = serve()
+    with client.open() as live:
+        client.server.publish("frame", b'{"topic":"frame","number":0}')
+        assert hear(live)["number"] == 0
+        for number in range(1, 200):
+            client.server.publish("frame", b'{"topic":"frame","number":%d}' % number)
+        client.server.close()
+        while (told := hear(live))["number"] < 199:
+            assert told["number"] > 0
+        assert {json.loads(text)["number"] for text in live} <= {199}

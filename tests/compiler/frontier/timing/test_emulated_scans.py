@@ -16,13 +16,13 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.compiler.frontier.wirings import BOARD, wirings
+from thenar.compiler.glove.propose import propose_board
 from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c, WireCounters
 from thenar.drivers.errors import DeviceError
 from thenar.drivers.i2c.bus import I2cBus, PlacedPort, Scan
 from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import propose_board
 from thenar.runtime.scanning.timing import free_us, reading_of, scan_us
 
 # Numbers of switches on new gloves; the most need muxes.

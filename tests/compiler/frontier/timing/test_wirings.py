@@ -14,13 +14,13 @@ from thenar.compiler.frontier.wirings import (
     scan_times,
     wirings,
 )
+from thenar.compiler.glove.propose import propose_board, propose_harness
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import BoardWiring, GloveWiring, Harness, StreamWiring
 from thenar.runtime.scanning.plan import plan_scan
-from thenar.runtime.scanning.propose import propose_board, propose_harness
 from thenar.runtime.scanning.timing import row_us, scan_us
 
 sizes = st.integers(1, 200)

@@ -2,12 +2,12 @@ from itertools import combinations_with_replacement
 
 import pytest
 
+from thenar.compiler.glove.propose import propose_harness
 from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import GloveWiring, MuxChannel
 from thenar.runtime.scanning.ports import ports_of, whole_scan
-from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
 
 KINDS = sorted(expanders())

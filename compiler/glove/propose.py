@@ -8,9 +8,8 @@ from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS, Chip, Converter, expanders
 from thenar.drivers.spi.chips import SPI_CHIPS
-
-from ..errors import HarnessError
-from ..harness.wiring import (
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.wiring import (
     MOST_COLUMNS,
     BoardWiring,
     BusWiring,
@@ -21,8 +20,8 @@ from ..harness.wiring import (
     SpiWiring,
     StreamWiring,
 )
-from ..names import list_names, nearest, taxel_and_code
-from .timing import row_us
+from thenar.runtime.names import nearest, taxel_and_code
+from thenar.runtime.scanning.timing import row_us
 
 # Supported by every board's I2C, and most chips; a slower chip slows it down.
 CLOCK_HZ = 400_000
@@ -140,16 +139,6 @@ def propose_cyberglove(joints: Sequence[str]) -> GloveWiring | None:
     if sensors is None:
         return None
     return GloveWiring(port="/dev/ttyUSB0", sensors=None if sensors == SENSORS else 22)
-
-
-def own_joints(joints: Sequence[str]) -> str:
-    """Return a sentence on how to read joints that no CyberGlove measures; "" for others, and without joints."""
-    if not joints or sensors_with(joints) is not None:
-        return ""
-    return (
-        f"joints {list_names(joints)} need a source of your own: a board that prints them ([[stream]] of glove.toml), "
-        "or a source that you add (docs/how-to/extend.md)"
-    )
 
 
 def _inputs(chip: Chip) -> list[str]:
