@@ -2,10 +2,10 @@
 
     python benchmarks/live.py [--seconds N]
 
-Prints three tables and the path of a frame: microseconds of CPU per frame, with all inputs changing and with a hand at
-rest, and of a row by UDP from its datagram on; frames per second on emulated devices compared with the wire's limit; the
-files that a frame passes from the bytes on the wire to a published grasp, and the calls per grasp; the peak memory of a
-`thenar run` compared with 45 MiB. Emulated buses need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0,
+Prints two tables and the path of a frame: microseconds of CPU per frame, with all inputs changing and with a hand at
+rest; those of a row by UDP from its datagram on; frames per second on emulated devices compared with the wire's limit;
+the files that a frame passes from the bytes on the wire to a published grasp, and the calls per grasp; the peak memory
+of a `thenar run` compared with 45 MiB. Emulated buses need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0,
 python3-gi). Emulated devices and readers run on the same cores as the run, so a busy or single-core machine gives worse
 numbers than a glove would.
 """

@@ -19,7 +19,7 @@ from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.live.sources import FrameBuffer, Snapshot
-from thenar.runtime.scanning.propose import propose_harness
+from thenar.compiler.glove.propose import propose_harness
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.playing.performance import Performance, of_scene
 
