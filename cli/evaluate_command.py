@@ -167,7 +167,7 @@ def command(
     whose streams are decoded, live and afterwards. The dwell rule and a plain hidden Markov model are compared.
 
     --by subject --adapt leaves out each subject. It adapts the others' model to the subject's first trials, as `thenar
-    adapt` does, and tests it on the rest, before and after.
+    adapt` does with the strength that suits the other subjects, and tests it on the rest, before and after.
 
     \b
     Example:
