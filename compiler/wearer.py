@@ -286,8 +286,8 @@ class Adaptation:
         tables = self._start(kept)
         ones = np.ones((1, len(weights)))
         bias = tables.bias + _product(ones, weights)[0]
-        closed = CLOSED * self.bits[self._rows].T
-        switch_rows = tables.switch_rows + _product(closed, weights)
+        closed = self.bits[self._rows].T.astype(np.float64)
+        switch_rows = tables.switch_rows + CLOSED * _product(closed, weights)
         near = {term.inputs: near for term, near, _ in self._near}
         rows = {
             term: term.rows + _product(near[term.inputs], weights).reshape(term.rows.shape)
