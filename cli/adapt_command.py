@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .parameters import OutputFolder, existing_file, existing_folder, keep_apart
+from .parameters import OutputFolder, add_type_option, existing_file, existing_folder, keep_apart
 from .printing import echo, json_flag, progress, show, warning
 
 if TYPE_CHECKING:
@@ -17,12 +17,14 @@ if TYPE_CHECKING:
 @click.argument("build", metavar="BUILD", type=existing_folder)
 @click.argument("mine", metavar="MINE.grasps", type=existing_file)
 @click.option("-o", "--output", metavar="DIR", type=OutputFolder(), required=True, help="The folder to write.")
+@add_type_option
 @json_flag
-def command(build: Path, mine: Path, output: Path) -> None:
+def command(build: Path, mine: Path, output: Path, add_type: tuple[str, ...]) -> None:
     """Adapt BUILD to one person, from a few trials in MINE.grasps: two of each type are enough to help.
 
     The result is a build with the same switches, joints and thresholds, and other scores. Types may be missing: they
-    change as the others do on average. Recordings of other people are not needed.
+    change as the others do on average. Recordings of other people are not needed. With --add-type, BUILD learns a type
+    that nobody else has.
 
     It needs no more than `pip install thenar`; only the firmware needs thenar[compiler]. The same input gives the same
     bytes.
@@ -30,6 +32,7 @@ def command(build: Path, mine: Path, output: Path) -> None:
     \b
     Example:
         thenar adapt build/ mine.grasps -o mine/
+        thenar adapt build/ mine.grasps --add-type stapler -o mine/
         thenar run mine/ --replay mine.grasps
     """
     from thenar.compiler.artifact.adapting import adapt
@@ -37,7 +40,7 @@ def command(build: Path, mine: Path, output: Path) -> None:
 
     keep_apart(mine, output)
     with progress("adapting"):
-        made = adapt(build, GraspSet.load(mine), output)
+        made = adapt(build, GraspSet.load(mine), output=output, add_type=add_type)
     for sentence in made.warnings:
         warning(sentence)
     show(made.manifest, lambda _: _print(made, output))

@@ -159,7 +159,7 @@ def command(
     whose streams are decoded, live and afterwards, and compared with the dwell rule.
 
     --by subject --adapt leaves out each subject. It adapts the others' model to the subject's first trials, as `thenar
-    adapt` does, and tests it on the rest, before and after.
+    adapt` does with the strength that suits the other subjects, and tests it on the rest, before and after.
 
     \b
     Example:

@@ -200,6 +200,14 @@ def web_options(command: Command) -> Command:
     return option(web_token_option(command))
 
 
+add_type_option = click.option(
+    "--add-type",
+    metavar="NAME",
+    multiple=True,
+    help="A grasp type that BUILD does not know, to be taught by three trials of it; repeatable.",
+)
+
+
 def comma_separated(text: str) -> tuple[str, ...]:
     """Return the comma-separated parts of `text`, each once, in the order given."""
     return tuple(dict.fromkeys(part.strip() for part in text.split(",")))

@@ -10,6 +10,7 @@ import click
 from .parameters import (
     Number,
     OutputFile,
+    add_type_option,
     check_devices,
     existing_file,
     existing_folder,
@@ -27,10 +28,15 @@ if TYPE_CHECKING:
 @click.command("record")
 @click.option("--glove", type=existing_file, required=True, help="The harness, a glove.toml.")
 @click.option("--for", "build", metavar="BUILD", type=existing_folder, help="Record what this build recognises.")
+@add_type_option
 @click.option("--taxonomy", help="kamakura14, cutkosky16, feix33 or own.  [default: kamakura14, or the build's]")
 @click.option("--subject", required=True, help="Name of the subject.")
 @click.option("--objects", type=existing_file, help="objects.toml: the objects for each grasp type.")
-@click.option("--repetitions", type=click.IntRange(1), help="Trials per grasp type.  [default: 100, or 2 for a build]")
+@click.option(
+    "--repetitions",
+    type=click.IntRange(1),
+    help="Trials per grasp type.  [default: 100; for a build 2, 3 to add a type]",
+)
 @click.option(
     "--countdown",
     type=Number(0, 3600),
@@ -50,6 +56,7 @@ if TYPE_CHECKING:
 def command(
     glove: Path,
     build: Path | None,
+    add_type: tuple[str, ...],
     taxonomy: str | None,
     subject: str,
     objects: Path | None,
@@ -86,10 +93,7 @@ def command(
     keep_apart(glove, objects, output, recording)
     if output.exists() and not recording.exists():
         raise click.UsageError(f"{output} exists, but its recording {recording.name} does not: name another --output")
-    if build is not None and (taxonomy is not None or objects is not None or none is not None):
-        raise click.UsageError("--for takes grasp types from the build: leave out --taxonomy, --objects and --none")
-    if taxonomy == "own" and objects is None:
-        raise click.UsageError("--taxonomy own takes its grasp types from an objects.toml: name it with --objects")
+    _check_types(build, add_type, taxonomy, objects, none)
     harness = load_harness(glove)
     check_devices(harness, glove)
     check_names("subject", [subject])
@@ -102,11 +106,12 @@ def command(
         with progress(f"reading {recording.name}"):
             journal = read_journal(recording)
     if loaded is not None:
-        types, tasks = tasks_of(loaded.manifest)
+        types, tasks = tasks_of(loaded.manifest, add_type)
     else:
         types, tasks = collected(taxonomy or "kamakura14", objects, _with_none(journal) if none is None else none)
     drawn = secrets.randbits(32) if seed is None else seed
-    wanted = Collection(subject, types.name, types.types, tasks, repetitions or (100 if build is None else 2), drawn)
+    repetitions = repetitions or (100 if build is None else 3 if add_type else 2)
+    wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
     if journal is not None:
         wanted = _resumed(journal, wanted, seed)
     trials = planned(wanted)
@@ -116,6 +121,18 @@ def command(
         collect(harness, glove, wanted, trials, recording, journal, countdown, write)
     else:
         write(accepted)
+
+
+def _check_types(
+    build: Path | None, add_type: tuple[str, ...], taxonomy: str | None, objects: Path | None, none: bool | None
+) -> None:
+    """Raise UsageError if the options name grasp types in two ways, or in none."""
+    if build is not None and (taxonomy is not None or objects is not None or none is not None):
+        raise click.UsageError("--for takes grasp types from the build: leave out --taxonomy, --objects and --none")
+    if build is None and add_type:
+        raise click.UsageError("--add-type adds a grasp type to those of a build: name it with --for")
+    if taxonomy == "own" and objects is None:
+        raise click.UsageError("--taxonomy own takes its grasp types from an objects.toml: name it with --objects")
 
 
 def _with_none(journal: "Journal | None") -> bool:

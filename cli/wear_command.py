@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from .group import thenar
-from .parameters import Number, OutputFolder, existing_file, existing_folder
+from .parameters import Number, OutputFolder, add_type_option, existing_file, existing_folder
 from .printing import echo
 
 
@@ -14,12 +14,20 @@ from .printing import echo
 @click.argument("build", metavar="BUILD", type=existing_folder)
 @click.option("--glove", type=existing_file, required=True, help="The harness, a glove.toml.")
 @click.option("--subject", default="me", show_default=True, help="Name of the wearer.")
-@click.option("--repetitions", type=click.IntRange(1), default=2, show_default=True, help="Trials per grasp type.")
+@add_type_option
+@click.option("--repetitions", type=click.IntRange(1), help="Trials per grasp type.  [default: 2, 3 to add a type]")
 @click.option("--countdown", type=Number(0, 3600), default=3.0, show_default=True, help="Countdown, seconds.")
 @click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop the run after N frames.")
 @click.option("-o", "--output", metavar="DIR", type=OutputFolder(), required=True, help="The wearer's build.")
 def command(
-    build: Path, glove: Path, subject: str, repetitions: int, countdown: float, frames: int | None, output: Path
+    build: Path,
+    glove: Path,
+    subject: str,
+    add_type: tuple[str, ...],
+    repetitions: int | None,
+    countdown: float,
+    frames: int | None,
+    output: Path,
 ) -> None:
     """Adapt BUILD to the person who wears the glove, and run it. 14 grasp types take two minutes.
 
@@ -35,11 +43,13 @@ def command(
 
     trials = Path(f"{check_target(output)}.grasps")
     harness = ("--glove", str(glove))
-    collected = ("--subject", subject, "--repetitions", str(repetitions), "--countdown", str(countdown))
+    taught = [word for name in add_type for word in ("--add-type", name)]
+    often = () if repetitions is None else ("--repetitions", str(repetitions))
+    collected = ("--subject", subject, *taught, *often, "--countdown", str(countdown))
     some = () if frames is None else ("--frames", str(frames))
     for words in (
         ("record", "--for", str(build), *harness, *collected, "-o", str(trials)),
-        ("adapt", str(build), str(trials), "-o", str(output)),
+        ("adapt", str(build), str(trials), *taught, "-o", str(output)),
         ("verify", str(output), str(trials)),
         ("run", str(output), *harness, *some),
     ):

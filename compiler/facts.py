@@ -101,7 +101,9 @@ def _accuracy(manifest: Manifest) -> Iterator[Fact]:
         yield Fact("accuracy", f"accuracy, {rate.title}", str(rate).removeprefix(f"{rate.title}: "))
     if manifest.adapted is not None:
         counts = [count for count in manifest.adapted.counts if count]
-        yield Fact("accuracy", "adapted", f"to {counted(sum(counts), 'trial')} of {counted(len(counts), 'type')}")
+        added = f"; added: {listed(manifest.adapted.added)}" if manifest.adapted.added else ""
+        to = f"to {counted(sum(counts), 'trial')} of {counted(len(counts), 'type')}{added}"
+        yield Fact("accuracy", "adapted", to)
     if manifest.grasps[-1] == NONE:
         yield Fact("accuracy", "nothing held", "a class of the tables")
     elif manifest.rejection is not None:

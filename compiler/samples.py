@@ -234,11 +234,9 @@ class Samples:
 
 
 def check_types(types: int, raises: type[ThenarError]) -> None:
-    """Raise `raises` if the recordings hold more grasp types than a build can."""
+    """Raise `raises` if there are more grasp types than a build can have."""
     if types > MAX_CLASSES:
-        raise raises(
-            f"the recordings hold {types} grasp types, a build has at most {MAX_CLASSES}: join types, or leave some out"
-        )
+        raise raises(f"{types} grasp types, a build has at most {MAX_CLASSES}: join types, or leave some out")
 
 
 def decided(predicted: NDArray[np.intp], trial: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -3,7 +3,7 @@
 `build.json` holds its fields in the order of the structs below: see manifest_file.py.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
@@ -319,14 +319,15 @@ class Wearing(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     related: tuple[Annotated[int, Meta(ge=-1000, le=1000)], ...] = ()
 
 
-class Adapted(Struct, frozen=True, forbid_unknown_fields=True):
+class Adapted(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """The checksum of the build that this one is an adaptation of, and its wearer's recordings, with the number of
-    trials of each grasp type.
+    trials of each grasp type; `added` are the types that the other build does not have.
     """
 
     build: Digest
     source: Origin
     counts: tuple[Count, ...]
+    added: tuple[Name, ...] = ()
 
 
 class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
@@ -379,6 +380,11 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     def knows_none(self) -> bool:
         """Whether rows in which nothing is held were trained on."""
         return self.grasps[-1] == NONE
+
+    def grasps_with(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Return the grasp types with further ones, and NONE last if it is one."""
+        place = len(self.grasps) - self.knows_none
+        return (*self.grasps[:place], *names, *self.grasps[place:])
 
     @property
     def classes(self) -> tuple[str, ...]:

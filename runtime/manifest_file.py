@@ -59,7 +59,7 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     wearing, adapted, joints = manifest.wearing, manifest.adapted, len(manifest.joints)
     if wearing is not None and len(wearing.related) not in (0, joints * (joints - 1) // 2):
         yield "relates other joints than it has"
-    if adapted is not None and len(adapted.counts) != len(manifest.grasps):
+    if adapted and (len(adapted.counts) != len(manifest.grasps) or not {*adapted.added} <= {*manifest.grasps}):
         yield "was adapted to trials of other grasp types than it has"
 
 

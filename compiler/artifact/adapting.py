@@ -8,25 +8,27 @@ from pathlib import Path
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build, read_member
 from thenar.runtime.hand import HAND_NAME
-from thenar.runtime.manifest import Adapted, Manifest, Of, Recognised, Rejection, Wearing
+from thenar.runtime.manifest import Adapted, Manifest, Of, Recognised, Rejection, Switch, Wearing
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import LIMIT, MAX_BYTES, IntegerTables, tables_to_bytes
 from thenar.runtime.model.tables import winners
-from thenar.runtime.names import list_names, nearest
+from thenar.runtime.names import list_names, nearest, shortened
+from thenar.runtime.published import NONE
 from thenar.runtime.segmenting.model import STEPS, SegmentModel, gain_of
 
 from ..model.collapse import collapse
 from ..model.compare import compare
 from ..model.quantise import quantise
 from ..recogniser import predicted_classes
-from ..recordings.graspset import GraspSet
-from ..samples import decided, select_inputs
+from ..recordings.graspset import GraspSet, Joint
+from ..recordings.taxonomy import ANY, own
+from ..samples import Samples, check_types, decided, select_inputs
 from ..wearer import STRENGTH, Adaptation, AdaptationError
-from .compile import check_target, origin_of, proof_of, publish, sha256
+from .compile import check_target, closed_shares, origin_of, proof_of, publish, sha256
 from .documents import SPEC_FOLDER
 from .ensemble import ensemble_to_bytes
 from .verify import load_ensemble
@@ -59,7 +61,15 @@ class AdaptedBuild:
     firmware: str
 
 
-def adapt(folder: str | Path, recordings: GraspSet, output: str | Path) -> AdaptedBuild:
+def adapt(
+    folder: str | Path,
+    X: GraspSet | ArrayLike,
+    y: ArrayLike | None = None,
+    *,
+    output: str | Path,
+    trials: ArrayLike | None = None,
+    add_type: Sequence[str] = (),
+) -> AdaptedBuild:
     """Write a build for one person: the same elements, thresholds and kinds of terms, with scores for this person.
 
     The base dependencies suffice; without the extra `compiler` the build has no firmware. The same input gives the same
@@ -69,10 +79,18 @@ def adapt(folder: str | Path, recordings: GraspSet, output: str | Path) -> Adapt
     ----------
     folder : path
         The build of everybody.
-    recordings : GraspSet
-        The person's trials. Types may be missing.
+    X : GraspSet, or array, shape (n, s + j)
+        The person's trials: recordings, or a frame in each row, first the bits of the build's switches (of a taxel:
+        whether its code is above the threshold), then the codes of its joints, in the order of `build.json`.
+    y : array of str, shape (n,), optional
+        The grasp type of each frame of an array. Types may be missing.
     output : path
         The folder to write: new, empty, or a build, which is replaced.
+    trials : array of int, shape (n,), optional
+        The trial of each frame of an array. None: each is a trial.
+    add_type : sequence of str
+        Types that the build does not know and that these trials teach: three of each suffice, with two of each type
+        that it knows.
 
     Returns
     -------
@@ -82,9 +100,11 @@ def adapt(folder: str | Path, recordings: GraspSet, output: str | Path) -> Adapt
     Raises
     ------
     AdaptationError
-        If there are no trials, or of a type that the build does not know.
+        If there are no trials, or of a type that the build does not know; if a type to add is known or has no trials.
     CompileError
         If the recordings lack inputs of the build, or `output` is not a folder for one.
+    RecordingError
+        If an array holds no bits and codes.
     BuildError, FormatError
         If there is no build.
 
@@ -94,35 +114,39 @@ def adapt(folder: str | Path, recordings: GraspSet, output: str | Path) -> Adapt
     >>> from thenar.compiler import GraspSet, adapt, compile_build
     >>> grasp_set = GraspSet.load("set.grasps")
     >>> report = compile_build(grasp_set, "build", rounds=5, folds=0)
-    >>> sum(adapt("build", grasp_set.rows(np.arange(6)), "mine").manifest.adapted.counts)
+    >>> sum(adapt("build", grasp_set.rows(np.arange(6)), output="mine").manifest.adapted.counts)
     6
+
+    From arrays, with a type that nobody else has:
+
+    >>> manifest = report.manifest
+    >>> X = np.tile(np.arange(len(manifest.switches) + len(manifest.joints)) % 2, (5, 1))
+    >>> y = ["my own"] * 3 + [manifest.grasps[0]] * 2
+    >>> adapt("build", X, y, output="mine", add_type=["my own"]).manifest.adapted.added
+    ('my own',)
     """
     target, source = check_target(Path(output)), Path(folder)
     crowd = Build.load(source)
     manifest, old, wearing = crowd.manifest, crowd.tables, crowd.manifest.wearing or Wearing(STRENGTH)
     if target == source.resolve() or manifest.adapted is not None:
         raise AdaptationError(f"{source} must be the build of everybody, and the folder to write another one")
-    if not manifest.knows_none:
-        recordings = recordings.without_none()
-    grasps = np.array(manifest.grasps)
-    if unknown := sorted({*recordings.grasps.tolist()} - {*manifest.grasps}):
-        raise AdaptationError(
-            f"the build does not know {list_names(unknown)}{nearest(unknown[0], manifest.grasps)}: leave these trials "
-            "out, or compile a build with trials of others"
-        )
-    bits, codes = select_inputs(recordings, manifest)
-    labels = (recordings.grasps[:, np.newaxis] == grasps).argmax(axis=1)
+    recordings, bits, codes = _inputs(manifest, X, y, trials)
+    place = len(manifest.grasps) - manifest.knows_none
+    new, names = range(place, place + len(add_type)), manifest.grasps_with(add_type)
+    _check_types(manifest, recordings, add_type)
+    labels = (recordings.grasps[:, np.newaxis] == np.array(names)).argmax(axis=1)
     before = collapse(load_ensemble(source, crowd), old.n_switches)
-    trials = recordings.trial_ids
-    adaptation = Adaptation(before, bits, codes, labels, trials, wearing.strength, wearing.related)
+    trial = recordings.trial_ids
+    adaptation = Adaptation(before, bits, codes, labels, trial, wearing.strength, wearing.related, new)
     made = quantise(adaptation.adapted, bits, codes, manifest.options.width, manifest.options.table_bits)
-    tables = _with_substitutes(made, old, bits, codes)
-    rejection = _wider(manifest.rejection, old, tables, bits, codes, labels)
-    guesses = [labels, winners(before.scores(bits, codes)), winners(adaptation.left_out)]
+    tables = _with_substitutes(made, old, bits, codes, adaptation)
+    rejection = _wider(manifest.rejection, old, tables, bits, codes, labels, new)
+    known = np.delete(np.arange(len(names)), new)
+    guesses = [labels, known[winners(before.scores(bits, codes))], winners(adaptation.left_out)]
     guesses.append(predicted_classes(tables, rejection, bits, codes))
-    truth, *rows = decided(np.stack(guesses), np.unique(trials, return_inverse=True)[1])
+    truth, *rows = decided(np.stack(guesses), np.unique(trial, return_inverse=True)[1])
     unadapted, left_out, learnt = (int(np.count_nonzero(row == truth)) for row in rows)
-    counts, seed = np.bincount(truth, minlength=len(grasps)).tolist(), manifest.options.seed
+    counts, seed = np.bincount(truth, minlength=len(names)).tolist(), manifest.options.seed
     of: Of = "within subject"
     files = {TABLES_NAME: tables_to_bytes(tables), ENSEMBLE_NAME: ensemble_to_bytes(adaptation.adapted)}
     described = manifest_to_bytes(
@@ -131,6 +155,8 @@ def adapt(folder: str | Path, recordings: GraspSet, output: str | Path) -> Adapt
             thenar=version("thenar"),
             tables_sha256=sha256(files[TABLES_NAME]),
             ensemble_sha256=sha256(files[ENSEMBLE_NAME]),
+            grasps=names,
+            switches=_closed(manifest.switches, Samples(bits, codes, labels, names, trial), new),
             proof=proof_of(tables, compare(adaptation.adapted, tables, bits, codes), manifest.options.width),
             rates=(
                 Recognised("training", 0, seed, learnt, len(truth), of, "trials"),
@@ -139,8 +165,8 @@ def adapt(folder: str | Path, recordings: GraspSet, output: str | Path) -> Adapt
             faults=None,
             detection=(),
             rejection=rejection,
-            segments=_rescaled(manifest.segments, old.scale / tables.scale),
-            adapted=Adapted(manifest.checksum, origin_of(recordings), tuple(counts)),
+            segments=_rescaled(manifest.segments, old.scale / tables.scale, new),
+            adapted=Adapted(manifest.checksum, origin_of(recordings), tuple(counts), tuple(add_type)),
         )
     )
     personal = manifest_from_bytes(described)
@@ -150,11 +176,77 @@ def adapt(folder: str | Path, recordings: GraspSet, output: str | Path) -> Adapt
         firmware, note = {}, ""
     files |= {path: text.encode() for path, text in firmware.items()} | _carried(source, manifest)
     publish(files | {MANIFEST_NAME: described}, target)
-    return AdaptedBuild(target, personal, unadapted, left_out, tuple(_warnings(manifest, adaptation, counts)), note)
+    return AdaptedBuild(target, personal, unadapted, left_out, tuple(_warnings(personal, adaptation)), note)
+
+
+def _inputs(
+    manifest: Manifest, X: GraspSet | ArrayLike, y: ArrayLike | None, trials: ArrayLike | None
+) -> tuple[GraspSet, NDArray[np.bool_], NDArray[np.uint16]]:
+    """Return the trials as recordings, without those of nothing held where the build does not know it, and as the
+    build's inputs (n, s) and (n, j).
+    """
+    if isinstance(X, GraspSet):
+        recordings = X if manifest.knows_none else X.without_none()
+        return recordings, *select_inputs(recordings, manifest)
+    frames, grasps, s = np.asarray(X), np.asarray([] if y is None else y, np.str_), len(manifest.switches)
+    if frames.shape != (len(grasps), s + len(manifest.joints)):
+        raise AdaptationError(
+            f"X has shape {frames.shape}: it needs a row for each of the {len(grasps)} names in y, and a column for "
+            f"each of the build's {s} switches, then {len(manifest.joints)} joints"
+        )
+    recordings = GraspSet(
+        switches=frames[:, :s],
+        switch_names=tuple(switch.name for switch in manifest.switches),
+        codes=frames[:, s:],
+        joints=tuple(Joint(*structs.astuple(joint)[1:]) for joint in manifest.joints),
+        grasps=grasps,
+        taxonomy=own(np.unique(grasps).tolist()),
+        subjects=np.full(len(grasps), "wearer"),
+        objects=np.full(len(grasps), ANY),
+        trials=np.arange(len(grasps)) if trials is None else np.asarray(trials),
+    )
+    recordings = recordings if manifest.knows_none else recordings.rows(recordings.grasps != NONE)
+    return recordings, recordings.switches, recordings.codes
+
+
+def _check_types(manifest: Manifest, recordings: GraspSet, add_type: Sequence[str]) -> None:
+    """Raise AdaptationError for trials of unknown types, and for types that are not new or have no trials."""
+    present = {*recordings.grasps.tolist()}
+    if unknown := sorted(present - {*manifest.grasps, *add_type}):
+        raise AdaptationError(
+            f"the build does not know {list_names(unknown)}{nearest(unknown[0], manifest.grasps)}: leave these trials "
+            "out, or teach new types with ``add_type``"
+        )
+    check_types(len(manifest.grasps) + len(add_type), AdaptationError)
+    for number, name in enumerate(add_type):
+        if name in (*manifest.grasps, *add_type[:number], NONE):
+            raise AdaptationError(f"{shortened(name)} is no new type: leave it out of ``add_type``")
+        if name not in present:
+            raise AdaptationError(f"there are no trials of {shortened(name)} to teach it with: record three")
+
+
+def _closed(switches: Sequence[Switch], trials: Samples, new: range) -> tuple[Switch, ...]:
+    """Return the switches with the shares of the trials of `new` types in which they are closed."""
+
+    def with_new(text: str, shares: NDArray[np.uint8]) -> str:
+        return text and text[: 2 * new.start] + shares[new].tobytes().hex() + text[2 * new.start :]
+
+    return tuple(
+        structs.replace(
+            switch,
+            closed_least=with_new(switch.closed_least, least),
+            closed_most=with_new(switch.closed_most, most),
+        )
+        for switch, least, most in zip(switches, *closed_shares(trials), strict=True)
+    )
 
 
 def _with_substitutes(
-    made: IntegerTables, old: IntegerTables, bits: NDArray[np.bool_], codes: NDArray[np.uint16]
+    made: IntegerTables,
+    old: IntegerTables,
+    bits: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+    adaptation: Adaptation,
 ) -> IntegerTables:
     """Return tables whose substitutes of lost inputs differ from the mean contributions in the person's frames, which
     they are in `made`, as much as they did before.
@@ -162,11 +254,12 @@ def _with_substitutes(
     switch_means, joint_means = made.switch_means.astype(np.float64), made.joint_means.astype(np.float64)
     ratio, rows = made.scale / old.scale, made.switch_rows
     share = bits.sum(axis=0)[:, np.newaxis] / len(bits)
-    switch_means += (old.switch_means - share * old.switch_rows) * ratio
+    shares = adaptation.shares(adaptation.everything)
+    switch_means += adaptation.with_new((old.switch_means - share * old.switch_rows) * ratio, shares)
     for joint, column in enumerate(codes.T):
         contribution = sum(term.of(column).astype(np.int64).sum(axis=0) for term in old.of_joint(joint))
         possible = made.choices(joint)[1]
-        joint_means[joint] += (old.joint_means[joint] - contribution / len(codes)) * ratio
+        joint_means[joint] += adaptation.with_new((old.joint_means[joint] - contribution / len(codes)) * ratio, shares)
         joint_means[joint] = np.clip(joint_means[joint], possible.min(axis=0), possible.max(axis=0))
     switch_means = np.clip(switch_means, np.minimum(rows, 0), np.maximum(rows, 0))
     return replace(
@@ -183,13 +276,21 @@ def _wider(
     bits: NDArray[np.bool_],
     codes: NDArray[np.uint16],
     labels: NDArray[np.intp],
+    new: range,
 ) -> Rejection | None:
-    """Return the limits in steps of the new tables, widened so that each contains the person's frames of its type."""
+    """Return the limits in steps of the new tables, widened so that each contains the person's frames of its type.
+
+    Those of `new` types contain the limits of all others: a few trials say little of what is beyond them.
+    """
     if rejection is None:
         return None
     scores, count = tables.scores(bits, codes), bits.sum(axis=1)
     least = [math.floor(score * tables.scale / old.scale) for score in rejection.least_scores]
     closed, ranges = list(rejection.closed), list(rejection.ranges)
+    for label in new:
+        least.insert(label, min(least))
+        closed.insert(label, _around(closed))
+        ranges.insert(label, tuple(map(_around, zip(*ranges, strict=True))))
     for label in np.unique(labels).tolist():
         rows = labels == label
         least[label] = min(least[label], int(scores[rows, label].min()))
@@ -201,12 +302,21 @@ def _wider(
     return structs.replace(rejection, **limits, closed=tuple(closed), ranges=tuple(ranges))
 
 
-def _rescaled(segments: SegmentModel | None, ratio: float) -> SegmentModel | None:
-    """Return the costs of segments for scores of `ratio` times as many units a step."""
+def _around(limits: Sequence[tuple[int, int]]) -> tuple[int, int]:
+    """Return the limits that contain all these."""
+    lowest, highest = zip(*limits, strict=True)
+    return min(lowest), max(highest)
+
+
+def _rescaled(segments: SegmentModel | None, ratio: float, new: range) -> SegmentModel | None:
+    """Return the costs of segments for scores of `ratio` times as many units a step; `new` types cost the median."""
     if segments is None:
         return None
     shift, gain = gain_of(1.0, segments.gain * ratio / STEPS / 2.0 ** (8 + segments.shift))
-    return structs.replace(segments, shift=shift, gain=gain)
+    place, costs = new.start, {name: getattr(segments, name) for name in ("least", "stay", "enter", "leave", "direct")}
+    for name, known in costs.items():
+        costs[name] = (*known[:place], *(sorted(known[:place])[place // 2],) * len(new), *known[place:])
+    return structs.replace(segments, shift=shift, gain=gain, **costs)
 
 
 def _carried(folder: Path, manifest: Manifest) -> dict[str, bytes]:
@@ -217,9 +327,14 @@ def _carried(folder: Path, manifest: Manifest) -> dict[str, bytes]:
     return files | {f"{SPEC_FOLDER}/{path.name}": read_member(path, MAX_BYTES) for path in spec}
 
 
-def _warnings(manifest: Manifest, adaptation: Adaptation, counts: Sequence[int]) -> Iterator[str]:
+def _warnings(personal: Manifest, adaptation: Adaptation) -> Iterator[str]:
+    assert personal.adapted is not None
     for classes in adaptation.contradictions:
-        names = list_names([manifest.grasps[number] for number in classes])
+        names = list_names([personal.grasps[number] for number in classes])
         yield f"a frame is the same for {names}: if one of these trials was labelled wrongly, leave it out"
-    if missing := [name for name, count in zip(manifest.grasps, counts, strict=True) if not count]:
-        yield f"no trials of {list_names(missing)}: they change as the other types do on average"
+    if missing := [name for name, count in zip(personal.grasps, personal.adapted.counts, strict=True) if not count]:
+        added = personal.adapted.added
+        change = (
+            f"some may be taken for {list_names(added)}" if added else "they change as the other types do on average"
+        )
+        yield f"no trials of {list_names(missing)}: {change}"

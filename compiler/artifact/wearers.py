@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import product
 from statistics import fmean
 
 import msgspec
@@ -71,11 +72,17 @@ def chosen_strength(hits: Sequence[Hits], folds: int, seed: int) -> tuple[float,
     if len(hits) < _LEAST_PEOPLE:
         return STRENGTH, []
     totals = [total for _, total in hits]
-    correct = [own[_best([*hits[:person], *hits[person + 1 :]])] for person, (own, _) in enumerate(hits)]
+    correct = [own[best] for best, (own, _) in zip(_chosen_by_others(hits), hits, strict=True)]
     low, high = (round(end, 6) for end in clustered(correct, totals, "trials"))
     of: Of = "new subject after adaptation"
     rate = Recognised("nested", folds, seed, sum(correct), sum(totals), of, "trials", low, high)
     return STRENGTHS[_best(hits)], [rate]
+
+
+def _chosen_by_others(hits: Sequence[Hits]) -> list[int]:
+    """Return for each person the number of the strength that suits the others; the usual one, if they are too few."""
+    usual, few = STRENGTHS.index(STRENGTH), len(hits) < _LEAST_PEOPLE
+    return [usual if few else _best([*hits[:person], *hits[person + 1 :]]) for person in range(len(hits))]
 
 
 def _best(hits: Sequence[Hits]) -> int:
@@ -117,6 +124,8 @@ def study_wearers(
 ) -> WearerStudy:
     """Evaluate adaptation on people left out: the first trials of each of their types adapt, the rest are tested.
 
+    Each is adapted to with the strength that suits the others, as they are left out.
+
     Parameters
     ----------
     grasp_set : GraspSet
@@ -145,16 +154,20 @@ def study_wearers(
     people = [person for fold in folds for person in hits[fold.name]]
     if not people:
         raise EvaluationError(f"nobody has more than {max(numbers)} trials of a type: adapt to fewer")
-    rows = []
+    totals = [total for _, total in people]
+    counts = np.reshape([correct for correct, _ in people], (len(people), len(numbers), len(STRENGTHS)))
+    # The strength is chosen once, for all numbers.
+    sums = zip(map(tuple, counts.sum(axis=1).tolist()), [len(numbers) * total for total in totals], strict=True)
+    strengths, rows = _chosen_by_others([*sums]), []
     for number, own in enumerate(numbers):
-        rates = [correct[number] / total for correct, total in people]
+        rates = (counts[np.arange(len(people)), number, strengths] / totals).tolist()
         low, high = (min(1.0, max(0.0, end)) for end in student(rates)) if len(rates) > 1 else (None, None)
         rows.append(AdaptedRow(own, fmean(rates), low, high, tuple(rates)))
-    return WearerStudy(RecipeWords.of(recipe), sum(total for _, total in people), tuple(rows))
+    return WearerStudy(RecipeWords.of(recipe), sum(totals), tuple(rows))
 
 
 def _left_out(
     samples: Samples, groups: NDArray[np.str_] | None, recipe: Recipe, numbers: Sequence[int], fold: Fold
 ) -> tuple[str, list[Hits]]:
     recogniser = Recogniser.fit(samples, recipe, fold.train, groups=groups)
-    return fold.name, hits_of(recogniser, samples.rows(fold.test), [(own, STRENGTH) for own in numbers])
+    return fold.name, hits_of(recogniser, samples.rows(fold.test), [*product(numbers, STRENGTHS)])

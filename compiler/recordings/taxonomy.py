@@ -12,7 +12,7 @@ For "none" it lists movements of the empty hand, instead of MOVEMENTS.
 
 import difflib
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from unicodedata import decimal
@@ -214,10 +214,15 @@ def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[
     return types, (*tasks.values(), *(CollectionTask(NONE, movements),) * none)
 
 
-def tasks_of(manifest: Manifest) -> tuple[Taxonomy, tuple[CollectionTask, ...]]:
-    """Return the taxonomy of a build, and the tasks to collect for it: its types, and nothing held if it knows it."""
-    name, grasps = manifest.source.taxonomy, manifest.grasps
-    types = published(name) if name in _PUBLISHED else Taxonomy(name, tuple(grasp for grasp in grasps if grasp != NONE))
+def tasks_of(manifest: Manifest, add_type: Sequence[str] = ()) -> tuple[Taxonomy, tuple[CollectionTask, ...]]:
+    """Return the taxonomy of a build, and the tasks to collect for it: its types and those to add, and nothing held if
+    it knows it. Raises RecordingError if it knows one to add already.
+    """
+    name, grasps = manifest.source.taxonomy, manifest.grasps_with(add_type)
+    held = tuple(grasp for grasp in manifest.grasps if grasp != NONE) + tuple(add_type)
+    check_names("grasp type", (NONE, *held))
+    types = published(name) if name in _PUBLISHED else Taxonomy(name, held)
+    types = types if {*held} <= {*types.types} else own(held)
     tasks = (CollectionTask(grasp, tuple(MOVEMENTS) if grasp == NONE else (ANY,)) for grasp in grasps)
     return types, tuple(tasks)
 

@@ -121,6 +121,26 @@ def test_types_may_be_missing_and_contradictions_are_named(folder: Path, tmp_pat
     assert (scores[[0, 1], [0, 1]] >= limits.least_scores[:2]).all()
 
 
+def test_a_type_is_added_by_name(folder: Path, tmp_path: Path) -> None:
+    mine = GraspSet.load(folder / "mine.grasps")
+    switches, codes = np.vstack([mine.switches, mine.switches[:3]]), np.vstack([mine.codes, np.full((3, 2), 250)])
+    trials = grasp_set_of((*TYPES, "vase"), [0, 1, 2, 0, 1, 2, 3, 3, 3], switches=switches, codes=codes)
+    trials.save(tmp_path / "vase.grasps")
+    arguments = ("adapt", folder / "build", tmp_path / "vase.grasps", "-o", tmp_path / "new")
+    refused = thenar(*arguments)
+    assert refused.returncode == 2
+    assert "the build does not know vase" in refused.stderr
+    assert "or teach new types with --add-type" in refused.stderr
+    said = thenar(*arguments, "--add-type", "vase")
+    assert said.returncode == 0, said.stderr
+    assert "adapted to 9 trials of 4 types; added: vase" in said.stdout
+    assert Build.load(tmp_path / "new").grasps == (*TYPES, "vase")
+    assert thenar("verify", tmp_path / "new", tmp_path / "vase.grasps", "--firmware", "host").stdout.endswith("holds\n")
+    core = {path.name: path.read_bytes() for path in (folder / "build" / "firmware").iterdir()}
+    changed = {name for name, data in core.items() if (tmp_path / "new" / "firmware" / name).read_bytes() != data}
+    assert changed == {"thenar_glove.h", "thenar_glove.c"}
+
+
 def test_a_lost_inputs_substitute_moves_with_its_mean_contribution(folder: Path) -> None:
     one, other = (Build.load(folder / name).tables for name in ("build", "mine"))
     bits = select_inputs(GraspSet.load(folder / "mine.grasps"), Build.load(folder / "mine").manifest)[0]

@@ -35,9 +35,9 @@ TYPES, SWITCHES, JOINTS = ("cup", "pen", "rod"), ("s1", "s2", "s3"), ("index_mpj
 CODING = Calibration(0, "", "deg", 0, -20.0, 1000, 80.0)
 LINES = tuple(SensorCalibration(name, 40, 0.0, 200, 100.0) for name in SENSORS_18)
 # What the wearer's hand does for each type: others bend the index finger less.
-CLOSED = {"cup": ("s1", "s3"), "pen": ("s2", "s3"), "rod": ("s2", "s3")}
-BENT = {"cup": (60, 90), "pen": (150, 100), "rod": (170, 160)}
-PROMPT = re.compile(r"(\d+) of 6: (cup|pen|rod), ")
+CLOSED = {"cup": ("s1", "s3"), "pen": ("s2", "s3"), "rod": ("s2", "s3"), "fist": ("s1",)}
+BENT = {"cup": (60, 90), "pen": (150, 100), "rod": (170, 160), "fist": (60, 200)}
+PROMPT = re.compile(r"(\d+) of \d+: (cup|pen|rod|fist), ")
 
 
 def live_codes(raw: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -79,10 +79,12 @@ def glove(folder: Path) -> Iterator[EmulatedCyberGlove]:
         yield glove
 
 
-def worn(folder: Path, board: BoardSender, glove: EmulatedCyberGlove, leave_at: int = 9) -> tuple[int, str, str, str]:
+def worn(
+    folder: Path, board: BoardSender, glove: EmulatedCyberGlove, leave_at: int = 99, *more: str
+) -> tuple[int, str, str, str]:
     """Do what the prompts ask for, or leave; return the exit code, stdout, stderr and the last grasp."""
     command = [sys.executable, "-c", BARE, "wear", str(folder / "build"), "--glove", str(folder / "glove.toml")]
-    command += ["--countdown", "0.3", "--frames", "200", "-o", str(folder / "mine")]
+    command += ["--countdown", "0.3", "--frames", "200", "-o", str(folder / "mine"), *more]
     said, last = [], ""
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdin is not None
@@ -133,6 +135,16 @@ def test_whoever_leaves_goes_on_later(folder: Path, board: BoardSender, glove: E
     code, _, said, _ = worn(folder, board, glove)
     assert code == 0, said
     assert len(GraspSet.load(folder / "mine.grasps")) == 6
+
+
+def test_a_type_that_nobody_else_has_is_taught(folder: Path, board: BoardSender, glove: EmulatedCyberGlove) -> None:
+    code, out, said, last = worn(folder, board, glove, 99, "--add-type", "fist")
+    assert code == 0, said
+    mine = GraspSet.load(folder / "mine.grasps")
+    assert sorted(mine.grasps.tolist()) == sorted(3 * (*TYPES, "fist"))
+    assert Build.load(folder / "mine").grasps == (*TYPES, "fist")
+    assert re.search("accuracy of the integers.*, 12 of 12 trials", out)
+    assert json.loads(out.splitlines()[-1])["candidate"] == last
 
 
 @pytest.mark.parametrize(

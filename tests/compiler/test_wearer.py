@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.optimize import minimize
+from scipy.special import softmax
 
 from thenar.compiler.artifact.wearers import chosen_strength
-from thenar.compiler.wearer import STRENGTH, STRENGTHS, Adaptation, AdaptationError, correlations
+from thenar.compiler.wearer import FREE, STRENGTH, STRENGTHS, Adaptation, AdaptationError, correlations
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Line
@@ -30,13 +31,17 @@ def tables_of(kind: str, random: np.random.Generator, K: int = 4) -> ScoreTables
     return ScoreTables.of(bias, switches, none, plain, lines)
 
 
-def adaptation(kind: str, seed: int = 0, trials: int = 12, frames: int = 2, strength: float = 1.0) -> Adaptation:
+def adaptation(
+    kind: str, seed: int = 0, trials: int = 12, frames: int = 2, strength: float = 1.0, new: range = range(0)
+) -> Adaptation:
+    """Return an adaptation to trials of four types, without and with the `new` ones."""
     random = np.random.default_rng(seed)
     n = trials * frames
     codes = random.integers(0, 256, (n, 2)).astype(np.uint16)
     labels = np.repeat(np.arange(trials) % 4, frames)
-    tables = tables_of(kind, random)
-    return Adaptation(tables, random.random((n, 5)) < 0.5, codes, labels, np.arange(n) // frames, strength, (400,))
+    tables = tables_of(kind, random, 4 - len(new))
+    bits, trial = random.random((n, 5)) < 0.5, np.arange(n) // frames
+    return Adaptation(tables, bits, codes, labels, trial, strength, (400,), new)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -47,38 +52,51 @@ def test_without_a_limit_to_the_pull_nothing_changes(kind: str) -> None:
     assert adaptation(kind, strength=inf).adapted.scores(mine.bits, mine.codes).tolist() == far.tolist()
 
 
+def free(mine: Adaptation) -> Floats:
+    """How much less each type is pulled."""
+    return np.where(np.isin(np.arange(4), mine.new), FREE, 1.0)
+
+
 def loss(weights: Floats, mine: Adaptation) -> tuple[float, Floats]:
     """The penalised loss of a sum of kernels with these weights, and its gradient, on the frames in their order."""
-    rows, root, kernel = mine._rows, mine._roots, mine._kernel
-    n, K = len(rows), mine.tables.n_classes
+    rows, root, kernel, start = mine._rows, mine._roots, mine._kernel, replace(mine, strength=inf).adapted
+    n, K = len(rows), start.n_classes
     change = kernel @ weights.reshape(n, K)
-    scores = mine.tables.scores(mine.bits[rows], mine.codes[rows]) + change
+    scores = start.scores(mine.bits[rows], mine.codes[rows]) + change
     top = scores.max(axis=1, keepdims=True)
     log_sum = top[:, 0] + np.log(np.exp(scores - top).sum(axis=1))
     losses = root[:, 0] ** 2 * (log_sum - scores[np.arange(n), mine.labels[rows]])
     off = root**2 * (np.exp(scores - log_sum[:, np.newaxis]) - np.eye(K)[mine.labels[rows]])
-    pull = mine.strength * weights.reshape(n, K)
+    pull = mine.strength / free(mine) * weights.reshape(n, K)
     return float(losses.sum() + 0.5 * (pull * change).sum()), (kernel @ (off + pull)).ravel()
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("strength", [0.1, 1.0, 10.0])
-def test_the_change_is_the_minimum_of_the_penalised_loss(kind: str, strength: float) -> None:
-    mine = adaptation(kind, strength=strength)
-    n, K = len(mine._rows), mine.tables.n_classes
+@pytest.mark.parametrize("new", [range(0), range(2, 3)])
+def test_the_change_is_the_minimum_of_the_penalised_loss(kind: str, strength: float, new: range) -> None:
+    mine = adaptation(kind, strength=strength, new=new)
+    n, K = len(mine._rows), 4
     best = minimize(loss, np.zeros(n * K), args=(mine,), jac=True, method="L-BFGS-B", options={"maxiter": 5000})
     weights = mine._weights(mine._fitted, np.ones(n, bool))
-    assert loss(weights.ravel(), mine)[0] == pytest.approx(best.fun, abs=1e-4)
-    assert np.abs(loss(weights.ravel(), mine)[1]).max() < 1e-3
+    # What is common to all types changes no probability: the loss is least without.
+    common = weights @ (1 / free(mine)) / (1 / free(mine)).sum()
+    least, slope = loss((weights - common[:, np.newaxis]).ravel(), mine)
+    assert least == pytest.approx(best.fun, abs=1e-4)
+    assert np.abs(slope).max() < 1e-3
     # The tables say the same as the kernels.
     rows = mine._rows
-    by_kernels = mine.tables.scores(mine.bits[rows], mine.codes[rows]) + mine._kernel @ weights
-    assert mine.adapted.scores(mine.bits[rows], mine.codes[rows]) == pytest.approx(by_kernels, abs=1e-4)
+    start = replace(mine, strength=inf).adapted
+    by_kernels = start.scores(mine.bits[rows], mine.codes[rows]) + mine._kernel @ weights
+    assert mine.adapted.scores(mine.bits[rows], mine.codes[rows]) == pytest.approx(
+        by_kernels, abs=1e-4 * free(mine).max()
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_neither_the_order_of_rows_nor_the_names_of_trials_matter(kind: str) -> None:
-    mine = adaptation(kind)
+@pytest.mark.parametrize("new", [range(0), range(1, 3)])
+def test_neither_the_order_of_rows_nor_the_names_of_trials_matter(kind: str, new: range) -> None:
+    mine = adaptation(kind, new=new)
     order = np.random.default_rng(1).permutation(len(mine.labels))
     columns = {name: getattr(mine, name)[order] for name in ("bits", "codes", "labels")}
     mixed = replace(mine, **columns, trials=99 - mine.trials[order])
@@ -110,12 +128,30 @@ def test_a_type_without_trials_changes_as_the_others_do_on_average(kind: str) ->
     assert one.adapted.scores(mine.bits, mine.codes) == pytest.approx(mine.tables.scores(mine.bits, mine.codes))
 
 
-def test_each_trial_is_left_out_once() -> None:
-    mine = adaptation("lines", frames=1)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_new_type_starts_as_what_its_trials_were_taken_for(kind: str) -> None:
+    mine = adaptation(kind, frames=3, strength=inf, new=range(1, 2))
+    scores = mine.tables.scores(mine.bits, mine.codes)
+    shares = softmax(scores[mine.labels == 1], axis=1).mean(axis=0)
+    wider = np.insert(scores, 1, scores @ shares, axis=1)
+    assert mine.adapted.scores(mine.bits, mine.codes) == pytest.approx(wider, abs=1e-4)
+
+
+@pytest.mark.parametrize("new", [range(0), range(1, 2)])
+def test_each_trial_is_left_out_once(new: range) -> None:
+    mine = adaptation("lines", frames=1, new=new)
     kept = mine.trials != 5
     columns = {name: getattr(mine, name)[kept] for name in ("bits", "codes", "labels", "trials")}
     alone = replace(mine, **columns).adapted.scores(mine.bits[~kept], mine.codes[~kept])
     assert mine.left_out[~kept] == pytest.approx(alone, abs=0.02)
+
+
+def test_without_its_only_trial_a_new_type_is_never_recognised() -> None:
+    mine = adaptation("bits", trials=10, frames=1, new=range(3, 4))
+    columns = {name: getattr(mine, name)[:4] for name in ("bits", "codes", "labels", "trials")}
+    few = replace(mine, **columns)
+    assert few.adapted.scores(few.bits, few.codes)[3].argmax() == 3
+    assert few.left_out[3].argmax() != 3
 
 
 def test_frames_of_two_types_are_named() -> None:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.runtime.errors import BuildError, ThenarError
-from thenar.runtime.manifest import Compared, Fitting, Manifest, Recognised
+from thenar.runtime.manifest import Adapted, Compared, Fitting, Manifest, Recognised
 from thenar.runtime.manifest_file import MAX_BYTES, manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.published import NONE
@@ -167,6 +167,8 @@ _WRONG: list[Callable[[Manifest], Manifest]] = [
     lambda m: replace(m, stopped_after=101),
     lambda m: replace(m, options=replace(m.options, rounds=0)),
     lambda m: replace(m, options=replace(m.options, shrinkage=1e308)),
+    lambda m: replace(m, adapted=Adapted("0" * 64, m.source, (1,) * (len(m.grasps) - 1))),
+    lambda m: replace(m, adapted=Adapted("0" * 64, m.source, (1,) * len(m.grasps), ("unknown",))),
 ]
 
 

@@ -190,7 +190,8 @@ def test_static_grasps_teach_types_and_not_whether_something_is_held(mixed: Gras
     # The wearer's evidence weighs as much, whatever a step of the new tables is worth: here of one with other habits.
     other = mixed.rows((mixed.subjects == "S0") & (mixed.trials < 6))
     turned = dict(zip((*TYPES, "none"), (*TYPES[1:], TYPES[0], "none"), strict=True))
-    adapt(tmp_path / "build", replace(other, grasps=np.array([*map(turned.get, other.grasps)])), tmp_path / "mine")
+    habits = replace(other, grasps=np.array([*map(turned.get, other.grasps)]))
+    adapt(tmp_path / "build", habits, output=tmp_path / "mine")
     mine = Build.load(tmp_path / "mine")
     assert mine.manifest.segments is not None
     assert mine.tables.scale != report.tables.scale
