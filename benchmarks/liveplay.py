@@ -13,13 +13,13 @@ import msgspec
 import numpy as np
 
 from thenar.compiler import compile_build
+from thenar.compiler.glove.propose import propose_harness
 from thenar.drivers.cyberglove_protocol import ALWAYS, PLUGGED
 from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.live.sources import FrameBuffer, Snapshot
-from thenar.compiler.glove.propose import propose_harness
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.playing.performance import Performance, of_scene
 

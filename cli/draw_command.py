@@ -67,7 +67,7 @@ def command(
         raise click.UsageError("--kept already numbers the kept switches: leave out --numbers")
     for source in (grasps, layout, *(path for _, path in kept)):
         keep_apart(source, output)
-    from thenar.compiler.placement.drawing import kept_names
+    from thenar.compiler.placement.kept import kept_names
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.simulator.handmaps import draw as handpanels
 

@@ -13,7 +13,6 @@ import msgspec
 from thenar.drivers.names import fault
 
 from . import ended_by_signals
-from .options import complete_scene
 from .parameters import (
     Number,
     OutputFile,
@@ -41,7 +40,7 @@ _KILLED = 128
 
 
 @click.command("emulate", context_settings={"ignore_unknown_options": True})
-@click.argument("source", metavar="SCENE|FILE", shell_complete=complete_scene)
+@click.argument("source", metavar="SCENE|FILE")
 @click.argument("client", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
 @click.option("--glove", metavar="glove.toml", type=existing_file, required=True, help="The harness to emulate.")
 @click.option(

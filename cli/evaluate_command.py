@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from thenar.runtime.recipe import Recipe
 
 _USUAL = ("compositions", "generality", "pruning", "baselines")
-TABLES = (*_USUAL, "trainers", "joints")
+TABLES = (*_USUAL, "trainers")
 
 
 def _numbers(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, ...]:
@@ -114,7 +114,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     type=ListOf("table", lambda: TABLES, none=True),
     default=",".join(_USUAL),
     show_default=True,
-    help="Tables to print, or none; trainers, which takes longer; joints: the best 1, 2, ... of them.",
+    help="Tables to print, or none; trainers takes longer.",
 )
 @click.option(
     "--streams",
@@ -166,7 +166,6 @@ def command(
         thenar evaluate set.grasps
         thenar evaluate set.grasps --by subject
         thenar evaluate movements.grasps --streams --trainer logit
-        thenar evaluate set.grasps --by subject --tables joints
         thenar evaluate set.grasps --by subject --adapt 1,2,3
         thenar evaluate set.grasps --by subject -o result.json
     """

@@ -113,7 +113,7 @@ def command(
         raise click.UsageError("--budget-us and --rate each pick a point: give one of them.")
     harness = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    methods = methods or usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns))
+    methods = methods or usual(wired=harness is not None or bool(grasp_set.taxel_columns))
     rounds, training = asked["rounds"], asked_settings(context, asked)
     search = Search(
         methods=methods,

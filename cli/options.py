@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
 
 from thenar.runtime.recipe import AUTO
 
@@ -40,14 +39,6 @@ def _trainers() -> Iterable[str]:
 
 method_name = OneOf("method", _methods)
 method_list = ListOf("method", _methods, none=True)
-
-
-def complete_scene(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Complete the names of shipped scenes and of files."""
-    from thenar.simulator.scenes import shipped
-
-    names = [CompletionItem(name) for name in shipped() if name.startswith(incomplete)]
-    return [*names, CompletionItem(incomplete, type="file")]
 
 
 def _names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str, ...]:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
-from click.shell_completion import CompletionItem
 
 from thenar.drivers.names import shortened
 
@@ -139,11 +138,6 @@ class ListOf(click.ParamType[tuple[str, ...]]):
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
         """Return the placeholder that shows how to write the list."""
         return f"{self._one.kind.upper()},..."
-
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Complete the name after the last comma."""
-        before, comma, last = incomplete.rpartition(",")
-        return [CompletionItem(f"{before}{comma}{item.value}") for item in self._one.shell_complete(ctx, param, last)]
 
 
 existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)

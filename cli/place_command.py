@@ -55,7 +55,7 @@ _OF_METHODS = {"placement", "keep", "prune", "keep_joints", "apart_mm", "at_most
 @trainer_option(AUTO)
 @jobs_option()
 @click.option("--tree", "show_tree", is_flag=True, help="Also print ID3's tree.")
-@click.option("--draw", type=picture_file, help="Also draw the curve, or ID3's tree: an .svg or .png file.")
+@click.option("--draw", type=picture_file, help="Also draw the curve and the hand: an .svg or .png file.")
 @click.option("-o", "--output", type=OutputFile(".json"), help="Also store the placement as JSON.")
 @overwrite_flag
 @json_flag
@@ -93,9 +93,8 @@ def command(
         thenar place set.grasps --have flex_thumb,flex_index --sensors 5
         thenar place set.grasps --drop 2
         thenar place set.grasps --sensors 8 --instead-of palm_3
-        thenar place set.grasps --prune 13 --draw tree.svg -o placement.json
+        thenar place set.grasps --prune 13 --tree -o placement.json
         thenar place set.grasps --method elimination --keep 16
-        thenar place set.grasps --method elimination --keep 16 --folds 4 --trainer logit
         thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
         thenar place set.grasps --method elimination --keep 16 --have thumb_distal_5 --apart-mm 8
     """
@@ -125,10 +124,6 @@ def command(
             tested = fold_results(grasp_set, samples, recipe, **terms, jobs=jobs, report=report)
     rates = () if tested is None else tested.rates
     document = placement.document() | ({"rates": rates} if rates else {})
-    if draw is not None:
-        from thenar.compiler.placement.drawing import draw_placement
-
-        draw_placement(placement, draw)
     if output is not None:
         write_json(output, document)
     if wants_json():
@@ -235,14 +230,10 @@ def _print_chosen(study: "SensorStudy", parts: "Mapping[str, str]") -> None:
 
 def _where_it_ends(study: "SensorStudy") -> str:
     """Return the sentence that says after how many sensors more stop to matter."""
-    later = [point for point in study.points if point.number > study.enough]
-    if not later or later[0].worth is None:
+    later = next((point.worth for point in study.points if point.number > study.enough), None)
+    if later is None:
         return f"all {study.enough} sensors are worth something: the curve does not flatten"
-    worth = later[0].worth
-    return (
-        f"after {counted(study.enough, 'sensor')} the next is worth {100 * worth.mean:.1f} points "
-        f"[{100 * worth.low:.1f}, {100 * worth.high:.1f}]"
-    )
+    return f"after {counted(study.enough, 'sensor')} the next is worth {later} points"
 
 
 def _check(
@@ -255,8 +246,8 @@ def _check(
         raise click.UsageError("--tree is for people and --json for machines: give one of them")
     if show_tree and recipe.placement != PAPERS:
         raise click.UsageError("--tree prints the tree of the paper's ID3 only: leave it out")
-    if draw is not None and recipe.placement != PAPERS:
-        raise click.UsageError("--draw draws the tree of the paper's ID3 only: leave it out")
+    if draw is not None:
+        raise click.UsageError("--draw draws what sensors are worth: leave --method and its options out")
     for name in () if recipe.folds else ("by", "seed", *training):
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             raise click.UsageError(f"--{name.replace('_', '-')} is for an accuracy: add --folds, or leave it out.")

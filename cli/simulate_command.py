@@ -8,7 +8,6 @@ import click
 from thenar.compiler.text import counted
 
 from .consoles import Table
-from .options import complete_scene
 from .parameters import OutputFile, jobs_option, keep_apart, overwrite_flag, seed_range
 from .printing import echo, json_flag, out, progress, show, table, warning
 
@@ -21,7 +20,7 @@ _OWN = "dim"  # style of the scene-independent steps
 
 
 @click.command("simulate")
-@click.argument("scene", shell_complete=complete_scene, required=False)
+@click.argument("scene", required=False)
 @click.option(
     "-o", "--output", type=OutputFile(".grasps"), metavar="SET.grasps", help="Simulate, and write the set here."
 )

@@ -145,11 +145,10 @@ def available(n_switches: int, n_joints: int) -> tuple[Composition, ...]:
     return tuple(c for c in COMPOSITIONS if (n_joints or not c.angle) and (n_switches or not (c.selected or c.others)))
 
 
-TableName = Literal["compositions", "generality", "pruning", "baselines", "trainers", "joints"]
+TableName = Literal["compositions", "generality", "pruning", "baselines", "trainers"]
 Select = Callable[[Population, Fold], Elements]
 
 BASELINES = ("cmim", "mutual-information")
-JOINTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18)  # numbers of kept joints, without switches
 DRAWS = 5  # random placements to compare with
 
 
@@ -204,9 +203,6 @@ class Planner:
         }
         if name in rows:
             return rows[name](protocol)
-        if name == "joints":
-            sizes = [*(size for size in JOINTS if size < self.choices.n_joints), self.choices.n_joints]
-            return [self._row(str(n), f"the best {n} joints", ANGLE, lambda *_: (), most=n) for n in sizes]
         kinds = available(self._n_switches, self.choices.n_joints)
         return [self._row(kind.name, kind.what, kind, partial(self.placement, protocol)) for kind in kinds]
 
@@ -295,31 +291,26 @@ class Planner:
             return ()
         return self.choices.elements(recipe, np.sort(rows))
 
-    def _row(
-        self, name: str, what: str, kind: Composition, select: Select, learner: str = "", most: int | None = None
-    ) -> RowPlan:
+    def _joints(self, elements: Elements, fold: Fold) -> Columns:
+        if by_sensors(self.recipe):
+            return self.choices.sensors(self.recipe, np.sort(fold.train)).joints
+        return self.choices.joints(elements, fold.train, self.recipe.keep_joints)
+
+    def _row(self, name: str, what: str, kind: Composition, select: Select, learner: str = "") -> RowPlan:
         return RowPlan(
-            name, what, tuple(self.cell(population, kind, select, learner, most) for population in self.populations)
+            name, what, tuple(self.cell(population, kind, select, learner) for population in self.populations)
         )
 
-    def cell(
-        self, population: Population, kind: Composition, select: Select, learner: str = "", most: int | None = None
-    ) -> CellPlan:
-        """Return the fits of composition `kind` on every fold of a population.
-
-        `select` returns the placement for a fold, and `most` is the number of joints kept, None: the recipe's.
-        """
+    def cell(self, population: Population, kind: Composition, select: Select, learner: str = "") -> CellPlan:
+        """Return the fits of a composition on every fold of a population; `select` returns the placement of a fold."""
         learner = learner or (AUTO if self.recipe.trainer == AUTO else "")
 
         def fit(fold: Fold) -> FoldFit:
             # All switches depend on no placement.
             placement = select(population, fold) if kind.selected != kind.others else ()
             elements = kind.elements(placement, self.elements(fold.train) if kind.others else ())
-            most_joints = most or self.recipe.keep_joints
-            if kind.angle and by_sensors(self.recipe) and most is None:
-                joints = self.choices.sensors(self.recipe, np.sort(fold.train)).joints
-            else:
-                joints = self.choices.joints(elements, fold.train, most_joints) if kind.angle else ()
-            return FoldFit(fold, elements, joints, population.grasps, learner)
+            return FoldFit(
+                fold, elements, self._joints(elements, fold) if kind.angle else (), population.grasps, learner
+            )
 
         return CellPlan(population, tuple(tuple(map(fit, folds)) for folds in population.repeats))

@@ -43,7 +43,6 @@ from .tables import RateReader, RateTable
 
 # Without the table of trainers, which takes longer than all of these.
 TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines")
-_NESTED: tuple[TableName, ...] = ("trainers", "joints")
 
 # Tables with a row that trains on all switches at once.
 _OF_ALL_SWITCHES: tuple[TableName, ...] = ("compositions", "pruning")
@@ -208,7 +207,7 @@ class StudyRun:
             for name, reason in reasons.items()
             if reason is None
             for protocol in PROTOCOLS
-            if protocol in design.protocols and (protocol == "nested" or name not in _NESTED)
+            if protocol in design.protocols and (protocol == "nested" or name != "trainers")
         )
         samples, self._groups = Samples.of(chosen), groups_of(chosen, scheme)
         choices = InputChoices(samples, ports, limits)
@@ -246,7 +245,6 @@ def _recipe_of(name: TableName, recipe: Recipe) -> RecipeWords:
     methods: dict[TableName, str] = {
         "pruning": f"{PAPERS}, S of the row, all subjects pooled",
         "baselines": f"that of the row, as many elements as {same.method}",
-        "joints": "none, joints alone",
     }
     chosen = "that of the row, its settings chosen from the training rows"
     return RecipeWords(methods.get(name, same.method), chosen if name == "trainers" else same.trainer)
@@ -279,10 +277,8 @@ def _why_not(
     name: TableName, grasp_set: GraspSet, populations: tuple[Population, ...], design: StudyDesign
 ) -> str | None:
     """Return why a table has no meaning for the set and the design, or None."""
-    if name == "joints" and not grasp_set.joints:
-        return "the set has no joints"
-    if name in _NESTED:
-        return None if "nested" in design.protocols else f"{name} are compared under the nested protocol only"
+    if name == "trainers":
+        return None if "nested" in design.protocols else "trainers are compared under the nested protocol only"
     if name != "compositions" and not grasp_set.element_names:
         return "a placement needs switches, and the set has none"
     if name == "generality" and len(populations) < 2:

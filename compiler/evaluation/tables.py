@@ -24,7 +24,6 @@ _TITLES: dict[TableName, str] = {
     "pruning": "Placement of all subjects pooled, pruned by S, selected switches (Tables IV and VII)",
     "baselines": "ID3 compared with other placements of as many switches, selected switches",
     "trainers": f"Trainers, their settings chosen from the training rows, and baselines; paired with {REFERENCE}",
-    "joints": "The best joints alone, chosen from the training rows by backward elimination",
 }
 
 

@@ -124,7 +124,7 @@ def find_frontier(
     """
     samples = _samples(grasp_set.without_none())
     # Levels of one taxel share its conversion.
-    search = search or Search(methods=usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns)))
+    search = search or Search(methods=usual(wired=harness is not None or bool(grasp_set.taxel_columns)))
     cuts = Cuts.of(samples, search)
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     created = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]

@@ -82,7 +82,7 @@ class Search:
         If the search would be empty.
     """
 
-    methods: tuple[str, ...] = field(default_factory=lambda: usual(ours=True))
+    methods: tuple[str, ...] = field(default_factory=lambda: usual())
     folds: int = 4
     repeats: int = 3
     seed: int = 1

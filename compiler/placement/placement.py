@@ -397,22 +397,6 @@ def place(
     )
 
 
-def place_by_subject(grasp_set: GraspSet, prune: int, on_done: Progress) -> list[tuple[str, Placement]]:
-    """Return the paper's placement from the rows of each subject, by name, and from all rows, "pooled", if there are
-    several subjects; `on_done(done, all)` is called before each of them.
-    """
-    grasp_set = grasp_set.without_none()
-    subjects = np.unique(grasp_set.subjects).tolist()
-    groups = [(subject, grasp_set.rows(grasp_set.subjects == subject)) for subject in subjects]
-    if len(subjects) != 1:
-        groups.append(("pooled", grasp_set))
-    found = []
-    for done, (title, rows) in enumerate(groups):
-        on_done(done, len(groups))
-        found.append((title, place(rows, prune=prune)))
-    return found
-
-
 def _samples_of(grasp_set: GraspSet, recipe: Recipe) -> Samples:
     """Return the rows of a set to choose from, with the recipe's inputs."""
     if not by_sensors(recipe) and (not grasp_set.element_names or recipe.inputs == "joints"):

@@ -253,26 +253,6 @@ def _goes_on(totals: Counts, min_samples: int) -> bool:
     return int(np.count_nonzero(totals)) > 1 and int(totals.sum()) >= min_samples
 
 
-def sizes_of(tree: Tree) -> list[int]:
-    """Return the size of each node's subtree, the node included."""
-    sizes = [1] * len(tree.nodes)
-    for number in reversed(range(1, len(tree.nodes))):
-        sizes[tree.parents[number]] += sizes[number]
-    return sizes
-
-
-_STATES = {0: "open", 1: "closed"}
-
-
-def edge_label(tree: Tree, number: int) -> str:
-    """Return "open: " or "closed: ", or an input's value, on the edge that leads to a node; "" at the root."""
-    parent = tree.parents[number]
-    if parent < 0:
-        return ""
-    value = tree.nodes[parent].values[tree.children[parent].index(number)]
-    return f"{_STATES.get(value, str(value))}: "
-
-
 def names_for(tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> tuple[Sequence[str], Sequence[str]]:
     """Return a name for each input and each class: those given, or numbers and labels."""
     names = names or [f"x{number}" for number in range(tree.n_inputs)]

@@ -137,7 +137,7 @@ def tree_text(tree: Tree | None, manifest: Manifest) -> tuple[str, str]:
     *lines, summary = tree.text(names, [manifest.grasps[int(label)] for label in tree.classes]).split("\n")
     said = sentence(f"{summary}; 0 leads to where the switch is open, 1 to where it is closed")
     if len(lines) > MOST_LINES:
-        said += f" The first {MOST_LINES:,} nodes are shown; thenar place --draw draws all of them."
+        said += f" The first {MOST_LINES:,} nodes are shown; thenar place --tree prints all of them."
     return "\n".join(lines[:MOST_LINES]), said
 
 

@@ -59,7 +59,7 @@ def test_the_papers_tables_are_printed_with_both_protocols_explained(
 def test_every_table_names_its_method_and_its_trainer_with_their_settings(
     grasps: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    tables = "compositions,pruning,baselines,joints"
+    tables = "compositions,pruning,baselines"
     logit = ("--trainer", "logit", "--penalty", "2", "--smoothness", "3", "--prune", "4")
     asked = ("--repeats", "1", "--jobs", "1", "--tables", tables, "--protocol", "nested")
     assert run(["evaluate", grasps, *asked, *logit, "-o", str(tmp_path / "result.json")]) == 0
@@ -68,7 +68,6 @@ def test_every_table_names_its_method_and_its_trainer_with_their_settings(
         "compositions": "id3, S = 4",
         "pruning": "id3, S of the row, all subjects pooled",
         "baselines": "that of the row, as many elements as id3, S = 4",
-        "joints": "none, joints alone",
     }
     written = json.loads((tmp_path / "result.json").read_text())["tables"]
     assert {table["name"]: table["recipe"]["method"] for table in written} == methods

@@ -10,7 +10,6 @@ from thenar.cli import run
 from thenar.cli.group import COMMANDS, thenar
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.trainers.base import TRAINERS
-from thenar.simulator.scenes import shipped
 
 
 @pytest.mark.parametrize(
@@ -82,16 +81,10 @@ def completed(*words: str) -> list[str]:
     [
         (("",), [*COMMANDS]),
         (("ev",), ["evaluate"]),
-        (("simulate", ""), [*shipped()]),
-        (("simulate", "kam"), ["kamakura", "kamakura-analog", "kamakura-def"]),
-        (("emulate", "qu"), ["quick"]),
         (("place", "set.grasps", "--method", ""), [*METHODS]),
-        (("frontier", "--methods", "id3,cm"), ["id3,cmim"]),
-        (("evaluate", "--baselines", "cm"), ["cmim"]),
         (("compile", "--trainer", ""), ["auto", *TRAINERS]),
         (("compile", "--meth"), ["--method"]),
         (("firmware", "--target", "cortex"), ["cortex-m0plus", "cortex-m4"]),
-        (("verify", "build", "set.grasps", "--firmware", "host,a"), ["host,avr"]),
         (("stability", "weig"), ["weights"]),
         (("segm",), ["segment"]),
         (("segment", "--la"), ["--lag-ms"]),

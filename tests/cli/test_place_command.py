@@ -42,11 +42,6 @@ def test_the_tree_is_printed_with_the_names_of_switches_and_grasps(
     assert "pen  2 rows" in said
 
 
-def test_the_tree_is_drawn(set_file: Path, tmp_path: Path) -> None:
-    assert run(["place", str(set_file), "--method", "id3", "--draw", str(tmp_path / "tree.svg")]) == 0
-    assert "<!-- s4" in (tmp_path / "tree.svg").read_text()
-
-
 def test_nodes_at_which_nothing_gains_are_said(
     small_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

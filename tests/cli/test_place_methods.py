@@ -6,7 +6,7 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler.glove.propose import propose_harness
-from thenar.compiler.placement.drawing import kept_names
+from thenar.compiler.placement.kept import kept_names
 from thenar.runtime.harness.writing import harness_to_toml
 
 from ..sets import grasp_set_of
@@ -75,11 +75,15 @@ def test_a_glove_that_lacks_a_switch_says_nothing_of_its_cost(
         (["--method", "cmim", "--keep", "3", "--prune", "4"], "method 'cmim' takes --keep M and no --prune"),
         (["--method", "elimintion"], "there is no method 'elimintion' (did you mean 'elimination'"),
         (["--method", "cmim", "--keep", "3", "--tree"], "--tree prints the tree of the paper's ID3"),
-        (["--method", "cmim", "--keep", "3", "--draw", "a.svg"], "--draw draws the tree of the paper's ID3"),
-        (["--inputs", "joints"], "there are no switches to place"),
-        (["--trainer", "logit"], "--trainer is for an accuracy: add --folds"),
-        (["--by", "trial"], "--by is for an accuracy: add --folds"),
-        (["--glove", "GLOVE"], "--glove gives the scan costs"),
+        (
+            ["--method", "cmim", "--keep", "3", "--draw", "a.svg"],
+            "--draw draws what sensors are worth: leave --method and its options out",
+        ),
+        (["--inputs", "joints", "--prune", "2"], "there are no switches to place"),
+        (["--trainer", "logit", "--prune", "2"], "--trainer is for an accuracy: add --folds"),
+        (["--by", "trial", "--prune", "2"], "--by is for an accuracy: add --folds"),
+        (["--glove", "GLOVE"], "--glove gives scan costs, and sensors are chosen without"),
+        (["--glove", "GLOVE", "--prune", "2"], "--glove gives the scan costs"),
         (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "weighs them: elimination-cost, id3-cost"),
     ],
 )

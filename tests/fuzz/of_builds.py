@@ -23,7 +23,7 @@ from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.points import frontier_to_bytes
 from thenar.compiler.frontier.words import csv_bytes
 from thenar.compiler.glove.files import spec_files
-from thenar.compiler.placement.drawing import kept_names
+from thenar.compiler.placement.kept import kept_names
 from thenar.compiler.placement.placement import place
 from thenar.compiler.report.frontier import frontier_view
 from thenar.drivers.errors import ThenarError

@@ -163,10 +163,10 @@ def by_sensors(recipe: Recipe) -> bool:
     return recipe.sensors is not None or recipe.price is not None
 
 
-def usual(*, ours: bool, wired: bool = False) -> tuple[str, ...]:
-    """Return the methods, ours or the baselines, that a frontier tries by default."""
+def usual(*, wired: bool = False) -> tuple[str, ...]:
+    """Return the methods that a frontier tries by default."""
     when = ("always", "wired") if wired else ("always",)
-    return tuple(name for name, method in METHODS.items() if method.ours == ours and method.tried in when)
+    return tuple(name for name, method in METHODS.items() if method.tried in when)
 
 
 def first_of(order: Columns) -> Chooser:

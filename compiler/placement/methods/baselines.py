@@ -81,7 +81,6 @@ MEMBER = (
         help="Highest information about the grasp type, each switch alone",
         learn=ranked(most_informative),
         nested=True,
-        tried="always",
         label="top-k",
         rank=24,
     ),
@@ -90,7 +89,6 @@ MEMBER = (
         help="Drawn at random (seeded) among those that vary",
         learn=ranked(lambda bits, _: random_placement(bits.shape[1], bits.shape[1], _SEED)),
         nested=True,
-        tried="always",
         rank=25,
     ),
 )

@@ -9,10 +9,12 @@ from scipy import stats
 
 from tests.sets import grasp_set_of
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.artifact.sensor_study import MATTERS, Worth, study_sensors
+from thenar.compiler.artifact.sensor_study import MATTERS, Worth, draw_curve, study_sensors
+from thenar.compiler.pictures import PictureError
 from thenar.compiler.placement.constraints import Limits
 from thenar.runtime.manifest_file import manifest_from_bytes
 from thenar.runtime.recipe import Inputs, Recipe
+from thenar.simulator.handmaps.handmap import hand_map
 
 
 def people(noise: float = 0.15, switches: int = 8) -> GraspSet:
@@ -59,6 +61,17 @@ def test_the_curve_is_measured_in_folds_and_the_same_on_any_number_of_cores() ->
     assert all(0 <= row.folds <= 4 for row in study.chosen)
     assert {row.name for row in study.chosen} == {*study.point.sensors}
     assert not {*study.left_out} & {row.name for row in study.chosen}
+
+
+def test_a_study_is_drawn_the_same_each_time_and_a_dollar_is_a_dollar() -> None:
+    grasp_set = replace(people(), switch_names=(r"$\left{$", *"abcdefg"))
+    study = study_sensors(grasp_set, Recipe(sensors=3, have=(r"$\left{$",)), jobs=1)
+    hand = replace(hand_map(), names=(*grasp_set.switch_names, *hand_map().names[8:]))
+    pictures = [draw_curve(study, hand, kind) for kind in ("svg", "svg", "png", "png")]
+    assert pictures[0] == pictures[1]
+    assert pictures[2] == pictures[3]
+    with pytest.raises(PictureError, match=r"ends in \.png or \.svg, not in \.pdf"):
+        draw_curve(study, None, "pdf")
 
 
 def test_what_tells_nothing_is_worth_nothing() -> None:

@@ -55,7 +55,7 @@ def test_the_tree_has_a_line_a_node_and_is_cut_if_large(bare: ReportContent) -> 
     names = tuple(replaced(bare.manifest.switches[0], name=f"x{number}") for number in range(len(tree.inputs)))
     lines, said = tree_text(tree, replaced(bare.manifest, switches=names))
     assert len(lines.split("\n")) == MOST_LINES < len(tree.nodes)
-    assert "thenar place --draw draws all of them" in said
+    assert "thenar place --tree prints all of them" in said
 
 
 def test_the_terms_are_drawn_the_weightiest_first(bare: ReportContent) -> None:
