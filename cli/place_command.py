@@ -94,7 +94,6 @@ def command(
         thenar place set.grasps --drop 2
         thenar place set.grasps --sensors 8 --instead-of palm_3
         thenar place set.grasps --prune 13 --tree -o placement.json
-        thenar place set.grasps --method elimination --keep 16
         thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
         thenar place set.grasps --method elimination --keep 16 --have thumb_distal_5 --apart-mm 8
     """
