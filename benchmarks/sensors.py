@@ -11,7 +11,7 @@ levels of pads, and joints as 7 bits each; a sensor is as good as its best bit. 
 import argparse
 import warnings
 from bisect import bisect_left
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
@@ -117,7 +117,7 @@ def rfe(samples: Samples, sizes: tuple[int, ...]) -> Chosen:
     return {size: tuple(order[:size].tolist()) for size in sizes}
 
 
-OURS, ELIMINATION = PAIR = "floating search (thenar)", "elimination"
+OURS, ELIMINATION = "floating search (thenar)", "elimination"
 METHODS_COMPARED: dict[str, Method] = {
     OURS: floating,
     ELIMINATION: by_bits("elimination"),
@@ -148,8 +148,64 @@ def accuracy(cut: Cut, sensors: Columns) -> float:
     return float(models[int(np.argmax(means))].fit(X, y).score(T, cut.test.labels))
 
 
+# A set of CELLS, what folds leave out, and how many sensors are kept; and the accuracies of each method there, in %.
+Key = tuple[str, str, int]
+Rates = dict[str, dict[Key, float]]
+
+
+def measured(cell: str, by: Sequence[str], asked: argparse.Namespace, spent: dict[str, float]) -> Rates:
+    """Return the rates of a set; `spent` keeps the most seconds of CPU that a method took for a fold."""
+    name, kinds, sizes = CELLS[cell]
+    samples = load(str(asked.home) if name == "home" else name, asked.data).without_none()
+    samples = samples.with_joints(()) if kinds == "switches" else samples
+    hits: dict[str, dict[Key, list[float]]] = {method: {} for method in METHODS_COMPARED}
+    several = len(np.unique(samples.subjects)) >= LEAST_PEOPLE
+    folds = [(each, cut) for each in by if several or each == "trial" for cut in cuts(samples, each)]
+    for kind, cut in folds:
+        for method, choose in METHODS_COMPARED.items():
+            began = process_time()
+            chosen = choose(cut.train, sizes)
+            spent[method] = max(spent[method], process_time() - began)
+            for size in sizes:
+                hits[method].setdefault((cell, kind, size), []).append(accuracy(cut, chosen[size]))
+    return {method: {key: 100 * float(np.mean(each)) for key, each in found.items()} for method, found in hits.items()}
+
+
+def table_of(by: str, rates: Rates, spent: dict[str, float]) -> Table:
+    """Return the table of one kind of folds, with the gaps to the best method of each cell."""
+    keys = [key for key in rates[OURS] if key[1] == by]
+    cells = dict.fromkeys(cell for cell, *_ in keys)
+    table = Table("method", *cells, "mean gap", "worst", "s", title=f"by {by}, %")
+    for method, found in rates.items():
+        gaps = gaps_of(method, keys, rates)
+        shown = (" / ".join(f"{found[key]:.1f}" for key in keys if key[0] == cell) for cell in cells)
+        table.add_row(method, *shown, f"{np.mean(gaps):.2f}", f"{max(gaps):.1f}", f"{spent[method]:.1f}")
+    return table
+
+
+def gaps_of(method: str, keys: Sequence[Key], rates: Rates) -> list[float]:
+    """Return how far a method is behind the best one of each cell, in points."""
+    return [max(found[key] for found in rates.values()) - rates[method][key] for key in keys]
+
+
+def bounds_of(rates: Rates, seconds: float) -> Iterator[tuple[str, float, float]]:
+    """Yield what is bounded, its value and its bound."""
+    yield "most CPU of a fold, s", seconds, SECONDS
+    by_trial = [key for key in rates[OURS] if key[1] == "trial"]
+    if by_trial:
+        gaps = gaps_of(OURS, by_trial, rates)
+        yield "mean gap by trial, points", float(np.mean(gaps)), MEAN_GAP
+        yield "worst gap by trial, points", max(gaps), WORST_GAP
+    for cell in dict.fromkeys(cell for cell, by, _ in rates[OURS] if by == "subject"):
+        own, other = (
+            np.mean([rate for key, rate in rates[method].items() if key[:2] == (cell, "subject")])
+            for method in (OURS, ELIMINATION)
+        )
+        yield f"{cell}, new people: behind elimination, points", float(other - own), 0.0
+
+
 def main() -> None:
-    """Print the table, and whether the search keeps its bounds."""
+    """Print the tables, and whether the search keeps its bounds."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sets", nargs="+", default=list(CELLS), help="of " + "; ".join(CELLS))
     parser.add_argument("--by", nargs="+", default=["trial", "subject"], choices=("trial", "subject"))
@@ -157,52 +213,15 @@ def main() -> None:
     parser.add_argument("--home", type=Path, default=Path("home.grasps"), help="examples/home_glove.csv, imported")
     asked, console = parser.parse_args(), Console(width=170)
     warnings.filterwarnings("ignore")
-    rates: dict[str, dict[str, list[float]]] = {name: {} for name in METHODS_COMPARED}
     spent = dict.fromkeys(METHODS_COMPARED, 0.0)
+    rates: Rates = {method: {} for method in METHODS_COMPARED}
     with threadpool_limits(1):
         for cell in track(asked.sets, "sets", console=Console(stderr=True)):
-            name, kinds, sizes = CELLS[cell]
-            samples = load(str(asked.home) if name == "home" else name, asked.data).without_none()
-            samples = samples.with_joints(()) if kinds == "switches" else samples
-            for by in asked.by:
-                if by == "subject" and len(np.unique(samples.subjects)) < LEAST_PEOPLE:
-                    continue
-                for cut in cuts(samples, by):
-                    for method, choose in METHODS_COMPARED.items():
-                        began = process_time()
-                        chosen = choose(cut.train, sizes)
-                        seconds = process_time() - began
-                        spent[method] = max(spent[method], seconds)
-                        for size in sizes:
-                            rates[method].setdefault(f"{cell} {by} {size}", []).append(accuracy(cut, chosen[size]))
-    means = {
-        method: {key: 100 * float(np.mean(hits)) for key, hits in found.items()} for method, found in rates.items()
-    }
-    best = {key: max(found[key] for found in means.values()) for key in means["random"]}
+            for method, found in measured(cell, asked.by, asked, spent).items():
+                rates[method] |= found
     for by in asked.by:
-        shown = [cell for cell in asked.sets if any(key.startswith(f"{cell} {by}") for key in best)]
-        table = Table("method", *shown, "mean gap", "worst", "s", title=f"by {by}, %")
-        for method, found in means.items():
-            keys = [key for key in best if f" {by} " in key]
-            cells = [
-                " / ".join(f"{found[key]:.1f}" for key in keys if key.startswith(f"{cell} {by}")) for cell in shown
-            ]
-            gaps = [best[key] - found[key] for key in keys] or [0.0]
-            table.add_row(method, *cells, f"{np.mean(gaps):.2f}", f"{max(gaps):.1f}", f"{spent[method]:.1f}")
-        console.print(table)
-    gaps = [best[key] - rate for key, rate in means[OURS].items() if " trial " in key]
-    people = {
-        cell: [
-            float(np.mean([means[method][key] for key in best if key.startswith(f"{cell} subject")])) for method in PAIR
-        ]
-        for cell in asked.sets
-        if any(key.startswith(f"{cell} subject") for key in best)
-    }
-    bounds = [("most CPU of a fold, s", spent[OURS], SECONDS)]
-    if gaps:
-        bounds += [("mean gap by trial, points", float(np.mean(gaps)), MEAN_GAP), ("worst", max(gaps), WORST_GAP)]
-    bounds += [(f"{cell}, new people: behind elimination", other - own, 0.0) for cell, (own, other) in people.items()]
-    for what, value, bound in bounds:
+        console.print(table_of(by, rates, spent))
+    for what, value, bound in bounds_of(rates, spent[OURS]):
         console.print(f"{what}: {value:.2f}, at most {bound:g}: {'yes' if value <= bound else 'NO'}")
 
 
