@@ -230,6 +230,11 @@ def _remarks(
                 f"{switches[first - 1].ref} and {switches[second - 1].ref} are {apart} mm apart and their bodies "
                 f"{hand.body_mm:g} mm wide: move one of them aside"
             )
+    kept = {name for switch in manifest.switches for name in (switch.name, switch.source)}
+    kept |= {joint.name for joint in manifest.joints}
+    flexed = tuple(joint for stream in harness.streams for joint in stream.joints)
+    if unread := [name for name in (*harness.switches, *harness.taxel_names, *flexed) if name not in kept]:
+        yield f"not read, so that its cable can be pulled without soldering: {', '.join(unread)}"
     refs = {sensor.name: sensor.ref for sensor in switches}
     measured: dict[str, list[Switch]] = {}
     for switch in manifest.switches:

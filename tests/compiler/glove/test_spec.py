@@ -72,6 +72,15 @@ def test_the_calibrations_folder_stays_out_of_the_spec(path: str) -> None:
     assert written.fingerprint == harness.fingerprint
 
 
+def test_cables_of_an_existing_glove_that_are_not_read_are_told() -> None:
+    range_ = (0.0, 1023.0)
+    stream = StreamWiring(port="/dev/ttyACM0", switches=("c",), taxels={"pad": range_}, joints={"flex": range_})
+    harness = replace(propose_harness(["a", "b"]), streams=(stream,))
+    remarks = glove_spec(manifest_of(["a", "c"]), None, harness).summary.remarks
+    assert "not read, so that its cable can be pulled without soldering: b, pad, flex" in remarks
+    assert not [said for said in glove_spec(manifest_of(["a", "b"])).summary.remarks if "not read" in said]
+
+
 def test_switches_closer_than_their_bodies_are_told(hand: HandShape) -> None:
     names = ["index_distal_2", "index_distal_4", "palm_heel_6"]
     assert glove_spec(manifest_of(names), hand=hand).summary.remarks == ()
