@@ -29,9 +29,8 @@ def test_the_papers_ours_and_the_baselines_are_there() -> None:
 
 
 def test_what_a_frontier_tries_hangs_on_whether_the_wiring_is_known() -> None:
-    assert usual(ours=True) == ("elimination", "id3", "id3-cost")
-    assert usual(ours=True, wired=True) == ("elimination", "elimination-cost", "id3", "id3-cost")
-    assert usual(ours=False) == ("mutual-information", "random")
+    assert usual() == ("elimination", "id3", "id3-cost")
+    assert usual(wired=True) == ("elimination", "elimination-cost", "id3", "id3-cost")
 
 
 def test_a_ladder_ends_at_all_switches_where_a_method_says_so() -> None:
