@@ -39,11 +39,11 @@ from thenar.compiler.firmware.targets.avr import harness
 from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
 from thenar.compiler.firmware.words import numbered
 from thenar.compiler.model.collapse import collapse
-from thenar.compiler.model.quantise import quantise
 from thenar.compiler.trainers.base import Model
 from thenar.runtime.code_line import CodeLine, Point
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.quantise import quantise
 
 AVR = TARGETS["avr328p"]
 CORES = ("cortex-m4", "cortex-m0plus")

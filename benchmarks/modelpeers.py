@@ -26,9 +26,9 @@ from weka import installed, logitboost, write_arff
 
 from thenar.compiler.evaluation.choosing import choose_training
 from thenar.compiler.model.collapse import collapse
-from thenar.compiler.model.quantise import quantise
 from thenar.compiler.samples import Samples, decided
 from thenar.compiler.trainers.base import Training
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.recipe import AUTO, Recipe
 
 FEW, SEED = 2000, 1

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.manifest import Fitting, Rejection
 from thenar.runtime.model.integers import LIMIT, MAX_BYTES, MAX_JOINTS, MAX_SWITCHES, IntegerTables, payload_bytes
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.published import NONE
 from thenar.runtime.recipe import Recipe
@@ -30,7 +31,6 @@ from .evaluation.choosing import choose_training, inner_folds
 from .evaluation.folds import OF, leave_groups_out
 from .model.collapse import collapse
 from .model.faults import fit_lost
-from .model.quantise import quantise
 from .placement.constraints import Limits
 from .placement.elements import Elements
 from .placement.placement import InputSelection, select

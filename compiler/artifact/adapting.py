@@ -15,6 +15,7 @@ from thenar.runtime.hand import HAND_NAME
 from thenar.runtime.manifest import Adapted, Manifest, Of, Recognised, Rejection, Switch, Wearing
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import LIMIT, MAX_BYTES, IntegerTables, tables_to_bytes
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners
 from thenar.runtime.names import list_names, nearest, shortened
 from thenar.runtime.published import NONE
@@ -22,7 +23,6 @@ from thenar.runtime.segmenting.model import STEPS, SegmentModel, gain_of
 
 from ..model.collapse import collapse
 from ..model.compare import compare
-from ..model.quantise import quantise
 from ..recogniser import predicted_classes
 from ..recordings.graspset import GraspSet, Joint
 from ..recordings.taxonomy import ANY, own

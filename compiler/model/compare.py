@@ -8,14 +8,14 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from thenar.runtime.model.integers import LIMIT, IntegerTables
+from thenar.runtime.model.proof import Rounding, furthest
+from thenar.runtime.model.quantise import as_deployed, rounding_error
 from thenar.runtime.model.tables import TIE, ScoreTables, winners
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 
 from ..elementary import Floats
 from ..trainers.base import Model
 from .collapse import collapse
-from .proof import Rounding, furthest
-from .quantise import as_deployed, rounding_error
 
 COLLAPSE_TOLERANCE = 1e-12  # of the sum of the magnitudes that are added up
 

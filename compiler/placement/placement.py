@@ -11,12 +11,12 @@ import msgspec
 import numpy as np
 from msgspec import structs
 
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.recipe import Recipe, changed
 
 from ..elementary import LN_2
 from ..facts import SensorCount
 from ..model.faults import count_faults
-from ..model.quantise import quantise
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples, TrainingError, check_types
 from ..trainers.logit import fit_logit

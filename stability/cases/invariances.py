@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.faults import fit_lost
-from thenar.compiler.model.quantise import quantise
 from thenar.compiler.placement.tree import Tree, grow_id3
 from thenar.compiler.trainers.logitboost import boost
 from thenar.compiler.trainers.stumps import Stumps
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 
 from ..checks.rounds import moments, see_round

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
-from thenar.compiler.model.quantise import quantise
 from thenar.compiler.trainers.logit import BINS, ColumnTables, fit_logit
 from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE, TOLERANCE
 from thenar.compiler.trainers.pairs import fit_pairs
 from thenar.runtime.model.integers import LIMIT
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import ScoreTables
 
 from ..checks.rounds import ROUNDING

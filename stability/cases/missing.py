@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.model.proof import furthest
 from thenar.runtime.build import Build
+from thenar.runtime.model.proof import furthest
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.scores import LANE_OFFSET
 

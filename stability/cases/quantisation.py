@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from thenar.compiler.model.compare import float_slack
-from thenar.compiler.model.proof import Rounding
-from thenar.compiler.model.quantise import quantise
 from thenar.runtime.model.integers import MAX_SWITCHES, IntegerTables
+from thenar.runtime.model.proof import Rounding
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.base import Floats
 from thenar.runtime.scores import LANE_OFFSET, Scorer

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
 from thenar.compiler.model.collapse import collapse
-from thenar.compiler.model.quantise import balance, quantise
 from thenar.compiler.trainers.stumps import Stumps
+from thenar.runtime.model.quantise import balance, quantise
 from thenar.runtime.model.tables import ScoreTables
 
 from ..checks.rounds import ROUNDING, SMALLEST, part_of

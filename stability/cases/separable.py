@@ -15,9 +15,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from thenar.compiler.model.collapse import collapse
-from thenar.compiler.model.quantise import quantise
 from thenar.compiler.trainers.logitboost import boost
 from thenar.runtime.model.integers import LIMIT
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners
 
 from ..checks.rounds import ROUNDING, RoundState, loss_error, loss_rounding, moments, part_of, rise_rounding

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import COLLAPSE_TOLERANCE, compare, float_slack
-from thenar.compiler.model.quantise import quantise, rounding_error
 from thenar.compiler.placement.gain import Cooccurrence, NodeCounts, _log_sum, _score_bound, error_bound
 from thenar.compiler.trainers.stumps import Stumps, Targets, _tie_bound
+from thenar.runtime.model.quantise import quantise, rounding_error
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.line import Line
 

@@ -10,12 +10,12 @@ from thenar.compiler.artifact.training import samples_of
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.model.collapse import collapse
-from thenar.compiler.model.quantise import quantise
 from thenar.compiler.recogniser import Recogniser
 from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.samples import select_inputs
 from thenar.runtime import Build
 from thenar.runtime.manifest import Of
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Inputs, Recipe
 

@@ -26,7 +26,6 @@ from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
 from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.model.collapse import collapse
-from thenar.compiler.model.quantise import quantise
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.placement import InputSelection
@@ -36,6 +35,7 @@ from thenar.compiler.trainers.base import TRAINERS
 from thenar.compiler.trainers.logitboost import boost
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.errors import SettingError
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.scores import Scorer
 
 from ..conftest import make_set, with_none

@@ -12,7 +12,6 @@ from thenar.compiler.frontier.cache import question
 from thenar.compiler.frontier.search import SHAPES, Search
 from thenar.compiler.frontier.survey import Cuts, FoldHits, fit_stages
 from thenar.compiler.model.collapse import collapse
-from thenar.compiler.model.quantise import quantise
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.placement.ports import PortCosts
@@ -20,6 +19,7 @@ from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.logitboost import boost
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.scores import Scorer

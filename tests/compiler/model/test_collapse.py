@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.model.collapse import _contributions, _joint, collapse
-from thenar.compiler.model.quantise import quantise
 from thenar.compiler.trainers.stumps import Stumps, centred, spread
+from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.base import CoreTerm, Term
 from thenar.runtime.model.terms.bins import Bins

@@ -6,8 +6,8 @@ import pytest
 
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import Comparison, compare, float_slack
-from thenar.compiler.model.quantise import quantise, rounding_error
 from thenar.compiler.trainers.stumps import Stumps
+from thenar.runtime.model.quantise import quantise, rounding_error
 from thenar.runtime.model.tables import ScoreTables, winners
 
 from .conftest import make_rows, make_stumps

@@ -3,8 +3,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from thenar.compiler.model.proof import furthest
 from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.proof import furthest
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.stability.inputs.hard_tables import every_frame

@@ -10,10 +10,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.model.compare import compare, worst_case
-from thenar.compiler.model.proof import Rounding, furthest
-from thenar.compiler.model.quantise import as_deployed, balance, quantise
 from thenar.runtime.errors import BuildError
 from thenar.runtime.model.integers import LIMIT, IntegerTables, tables_from_bytes, tables_to_bytes
+from thenar.runtime.model.proof import Rounding, furthest
+from thenar.runtime.model.quantise import as_deployed, balance, quantise
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Line

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import compare
-from thenar.compiler.model.proof import Rounding
-from thenar.compiler.model.quantise import (
+from thenar.runtime.model.integers import FINEST_SCALE, IntegerTables, tables_to_bytes
+from thenar.runtime.model.proof import Rounding
+from thenar.runtime.model.quantise import (
     GROUP_SIZE,
     TRIED,
     balance,
@@ -19,7 +20,6 @@ from thenar.compiler.model.quantise import (
     reach,
     span,
 )
-from thenar.runtime.model.integers import FINEST_SCALE, IntegerTables, tables_to_bytes
 from thenar.runtime.model.tables import ScoreTables, winners
 
 from .conftest import make_rows, make_stumps

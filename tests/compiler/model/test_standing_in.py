@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.faults import _lack, fit_lost
-from thenar.compiler.model.quantise import quantise
 from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.quantise import quantise
 
 from .conftest import make_stumps
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import float_slack
-from thenar.compiler.model.proof import Rounding, _Pairs
-from thenar.compiler.model.quantise import quantise, rounding_error
 from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.proof import Rounding, _Pairs
+from thenar.runtime.model.quantise import quantise, rounding_error
 from thenar.runtime.model.tables import ScoreTables
 
 from .conftest import UNIT, exact_scores, lost_in_parts, make_rows, make_stumps

@@ -16,10 +16,10 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.model.integers import LOST, IntegerTables
-from thenar.runtime.model.tables import ScoreTables
-from thenar.runtime.model.terms.base import HIGHEST_CODE, CoreTerm, Floats
-from thenar.runtime.model.terms.bit import Bit
+from .integers import LOST, IntegerTables
+from .tables import ScoreTables
+from .terms.base import HIGHEST_CODE, CoreTerm, Floats
+from .terms.bit import Bit
 
 Exact = NDArray[np.object_]  # of Python integers
 

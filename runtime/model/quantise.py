@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.model.integers import COARSE, FINEST_SCALE, IntegerTables
-from thenar.runtime.model.tables import ScoreTables, winners
-from thenar.runtime.model.terms.base import Floats, ScoreTerm, StepTerm, rounded
-from thenar.runtime.model.terms.line import LARGEST_SLOPE, WIDEST, Line
+from .integers import COARSE, FINEST_SCALE, IntegerTables
+from .tables import ScoreTables, winners
+from .terms.base import Floats, ScoreTerm, StepTerm, rounded
+from .terms.line import LARGEST_SLOPE, WIDEST, Line
 
 # The most consecutive switches that firmware looks up together in tables of narrow entries. Every group of this many
 # consecutive switches keeps the span, so smaller groups do as well.
