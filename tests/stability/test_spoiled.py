@@ -16,6 +16,7 @@ import pytest
 from thenar.compiler import elementary as arithmetic
 from thenar.compiler import elementary as functions
 from thenar.compiler.evaluation.rates import Rate
+from thenar.compiler.model import collapse
 from thenar.compiler.placement import gain
 from thenar.compiler.placement.gain import Cooccurrence
 from thenar.compiler.placement.tree import grow_id3
@@ -25,7 +26,7 @@ from thenar.compiler.trainers.logitboost import boost
 from thenar.compiler.trainers.pairs import fit_pairs
 from thenar.compiler.trainers.stumps import FittedStumps, Targets, fit_stumps
 from thenar.runtime.build import Build, Recognition
-from thenar.runtime.model import collapse, quantise
+from thenar.runtime.model import quantise
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.scores import Scorer
