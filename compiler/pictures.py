@@ -40,6 +40,7 @@ PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
             "baseline-3": ("#6b6b6b", "#a9a9a9"),
         },
         **{"picked": ("#d1242f", "#ff6b74"), "hit": ("#1f5fa8", "#4b93dd"), "miss": ("#c2410c", "#e8743b")},
+        **{"decision": ("#d3e0f2", "#24405f")},
         **{"skin": ("#f9f1e9", "#2a2622"), "side": ("#eee3d8", "#221f1c"), "outline": ("#57493e", "#b8a594")},
         **{"crease": ("#c9b09a", "#5e5146"), "kept": ("#14304f", "#cfe3ff"), "on-kept": ("#ffffff", "#10243d")},
     }

@@ -238,7 +238,7 @@ def test_what_is_not_installed_is_named_with_the_extra_that_brings_it(
     "line",
     [
         "info {set}",
-        "place {set}",
+        "place {set} --method id3",
         "place {set} --method elimination --keep 2",
         "run {build} --replay {set}",
         "export {set} -o {new}.csv",

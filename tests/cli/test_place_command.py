@@ -146,6 +146,7 @@ def test_what_is_there_what_is_missed_least_and_what_replaces(
     assert alone["chosen"] == other["chosen"]
 
 
+@pytest.mark.slow
 def test_a_price_is_kept_to_and_parts_are_named(
     set_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

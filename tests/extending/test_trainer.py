@@ -72,7 +72,7 @@ def test_a_foreign_trainers_frontier_has_one_stage_and_builds(installed: Any, re
 
     folder, build = tmp_path / "frontier", tmp_path / "build"
     given = ("frontier", str(recordings), "-o", str(folder), "--trainer", "naive-bayes")
-    few = ("--methods", "elimination", "--baselines", "none", "--repeats", "1", "--finalists", "2", "--jobs", "1")
+    few = ("--methods", "elimination", "--repeats", "1", "--finalists", "2", "--jobs", "1")
     found = json.loads(installed.thenar(*given, "--joint-bins", "5", *few, "--json"))
     settings = [point["setting"] for point in found["points"]]
     assert {(each["trainer"], each["rounds"]) for each in settings} == {("naive-bayes", None)}

@@ -78,12 +78,12 @@ def test_what_tells_nothing_is_worth_nothing() -> None:
     grasp_set = people(noise=0.5, switches=40)
     codes = np.random.default_rng(2).integers(0, 200, grasp_set.codes.shape).astype(np.uint16)
     nothing = replace(grasp_set, codes=codes)
-    study = study_sensors(nothing, Recipe(), jobs=1)
-    # Chosen from all rows, the best 16 of 42 would seem to recognise nearly all trials.
-    assert max(point.mean for point in study.points) < 0.5
+    study = study_sensors(nothing, Recipe(sensors=16), jobs=1)
+    # Chosen from all rows, the best 16 of 42 would seem to recognise most trials.
+    assert study.point.mean < 0.5
 
 
-@pytest.mark.parametrize("inputs", ["both", "switches", "joints"])
+@pytest.mark.parametrize("inputs", ["both", pytest.param("switches", marks=pytest.mark.slow), "joints"])
 def test_a_build_keeps_the_sensors_of_the_study(inputs: Inputs, tmp_path: Path) -> None:
     grasp_set, recipe = people(), Recipe(sensors=2, inputs=inputs, folds=2)
     study = study_sensors(grasp_set, recipe, jobs=1)
