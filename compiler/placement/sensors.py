@@ -38,8 +38,10 @@ RIDGE = 0.3
 # begins.
 CANDIDATES, EXCHANGED, BEYOND = 4, 2, 2
 # Steps of L-BFGS for a candidate, and for what is kept; a step that lowers the loss by less than a share is the last.
-TRIAL_STEPS, STEPS, TRIAL_TOLERANCE, TOLERANCE = 15, 30, 1e-4, 1e-6
+TRIAL_STEPS, STEPS, TRIAL_TOLERANCE, TOLERANCE = 8, 30, 1e-4, 1e-6
 FIRST_STEPS = 60
+# On the way down, a set of which the loss is larger by more than this share is not worth exchanges.
+NEARLY = 0.02
 # A cheaper sensor is preferred if the loss rises by no more than this share.
 NEAR = 0.01
 # The usual number of sensors up to which is searched.
@@ -109,7 +111,9 @@ class SensorSearch:
         while len(now.sensors) < most + BEYOND and (added := self._added(now)):
             now = best[len(added.sensors)] = self._exchanged(self._finished(added))
         for number in sorted(best, reverse=True)[1:]:
-            fewer = self._exchanged(self._finished(self._dropped(best[number + 1])))
+            fewer = self._finished(self._dropped(best[number + 1]))
+            if fewer.loss < (1.0 + NEARLY) * best[number].loss:
+                fewer = self._exchanged(fewer)
             if fewer.loss < (1.0 - LEAST_GAIN) * best[number].loss:
                 best[number] = fewer
         return {number: self._thrifty(one) for number, one in best.items() if number <= most}
