@@ -33,9 +33,8 @@ ifdef TABLE
 else
 	$(BIN)/thenar simulate "$(SCENE)" $(PEOPLE) -o $(OUT)/set.grasps --overwrite
 	$(BIN)/thenar draw $(OUT)/set.grasps -o $(OUT)/contacts.svg --overwrite
-	$(BIN)/thenar place $(OUT)/set.grasps -o $(OUT)/kept.json --overwrite
-	$(BIN)/thenar draw --kept $(OUT)/kept.json -o $(OUT)/kept.svg --overwrite
 endif
+	$(BIN)/thenar place $(OUT)/set.grasps --draw $(OUT)/sensors.svg --overwrite
 	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json --overwrite --repeats 1 $(if $(TABLE),--tables compositions)
 	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --rounds 50 --repeats 1 --finalists 4 --budget-us 5000
 	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --from $(OUT)/frontier/frontier.json
@@ -46,10 +45,10 @@ ifndef TABLE
 	$(BIN)/thenar emulate "$(SCENE)" --glove $(OUT)/glove.toml --dir $(OUT)/emulated --period-ms 150 -- \
 	    $(BIN)/thenar run $(OUT)/live --glove $(OUT)/emulated/glove.toml --frames 2000 > $(OUT)/live.jsonl
 	@echo "Grasps are simulated; live ones, from a glove that was emulated, in $(OUT)/live.jsonl;"
-	@echo "hand maps: $(OUT)/contacts.svg (which switches close), $(OUT)/kept.svg (which are kept)."
+	@echo "which switches close: $(OUT)/contacts.svg."
 endif
 	@echo "The grasps are in $(OUT)/set.grasps, the build is in $(OUT)/build, one recognised grasp a line in $(OUT)/grasps.jsonl;"
-	@echo "what accuracy costs in time: $(OUT)/frontier/frontier.svg; the build on one page: $(OUT)/build/report.html; its glove: $(OUT)/build/spec;"
+	@echo "what each sensor is worth: $(OUT)/sensors.svg; what accuracy costs in time: $(OUT)/frontier/frontier.svg; the build on one page: $(OUT)/build/report.html; its glove: $(OUT)/build/spec;"
 	@echo "the rates: $(OUT)/evaluation.json."
 
 test: $(VENV)/installed  ## the tests, some six minutes on two idle cores

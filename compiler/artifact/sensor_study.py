@@ -8,7 +8,7 @@ sure the choice is; its stand-in is the sensor that does nearly as well in its p
 from collections.abc import Callable, Sequence
 from functools import partial
 from statistics import fmean
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 import numpy as np
@@ -97,12 +97,13 @@ class SensorPoint(msgspec.Struct, frozen=True):
 
 
 class SensorRow(msgspec.Struct, frozen=True):
-    """A chosen sensor: the folds that choose it, too, its price, and what could stand in for it.
+    """A chosen sensor: what it is, the folds that choose it, too, its price, and what could stand in for it.
 
     rise  the share by which the loss of the search rises with the stand-in in its place
     """
 
     name: str
+    kind: Literal["switch", "pad", "joint"]
     folds: int
     price: float | None = None
     stand_in: str = ""
@@ -219,6 +220,7 @@ def study_sensors(
         chosen=tuple(
             SensorRow(
                 names[sensor],
+                _kind(samples, sensor),
                 sum(sensor in each[len(rows.sensors)] for each in chosen),
                 None if search.prices is None else float(search.prices[sensor]),
                 "" if other is None else names[other.sensors[-1]],
@@ -228,6 +230,12 @@ def study_sensors(
         ),
         left_out=tuple(name for number, name in enumerate(names) if number not in rows.sensors),
     )
+
+
+def _kind(samples: Samples, sensor: int) -> Literal["switch", "pad", "joint"]:
+    if sensor < samples.n_switches:
+        return "switch"
+    return "pad" if sensor < samples.n_switches + samples.taxels.shape[1] else "joint"
 
 
 def _sets(search: SensorSearch, recipe: Recipe) -> dict[int, SensorSet]:

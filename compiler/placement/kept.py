@@ -42,8 +42,9 @@ def _of_file(path: Path) -> tuple[str, ...]:
         check_json(text.encode())
         found = msgspec.json.decode(text)
         if isinstance(found, dict):
-            switches = msgspec.convert(found.get("switches"), list[dict[str, Any]])
-            found = [switch.get("name") for switch in switches]
+            # Of chosen sensors, joints have no place on the hand.
+            sensors = msgspec.convert(found.get("switches", found.get("chosen")), list[dict[str, Any]])
+            found = [sensor.get("name") for sensor in sensors if sensor.get("kind") != "joint"]
         return msgspec.convert(found, tuple[str, ...])
     except ValueError as reason:
         why = shortened(str(reason))

@@ -67,6 +67,14 @@ def test_a_glove_that_lacks_a_switch_says_nothing_of_its_cost(
     assert "does not wire 's9'" in " ".join(capsys.readouterr().err.split())
 
 
+def test_the_kept_switches_of_a_choice_of_sensors_can_be_drawn(set_file: Path, tmp_path: Path) -> None:
+    placed = tmp_path / "placed.json"
+    assert run(["place", str(set_file), "--sensors", "8", "--jobs", "1", "-o", str(placed)]) == 0
+    chosen = json.loads(placed.read_text())["chosen"]
+    assert {row["kind"] for row in chosen} == {"switch", "joint"}
+    assert list(kept_names(placed)) == [row["name"] for row in chosen if row["kind"] == "switch"]
+
+
 @pytest.mark.parametrize(
     ("options", "reason"),
     [

@@ -92,6 +92,7 @@ def test_a_build_keeps_the_sensors_of_the_study(inputs: Inputs, tmp_path: Path) 
     assert manifest.options.sensors == 2
     kept = {switch.name for switch in manifest.switches} | {joint.name for joint in manifest.joints}
     assert kept == {row.name for row in study.chosen}
+    assert {joint.name for joint in manifest.joints} == {row.name for row in study.chosen if row.kind == "joint"}
     assert len(study.points) == 1
 
 
