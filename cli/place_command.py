@@ -231,7 +231,7 @@ def _where_it_ends(study: "SensorStudy") -> str:
     """Return the sentence that says after how many sensors more stop to matter."""
     later = next((point.worth for point in study.points if point.number > study.enough), None)
     if later is None:
-        return f"all {study.enough} sensors are worth something: the curve does not flatten"
+        return f"the curve does not flatten up to {counted(study.enough, 'sensor')}"
     return f"after {counted(study.enough, 'sensor')} the next is worth {later} points"
 
 

@@ -209,7 +209,6 @@ def study_sensors(
     enough = _enough(points)
     rows = sets[max(sets) if one else enough]
     words = RecipeWords.of(replace(recipe, trainer=training.trainer))
-    others = search.stand_ins(rows) if len(rows.sensors) <= 2 * USUAL else (None,) * len(rows.sensors)
     return SensorStudy(
         recipe=words if one else RecipeWords("the best sensors of each number", words.trainer),
         of=cut.of,
@@ -217,18 +216,28 @@ def study_sensors(
         trials=len(np.unique(samples.trials)),
         enough=enough,
         points=points,
-        chosen=tuple(
-            SensorRow(
-                names[sensor],
-                _kind(samples, sensor),
-                sum(sensor in each[len(rows.sensors)] for each in chosen),
-                None if search.prices is None else float(search.prices[sensor]),
-                "" if other is None else names[other.sensors[-1]],
-                None if other is None else round(other.loss / rows.loss - 1.0, 4),
-            )
-            for sensor, other in zip(rows.sensors, others, strict=True)
-        ),
+        chosen=_rows(search, rows, [each[len(rows.sensors)] for each in chosen], names),
         left_out=tuple(name for number, name in enumerate(names) if number not in rows.sensors),
+    )
+
+
+def _rows(
+    search: SensorSearch, chosen: SensorSet, in_folds: Sequence[Columns], names: Sequence[str]
+) -> tuple[SensorRow, ...]:
+    """Return the rows of the chosen sensors, given those that each fold chooses."""
+    # Of many sensors, stand-ins would take long, and nobody would read them.
+    few = len(chosen.sensors) <= 2 * USUAL
+    stand_ins = search.stand_ins(chosen) if few else (None,) * len(chosen.sensors)
+    return tuple(
+        SensorRow(
+            names[sensor],
+            _kind(search.samples, sensor),
+            sum(sensor in sensors for sensors in in_folds),
+            None if search.prices is None else float(search.prices[sensor]),
+            "" if other is None else names[other.sensors[-1]],
+            None if other is None else round(other.loss / chosen.loss - 1.0, 4),
+        )
+        for sensor, other in zip(chosen.sensors, stand_ins, strict=True)
     )
 
 
@@ -240,7 +249,7 @@ def _kind(samples: Samples, sensor: int) -> Literal["switch", "pad", "joint"]:
 
 def _sets(search: SensorSearch, recipe: Recipe) -> dict[int, SensorSet]:
     """Return the best sensors by their number: of the one that the recipe asks for, or of all."""
-    sets = [search.chosen(recipe.sensors)] if by_sensors(recipe) else search.sets(USUAL).values()
+    sets = [search.chosen(recipe.sensors)] if by_sensors(recipe) else search.sets(max(USUAL, len(search.have))).values()
     return {len(each.sensors): each for each in sets if each.sensors}
 
 

@@ -64,7 +64,9 @@ class Limits:
             raise TrainingError(
                 f"``apart_mm``: the position of {list_names(lost)} is unknown: give ``layout`` your glove"
             )
-        if self.price is not None and (lost := [name for name in every_name if name not in self.prices]):
+        if (self.price is not None or self.prices) and (
+            lost := [name for name in every_name if name not in self.prices]
+        ):
             raise TrainingError(f"``price``: the price of {list_names(lost)} is unknown: add it to ``prices``")
         if both := [name for name in self.keep if name in self.never]:
             raise TrainingError(f"``have`` and ``never`` both name {list_names(both)}: take it out of one of them")

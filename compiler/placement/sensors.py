@@ -106,6 +106,7 @@ class SensorSearch:
         """Return the chosen sensors for every number from those that are always kept to `most`, as far as there are so
         many that vary and that the budget pays for.
         """
+        self._seen.clear()
         best, now = dict[int, SensorSet](), self._first()
         best[len(now.sensors)] = now
         while len(now.sensors) < most + BEYOND and (added := self._added(now)):

@@ -96,6 +96,13 @@ def test_a_build_keeps_the_sensors_of_the_study(inputs: Inputs, tmp_path: Path) 
     assert len(study.points) == 1
 
 
+def test_more_sensors_than_a_curve_has_can_be_there_already() -> None:
+    grasp_set = people(switches=20)
+    recipe = Recipe(have=grasp_set.switch_names[:18])
+    study = study_sensors(grasp_set, recipe, limits=Limits.of(recipe, grasp_set, {}), jobs=1)
+    assert [point.number for point in study.points] == [18]
+
+
 def test_prices_limit_what_is_bought() -> None:
     grasp_set = people()
     prices = dict.fromkeys([*grasp_set.switch_names, *grasp_set.joint_names], 4.0)

@@ -114,6 +114,15 @@ def test_a_budget_is_kept_to_and_used(seed: int, prices: list[int], budget: int)
     assert not left or min(left) > budget - spent - 20
 
 
+@pytest.mark.parametrize("seed", [4, 13])
+def test_no_set_is_worse_than_a_larger_one_without_a_sensor(seed: int) -> None:
+    samples = drawn(seed, n=120, switches=14, joints=2, classes=6)
+    X, sets = inputs_of(samples), SensorSearch(samples).sets(6)
+    for number in (3, 4, 5):
+        rests = combinations(sets[number + 1].sensors, number)
+        assert sets[number].loss <= min(least_loss(X[:, list(rest)], samples.labels) for rest in rests) * 1.002
+
+
 def test_of_two_equal_sensors_the_cheaper_is_bought() -> None:
     samples = drawn(3)
     twice = replace(samples, codes=np.hstack([samples.codes, samples.codes]))
@@ -125,7 +134,9 @@ def test_of_two_equal_sensors_the_cheaper_is_bought() -> None:
 
 def test_a_number_has_the_same_sensors_alone_and_in_the_curve() -> None:
     samples = drawn(5)
-    curve = SensorSearch(samples).sets(sensors.USUAL)
+    search = SensorSearch(samples)
+    curve = search.sets(sensors.USUAL)
+    assert [found.sensors for found in search.sets(sensors.USUAL).values()] == [each.sensors for each in curve.values()]
     for number in (1, 3, 6, 10):
         assert SensorSearch(samples).chosen(number).sensors == curve[number].sensors
     assert {*SensorSearch(samples).chosen(50).sensors} == {*range(10)}

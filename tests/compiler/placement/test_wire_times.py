@@ -5,26 +5,18 @@ from itertools import chain
 import pytest
 
 from thenar.compiler.placement.ports import WireTimes
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
+from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.scanning.plan import units_of
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import scan_us
+
+from ...gloves import behind
 
 READ, WRITE = 98_800, 51_300  # one port of a PCA9555, one write to a mux, at 400 kHz
 
 
 def times_of(*places: tuple[int, int] | None) -> tuple[WireTimes, tuple[tuple[int, ...], ...], Harness]:
-    """A PCA9555 with one switch in each place: straight on the bus, or behind a channel of a mux."""
-    chips = tuple(
-        ChipWiring(
-            kind="pca9555",
-            address=0x20 + number,
-            mux=None if place is None else MuxChannel(address=place[0], channel=place[1]),
-            pins={"P00": f"s{number}"},
-        )
-        for number, place in enumerate(places)
-    )
-    harness = Harness(name="x", buses=(BusWiring(device="d", clock_hz=400_000, chips=chips),))
+    harness = behind(*places)
     ports = whole_scan(harness, harness.switches).ports
     return WireTimes(ports, harness), units_of(ports, harness), harness
 

@@ -6,9 +6,11 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.drivers.i2c.chips import CHIPS
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel
+from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import free_us, glove_us, port_us, row_us, scan_us, select_us
+
+from ...gloves import behind
 
 EightChips = Callable[..., Harness]
 
@@ -57,19 +59,6 @@ def test_a_few_kept_switches_take_their_share_of_all_that_are_wired(eight_chips:
     assert first.us == pytest.approx(97.5 + 1.3)
     assert second.us == pytest.approx(120.0 + 1.3)
     assert time.share == pytest.approx((98.8 + 121.3) / (8 * 121.3))
-
-
-def behind(*places: tuple[int, int] | None) -> Harness:
-    chips = tuple(
-        ChipWiring(
-            kind="pca9555",
-            address=0x20 + number,
-            mux=None if place is None else MuxChannel(address=place[0], channel=place[1]),
-            pins={"P00": f"s{number}"},
-        )
-        for number, place in enumerate(places)
-    )
-    return Harness(name="x", buses=(BusWiring(device="d", clock_hz=400_000, chips=chips),))
 
 
 @pytest.mark.parametrize(
