@@ -17,6 +17,7 @@ from .options import (
     asked_settings,
     fitted_hand,
     layout_option,
+    parts_of,
     prices_of,
     prices_option,
     recipe_options,
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 
 _BOARD = "board"
 # Options that a point of a frontier sets.
-_SETTLED = ("sensors", "price", "prune", "inputs", "table_bits", "placement", "keep", "width", "trainer")
+_SETTLED = ("sensors", "prune", "inputs", "table_bits", "placement", "keep", "width", "trainer", *LIMITS)
 _GROUPS = {
     "Basics": ("output", "sensors", "placement", "keep", "levels", "keep_joints", "prune", "inputs"),
     "Limits": LIMITS,
@@ -143,8 +144,9 @@ def command(
     grasp_set = GraspSet.load(recordings)
     hand = fitted_hand(layout, grasp_set.element_names, None)
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
-    options |= {} if chosen is None else chosen.options
+    options |= {"prices": prices_of(grasp_set, prices)} | ({} if chosen is None else chosen.options)
     marks: dict[str, Any] = {} if chosen is None else {"frontier": chosen.frontier, "point": chosen.point.number}
+    marks["parts"] = parts_of(grasp_set, prices)
     with progress("compiling") as report_done:
         made = compile_build(
             grasp_set,
@@ -152,7 +154,6 @@ def command(
             harness=given if chosen is None else chosen.wired(given),
             ports=ports_of_whole_glove(given, grasp_set.element_names, len(grasp_set.taxel_columns)),
             hand=hand,
-            prices=prices_of(grasp_set, prices),
             documents=Documents(hand, **marks) if report else None,
             jobs=jobs,
             progress=report_done,

@@ -10,22 +10,23 @@ from thenar.drivers.names import printable
 from thenar.runtime.recipe import AUTO
 
 from .consoles import Text
-from .options import TrainingCommand, asked_settings, method_list, trainer_option
-from .parameters import (
-    Number,
-    OneOf,
-    OutputFolder,
-    existing_file,
-    jobs_option,
-    seed_range,
+from .options import (
+    TrainingCommand,
+    asked_settings,
+    method_list,
+    prices_of,
+    prices_option,
+    recipe_options,
+    trainer_option,
 )
+from .parameters import Number, OneOf, OutputFolder, existing_file, jobs_option, seed_range
 from .printing import err, json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
     from thenar.compiler.frontier.points import Frontier
 
 
-_SEARCHED = ("repeats", "finalists", "seed", "by")
+_SEARCHED = ("repeats", "finalists", "seed", "by", "sensors", "price")
 _WORDS = ("inputs", "placement", "rounds, bits", "wiring")
 _SIZES = ("flash", "RAM")
 
@@ -66,6 +67,8 @@ def _timed() -> tuple[str, ...]:
     type=method_list,
     help="Placement methods to build from.  [default: elimination and ID3, by cost with --glove]",
 )
+@recipe_options("sensors", "price", "have", "never")
+@prices_option
 @trainer_option(AUTO)
 @click.option("--rounds", type=click.IntRange(1, 300), default=100, show_default=True, help="Most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Repeats of the folds.")
@@ -101,19 +104,26 @@ def command(
     \b
     Example:
         thenar frontier set.grasps -o frontier/ --budget-us 1500
+        thenar frontier set.grasps -o frontier/ --sensors 8
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
     from thenar.compiler.frontier.find import find_frontier
     from thenar.compiler.frontier.search import Search
+    from thenar.compiler.placement.constraints import Limits
     from thenar.compiler.placement.methods.base import usual
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
+    from thenar.runtime.recipe import Recipe
 
+    if methods and (asked["sensors"] or asked["price"] is not None):
+        raise click.UsageError("--methods choose switches, --sensors and --price all kinds: give one of them.")
     if budget_us is not None and rate is not None:
         raise click.UsageError("--budget-us and --rate each pick a point: give one of them.")
     harness = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
     methods = methods or usual(wired=harness is not None or bool(grasp_set.taxel_columns))
+    kept = Recipe(price=asked["price"], have=asked.pop("have"), never=asked.pop("never"))
+    limits = Limits.of(kept, grasp_set, {}, prices=prices_of(grasp_set, asked.pop("prices")))
     rounds, training = asked["rounds"], asked_settings(context, asked)
     search = Search(
         methods=methods,
@@ -131,6 +141,7 @@ def command(
             search=search,
             budget_us=budget_us,
             rate=rate,
+            limits=limits,
             report=report,
             **asked,
         )
@@ -165,7 +176,7 @@ def print_frontier(frontier: "Frontier") -> None:
         setting = point.setting
         trained = setting.rounds if setting.usual else words.training_of(setting)
         grid.add_row(
-            *(str(point.number), str(len(point.switches)), setting.inputs, words.way_of(setting)),
+            *(str(point.number), str(point.size), setting.inputs, words.way_of(setting)),
             *(f"{trained}, {setting.width}", words.wiring_of(setting)),
             *(interval(rate(point)) for rate in rates.values()),
             f"{duration(point.frame.us)} {point.frame.how}",

@@ -105,7 +105,7 @@ glove_option = click.option(
 prices_option = click.option(
     "--prices",
     type=existing_file,
-    help="Parts and prices of the sensors, a .toml file; of two alike the cheaper is kept.",
+    help="Parts and prices of the sensors, a .toml file; the cheaper of two alike is chosen, the bill lists the parts.",
 )
 
 

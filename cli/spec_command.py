@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .options import fitted_hand, layout_option
+from .options import fitted_hand, layout_option, prices_option
 from .parameters import Number, OutputFolder, existing_file, existing_folder
 from .printing import json_flag, out, show, table
 
@@ -24,6 +24,7 @@ _WIRING = "glove.toml"
 @click.argument("build", type=existing_folder)
 @click.option("--hand-length", type=Number(100, 300), metavar="MM", help="Length from wrist to middle fingertip.")
 @layout_option
+@prices_option
 @click.option("--glove", type=existing_file, help="The glove.toml of its wiring.  [default: propose a new one]")
 @click.option(
     "-o", "--output", type=OutputFolder(), help="Also write the files to this folder, replacing a spec there."
@@ -33,6 +34,7 @@ def command(
     build: Path,
     hand_length: float | None,
     layout: Path | None,
+    prices: Path | None,
     glove: Path | None,
     output: Path | None,
 ) -> None:
@@ -49,13 +51,17 @@ def command(
     """
     from thenar.compiler.glove.files import check_output, expectations, files_of, write_spec
     from thenar.compiler.glove.spec import glove_spec
+    from thenar.compiler.placement.prices import load_prices
     from thenar.runtime.build import Build
 
     loaded = Build.load(build)
     if output is not None:
         check_output(output)
-    hand = fitted_hand(layout, list(dict.fromkeys(switch.source for switch in loaded.manifest.switches)), hand_length)
-    spec = glove_spec(loaded.manifest, loaded.scan, _harness(build, loaded, glove), hand)
+    sensors = list(dict.fromkeys(switch.source for switch in loaded.manifest.switches))
+    hand = fitted_hand(layout, sensors, hand_length)
+    every = [*sensors, *(joint.name for joint in loaded.manifest.joints)]
+    parts = {} if prices is None else load_prices(prices, every)
+    spec = glove_spec(loaded.manifest, loaded.scan, _harness(build, loaded, glove), hand, parts)
     written = None
     if output is not None:
         files = files_of(spec)
@@ -101,10 +107,11 @@ def _print(spec: "SpecSummary", expected: "Iterable[str]", written: str | None) 
         metres = f"{sum(lengths) / 1000:.2f}" if lengths else ""
         bundles.add_row(wires[0].bundle, connector, str(signals), str(len(wires) - signals), metres)
     console.print(bundles)
-    materials = table(("quantity", "what", "part number", "note"), title="Materials")
+    materials = table(("quantity", "what", "part number", "note", "price"), title="Materials")
     for line in spec.materials:
         part = line.part if line.sure else f"{line.part} (not confirmed)"
-        materials.add_row(f"{line.quantity:g} {line.unit}", line.what, part, line.note)
+        price = "" if line.price is None else f"{line.quantity * line.price:.2f}"
+        materials.add_row(f"{line.quantity:g} {line.unit}", line.what, part, line.note, price)
     console.print(materials)
     if spec.print_on:
         console.print(f"the pattern is for {spec.print_on}")

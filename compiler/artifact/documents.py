@@ -23,6 +23,7 @@ from ..recordings.graspset import GraspSet
 if TYPE_CHECKING:
     from ..frontier.points import Frontier
     from ..movements.transitions import Transitions
+    from ..placement.prices import Part
 
 REPORT_NAME, TRY_NAME, SPEC_FOLDER = "report.html", "try.html", "spec"
 
@@ -102,6 +103,8 @@ class Documents:
     ----------
     hand : HandShape, optional
         The recorded glove, laid flat: pictures show the switches on it, if it has them all.
+    parts : mapping, optional
+        The part of a price list for each sensor of the glove, by name, for the bill of materials.
     frontier, point : Frontier and int, optional
         The frontier from which a point is built, and the point's number.
     """
@@ -109,6 +112,7 @@ class Documents:
     hand: HandShape | None = None
     frontier: "Frontier | None" = None
     point: int | None = None
+    parts: "Mapping[str, Part] | None" = None
 
     def files(self, made: BuildReport) -> Mapping[str, bytes]:
         """Return path in the build's folder -> content."""
@@ -117,7 +121,7 @@ class Documents:
         files = {REPORT_NAME: self._report(made)}
         if names := list(dict.fromkeys(switch.source for switch in made.manifest.switches)):
             hand = None if self.hand is None else self.hand.fitted(names)
-            spec = spec_files(made.manifest, made.scan, made.harness, hand)
+            spec = spec_files(made.manifest, made.scan, made.harness, hand, self.parts)
             files |= {f"{SPEC_FOLDER}/{name}": content for name, content in spec.items()}
         return files
 

@@ -29,6 +29,7 @@ from ..placement.methods.base import METHODS, by_sensors
 from ..placement.methods.elimination import joint_order
 from ..placement.placement import InputSelection, select
 from ..placement.ports import PortCosts
+from ..placement.sensors import read_by, search_of
 from ..samples import Columns, Samples, decided
 from ..trainers.base import TRAINERS, Model, Training
 from ..workers import in_workers
@@ -72,6 +73,18 @@ def choose_path(
     return tuple(tuple(elements[column] for column in choose(number)) for number in numbers)
 
 
+def choose_sensors(
+    samples: Samples, rows: Rows, recipe: Recipe, numbers: tuple[int | None, ...], limits: Limits | None
+) -> tuple[tuple[Elements, Columns], ...]:
+    """Return the elements and joints of the sensors that are kept by some rows, for each of several numbers of them;
+    None: the best that the price of the recipe pays for.
+    """
+    learning = samples.rows(rows)
+    search = search_of(learning, limits)
+    chosen = (read_by(learning, recipe, search.chosen(number).sensors) for number in numbers)
+    return tuple((tuple(elements[column] for column in columns), joints) for elements, columns, joints in chosen)
+
+
 def rank_joints(samples: Samples, rows: Rows, elements: Elements) -> Columns:
     """Return the joints in the order of their value in addition to these elements, in some rows."""
     return joint_order(bits_of(samples.rows(rows), elements))
@@ -92,7 +105,9 @@ class InputChoices:
     _available: dict[tuple[int | None, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
     _elements: dict[tuple[Recipe, float, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
     _orders: dict[tuple[Elements, bytes], Columns] = field(default_factory=dict, init=False, repr=False)
-    _sensors: dict[tuple[Recipe, bytes], InputSelection] = field(default_factory=dict, init=False, repr=False)
+    _sensors: dict[tuple[Recipe, int | None, bytes], InputSelection] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @property
     def n_joints(self) -> int:
@@ -109,8 +124,11 @@ class InputChoices:
     def choose(self, recipes: Iterable[Recipe], several: Sequence[Rows]) -> None:
         """Choose the elements of recipes from several rows; what differs in the method's number alone, together."""
         numbers: dict[Recipe, dict[float, None]] = {}
+        bought: dict[Recipe, dict[int | None, None]] = {}
         for recipe in recipes:
-            if recipe.inputs != "joints":
+            if by_sensors(recipe):
+                bought.setdefault(_bought(recipe), {})[recipe.sensors] = None
+            elif recipe.inputs != "joints":
                 same, number = _placement(recipe)
                 numbers.setdefault(same, {})[number] = None
         # Costs that a method does not use are no reason to ask it again.
@@ -124,6 +142,11 @@ class InputChoices:
         for (same, rows, _), path in zip(places, self.ask(choose_path, calls), strict=True):
             for number, elements in zip(numbers[same], path, strict=True):
                 self._elements[same, number, rows.tobytes()] = elements
+        wanted = [(same, rows) for same in bought for rows in several]
+        asked = [(self.samples, rows, same, tuple(bought[same]), self.limits) for same, rows in wanted]
+        for (same, rows), sets in zip(wanted, self.ask(choose_sensors, asked) if asked else (), strict=True):
+            for count, (elements, joints) in zip(bought[same], sets, strict=True):
+                self._sensors[same, count, rows.tobytes()] = InputSelection.of(elements, joints)
 
     def elements(self, recipe: Recipe, rows: Rows) -> Elements:
         """Return the elements that a recipe keeps by some rows."""
@@ -138,10 +161,10 @@ class InputChoices:
 
     def sensors(self, recipe: Recipe, rows: Rows) -> InputSelection:
         """Return the inputs of the sensors that a recipe chooses by some rows."""
-        same = Recipe(sensors=recipe.sensors, price=recipe.price, levels=recipe.levels), rows.tobytes()
-        if same not in self._sensors:
-            self._sensors[same] = select(self.samples.rows(rows), same[0], self.ports, self.limits)
-        return self._sensors[same]
+        place = _bought(recipe), recipe.sensors, rows.tobytes()
+        if place not in self._sensors:
+            self.choose([recipe], [rows])
+        return self._sensors[place]
 
     def rank(self, places: Sequence[tuple[Elements, Rows]]) -> None:
         """Rank the joints, given elements, by rows."""
@@ -166,6 +189,11 @@ def _placement(recipe: Recipe) -> tuple[Recipe, float]:
     inputs: Inputs = "both" if joints else "switches"
     same = Recipe(placement=recipe.placement, inputs=inputs, levels=recipe.levels, robust=recipe.robust)
     return same, float(recipe.keep or 0 if method.by_number else recipe.prune)
+
+
+def _bought(recipe: Recipe) -> Recipe:
+    """Return all on which the choice of a recipe's sensors depends, but for their number."""
+    return Recipe(price=recipe.price, levels=recipe.levels)
 
 
 def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:

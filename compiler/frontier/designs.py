@@ -46,9 +46,9 @@ class Design:
         return self.judged.rate.mean
 
     @property
-    def n_switches(self) -> int:
-        """The number of switches that are read."""
-        return len(self.finalist.screened.elements)
+    def size(self) -> int:
+        """The number of elements that are read, or of sensors if these were chosen."""
+        return self.finalist.screened.size
 
     @property
     def scan(self) -> PointTime:
@@ -82,7 +82,7 @@ def best_designs(designs: Sequence[Design]) -> tuple[list[Design], list[Design]]
     designs = sorted(designs, key=_effort)
     by_time = front(designs, lambda design: design.frame.us, lambda design: design.rate)
     designs.sort(key=lambda design: design.frame.us)
-    return by_time, front(designs, lambda design: design.n_switches, lambda design: design.rate)
+    return by_time, front(designs, lambda design: design.size, lambda design: design.rate)
 
 
 def lucks(designs: Sequence[Design], screened: Sequence[Screened], survey: Survey) -> dict[TrialAccuracy, float]:
@@ -99,19 +99,19 @@ def lucks(designs: Sequence[Design], screened: Sequence[Screened], survey: Surve
     finalists = list(dict.fromkeys(design.finalist for design in designs))
     chosen = {finalist.screened.recipe for finalist in finalists}
     picked_from = [
-        (judged, us, len(finalist.screened.elements))
+        (judged, us, finalist.screened.size)
         for finalist in finalists
         for recipe, judged in finalist.tables.items()
         if (us := quickest.get((finalist, changed_to(recipe, rounds=None)))) is not None
     ]
-    picked_from += [(one.judged, one.frame_us, len(one.elements)) for one in screened if one.recipe not in chosen]
+    picked_from += [(one.judged, one.frame_us, one.size) for one in screened if one.recipe not in chosen]
     judged, *costs = zip(*picked_from, strict=True)
     most = max(each.repeats for each in judged)
     hits = np.array([each.hits * (most // each.repeats) for each in judged])
     units = survey.cuts.people if survey.cuts.by == "new subject" else np.arange(hits.shape[1])
     draws = Draws.of(hits, units, survey.search.seed)
     found: dict[TrialAccuracy, float] = {}
-    prices: tuple[Callable[[Design], float], ...] = (lambda design: design.frame.us, lambda design: design.n_switches)
+    prices: tuple[Callable[[Design], float], ...] = (lambda design: design.frame.us, lambda design: design.size)
     for best, price, cost in zip(best_designs(designs), prices, costs, strict=True):
         beyond = [price(design) for design in best[1:]]
         for design, luck in zip(best, draws.luck(np.array(cost), [*beyond, np.inf]), strict=True):
@@ -132,12 +132,13 @@ def points_of(
     fronts = dict(zip(("frame", "switches"), best_designs(designs), strict=True))
     best = [design for design in designs if any(design in some for some in fronts.values())]
     points = []
-    for number, design in enumerate(sorted(best, key=lambda design: (design.frame.us, design.n_switches)), 1):
+    for number, design in enumerate(sorted(best, key=lambda design: (design.frame.us, design.size)), 1):
         wired, finalist, recipe = design.wired, design.finalist, design.finalist.screened.recipe
+        joints = survey.some_joints(recipe)
         points.append(
             FrontierPoint(
                 number=number,
-                setting=_setting(design, survey.training(recipe)),
+                setting=_setting(design, survey.training(recipe), joints),
                 switches=survey.names(recipe),
                 rate=design.judged.rate.corrected(luck[design.judged]),
                 luck=luck[design.judged],
@@ -152,20 +153,23 @@ def points_of(
                 ports=0 if wired is None else wired.ports,
                 chips=0 if wired is None else wired.chips,
                 fronts=tuple(name for name, some in fronts.items() if design in some),
-                joints=survey.some_joints(recipe),
+                joints=joints,
             )
         )
     return tuple(points)
 
 
-def _setting(design: Design, training: Training) -> PointSetting:
+def _setting(design: Design, training: Training, joints: Sequence[str]) -> PointSetting:
     """Return the choices of a point: of its recipe, and what the recipe leaves open."""
     wired, recipe, trainer = design.wired, design.tables.recipe, TRAINERS.named(training.trainer)
+    inputs = recipe.inputs
+    if recipe.sensors is not None and not (joints and design.finalist.screened.elements):
+        inputs = "joints" if joints else "switches"
     usual = {setting.name: setting.default for setting in trainer.settings}
     own: dict[str, Any] = {name: value for name, value in training.settings.items() if value not in (usual[name], None)}
     return PointSetting(
         placement=placement_of(recipe),
-        inputs=recipe.inputs,
+        inputs=inputs,
         rounds=recipe.rounds if trainer.staged else None,
         width=recipe.width,
         wiring="" if wired is None else wired.wiring,

@@ -48,6 +48,11 @@ class Screened:
         """The rate."""
         return self.judged.rate.mean
 
+    @property
+    def size(self) -> int:
+        """The number of its elements, or of its sensors if it was chosen by these."""
+        return self.recipe.sensors or len(self.elements)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluatedFinalist:
@@ -71,6 +76,8 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     methods.
     """
     search, cuts, trainer = survey.search, survey.cuts, survey.search.trainers[0]
+    if search.by_sensors:
+        return _screened_sensors(survey, trainer), ()
     sizes = {levels: survey.size(levels) for levels in survey.levels}
     kinds = ALL_INPUTS if survey.inputs.n_joints else ALL_INPUTS[1:]
     recipes = [
@@ -91,11 +98,23 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     return _screened(survey, recipes, rates), tuple(_curve(survey, method, rates) for method in methods)
 
 
+def _screened_sensors(survey: Survey, trainer: str) -> tuple[Screened, ...]:
+    """Return the best sensors of each number that is tried, screened."""
+    folds = (survey.cuts.everything, *survey.cuts.screening)
+    every = Recipe(sensors=survey.search.sensors, price=survey.search.price, trainer=trainer)
+    numbers = survey.search.numbers(survey.size_of(every))
+    recipes = [changed_to(every, sensors=number, levels=levels) for levels in survey.levels for number in numbers]
+    survey.choose(recipes, folds)
+    recipes = [recipe for recipe in recipes if survey.size_of(recipe) == recipe.sensors]
+    survey.tune(recipes, folds)
+    return _screened(survey, recipes, _rates(survey, recipes))
+
+
 def screen_fewer(survey: Survey, screened: Sequence[Screened]) -> tuple[Screened, ...]:
     """Return the same recipes, screened with fewer joints, if joints take time."""
     # Joints that take no time are all read.
     most = survey.inputs.n_joints if survey.equipment.records.each_us else 0
-    numbers = [number for number in JOINTS if number < most]
+    numbers = [number for number in JOINTS if number < most and not survey.search.by_sensors]
     recipes = [changed_to(one.recipe, keep_joints=number) for one in screened for number in numbers]
     survey.choose_joints(recipes, (survey.cuts.everything, *survey.cuts.screening))
     survey.tune(recipes, (survey.cuts.everything, *survey.cuts.screening))
@@ -128,7 +147,7 @@ def _screened(survey: Survey, recipes: Sequence[Recipe], rates: Mapping[Recipe, 
     screened = []
     for recipe, (priced,) in prices.items():
         us = priced.fastest_us(survey.transfer(recipe).us)
-        if us is not None and (priced.scans or recipe.inputs == "joints"):
+        if us is not None and (priced.scans or not survey.elements(recipe)):
             screened.append(Screened(recipe, survey.elements(recipe), rates[recipe], us))
     return tuple(screened)
 
@@ -165,7 +184,7 @@ def _fronts(screened: Sequence[Screened]) -> list[Screened]:
     best = front(screened, lambda one: one.frame_us, lambda one: one.mean, _STEP)
     for kind in dict.fromkeys(one.recipe.inputs for one in screened):
         pool = [one for one in screened if one.recipe.inputs == kind]
-        best += front(pool, lambda one: len(one.elements), lambda one: one.mean, _STEP)
+        best += front(pool, lambda one: one.size, lambda one: one.mean, _STEP)
     known = {id(one) for one in best}
     return [one for one in screened if id(one) in known]
 
@@ -174,7 +193,7 @@ def _spread(pool: list[Screened]) -> list[Screened]:
     """Return the one or more of a pool in the order in which they merit full evaluation."""
     best = max(pool, key=lambda one: one.mean)
     level = [one for one in pool if one.mean >= best.mean - _LEVEL]
-    order = list(dict.fromkeys([best, min(level, key=lambda one: len(one.elements))]))
+    order = list(dict.fromkeys([best, min(level, key=lambda one: one.size)]))
     left = [one for one in pool if one not in order]
     while left:
         order.append(max(left, key=lambda one: min(_distance(one, known) for known in order)))
@@ -221,6 +240,8 @@ def recipes_to_mark(survey: Survey) -> dict[Recipe, str]:
     """Return the recipes to mark, with their names: the paper's placement and all switches, alone and with the joints;
     with the most levels of each taxel.
     """
+    if survey.search.by_sensors:
+        return {}
     trainer, levels = survey.search.trainers[0], survey.levels[-1]
     n_elements = survey.size(levels)
     # Keeping all switches is the same by any method.

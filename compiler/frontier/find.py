@@ -17,6 +17,7 @@ from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.names import list_names
 
+from ..placement.constraints import Limits
 from ..placement.methods.base import usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
@@ -69,6 +70,7 @@ def find_frontier(
     budget_us: float | None = None,
     rate: float | None = None,
     joint_us: float | None = None,
+    limits: Limits | None = None,
     jobs: int = -1,
     report: Report | None = None,
 ) -> Frontier:
@@ -99,6 +101,8 @@ def find_frontier(
         Time of reading all joints, in microseconds. By default it is that of a CyberGlove's record, as measured for
         the harness, else by the vendor's formula; of other joints it is left out of every frame, and a sentence of
         `skipped` says so.
+    limits : Limits, optional
+        The sensors to keep or to leave out, and prices, for a search among sensors.
     jobs : int
         Worker processes, -1 for all cores.
     report : callable, optional
@@ -125,6 +129,8 @@ def find_frontier(
     samples = _samples(grasp_set.without_none())
     # Levels of one taxel share its conversion.
     search = search or Search(methods=usual(wired=harness is not None or bool(grasp_set.taxel_columns)))
+    if limits is not None and not search.by_sensors:
+        raise FrontierError("``have``, ``never`` and ``prices`` are for ``sensors`` or ``price``: add one of these")
     cuts = Cuts.of(samples, search)
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     created = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
@@ -132,7 +138,7 @@ def find_frontier(
         cache = Cache(store, report or (lambda _done, _total: None), _ROUNDS, jobs=jobs)
         with _remove_created_on_error(created, store):
             equipment = equipment_for(grasp_set, harness, target, cache, joint_us)
-            survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
+            survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache, limits)
         untimed = [_UNTIMED.format(list_names(grasp_set.joint_names))] if equipment.records.how == "unknown" else []
         frontier = _found(survey)
         frontier = changed_to(
@@ -251,6 +257,10 @@ def _found(survey: Survey) -> Frontier:
         tried=tried,
         curves=curves,
         marks=marks_of(recipes, finalists, survey),
+        have=() if survey.limits is None else survey.limits.keep,
+        never=() if survey.limits is None else survey.limits.never,
+        price=search.price,
+        prices={} if survey.limits is None else dict(survey.limits.prices),
         skipped=(*claimed, *notes),
     )
 
@@ -283,7 +293,7 @@ def _tried(screened: Sequence[Screened], finalists: Sequence[EvaluatedFinalist],
         Tried(
             placement=placement_of(one.recipe),
             inputs=one.recipe.inputs,
-            n_switches=len(one.elements),
+            n_switches=one.size,
             rounds=rounds if searches[one.recipe.trainer].staged else None,
             rate=rate,
             frame_us=one.frame_us,

@@ -32,7 +32,10 @@ class Picked:
         setting = self.point.setting
         names = ("max_bins", "keep_joints", "levels", "rounds")
         chosen = {name: value for name in names if (value := getattr(setting, name)) is not None}
-        if setting.inputs != "joints":
+        if self.point.by_sensors:
+            chosen |= {"sensors": self.point.size, "inputs": "both"}
+            chosen |= {name: getattr(self.frontier, name) for name in ("have", "never", "price", "prices")}
+        elif setting.inputs != "joints":
             parameter = "keep" if METHODS[setting.placement.method].by_number else "prune"
             chosen |= {"placement": setting.placement.method, parameter: int(setting.placement.parameter)}
         return {
@@ -117,9 +120,10 @@ def _check(point: FrontierPoint, grasp_set: GraspSet, what: str) -> None:
     levels = [taxel_and_code(name) or (name, 0) for name in point.switches]
     if not set(grasp_set.element_names).issuperset(name for name, _ in levels):
         raise FrontierError(f"{what} keeps switches that the recordings do not have: run thenar frontier on these")
-    if setting.inputs != "joints" and setting.placement.method not in METHODS:
+    choosing = not point.by_sensors and setting.inputs != "joints"
+    if choosing and setting.placement.method not in METHODS:
         raise FrontierError(f"{what} has an unknown method: {shortened(repr(setting.placement.method))}")
-    least = 1 if setting.inputs != "joints" and METHODS[setting.placement.method].by_number else 0
+    least = 1 if point.by_sensors or (choosing and METHODS[setting.placement.method].by_number) else 0
     if not (setting.placement.parameter.is_integer() and setting.placement.parameter >= least):
         raise FrontierError(
             f"{what} has {setting.placement.parameter} as its method's parameter: it must be an integer from {least} on"

@@ -76,7 +76,7 @@ _FRAME = _Cost(
 _SWITCHES = _Cost(
     title="Accuracy against the number of switches",
     axis="switches kept",
-    of_point=lambda point: float(len(point.switches)) or None,
+    of_point=lambda point: float(point.size) or None,
     of_mark=lambda mark: float(mark.n_switches) or None,
     of_tried=lambda tried: float(tried.n_switches) or None,
 )

@@ -12,6 +12,7 @@ from thenar.runtime.names import fault, shortened
 from thenar.runtime.recipe import PAPERS_TRAINER, Inputs, Name, TableBits, Value
 
 from ..evaluation.rates import Rate
+from ..placement.sensors import SENSORS
 
 SCHEMA = 4
 MAX_BYTES = 64 << 20
@@ -46,7 +47,7 @@ class PointTime(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PlacementChoice(Struct, frozen=True, forbid_unknown_fields=True):
-    """A placement method: a name of `METHODS`, and its parameter (S, or a number of switches)."""
+    """A placement method: a name of `METHODS`, and its parameter (S, or a number of switches); or sensors."""
 
     method: str
     parameter: Annotated[float, Meta(ge=0.0, le=1e6)]
@@ -122,6 +123,16 @@ class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     fronts: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
 
+    @property
+    def by_sensors(self) -> bool:
+        """Whether it keeps the best sensors of a number: switches, pads and joints in one pool."""
+        return self.setting.placement.method == SENSORS
+
+    @property
+    def size(self) -> int:
+        """The number of its switches and levels, or of its sensors if it keeps the best of these."""
+        return int(self.setting.placement.parameter) if self.by_sensors else len(self.switches)
+
 
 class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A screened placement: its rate after `rounds` rounds (None: its trainer has none), in the fastest of its wirings;
@@ -164,6 +175,7 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     machine  what classifies in the stated times, in words; measured ones are of this machine
     n_levels  most levels of the n_taxels to choose from, in addition to the switches
     picked   number of the point selected by the given budget or rate; None if neither was given
+    have, never, price, prices  the limits of the sensors, if these were chosen
     skipped  sentences: measurements that were not possible here, and options that were left out
     """
 
@@ -192,6 +204,10 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     wanted: str = ""
     n_taxels: Count = 0
     n_levels: Count = 0
+    have: tuple[Name, ...] = ()
+    never: tuple[Name, ...] = ()
+    price: Value | None = None
+    prices: dict[Name, Value] = {}
 
     @property
     def trainers(self) -> tuple[str, ...]:

@@ -13,7 +13,8 @@ from msgspec.structs import replace as changed_to
 from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Inputs, Recipe, changed
 
 from ..placement.elements import LEVELS
-from ..placement.methods.base import METHODS, usual
+from ..placement.methods.base import FINE, METHODS, usual
+from ..placement.sensors import SENSORS
 from ..trainers.base import TRAINERS, Number, Training
 from .points import FrontierError, PlacementChoice
 
@@ -37,6 +38,8 @@ def placed(method: str, number: int, trainer: str, inputs: Inputs, levels: int |
 
 def placement_of(recipe: Recipe) -> PlacementChoice:
     """Return the placement of a candidate as a frontier writes it; of joints alone, none."""
+    if recipe.sensors is not None:
+        return PlacementChoice(SENSORS, float(recipe.sensors))
     if recipe.inputs == "joints":
         return PlacementChoice("none", 0.0)
     by_number = METHODS[recipe.placement].by_number
@@ -56,6 +59,10 @@ class Search:
     ----------
     methods : tuple of str
         Placement methods that points are built from.
+    sensors : int, optional
+        Build points from the best sensors instead, at most this many: switches, pads and joints in one pool.
+    price : float, optional
+        The same, as many as this pays for.
     folds, repeats, seed : int
         The stratified folds are cut `repeats` times, with seeds seed, seed + 1, ...
     screening : int
@@ -90,6 +97,8 @@ class Search:
     rounds: int = PAPERS_ROUNDS
     finalists: int = 12
     by: Literal["subject", "trial"] | None = None
+    sensors: int | None = None
+    price: float | None = None
     trainer: str = AUTO
     settings: Mapping[str, Number] = field(default_factory=dict, hash=False)
 
@@ -99,6 +108,16 @@ class Search:
         if min(self.repeats, self.screening, self.rounds, self.finalists) < 1 or not self.methods:
             raise FrontierError("a frontier needs a method, a repeat, a round and a finalist at least")
         _ = self.training
+
+    @property
+    def by_sensors(self) -> bool:
+        """Whether points are built from the best sensors, not by methods."""
+        return self.sensors is not None or self.price is not None
+
+    def numbers(self, there: int) -> tuple[int, ...]:
+        """Return the numbers of sensors that are tried of those that are there, or that are paid for."""
+        most = min(there, self.sensors or there)
+        return (*(number for number in FINE if number < most), most)
 
     @property
     def trainers(self) -> tuple[str, ...]:

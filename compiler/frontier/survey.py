@@ -14,9 +14,10 @@ from thenar.runtime.manifest import Fitting, Unit
 from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Inputs, Recipe
 
-from ..evaluation.choosing import InputChoices, choose_path, choose_training, rank_joints
+from ..evaluation.choosing import InputChoices, choose_path, choose_sensors, choose_training, rank_joints
 from ..evaluation.folds import EvaluationError, Fold, Rows, leave_groups_out, trial_folds
 from ..evaluation.rates import Rate
+from ..placement.constraints import Limits
 from ..placement.elements import Elements, names_of
 from ..placement.placement import InputSelection
 from ..placement.ports import PortCosts
@@ -140,6 +141,7 @@ class Survey:
 
     source  name of the recordings
     ports   costs of reading switches and taxels on the whole glove, None if unknown
+    limits  constraints on the sensors, and their prices
     """
 
     grasp_set: GraspSet
@@ -150,12 +152,13 @@ class Survey:
     cuts: Cuts
     equipment: Equipment
     cache: Cache
+    limits: Limits | None = None
     _trainings: dict[tuple[str, Inputs, Fold], Training] = field(default_factory=dict, init=False)
 
     @cached_property
     def inputs(self) -> InputChoices:
         """The elements and joints that recipes keep."""
-        return InputChoices(self.samples, self.ports, ask=self.cache.ask)
+        return InputChoices(self.samples, self.ports, self.limits, ask=self.cache.ask)
 
     @property
     def levels(self) -> tuple[int | None, ...]:
@@ -172,9 +175,11 @@ class Survey:
 
     def joints(self, recipe: Recipe, fold: Fold | None = None) -> Columns:
         """Return the joints of a recipe, ascending, by the training rows of `fold`, or by all rows."""
+        rows = (fold or self.cuts.everything).train
+        if recipe.sensors is not None or recipe.price is not None:
+            return self.inputs.sensors(recipe, rows).joints
         if recipe.inputs == "switches":
             return ()
-        rows = (fold or self.cuts.everything).train
         return self.inputs.joints(self.elements(recipe, fold), rows, recipe.keep_joints)
 
     def selection(self, recipe: Recipe, fold: Fold | None = None) -> InputSelection:
@@ -191,8 +196,13 @@ class Survey:
 
     def some_joints(self, recipe: Recipe) -> tuple[str, ...]:
         """Return the names of the joints of a recipe from all rows, if not all are kept."""
-        names = self.grasp_set.joint_names
-        return () if recipe.keep_joints is None else tuple(names[joint] for joint in self.joints(recipe))
+        if recipe.keep_joints is None and not self.search.by_sensors:
+            return ()
+        return tuple(self.grasp_set.joint_names[joint] for joint in self.joints(recipe))
+
+    def size_of(self, recipe: Recipe) -> int:
+        """Return the number of sensors that a recipe keeps by all rows."""
+        return len({element.column for element in self.elements(recipe)}) + len(self.joints(recipe))
 
     def training(self, recipe: Recipe, fold: Fold | None = None) -> Training:
         """Return the training of a recipe on the training rows of a fold, or on all rows; call `tune` first."""
@@ -292,6 +302,7 @@ class Survey:
 
 
 stored(5)(choose_path)
+stored(1)(choose_sensors)
 stored(3)(rank_joints)
 
 

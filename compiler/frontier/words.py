@@ -31,7 +31,9 @@ def inputs_of(frontier: Frontier, point: FrontierPoint) -> str:
 
 
 def elements_of(frontier: Frontier) -> str:
-    """Return the name of the kept elements: switches, levels, or, for both, elements."""
+    """Return the name of what is kept: switches, levels, or, for both, elements; or sensors of all kinds."""
+    if any(point.by_sensors for point in frontier.points):
+        return "sensors"
     if not frontier.n_taxels:
         return "switches"
     return "elements" if frontier.n_switches else "levels"

@@ -4,7 +4,7 @@ It has switches, the connectors of their bundles, boards and diodes; and expande
 reset, bus pull-ups, muxes, and the host's plugs.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from msgspec import Struct
@@ -16,6 +16,7 @@ from thenar.drivers.i2c.chips.base import RESET, ChipPackage
 from thenar.drivers.i2c.chips.base import SUPPLY as SUPPLY_PINS
 from thenar.runtime.harness.wiring import ChipWiring, Harness, MuxChannel, SpiWiring
 
+from ..placement.prices import Part
 from .layout import GROUND, PUSH_BUTTON, SUPPLY, GloveWire, PlacedSensor, Unit, WireEnd, net_of
 
 
@@ -375,7 +376,7 @@ class BillLine(Struct, frozen=True):
     """A line of the bill: `part` is an orderable part number of `maker`, empty if unknown.
 
     sure is False if part or footprint is not confirmed twice: compare with the data sheet before ordering.
-    quantity counts pieces, or metres if `unit` is "m".
+    quantity counts pieces, or metres if `unit` is "m"; price is that of one, None if unknown.
     """
 
     quantity: float
@@ -387,13 +388,15 @@ class BillLine(Struct, frozen=True):
     designators: tuple[str, ...]
     sure: bool
     note: str
+    price: float | None = None
 
 
-def bill_of(circuit: Circuit, wires: Sequence[GloveWire]) -> Iterator[BillLine]:
-    """Yield the bill of materials for a glove's circuit and its wires."""
+def bill_of(circuit: Circuit, wires: Sequence[GloveWire], listed: Container[str] = ()) -> Iterator[BillLine]:
+    """Yield the bill of materials for a glove's circuit and its wires, without the sensors `listed` by name."""
     groups: dict[ComponentKind, list[str]] = {}
     for component in circuit.components:
-        groups.setdefault(component.kind, []).append(component.ref)
+        if component.on_board or component.name not in listed:
+            groups.setdefault(component.kind, []).append(component.ref)
     devices = {"R": "resistor ", "C": "ceramic capacitor ", "R_Variable": ""}
     for kind, refs in groups.items():
         what = kind.value
@@ -420,6 +423,13 @@ def bill_of(circuit: Circuit, wires: Sequence[GloveWire]) -> Iterator[BillLine]:
         connectors = tuple(dict.fromkeys(wire.connector for wire in group))
         if lengths:
             yield BillLine(sum(lengths) / 1000, "m", f"{_STRANDED}, {colour}", "", "", "", connectors, True, _ESTIMATE)
+
+
+def bill_of_parts(sensors: Mapping[str, str], parts: Mapping[str, Part]) -> Iterator[BillLine]:
+    """Yield a line for each part of a price list that sensors, designators by name, are made of."""
+    for part in dict.fromkeys(parts[name] for name in sensors):
+        refs = tuple(ref for name, ref in sensors.items() if parts[name] == part)
+        yield BillLine(len(refs), "pcs", part.name, part.number, "", "", refs, True, "of the price list", part.price)
 
 
 def bill_of_joints(joints: Sequence[str], cyberglove: bool) -> tuple[BillLine, ...]:

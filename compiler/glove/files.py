@@ -16,6 +16,7 @@ from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..hand import HandShape
+from ..placement.prices import Part
 from ..publication import check_folder, entries, publish_folder
 from ..text import cells, sentence
 from .circuit import BillLine, Circuit, Component, ComponentKind
@@ -68,11 +69,11 @@ def wiring_csv(summary: SpecSummary) -> bytes:
 def materials_csv(materials: Sequence[BillLine]) -> bytes:
     """Return the bill of materials."""
     return _csv(
-        ("quantity", "unit", "what", "part_number", "maker", "footprint", "designators", "confirmed", "note"),
+        ("quantity", "unit", "what", "part_number", "maker", "footprint", "designators", "confirmed", "note", "price"),
         (
             (
                 *(f"{m.quantity:g}", m.unit, m.what, m.part, m.maker, m.footprint, " ".join(m.designators)),
-                *("yes" if m.sure else "no", m.note),
+                *("yes" if m.sure else "no", m.note, "" if m.price is None else m.price),
             )
             for m in materials
         ),
@@ -244,12 +245,13 @@ def spec_files(
     scan: ScanMap | None = None,
     harness: Harness | None = None,
     hand: HandShape | None = None,
+    parts: Mapping[str, Part] | None = None,
 ) -> Mapping[str, bytes]:
     """Return name -> content of the files of a build's spec; the same arguments give the same bytes.
 
     Arguments and errors are those of `glove_spec`.
     """
-    return files_of(glove_spec(manifest, scan, harness, hand))
+    return files_of(glove_spec(manifest, scan, harness, hand, parts))
 
 
 def files_of(spec: GloveSpec) -> Mapping[str, bytes]:

@@ -1,6 +1,6 @@
 """The content of a spec for a reduced glove, decided once; files and tables only write it down."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from msgspec import Struct
@@ -18,7 +18,8 @@ from thenar.runtime.scanning.timing import glove_us, scan_us
 
 from ..facts import Fact, SensorCount, facts
 from ..hand import HandShape
-from .circuit import BillLine, Circuit, bill_of, bill_of_joints, glove_circuit
+from ..placement.prices import Part
+from .circuit import BillLine, Circuit, bill_of, bill_of_joints, bill_of_parts, glove_circuit
 from .layout import (
     GloveWire,
     PlacedSensor,
@@ -126,10 +127,12 @@ def glove_spec(
     scan: ScanMap | None = None,
     harness: Harness | None = None,
     hand: HandShape | None = None,
+    parts: Mapping[str, Part] | None = None,
 ) -> GloveSpec:
     """Return the spec of a build's glove, wired with `harness`; without one, a wiring is proposed.
 
-    scan is the build's scan map, if it has one; hand, the hand that has positions for its switches. Raises BuildError
+    scan is the build's scan map, if it has one; hand, the hand that has positions for its switches; parts, the part of
+    a price list for each of its sensors, by name: all of them, or none. Raises BuildError
     if the build keeps no switch, or has a scan map but no harness is given; HarnessError if the harness lacks a kept
     switch, or does not match the scan map.
     """
@@ -145,6 +148,10 @@ def glove_spec(
     switches = place_sensors(names, {names[end.switch] for end in ends if end.taxel}, known)
     wires = wires_of(switches, ends, known)
     circuit = glove_circuit(switches, ends, wires, soldered, "" if known is None else known.part_number)
+    joints = [joint.name for joint in manifest.joints]
+    bought = {sensor.name: sensor.ref for sensor in switches} if parts else {}
+    if parts and wired.cyberglove is None:
+        bought |= {joint: joint for joint in joints}
     kept = str(SensorCount.of_build(manifest))
     size = "" if known is None or known.length_mm is None else f", right hand of {known.length_mm:g} mm"
     title = f"{wired.name}: {counted_sensors(switches)}{size}"
@@ -159,8 +166,9 @@ def glove_spec(
         readers=_readers(ends),
         wires=wires,
         materials=(
-            *bill_of(circuit, wires),
-            *bill_of_joints([joint.name for joint in manifest.joints], wired.cyberglove is not None),
+            *bill_of_parts(bought, parts or {}),
+            *bill_of(circuit, wires, bought),
+            *bill_of_joints([joint for joint in joints if joint not in bought], wired.cyberglove is not None),
         ),
         expected=expected_of(manifest, read, wired),
         remarks=(*_remarks(manifest, wired, switches, known), *_of_boards(wired)),

@@ -2,6 +2,7 @@
 
 [[part]]
 name = "flex sensor, 2.2 inch"
+number = "FS-L-055-253-ST"
 price = 11.50
 sensors = ["flex_*"]
 """
@@ -20,11 +21,14 @@ from ..samples import TrainingError
 
 
 class Part(Struct, frozen=True, forbid_unknown_fields=True):
-    """A part to buy, its price, and the names of the sensors that it is for; * stands for any letters."""
+    """A part to buy, its price, the names of the sensors that it is for, where * stands for any letters, and the number
+    by which it is ordered.
+    """
 
     name: str
     price: Annotated[float, Meta(ge=0.0, le=1e9)]
     sensors: tuple[str, ...]
+    number: str = ""
 
 
 class PriceList(Struct, frozen=True, forbid_unknown_fields=True):

@@ -93,6 +93,7 @@ class SensorSearch:
     _varying: NDArray[np.bool_] = field(init=False)
     _rows: Samples = field(init=False)
     _seen: set[frozenset[int]] = field(init=False, default_factory=set)
+    _sets: dict[int, dict[int, SensorSet]] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self._rows = rows = sampled(self.samples, MOST_ROWS)
@@ -106,6 +107,11 @@ class SensorSearch:
         """Return the chosen sensors for every number from those that are always kept to `most`, as far as there are so
         many that vary and that the budget pays for.
         """
+        if most not in self._sets:
+            self._sets[most] = self._searched(most)
+        return self._sets[most]
+
+    def _searched(self, most: int) -> dict[int, SensorSet]:
         self._seen.clear()
         best, now = dict[int, SensorSet](), self._first()
         best[len(now.sensors)] = now
@@ -133,7 +139,7 @@ class SensorSearch:
         return now
 
     def chosen(self, number: int | None) -> SensorSet:
-        """Return the chosen sensors: this many, or fewer if no more vary; None: as many as the budget pays for.
+        """Return the chosen sensors: this many, or fewer if no more vary; None: the best that the budget pays for.
 
         A number up to USUAL gives the set of the search up to USUAL, so curves and placements agree. Raises
         TrainingError if more are always kept.
@@ -144,7 +150,9 @@ class SensorSearch:
         if number is not None and self.budget is None and number > max(USUAL, there // 2):
             return self._left(number)
         sets = self.sets(max(there if number is None else number, USUAL))
-        return sets[max(sets) if number is None else min(max(number, min(sets)), max(sets))]
+        if number is None:
+            return min(sets.values(), key=_loss)
+        return sets[min(max(number, min(sets)), max(sets))]
 
     def stand_ins(self, now: SensorSet) -> tuple[SensorSet | None, ...]:
         """Return, for each of the sensors, the set with the best other one in its place, as the last; None if none is

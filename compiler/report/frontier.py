@@ -220,7 +220,7 @@ def _points(frontier: Frontier) -> PlainTable:
     rows = tuple(
         (
             str(point.number),
-            str(len(point.switches)),
+            str(point.size),
             point.setting.inputs,
             _placement(point),
             trainer_of(point.setting),

@@ -156,3 +156,51 @@ def test_a_budget_that_nothing_meets_ends_with_a_code(set_file: Path, found_fold
     assert done.returncode == 1
     assert "no point qualifies" in done.stderr
     assert (again / "frontier.json").exists()
+
+
+def test_points_of_the_best_sensors_stay_within_number_price_and_limits(set_file: Path, tmp_path: Path) -> None:
+    """The best point becomes a build of the same sensors, for which the price list need not be given again."""
+    prices, frontier = tmp_path / "prices.toml", tmp_path / "frontier"
+    prices.write_text(
+        '[[part]]\nname = "dear"\nprice = 9\nsensors = ["s0"]\n[[part]]\nname = "plain"\nprice = 2\nsensors = ["*"]'
+    )
+    limits = ("--sensors", 5, "--price", 8, "--prices", prices, "--have", "s2", "--never", "s1")
+    quick = ("--rounds", 6, "--finalists", 3, "--repeats", 1, "--jobs", 1, *SETTLED)
+    done = thenar("frontier", set_file, "-o", frontier, *quick, *limits)
+    assert done.returncode == 0, done.stderr
+    assert "sensors" in done.stdout
+    found = frontier_from_bytes((frontier / "frontier.json").read_bytes())
+    for point in found.points:
+        kept = {*point.switches, *point.joints}
+        # One that is there already is not bought.
+        assert len(kept) == point.size <= 5
+        assert "s2" in kept
+        assert not kept & {"s0", "s1"}
+    best = max(found.points, key=lambda each: each.size)
+    build = tmp_path / "build"
+    made = thenar(
+        *("compile", set_file, "-o", build, "--folds", 0, "--from", frontier / "frontier.json", "--point", best.number)
+    )
+    assert made.returncode == 0, made.stderr
+    manifest = Build.load(build).manifest
+    assert {*(switch.name for switch in manifest.switches), *(joint.name for joint in manifest.joints)} == {
+        *best.switches,
+        *best.joints,
+    }
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (("--sensors", 2, "--methods", "cmim"), "--sensors and --price all kinds: give one of them"),
+        (("--have", "s2"), "--have, --never and --prices are for --sensors or --price: add one of these"),
+        (("--price", 3), "the price of s0"),
+    ],
+)
+def test_a_mistake_with_sensors_is_one_sentence(
+    set_file: Path, tmp_path: Path, asked: tuple[object, ...], said: str
+) -> None:
+    done = thenar("frontier", set_file, "-o", tmp_path / "frontier", *asked)
+    assert done.returncode == 2
+    assert said in " ".join(done.stderr.split())
+    assert not (tmp_path / "frontier").exists()

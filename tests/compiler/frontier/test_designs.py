@@ -95,8 +95,8 @@ def samples_of_trials(trials: int) -> Samples:
 def test_fronts_hold_the_quickest_and_the_smallest() -> None:
     big, small = close_of(30, 0.95, scan_us=100.0), close_of(5, 0.9, scan_us=400.0)
     by_time, by_switches = best_designs([*designs_of(small), *designs_of(big)])
-    assert [design.n_switches for design in by_time] == [30]
-    assert [design.n_switches for design in by_switches] == [5, 30]
+    assert [design.size for design in by_time] == [30]
+    assert [design.size for design in by_switches] == [5, 30]
 
 
 def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
