@@ -167,7 +167,7 @@ def print_frontier(frontier: "Frontier") -> None:
     from thenar.compiler.evaluation.rates import interval
     from thenar.compiler.frontier import words
 
-    rates, elements = words.rates_of(frontier), words.elements_of(frontier)
+    rates, elements = words.rates_of(frontier), words.counted_of(frontier)
     numbers = (*(f"{what} %" for what in rates), words.of_time(frontier, "frame"), *_SIZES)
     wanted = f"; {frontier.wanted}: point {frontier.picked}" if frontier.picked is not None else ""
     title = f"The best of {frontier.combinations:,} combinations, {frontier.source} on {frontier.machine}{wanted}"

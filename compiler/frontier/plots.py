@@ -13,7 +13,7 @@ from ..evaluation.rates import Rate
 from ..pictures import on_paper, painting, rendered
 from ..text import counted, duration, percent
 from .points import Curve, Frontier, FrontierPoint, ReferencePoint, Tried, front
-from .words import elements_of, featured, inputs_of, mark_name, of_time, shorten
+from .words import counted_of, elements_of, featured, inputs_of, mark_name, of_time, shorten
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -93,7 +93,7 @@ def pictures(frontier: Frontier, kind: Literal["svg", "png"], *, letters: bool =
 
 def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     machine = f", {shorten(frontier.machine)}" if cost.is_time else ""
-    figure, axes = _sheet(frontier, cost.title.replace("switches", elements_of(frontier)) + machine)
+    figure, axes = _sheet(frontier, cost.title.replace("switches", counted_of(frontier)) + machine)
     marks = [(max(x, _LOWEST), mark) for mark in frontier.marks if (x := cost.of_mark(mark)) is not None]
     points = [(max(x, _LOWEST), point) for point in frontier.points if (x := cost.of_point(point)) is not None]
     curves = () if cost.is_time else frontier.curves
@@ -109,9 +109,11 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     if cost.is_time:
         _scale_times(axes, [x for x, _ in (*marks, *tried, *points)])
     else:
-        _scale_counts(axes, frontier.n_switches + frontier.n_levels)
+        sensors = counted_of(frontier) == "sensors"
+        there = max(each.n_switches for each in frontier.tried) if sensors else frontier.n_switches + frontier.n_levels
+        _scale_counts(axes, there)
     untimed = cost.is_time and any(point.transfer.how == "unknown" for _, point in points)
-    axis = cost.axis.replace("switches", elements_of(frontier))
+    axis = cost.axis.replace("switches", counted_of(frontier))
     axis = of_time(frontier, axis) if cost.is_time else axis
     axes.set_xlabel(axis + "; reading the joints is left out" * untimed, color=_INK)
 

@@ -31,12 +31,15 @@ def inputs_of(frontier: Frontier, point: FrontierPoint) -> str:
 
 
 def elements_of(frontier: Frontier) -> str:
-    """Return the name of what is kept: switches, levels, or, for both, elements; or sensors of all kinds."""
-    if any(point.by_sensors for point in frontier.points):
-        return "sensors"
+    """Return the name of the kept elements: switches, levels, or, for both, elements."""
     if not frontier.n_taxels:
         return "switches"
     return "elements" if frontier.n_switches else "levels"
+
+
+def counted_of(frontier: Frontier) -> str:
+    """Return the name of what the size of a point counts: sensors if these were chosen, else its elements."""
+    return "sensors" if any(point.by_sensors for point in frontier.points) else elements_of(frontier)
 
 
 def counted_elements(frontier: Frontier, count: int) -> str:

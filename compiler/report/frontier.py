@@ -16,6 +16,7 @@ from ..frontier.plots import POINT_ID, RING_ID, pictures
 from ..frontier.points import Frontier, FrontierPoint, PointTime
 from ..frontier.words import (
     LUCK,
+    counted_of,
     elements_of,
     featured,
     folds_of,
@@ -209,7 +210,7 @@ def _time(time: PointTime) -> str:
 def _points(frontier: Frontier) -> PlainTable:
     columns = (
         "Point",
-        elements_of(frontier).capitalize(),
+        counted_of(frontier).capitalize(),
         "Inputs",
         "Method",
         "Trainer",
