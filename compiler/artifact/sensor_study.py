@@ -20,13 +20,13 @@ from thenar.runtime.model.tables import winners
 from thenar.runtime.names import shortened
 from thenar.runtime.recipe import AUTO, Recipe
 
-from ..evaluation.folds import EvaluationError, Fold
+from ..evaluation.folds import EvaluationError, Fold, Rows
 from ..evaluation.rates import Rate, RecipeWords, student
 from ..hand import HandShape
 from ..model.collapse import collapse
 from ..pictures import on_paper, painting, rendered
 from ..placement.constraints import Limits
-from ..placement.elements import bits_of, elements_of
+from ..placement.elements import Elements, bits_of, elements_of
 from ..placement.methods.base import METHODS, PAPERS, by_sensors
 from ..placement.placement import InputSelection
 from ..placement.sensors import NEAR, USUAL, SensorSearch, SensorSet, read_by, search_of, sensor_names
@@ -186,26 +186,25 @@ def study_sensors(
         raise EvaluationError("``folds`` 0: the worth of sensors is measured in folds, of which 2 or more are needed")
     cut = cuts[0]
     names = sensor_names(samples, grasp_set.element_names, grasp_set.joint_names)
-    search = search_of(samples, limits)
-    one, sets = by_sensors(recipe), _sets(search, recipe)
+    training = Training.of(replace(recipe, trainer=TRAINER) if recipe.trainer == AUTO else recipe)
+    folds, sets = dict[int, _Found](), dict[int, SensorSet]()
+    # The search among all rows takes as long as a fold, and a rough curve does without.
+    tasks = (0, 1, None, *range(2, len(cut.folds)))
+    task = partial(_task, samples, recipe, training, limits, cut.folds)
+    for done, found in enumerate(in_workers(task, tasks, jobs), 1):
+        if isinstance(found, _Found):
+            folds[found.fold] = found
+            if rough is not None:
+                rough(len(folds), len(cut.folds), _rates(samples, [*folds.values()]))
+        else:
+            sets = found
+        if report is not None:
+            report(done, len(tasks))
     if not sets:
         raise EvaluationError("no sensor differs between rows: nothing distinguishes the grasp types")
-    training = Training.of(replace(recipe, trainer=TRAINER) if recipe.trainer == AUTO else recipe)
-    measured = partial(_fold, samples, recipe, training, limits, tuple(sets))
-    predicted = np.empty((2, max(sets) + 1, len(samples.labels)), np.intp)
-    folds, chosen, people = list[Fold](), list[dict[int, Columns]](), list[Hits]()
-    for fold, found in in_workers(measured, cut.folds, jobs):
-        folds.append(fold)
-        predicted[:, :, fold.test] = found.predicted
-        chosen.append(found.sensors)
-        people += found.adapted
-        if report is not None:
-            report(len(folds), len(cut.folds))
-        if rough is not None:
-            tested = np.concatenate([each.test for each in folds])
-            hits = predicted[0][:, tested] == samples.labels[tested]
-            rough(len(folds), len(cut.folds), {number: float(hits[number].mean()) for number in sets})
-    points = _points(samples, cut, predicted, sets, people, names)
+    several, one = [folds[number] for number in range(len(cut.folds))], by_sensors(recipe)
+    search = search_of(samples, limits)
+    points = _points(samples, cut, several, sets, names)
     enough = _enough(points)
     rows = sets[max(sets) if one else enough]
     words = RecipeWords.of(replace(recipe, trainer=training.trainer))
@@ -216,7 +215,7 @@ def study_sensors(
         trials=len(np.unique(samples.trials)),
         enough=enough,
         points=points,
-        chosen=_rows(search, rows, [each[len(rows.sensors)] for each in chosen], names),
+        chosen=_rows(search, rows, [found.sensors[found.nearest(len(rows.sensors))] for found in several], names),
         left_out=tuple(name for number, name in enumerate(names) if number not in rows.sensors),
     )
 
@@ -254,36 +253,58 @@ def _sets(search: SensorSearch, recipe: Recipe) -> dict[int, SensorSet]:
 
 
 class _Found(msgspec.Struct):
-    """What a fold finds: the classes (2, numbers, n_test) by sensors and by the paper's switches, the sensors of each
-    number, and what own trials bring.
+    """What a fold, by its number, finds for its rows `test` with each number of sensors, from none on: the sensors, the
+    classes (2, n_test) by them and by the paper's switches, and what own trials of people bring.
     """
 
-    predicted: NDArray[np.intp]
+    fold: int
+    test: Rows
     sensors: dict[int, Columns]
-    adapted: list[Hits]
+    predicted: dict[int, Classes]
+    adapted: dict[int, list[Hits]]
+
+    def nearest(self, number: int) -> int:
+        """Return the number, or the most sensors that the fold has."""
+        return number if number in self.sensors else max(self.sensors)
 
 
-def _fold(
-    samples: Samples, recipe: Recipe, training: Training, limits: Limits | None, numbers: Sequence[int], fold: Fold
-) -> tuple[Fold, _Found]:
-    learnt, tested = samples.rows(fold.train), samples.rows(fold.test)
-    search = search_of(learnt, limits)
-    sets = _sets(search, recipe)
-    predicted = np.full((2, max(numbers) + 1, len(tested.labels)), learnt.most_frequent)
-    hits = list[list[Hits]]()
-    papers = _papers(learnt, recipe)
-    chosen = dict[int, Columns]()
-    for number in numbers:
-        # A fold may have fewer sensors that vary.
-        best = sets.get(number) or sets[max(sets)]
-        chosen[number] = best.sensors
-        recogniser = _trained(learnt, recipe, training, InputSelection(*read_by(learnt, recipe, best.sensors)))
-        predicted[0, number] = _classes(recogniser, tested)
-        hits.append(hits_of(recogniser, tested, ((OWN, STRENGTH),)))
+def _task(
+    samples: Samples,
+    recipe: Recipe,
+    training: Training,
+    limits: Limits | None,
+    folds: Sequence[Fold],
+    fold: int | None,
+) -> "_Found | dict[int, SensorSet]":
+    """Return what the fold of a number finds; None: the best sensors by all rows."""
+    if fold is None:
+        return _sets(search_of(samples, limits), recipe)
+    test = folds[fold].test
+    learnt, tested = samples.rows(folds[fold].train), samples.rows(test)
+    elements = elements_of(learnt, recipe.levels)
+    papers = _papers(learnt, elements)
+    # Of rows that no sensor distinguishes, the most frequent type is predicted.
+    usual = np.full((2, len(test)), learnt.most_frequent)
+    found = _Found(fold, test, {0: ()}, {0: usual}, {0: []})
+    for number, best in _sets(search_of(learnt, limits), recipe).items():
+        found.sensors[number], found.predicted[number] = best.sensors, usual.copy()
+        selection = InputSelection(elements, *read_by(learnt, elements, best.sensors))
+        recogniser = _trained(learnt, recipe, training, selection)
+        found.predicted[number][0] = _classes(recogniser, tested)
+        found.adapted[number] = hits_of(recogniser, tested, ((OWN, STRENGTH),))
         if papers is not None and (selection := papers(number)).columns:
-            predicted[1, number] = _classes(_trained(learnt, recipe, training, selection), tested)
-    together = [(tuple(each[person][0][0] for each in hits), hits[0][person][1]) for person in range(len(hits[0]))]
-    return fold, _Found(predicted, chosen, together)
+            found.predicted[number][1] = _classes(_trained(learnt, recipe, training, selection), tested)
+    return found
+
+
+def _rates(samples: Samples, several: Sequence[_Found]) -> dict[int, float]:
+    """Return the accuracy of rows for each number of sensors, by the folds so far."""
+    truth = np.concatenate([samples.labels[found.test] for found in several])
+    rates = {}
+    for number in filter(None, several[0].sensors):
+        predicted = np.concatenate([found.predicted[found.nearest(number)][0] for found in several])
+        rates[number] = float((predicted == truth).mean())
+    return rates
 
 
 def _trained(learnt: Samples, recipe: Recipe, training: Training, selection: InputSelection) -> Recogniser:
@@ -296,11 +317,10 @@ def _classes(recogniser: Recogniser, tested: Samples) -> Classes:
     return winners(collapse(recogniser.model, read.n_switches).scores(read.switches, read.codes))
 
 
-def _papers(learnt: Samples, recipe: Recipe) -> Callable[[int], InputSelection] | None:
+def _papers(learnt: Samples, elements: Elements) -> Callable[[int], InputSelection] | None:
     """Return the paper's placement with at most a number of switches and pads: ID3 with the least S that has so few."""
     if not learnt.n_switches + learnt.taxels.shape[1]:
         return None
-    elements = elements_of(learnt, recipe.levels)
     choose = METHODS[PAPERS].chooser(bits_of(learnt, elements))
     n = len(learnt.labels)
 
@@ -318,9 +338,8 @@ def _papers(learnt: Samples, recipe: Recipe) -> Callable[[int], InputSelection] 
 def _points(
     samples: Samples,
     cut: Cut,
-    predicted: NDArray[np.intp],
+    several: Sequence[_Found],
     sets: dict[int, SensorSet],
-    people: Sequence[Hits],
     names: Sequence[str],
 ) -> tuple[SensorPoint, ...]:
     _, first, trial = np.unique(samples.trials, return_index=True, return_inverse=True)
@@ -328,9 +347,13 @@ def _points(
     clusters = np.arange(len(first)) if cut.groups is None else np.unique(cut.groups[first], return_inverse=True)[1]
     points, before, previous = list[SensorPoint](), None, tuple[str, ...]()
     paper = (samples.n_switches + samples.taxels.shape[1]) > 0
-    for place, number in enumerate(sets):
-        rate = Rate.predicted(predicted[0, number], samples.labels, samples.trials, of=cut.of, groups=cut.groups)
-        hits, by_paper = (decided(each[number][np.newaxis], trial)[0] == truth for each in predicted)
+    for number in sets:
+        predicted = np.empty((2, len(samples.labels)), np.intp)
+        for found in several:
+            predicted[:, found.test] = found.predicted[found.nearest(number)]
+        people = [hits for found in several for hits in found.adapted[found.nearest(number)]]
+        rate = Rate.predicted(predicted[0], samples.labels, samples.trials, of=cut.of, groups=cut.groups)
+        hits, by_paper = (decided(each[np.newaxis], trial)[0] == truth for each in predicted)
         sensors = tuple(names[sensor] for sensor in sets[number].sensors)
         points.append(
             SensorPoint(
@@ -342,7 +365,7 @@ def _points(
                 low=round(rate.low, 6),
                 high=round(rate.high, 6),
                 worth=None if before is None else Worth.of(hits, before, clusters),
-                adapted=fmean(correct[place] / total for correct, total in people) if people else None,
+                adapted=fmean(correct[0] / total for correct, total in people) if people else None,
                 papers=float(by_paper.mean()) if paper else None,
             )
         )

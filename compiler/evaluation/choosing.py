@@ -80,9 +80,9 @@ def choose_sensors(
     None: the best that the price of the recipe pays for.
     """
     learning = samples.rows(rows)
-    search = search_of(learning, limits)
-    chosen = (read_by(learning, recipe, search.chosen(number).sensors) for number in numbers)
-    return tuple((tuple(elements[column] for column in columns), joints) for elements, columns, joints in chosen)
+    search, elements = search_of(learning, limits), elements_of(learning, recipe.levels)
+    chosen = (read_by(learning, elements, search.chosen(number).sensors) for number in numbers)
+    return tuple((tuple(elements[column] for column in columns), joints) for columns, joints in chosen)
 
 
 def rank_joints(samples: Samples, rows: Rows, elements: Elements) -> Columns:

@@ -284,17 +284,18 @@ def select_sensors(samples: Samples, recipe: Recipe, limits: Limits | None) -> t
 
     A pad is kept with all its levels. Raises TrainingError if `have` names more than are to be kept.
     """
-    return read_by(samples, recipe, search_of(samples, limits).chosen(recipe.sensors).sensors)
+    elements = elements_of(samples, recipe.levels)
+    return elements, *read_by(samples, elements, search_of(samples, limits).chosen(recipe.sensors).sensors)
 
 
-def read_by(samples: Samples, recipe: Recipe, sensors: Columns) -> tuple[Elements, Columns, Columns]:
-    """Return the elements of `samples`, and the columns of those that these sensors are read as, and of joints."""
-    elements, wide = elements_of(samples, recipe.levels), samples.n_switches + samples.taxels.shape[1]
+def read_by(samples: Samples, elements: Elements, sensors: Columns) -> tuple[Columns, Columns]:
+    """Return the columns of the `elements` of samples that sensors are read as, and of joints."""
+    wide = samples.n_switches + samples.taxels.shape[1]
     places: dict[int, list[int]] = {}
     for place, element in enumerate(elements):
         places.setdefault(element.column, []).append(place)
     columns = tuple(place for sensor in sensors for place in places.get(sensor, ()))
-    return elements, columns, tuple(sorted(sensor - wide for sensor in sensors if sensor >= wide))
+    return columns, tuple(sorted(sensor - wide for sensor in sensors if sensor >= wide))
 
 
 def _loss(one: SensorSet) -> float:

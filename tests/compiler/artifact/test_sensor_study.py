@@ -40,8 +40,12 @@ def test_the_worth_of_a_sensor_is_paired_over_people() -> None:
 def test_the_curve_is_measured_in_folds_and_the_same_on_any_number_of_cores() -> None:
     grasp_set, seen = people(), list[tuple[int, int]]()
     study = study_sensors(grasp_set, Recipe(), jobs=2, report=lambda *done: seen.append(done))
-    assert study == study_sensors(grasp_set, Recipe(), jobs=1)
-    assert seen == [(done, 4) for done in range(1, 5)]
+    rough = list[tuple[int, int, dict[int, float]]]()
+    assert study == study_sensors(grasp_set, Recipe(), jobs=1, rough=lambda *so_far: rough.append(so_far))
+    assert seen == [(done, 5) for done in range(1, 6)]
+    # Every trial has as many rows, so the last of the rough curves is that of rows.
+    assert [(done, folds) for done, folds, _ in rough] == [(done, 4) for done in range(1, 5)]
+    assert rough[-1][2] == pytest.approx({point.number: point.mean for point in study.points}, abs=0.05)
     assert (study.of, study.folds, study.there) == ("new subject", 4, 10)
     assert [point.number for point in study.points] == list(range(1, 11))
     for before, point in zip(study.points, study.points[1:], strict=False):
