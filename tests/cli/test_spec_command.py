@@ -85,6 +85,29 @@ def test_machines_get_the_same_as_spec_json(hand_build: Path, tmp_path: Path) ->
     assert json.loads(done.stdout)["hand_length_mm"] == 171
 
 
+def test_the_bill_has_every_sensor_once_with_part_and_price(build_folder: Path, tmp_path: Path) -> None:
+    """Joints, too; without the list the parts of sensors are thenar's own."""
+    prices = tmp_path / "prices.toml"
+    prices.write_text(
+        '[[part]]\nname = "flex"\nnumber = "FS7"\nprice = 11.5\nsensors = ["j*"]\n'
+        '[[part]]\nname = "button"\nprice = 2\nsensors = ["s*"]'
+    )
+    summary = json.loads(thenar("spec", build_folder, "--prices", prices, "--json").stdout)
+    bought = [line for line in summary["materials"] if line.get("price")]
+    manifest = Build.load(build_folder).manifest
+    refs = {sensor["name"]: f"SW{sensor['number']}" for sensor in summary["sensors"]}
+    expected = {"button": {refs[switch.name] for switch in manifest.switches}}
+    expected |= {"flex": {joint.name for joint in manifest.joints}} if manifest.joints else {}
+    assert {line["what"]: set(line["designators"]) for line in bought} == expected
+    listed = [ref for line in summary["materials"] for ref in line["designators"]]
+    assert all(listed.count(ref) == 1 for refs in expected.values() for ref in refs)
+    assert [(line["part"], line["quantity"] * line["price"]) for line in bought if line["what"] == "flex"] == [
+        ("FS7", 11.5 * len(manifest.joints))
+    ]
+    prices.write_text('[[part]]\nname = "flex"\nprice = 11.5\nsensors = ["j*"]\n')
+    assert "has no part for" in refused(thenar("spec", build_folder, "--prices", prices))
+
+
 @pytest.mark.slow
 def test_a_glove_is_described_as_it_is_wired(hand_set: GraspSet, tmp_path: Path) -> None:
     glove = tmp_path / "bench.toml"
