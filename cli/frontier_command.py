@@ -20,7 +20,7 @@ from .options import (
     trainer_option,
 )
 from .parameters import Number, OneOf, OutputFolder, existing_file, jobs_option, seed_range
-from .printing import err, json_flag, out, progress, show, table
+from .printing import echo, err, json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
     from thenar.compiler.frontier.points import Frontier
@@ -107,6 +107,7 @@ def command(
         thenar frontier set.grasps -o frontier/ --sensors 8
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
+    from thenar.compiler.frontier import words
     from thenar.compiler.frontier.find import find_frontier
     from thenar.compiler.frontier.search import Search
     from thenar.compiler.placement.constraints import Limits
@@ -143,6 +144,7 @@ def command(
             rate=rate,
             limits=limits,
             report=report,
+            rough=lambda early: echo(f"rough, from screening: {words.rough_of(early)}; drawn in {output}", err=True),
             **asked,
         )
     show(found, _print, output)

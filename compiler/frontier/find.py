@@ -1,7 +1,7 @@
 """Find a frontier from recordings: screen everything, evaluate candidates near the front fully, assemble the result."""
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from importlib.metadata import version
@@ -14,6 +14,7 @@ import numpy as np
 from msgspec.structs import replace as changed_to
 
 from thenar.runtime.errors import HarnessError
+from thenar.runtime.files import write_atomically
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.names import list_names
 
@@ -73,6 +74,7 @@ def find_frontier(
     limits: Limits | None = None,
     jobs: int = -1,
     report: Report | None = None,
+    rough: Callable[[Frontier], None] | None = None,
 ) -> Frontier:
     """Find the trade-off of accuracy and time: the best switches, joints, rounds, tables and wirings.
 
@@ -107,6 +109,9 @@ def find_frontier(
         Worker processes, -1 for all cores.
     report : callable, optional
         Called with the done and total steps; every round of work has the same number of them.
+    rough : callable, optional
+        Called after the first screening, with a frontier of which only what was tried is known. Its pictures are in
+        `output` until the finished ones replace them.
 
     Returns
     -------
@@ -140,7 +145,15 @@ def find_frontier(
             equipment = equipment_for(grasp_set, harness, target, cache, joint_us)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache, limits)
         untimed = [_UNTIMED.format(list_names(grasp_set.joint_names))] if equipment.records.how == "unknown" else []
-        frontier = _found(survey)
+
+        def show_rough(early: Frontier) -> None:
+            if output is not None:
+                for name, data in pictures(early, "svg").items():
+                    write_atomically(output / f"{name}.svg", data)
+            if rough is not None:
+                rough(early)
+
+        frontier = _found(survey, show_rough)
         frontier = changed_to(
             frontier,
             skipped=(*untimed, *frontier.skipped),
@@ -206,8 +219,8 @@ def _documents(frontier: Frontier) -> dict[str, bytes]:
     return {FRONTIER_NAME: frontier_to_bytes(frontier), TABLE_NAME: csv_bytes(frontier), **drawn}
 
 
-def _found(survey: Survey) -> Frontier:
-    """Return the frontier of a survey, without a picked point."""
+def _found(survey: Survey, rough: Callable[[Frontier], None]) -> Frontier:
+    """Return the frontier of a survey, without a picked point; call `rough` with what the first screening tried."""
     search, equipment, n_switches = survey.search, survey.equipment, survey.samples.n_switches
     screened, curves = screen(survey)
     if not screened:
@@ -215,26 +228,11 @@ def _found(survey: Survey) -> Frontier:
             f"no placement that was tried can be built for {equipment.model.target}: name other ``methods`` or "
             "another ``target``"
         )
-    fewer = screen_fewer(
-        survey, select_finalists([one for one in screened if one.recipe.inputs != "switches"], (), _FEWER)
-    )
-    others = screen_others(survey, select_finalists(screened, (), _WIDER * search.finalists))
-    screened += (*fewer, *others)
-    recipes = recipes_to_mark(survey)
-    finalists = evaluate_finalists(survey, select_finalists(screened, recipes, search.finalists))
-    designs = [
-        design for finalist in finalists for design in designs_of(finalist, survey.transfer(finalist.screened.recipe))
-    ]
-    tried = _tried(screened, finalists, search)
-    combinations = len(designs) + len(tried)
-    luck = lucks(designs, screened, survey)
-    designs = list(dict.fromkeys(design for front in best_designs(designs) for design in front))
-    times = survey.measured(design.tables.content for design in designs)
-    designs = [replace(design, measured=times.get(design.tables.content)) for design in designs]
     claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
     model = equipment.model
     notes = filter(None, (model.unmeasured, model.note, equipment.overhead.what, equipment.records.what))
-    return Frontier(
+    tried = _tried(screened, (), search)
+    frontier = Frontier(
         schema=SCHEMA,
         thenar=version("thenar"),
         source=survey.source,
@@ -252,16 +250,39 @@ def _found(survey: Survey) -> Frontier:
         machine=model.machine,
         folds=search.folds,
         repeats=len(survey.cuts.repeats),
-        combinations=combinations,
-        points=points_of(designs, luck, survey),
+        combinations=len(tried),
+        points=(),
         tried=tried,
         curves=curves,
-        marks=marks_of(recipes, finalists, survey),
+        marks=(),
         have=() if survey.limits is None else survey.limits.keep,
         never=() if survey.limits is None else survey.limits.never,
         price=search.price,
         prices={} if survey.limits is None else dict(survey.limits.prices),
         skipped=(*claimed, *notes),
+    )
+    rough(frontier)
+    fewer = screen_fewer(
+        survey, select_finalists([one for one in screened if one.recipe.inputs != "switches"], (), _FEWER)
+    )
+    others = screen_others(survey, select_finalists(screened, (), _WIDER * search.finalists))
+    screened += (*fewer, *others)
+    recipes = recipes_to_mark(survey)
+    finalists = evaluate_finalists(survey, select_finalists(screened, recipes, search.finalists))
+    designs = [
+        design for finalist in finalists for design in designs_of(finalist, survey.transfer(finalist.screened.recipe))
+    ]
+    tried = _tried(screened, finalists, search)
+    luck = lucks(designs, screened, survey)
+    kept = list(dict.fromkeys(design for front in best_designs(designs) for design in front))
+    times = survey.measured(design.tables.content for design in kept)
+    kept = [replace(design, measured=times.get(design.tables.content)) for design in kept]
+    return changed_to(
+        frontier,
+        combinations=len(designs) + len(tried),
+        points=points_of(kept, luck, survey),
+        tried=tried,
+        marks=marks_of(recipes, finalists, survey),
     )
 
 

@@ -4,14 +4,17 @@ import csv
 import io
 from collections.abc import Callable, Iterable
 
+import numpy as np
+
 from thenar.runtime.names import printable, taxel_and_code
 from thenar.runtime.recipe import PAPERS_TRAINER
 
 from ..evaluation.rates import Rate, interval
 from ..facts import SensorCount
 from ..text import cells, counted, duration, listed, percent
-from .points import Frontier, FrontierPoint, PointSetting, PointTime, ReferencePoint
+from .points import Frontier, FrontierPoint, PointSetting, PointTime, ReferencePoint, front
 
+_ROUGH = 8
 _LONGEST = 40  # letters of a name on a picture
 _SPARED = 0.005  # rates within half a point count as equal
 
@@ -35,6 +38,13 @@ def elements_of(frontier: Frontier) -> str:
     if not frontier.n_taxels:
         return "switches"
     return "elements" if frontier.n_switches else "levels"
+
+
+def rough_of(frontier: Frontier) -> str:
+    """Return the front of what was tried, by accuracy against frame time, in a few words each: at most eight."""
+    best = front(frontier.tried, lambda one: one.frame_us, lambda one: one.rate.mean)
+    shown = [best[round(place)] for place in np.linspace(0, len(best) - 1, min(len(best), _ROUGH))]
+    return ", ".join(f"{percent(one.rate.mean)} in {duration(one.frame_us)}" for one in shown)
 
 
 def counted_of(frontier: Frontier) -> str:

@@ -169,6 +169,7 @@ def test_points_of_the_best_sensors_stay_within_number_price_and_limits(set_file
     done = thenar("frontier", set_file, "-o", frontier, *quick, *limits)
     assert done.returncode == 0, done.stderr
     assert "sensors" in done.stdout
+    assert "rough, from screening: " in done.stderr
     found = frontier_from_bytes((frontier / "frontier.json").read_bytes())
     for point in found.points:
         kept = {*point.switches, *point.joints}

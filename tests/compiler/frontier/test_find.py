@@ -89,6 +89,20 @@ def test_a_frame_is_reading_on_lines_of_their_own_and_classifying(first: tuple[R
         assert point.frame.us == pytest.approx(max(point.scan.us, point.transfer.us) + point.classify.us)
 
 
+def test_a_rough_frontier_comes_before_what_is_refined(tmp_path: Path, first: tuple[Request, Frontier]) -> None:
+    """It holds what was tried first, with the same rates, and is drawn in the folder."""
+    seen = list[tuple[Frontier, set[str]]]()
+    request = first[0] | {"output": tmp_path / "out"}
+    found = find_frontier(
+        **request, rough=lambda early: seen.append((early, {path.name for path in request["output"].iterdir()}))
+    )
+    ((early, names),) = seen
+    assert (early.points, early.marks) == ((), ())
+    assert early.tried == found.tried[: len(early.tried)]
+    assert {"frontier.svg", "switches.svg"} < names
+    assert "frontier.json" not in names
+
+
 def test_rows_in_which_nothing_is_held_change_no_rate(tmp_path: Path, first: tuple[Request, Frontier]) -> None:
     more = with_none(first[0]["grasp_set"])
     found = found_of(first[0] | {"grasp_set": more, "output": tmp_path / "out"})
