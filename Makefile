@@ -13,7 +13,7 @@ WORKERS = $(shell expr $(CORES) \* 3 / 2)
 SCENE ?= crowd
 PEOPLE := $(if $(filter crowd,$(SCENE)),--subjects 4 --repetitions 6)
 
-PACKAGES := cli compiler drivers firmware_templates runtime simulator stability
+PACKAGES := cli compiler drivers firmware_templates runtime simulator stability studio
 
 .PHONY: help demo test test-slow test-all pythons mutants lint format types size bench soak fuzz docs dist check clean
 

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-PRODUCT = ("compiler", "runtime", "drivers", "firmware_templates", "simulator", "stability", "cli")
+PRODUCT = ("compiler", "runtime", "drivers", "firmware_templates", "simulator", "stability", "studio", "cli")
 _SOURCE = {".py", ".j2", ".js", ".css", ".html", ".c", ".h", ".S", ".cpp", ".ino", ".ld", ".rs"}
 _BETWEEN = {tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.COMMENT, tokenize.ENDMARKER}
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)

@@ -24,7 +24,7 @@ from .printing import echo
 # In the order of work.
 GROUPS = {
     "Data": ("import", "simulate", "info", "draw", "merge", "split", "export"),
-    "Choose and measure": ("place", "evaluate", "frontier", "stability"),
+    "Choose and measure": ("place", "studio", "evaluate", "frontier", "stability"),
     "Build": ("compile", "adapt", "verify", "spec", "firmware"),
     "Live": ("doctor", "calibrate", "record", "wear", "run", "monitor", "segment", "teach", "emulate"),
 }

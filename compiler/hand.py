@@ -237,14 +237,14 @@ def drawn_hand(
     if not manifest.switches or hand is None or not hand.knows([*switch_names, *taxel_names]):
         return grid_hand(manifest, ranges)
     return HandDrawing(
-        **_shape(hand),
-        switches=drawn_switches(manifest, _places(hand, switch_names)),
-        taxels=drawn_taxels(manifest, _places(hand, taxel_names)),
+        **shape_of(hand),
+        switches=drawn_switches(manifest, places_of(hand, switch_names)),
+        taxels=drawn_taxels(manifest, places_of(hand, taxel_names)),
         joints=drawn_joints(manifest.joints, ranges),
     )
 
 
-def _shape(hand: HandShape) -> dict[str, Any]:
+def shape_of(hand: HandShape) -> dict[str, Any]:
     """Return the fields of a drawing that show the hand."""
     return {
         "view": hand.view,
@@ -257,7 +257,8 @@ def _shape(hand: HandShape) -> dict[str, Any]:
     }
 
 
-def _places(hand: HandShape, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+def places_of(hand: HandShape, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return the positions of switches and taxels by name, in mm. Raises MapError for an unknown one."""
     return dict(zip(names, _rounded(hand.places[hand.numbers_of(names)]), strict=True))
 
 
@@ -276,11 +277,16 @@ def _rounded(points: Floats) -> list[tuple[float, float]]:
     return [(x, y) for x, y in (np.round(points, 1) + 0.0).tolist()]
 
 
+def grid_places(names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return places in a grid for switches and taxels whose positions are unknown, by name, in mm."""
+    wide, high = _PITCH_MM
+    return {name: (wide * (at % _COLUMNS), -high * (at // _COLUMNS)) for at, name in enumerate(names)}
+
+
 def grid_hand(manifest: Manifest, ranges: Sequence[tuple[int, int]] | None = None) -> HandDrawing:
     """Return the kept switches and taxels of a build in a grid, and its joints: `ranges` of their codes, if known."""
     names = list(dict.fromkeys(switch.source for switch in manifest.switches))
-    wide, high = _PITCH_MM
-    places = {name: (wide * (at % _COLUMNS), -high * (at // _COLUMNS)) for at, name in enumerate(names)}
+    places = grid_places(names)
     taxels = tuple(switch.source for switch in manifest.switches if switch.threshold is not None)
     return HandDrawing(
         view="switches and taxels in the order of the build; their positions on the hand are unknown" if names else "",

@@ -1,12 +1,14 @@
 """A browser that has one page open, as tests of reports and of live pages share it."""
 
 import json
+import os
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from selenium import webdriver
+from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
 PATIENCE_S = 30
@@ -24,6 +26,31 @@ class Browser:
         self.log("browser")
         self.scheme("light")
         self.driver.get(path.as_uri())
+
+    def open(self, url: str, *, width: int = 1400, scheme: str = "light") -> None:
+        """Open a page, in a window so wide, of a reader whose system is light or dark."""
+        self.log()
+        self.scheme(scheme)
+        metrics = {"width": width, "height": 1000, "deviceScaleFactor": 1, "mobile": width < 600}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        self.driver.get(url)
+
+    def text(self, name: str) -> str:
+        """Return the text of the element with this id, at one moment."""
+        return str(self.script("return document.getElementById(arguments[0]).textContent", name))
+
+    def texts(self, selector: str) -> list[str]:
+        """Return the texts of all elements that a selector finds, at one moment."""
+        found = self.script("return [...document.querySelectorAll(arguments[0])].map((e) => e.textContent)", selector)
+        return list(found)
+
+    def click(self, name: str) -> None:
+        self.driver.find_element(By.ID, name).click()
+
+    def picture(self, name: str) -> None:
+        """Keep a picture of the page where THENAR_PICTURES names a folder for them."""
+        if folder := os.environ.get("THENAR_PICTURES"):
+            self.driver.save_screenshot(f"{folder}/{name}.png")
 
     def scheme(self, name: str) -> None:
         """Let the reader's system be "light" or "dark"."""

@@ -8,7 +8,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("cli", "compiler", "drivers", "firmware_templates", "runtime", "simulator", "stability")
+PACKAGES = ("cli", "compiler", "drivers", "firmware_templates", "runtime", "simulator", "stability", "studio")
 
 # What modules whose name starts with the key may import of ours; the longest key that fits counts.
 ALLOWED = {
@@ -132,6 +132,7 @@ ALLOWED = {
     ),
     "stability": ("compiler", "drivers", "runtime", "simulator", "stability"),
     "stability.reference": ("stability.reference",),
+    "studio": ("compiler", "drivers", "runtime", "studio"),
     "cli": PACKAGES,
 }
 

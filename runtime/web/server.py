@@ -67,9 +67,11 @@ class Server(Closing):
         The secret that the first address must hold; None is for loopback addresses only.
     on_message : callable, optional
         Takes a page's message: an object with "do", a string. It is called on the server's thread. A ThenarError that
-        it raises is sent to that page only, as the message "refused".
+        it raises is sent to that page only, as the message "refused", and so is a message that it returns.
     hello : callable, optional
         Returns the first messages for a page. It is called on the server's thread.
+    folder : Path
+        The folder of the page, whose files are served in addition to those of the live page.
 
     Attributes
     ----------
@@ -92,10 +94,11 @@ class Server(Closing):
         address: str = "127.0.0.1:8080",
         *,
         token: str | None,
-        on_message: Callable[[Mapping[str, object]], None] | None = None,
+        on_message: Callable[[Mapping[str, object]], bytes | None] | None = None,
         hello: Callable[[], Sequence[bytes]] | None = None,
+        folder: Path = PAGES,
     ) -> None:
-        self._files = _files(page)
+        self._files = _files(page, folder)
         self._listener = listen(address, f"--web {address}", "127.0.0.1:8080")
         try:
             there, port = self._listener.getsockname()[:2]
@@ -273,7 +276,7 @@ class Server(Closing):
                 raise msgspec.ValidationError("it has no `do`")
             if self._on_message is None:
                 raise ThenarError("this page takes no requests")
-            self._on_message(asked)
+            await page.say(self._on_message(asked) or b"")
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as wrong:
             await page.say(message("refused", why=f"the page sent an invalid message: {wrong}"))
         except ThenarError as reason:
@@ -320,9 +323,10 @@ class _Page:
             await self.socket.close(code=code)
 
 
-def _files(page: str) -> dict[str, tuple[bytes, str]]:
+def _files(page: str, folder: Path) -> dict[str, tuple[bytes, str]]:
     """Return content and type of each file, by its request path: nothing else can be read."""
-    found = {f"/{path.name}": (path.read_bytes(), _TYPES[path.suffix]) for path in PAGES.iterdir() if path.is_file()}
+    paths = {path.name: path for place in (PAGES, folder) for path in place.iterdir() if path.is_file()}
+    found = {f"/{name}": (path.read_bytes(), _TYPES[path.suffix]) for name, path in paths.items()}
     return {"/": found[f"/{page}.html"]} | {path: file for path, file in found.items() if file[1] != "text/html"}
 
 

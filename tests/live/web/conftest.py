@@ -1,6 +1,5 @@
 """A run in this process on emulated serial devices, its page, and a browser that has it open."""
 
-import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -9,7 +8,6 @@ from typing import Any
 
 import pytest
 from selenium import webdriver
-from selenium.webdriver.common.by import By
 
 from thenar.runtime import Glove
 from thenar.runtime.frames import now_us
@@ -27,31 +25,6 @@ FRANK = Policy(lead=0.0, dwell_us=0)
 
 class Browser(BareBrowser):
     """A browser, with one live page open."""
-
-    def open(self, url: str, *, width: int = 1400, scheme: str = "light") -> None:
-        """Open a page, in a window so wide, of a reader whose system is light or dark."""
-        self.log()
-        self.scheme(scheme)
-        metrics = {"width": width, "height": 1000, "deviceScaleFactor": 1, "mobile": width < 600}
-        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-        self.driver.get(url)
-
-    def text(self, name: str) -> str:
-        """Return the text of the element with this id, at one moment."""
-        return str(self.script("return document.getElementById(arguments[0]).textContent", name))
-
-    def texts(self, selector: str) -> list[str]:
-        """Return the texts of all elements that a selector finds, at one moment."""
-        found = self.script("return [...document.querySelectorAll(arguments[0])].map((e) => e.textContent)", selector)
-        return list(found)
-
-    def click(self, name: str) -> None:
-        self.driver.find_element(By.ID, name).click()
-
-    def picture(self, name: str) -> None:
-        """Keep a picture of the page where THENAR_PICTURES names a folder for them."""
-        if folder := os.environ.get("THENAR_PICTURES"):
-            self.driver.save_screenshot(f"{folder}/{name}.png")
 
     def axe(self, *impacts: str) -> list[str]:
         """Return what axe-core finds of serious and critical faults: the rule, and where."""

@@ -1,0 +1,241 @@
+// The page Choose: sensors are clicked on and off, and the server answers with what they recognise.
+import { drawHand } from "./hand.js";
+import { cell, connect, say } from "./wire.js";
+
+const $ = (id) => document.getElementById(id);
+const percent = (share) => (100 * share).toFixed(1);
+const interval = ({ mean, low, high }) => `${percent(mean)} % [${percent(low)}, ${percent(high)}]`;
+const KINDS = { switch: "Switches", pad: "Pads", joint: "Joints" };
+
+let set = null; // the message on the set
+let drawn = null; // the message on the hand
+let hand = null, trialHand = null;
+let boxes = [];
+let chosen = []; // numbers of sensors, in the order in which they were chosen
+let shown = null; // the last answer
+const measured = new Map(); // accuracies that were measured, by the sensors
+
+const send = connect({
+  open: () => link(true),
+  closed: () => link(false),
+  set: (message) => {
+    set = message;
+    say($("name"), `${set.name}: choose sensors`);
+    chosen = chosen.filter((sensor) => sensor < set.sensors.length);
+    list();
+    choose(chosen);
+  },
+  hand: (message) => {
+    drawn = message;
+    $("drawn").hidden = !drawn.switches.length;
+    hand = drawHand($("hand"), drawn, { onSwitch: (sensor) => toggle(sensor) });
+    trialHand = drawHand($("trial-hand"), drawn);
+    mark();
+  },
+  quick: (answer) => {
+    if (String(answer.sensors) === String(chosen)) show(answer);
+  },
+  add: ({ sensor }) => sensor === null || choose([...chosen, sensor]),
+  drop: ({ sensor }) => sensor === null || choose(chosen.filter((one) => one !== sensor)),
+  measure: ({ sensors, points, of, recipe }) => {
+    measured.set(key(sensors), { ...points[0], of, recipe });
+    certify();
+  },
+  curve: (curve) => drawCurve(curve),
+  work: ({ done, total, what, why }) => {
+    const busy = { measure: "measuring", curve: "measuring the curve" }[what];
+    say($("work"), why ?? (done < total ? `${busy}: ${Math.round((100 * done) / total)} %` : ""));
+  },
+  trial: ({ trial, shown: values }) => showTrial(trial, values),
+  refused: ({ why }) => say($("refused"), why),
+});
+
+const key = (sensors) => [...sensors].sort((a, b) => a - b).join(",");
+
+function link(open) {
+  say($("link"), open ? "page: connected" : "page: lost, it reconnects by itself");
+  $("link").dataset.is = open ? "good" : "bad";
+  if (open && set) choose(chosen);
+}
+
+function ask(what, more = {}) {
+  say($("refused"), send({ do: what, ...more }) ? "" : "not connected");
+}
+
+function toggle(sensor) {
+  choose(chosen.includes(sensor) ? chosen.filter((one) => one !== sensor) : [...chosen, sensor]);
+}
+
+function choose(sensors) {
+  chosen = sensors;
+  mark();
+  ask("choose", { sensors });
+}
+
+/** Show which sensors are chosen, on the hand and in the list. */
+function mark() {
+  if (!set) return;
+  const bits = set.sensors.map((_, sensor) => chosen.includes(sensor));
+  hand?.setClosed(bits);
+  boxes.forEach((box, sensor) => (box.checked = bits[sensor]));
+}
+
+function list() {
+  boxes = [];
+  const groups = Object.entries(KINDS).map(([kind, title]) => {
+    const group = document.createElement("fieldset"), legend = document.createElement("legend");
+    const inside = document.createElement("div");
+    legend.textContent = title;
+    group.append(legend, inside);
+    set.sensors.forEach(({ name, kind: own, price }, sensor) => {
+      if (own !== kind) return;
+      const label = document.createElement("label"), box = document.createElement("input");
+      box.type = "checkbox";
+      box.addEventListener("change", () => toggle(sensor));
+      label.append(box, price === null ? name : `${name}, ${price.toFixed(2)}`);
+      inside.append(label);
+      boxes[sensor] = box;
+    });
+    return inside.children.length ? group : null;
+  });
+  $("list").replaceChildren(...groups.filter(Boolean));
+}
+
+function show(answer) {
+  const before = shown;
+  shown = answer;
+  say($("rate"), interval(answer));
+  say($("count"), `${chosen.length} of ${set.sensors.length}`);
+  say($("scan"), answer.scan_us ? `${answer.scan_us.toFixed(0)} µs on the wire` : "none is read");
+  $("price").hidden = $("price-term").hidden = answer.price === null;
+  if (answer.price !== null) say($("price"), answer.price.toFixed(2));
+  const change = before && before.sensors.length !== chosen.length ? 100 * (answer.mean - before.mean) : null;
+  const moved = change === null ? "" : `; ${change >= 0 ? "+" : ""}${change.toFixed(1)} points by the last click`;
+  say($("change"), `trials of a ${answer.of}, quick: not nested, and chosen while looking at it${moved}`);
+  say($("weakest"), weakest(answer));
+  say($("command"), answer.command || "choose a sensor");
+  say($("spoken"), `${chosen.length} sensors, ${percent(answer.mean)} percent`);
+  $("measure").disabled = !chosen.length;
+  $("trial").hidden = true;
+  $("trials").replaceChildren();
+  confusion(answer);
+  certify();
+}
+
+function weakest({ confusion: counts }) {
+  let worst = null;
+  counts.forEach((row, truth) =>
+    row.forEach((count, read) => {
+      if (truth !== read && count > (worst?.count ?? 0)) worst = { count, truth, read };
+    }),
+  );
+  if (!worst) return "none";
+  const total = counts[worst.truth].reduce((sum, count) => sum + count, 0);
+  return `${set.grasps[worst.truth]} read as ${set.grasps[worst.read]}: ${worst.count} of ${total} trials`;
+}
+
+/** Show the accuracy that was measured for the chosen sensors, if it was. */
+function certify() {
+  const found = measured.get(key(chosen));
+  say($("measured"), found ? `measured in folds: ${interval(found)} ${found.of}; ${found.recipe}` : "");
+}
+
+function confusion({ confusion: counts, misread }) {
+  const head = document.createElement("tr");
+  head.append(document.createElement("td"), ...set.grasps.map((name) => column(name)));
+  const rows = counts.map((row, truth) => {
+    const line = document.createElement("tr");
+    line.append(cell("th", set.grasps[truth]));
+    row.forEach((count, read) => {
+      const made = cell("td", truth === read || !count ? String(count || "") : "");
+      if (truth === read) made.dataset.is = "good";
+      else if (count) {
+        const button = document.createElement("button");
+        button.type = "button";
+        button.textContent = count;
+        button.setAttribute("aria-label", `${count} trials of ${set.grasps[truth]} read as ${set.grasps[read]}`);
+        button.addEventListener("click", () =>
+          listTrials(misread.filter((one) => one.truth === set.grasps[truth] && one.read === set.grasps[read])),
+        );
+        made.append(button);
+      }
+      line.append(made);
+    });
+    return line;
+  });
+  const table = document.createElement("tbody");
+  table.append(head, ...rows);
+  $("confusion").replaceChildren(table);
+}
+
+function column(name) {
+  const made = cell("th", name);
+  made.scope = "col";
+  return made;
+}
+
+function listTrials(trials) {
+  const items = trials.map(({ trial, subject, truth, read }) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "plain";
+    button.textContent = `trial ${trial + 1} of ${subject}`;
+    button.addEventListener("click", () => {
+      say($("trial-heading"), `Trial ${trial + 1} of ${subject}: ${truth}, read as ${read}`);
+      ask("trial", { trial });
+    });
+    return button;
+  });
+  const row = document.createElement("p");
+  row.className = "row";
+  row.append(...items);
+  $("trials").replaceChildren(row);
+  items[0]?.focus();
+}
+
+/** Show what the sensors saw in a trial: closed where they were for more than half of it, or of their range. */
+function showTrial(trial, values) {
+  $("trial").hidden = false;
+  trialHand?.setClosed(values.map((value) => value > 0.5));
+  const joints = set.sensors.map(({ name, kind }, sensor) => ({ name, kind, value: values[sensor] }));
+  const items = joints
+    .filter(({ kind }) => kind === "joint")
+    .map(({ name, value }) => {
+      const item = document.createElement("li"), label = document.createElement("label");
+      const meter = document.createElement("meter");
+      meter.value = value;
+      label.append(`${name} `, meter, ` ${Math.round(100 * value)} % of its range`);
+      item.append(label);
+      return item;
+    });
+  $("trial-joints").replaceChildren(...items);
+}
+
+function drawCurve({ points, of, enough }) {
+  $("curve-panel").hidden = false;
+  say($("curve-of"), `${of}, %`);
+  const rows = points.map((point) => {
+    const row = document.createElement("tr"), button = document.createElement("button"), last = cell("td", "");
+    const number = point.sensors.length;
+    if (number === enough) row.setAttribute("aria-current", "true");
+    button.type = "button";
+    button.textContent = `Choose these ${number}`;
+    button.addEventListener("click", () => choose(point.sensors));
+    last.append(button);
+    row.append(
+      cell("th", number === enough ? `${number}: more matter little` : String(number)),
+      cell("td", `${percent(point.mean)} [${percent(point.low)}, ${percent(point.high)}]`),
+      cell("td", point.worth || "–"),
+      cell("td", point.adapted === null ? "–" : percent(point.adapted)),
+      last,
+    );
+    return row;
+  });
+  $("points").replaceChildren(...rows);
+}
+
+$("add").addEventListener("click", () => ask("add", { sensors: chosen }));
+$("drop").addEventListener("click", () => ask("drop", { sensors: chosen }));
+$("clear").addEventListener("click", () => choose([]));
+$("measure").addEventListener("click", () => ask("measure", { sensors: chosen }));
+$("curve").addEventListener("click", () => ask("curve"));

@@ -1,0 +1,72 @@
+"""A page *Choose* of a small set, whose measurements run, and a browser."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from threading import Event, Thread
+from typing import Any
+
+import numpy as np
+import pytest
+from selenium import webdriver
+
+from thenar.compiler.hand import HandShape
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.simulator.handmaps.handmap import hand_map
+from thenar.studio import ChoosePage
+
+from ..browser import Browser
+from ..sets import grasp_set_of
+
+
+@pytest.fixture(scope="session")
+def hand() -> HandShape:
+    return hand_map()
+
+
+@pytest.fixture(scope="session")
+def people(hand: HandShape) -> GraspSet:
+    """Return 3 types of 4 people, 6 trials of each: switches of the drawn glove, of which some tell the types, and two
+    joints.
+    """
+    random, n = np.random.default_rng(6), 72
+    labels, subjects = np.arange(n) % 3, np.repeat(np.array(list("ABCD")), n // 4)
+    told = (random.random((3, 8)) < 0.5)[labels] ^ (random.random((n, 8)) < 0.15)
+    codes = np.array([[60, 90], [120, 70], [100, 160]])[labels] + random.integers(-30, 30, (n, 2))
+    names = hand.names[:8]
+    return grasp_set_of(
+        ["cup", "pen", "rod"], labels, switches=told, switch_names=names, codes=codes, subjects=subjects
+    )
+
+
+@pytest.fixture
+def studio(people: GraspSet, hand: HandShape) -> Iterator[Callable[..., ChoosePage]]:
+    """Return what serves the page; changes are arguments of ChoosePage."""
+    with ExitStack() as stack:
+
+        def start(**changes: Any) -> ChoosePage:
+            known = {"hand": hand.fitted(people.element_names), "jobs": 1, "token": None} | changes
+            page = stack.enter_context(ChoosePage(people, "set.grasps", "127.0.0.1:0", **known))
+            stop = Event()
+            working = Thread(target=page.run, args=(stop,))
+            working.start()
+            stack.callback(working.join)
+            stack.callback(stop.set)
+            return page
+
+        yield start
+
+
+@pytest.fixture(scope="module")
+def chromium(new_chromium: Callable[..., webdriver.Chrome]) -> Iterator[Browser]:
+    driver = new_chromium("--window-size=1400,1000")
+    yield Browser(driver)
+    driver.quit()
+
+
+@pytest.fixture
+def browser(chromium: Browser, studio: Callable[..., ChoosePage]) -> Iterator[Browser]:
+    """Return the browser, which leaves the page before its server ends. The page may not have complained of anything."""
+    yield chromium
+    complaints = chromium.log()
+    chromium.driver.get("about:blank")
+    assert complaints == []

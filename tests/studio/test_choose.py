@@ -1,0 +1,157 @@
+"""The page *Choose*, in Chromium as a person uses it, and through its WebSocket as an attacker does."""
+
+import json
+from collections.abc import Callable
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from websockets.sync.client import connect
+
+from thenar.compiler.artifact.sensor_study import study_sensors
+from thenar.compiler.placement.constraints import Limits
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.runtime.recipe import Recipe
+from thenar.studio import ChoosePage
+
+from ..browser import Browser
+
+Studio = Callable[..., ChoosePage]
+PATIENCE_S = 30
+
+
+def answers(page: ChoosePage, *asked: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return what the page is told on opening and, in this order, on what it asks for."""
+    parts = urlsplit(page.server.url)
+    with connect(f"ws://{parts.netloc}/live", origin=f"http://{parts.netloc}", compression=None, proxy=None) as live:
+        found = [json.loads(live.recv(timeout=PATIENCE_S)) for _ in range(2)]
+        for one in asked:
+            live.send(json.dumps(one))
+            found.append(json.loads(live.recv(timeout=PATIENCE_S)))
+        return found
+
+
+def test_sensors_are_chosen_on_the_hand_and_in_the_list(browser: Browser, studio: Studio, people: GraspSet) -> None:
+    """By mouse and by keyboard; accuracy, count, command, list and hand follow each time."""
+    page = studio(prices=dict.fromkeys((*people.element_names, *people.joint_names), 2.5))
+    browser.open(page.server.url)
+    browser.wait(lambda: browser.text("count") == "0 of 10")
+    none = browser.text("rate")
+    first = browser.driver.find_element(By.CSS_SELECTOR, "#hand [role=button]")
+    name = first.get_attribute("aria-label")
+    first.send_keys(Keys.ENTER)
+    browser.wait(lambda: browser.text("count") == "1 of 10")
+    assert first.get_attribute("aria-pressed") == "true"
+    boxes = browser.driver.find_elements(By.CSS_SELECTOR, "#list input")
+    assert [box.is_selected() for box in boxes].count(True) == 1
+    assert browser.text("command") == f"thenar compile set.grasps -o build/ --sensors 1 --have {name}"
+    assert browser.text("price") == "2.50"
+    assert browser.text("scan").endswith("µs on the wire")
+    boxes[-1].send_keys(Keys.SPACE)
+    browser.wait(lambda: browser.text("count") == "2 of 10")
+    assert browser.text("rate") != none
+    assert "quick: not nested" in browser.text("change")
+    browser.click("clear")
+    browser.wait(lambda: browser.text("count") == "0 of 10")
+    assert not any(box.is_selected() for box in boxes)
+    assert browser.text("rate") == none
+
+
+def test_the_best_is_added_measured_and_compared_with_the_curve(
+    browser: Browser, studio: Studio, people: GraspSet
+) -> None:
+    page = studio()
+    browser.open(page.server.url)
+    browser.wait(lambda: browser.text("count") == "0 of 10")
+    for number in (1, 2, 3):
+        browser.click("add")
+        browser.wait(lambda number=number: browser.text("count") == f"{number} of 10")
+    browser.click("drop")
+    browser.wait(lambda: browser.text("count") == "2 of 10")
+    have = tuple(browser.text("command").rpartition(" ")[2].split(","))
+    browser.click("measure")
+    browser.wait(lambda: browser.text("measured"))
+    recipe = Recipe(sensors=2, have=have)
+    study = study_sensors(people, recipe, limits=Limits.of(recipe, people, {}), jobs=1)
+    assert f"{100 * study.point.mean:.1f} % [" in browser.text("measured")
+    assert study.of in browser.text("measured")
+    browser.click("curve")
+    browser.wait(lambda: browser.texts("#points tr"))
+    curve = study_sensors(people, Recipe(), jobs=1)
+    assert [row.split(" ")[0].rstrip(":") for row in browser.texts("#points th")] == [
+        str(point.number) for point in curve.points
+    ]
+    assert browser.texts("#points [aria-current] th") == [f"{curve.enough}: more matter little"]
+    browser.driver.find_elements(By.CSS_SELECTOR, "#points button")[4].click()
+    browser.wait(lambda: browser.text("count") == "5 of 10")
+    assert set(browser.text("command").rpartition(" ")[2].split(",")) == {*curve.points[4].sensors}
+
+
+def test_a_number_of_the_matrix_shows_its_trials(browser: Browser, studio: Studio) -> None:
+    browser.open(studio().server.url)
+    browser.wait(lambda: browser.text("count") == "0 of 10")
+    browser.click("add")
+    browser.wait(lambda: browser.text("count") == "1 of 10")
+    cell = browser.driver.find_element(By.CSS_SELECTOR, "#confusion button")
+    said, count = str(cell.get_attribute("aria-label")), int(cell.text)
+    cell.click()
+    trials = browser.driver.find_elements(By.CSS_SELECTOR, "#trials button")
+    assert len(trials) == count
+    trials[0].click()
+    browser.wait(lambda: browser.driver.find_element(By.ID, "trial").is_displayed())
+    truth, read = said.partition(" trials of ")[2].split(" read as ")
+    assert browser.text("trial-heading").endswith(f": {truth}, read as {read}")
+    assert len(browser.texts("#trial-joints li")) == 2
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (400, "dark")])
+def test_nothing_keeps_people_out_and_a_phone_sees_all(
+    browser: Browser, studio: Studio, width: int, scheme: str
+) -> None:
+    browser.open(studio().server.url, width=width, scheme=scheme)
+    browser.wait(lambda: browser.text("count") == "0 of 10")
+    browser.click("add")
+    browser.wait(lambda: browser.text("count") == "1 of 10")
+    browser.driver.find_element(By.CSS_SELECTOR, "#confusion button").click()
+    browser.driver.find_element(By.CSS_SELECTOR, "#trials button").click()
+    browser.wait(lambda: browser.driver.find_element(By.ID, "trial").is_displayed())
+    assert browser.axe() == []
+    assert browser.script("return document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_two_browsers_do_not_move_each_other(studio: Studio) -> None:
+    page = studio()
+    choices = [{"do": "choose", "sensors": sensors} for sensors in ([0, 1], [9])]
+    assert [answers(page, one)[2]["sensors"] for one in choices] == [[0, 1], [9]]
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"do": "choose", "sensors": [10]}, "there are 10 sensors"),
+        ({"do": "add", "sensors": [-1]}, "there are 10 sensors"),
+        ({"do": "measure", "sensors": [99]}, "there are 10 sensors"),
+        ({"do": "measure", "sensors": []}, "choose a sensor first"),
+        ({"do": "choose", "sensors": ["../../etc/passwd"]}, "invalid message"),
+        ({"do": "choose", "sensors": 1}, "invalid message"),
+        ({"do": "trial", "trial": 72}, "there are 72 trials"),
+        ({"do": "trial", "trial": 1e300}, "invalid message"),
+        ({"do": "quit"}, "a page cannot quit"),
+    ],
+)
+def test_what_a_page_may_not_ask_for_is_refused_and_ends_nothing(
+    studio: Studio, asked: dict[str, Any], said: str
+) -> None:
+    *_, refused, then = answers(studio(), asked, {"do": "choose", "sensors": [1]})
+    assert refused["topic"] == "refused"
+    assert said in refused["why"]
+    assert then["topic"] == "quick"
+
+
+def test_without_positions_the_sensors_are_drawn_in_a_grid(studio: Studio, people: GraspSet) -> None:
+    _, hand = answers(studio(hand=None))
+    assert not hand["placed"]
+    assert [each["name"] for each in hand["switches"]] == list(people.element_names)
+    assert [each["bit"] for each in hand["switches"]] == list(range(8))

@@ -1,0 +1,97 @@
+"""The quick accuracy of sensors, compared with discriminants by scipy, row by row."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import multivariate_normal
+
+from thenar.compiler.artifact.training import cuts_of, samples_of
+from thenar.compiler.evaluation.folds import EvaluationError
+from thenar.compiler.placement.logistic import lines
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.runtime.recipe import Recipe
+from thenar.studio.quick import SHRINKAGE, QuickAccuracy
+
+
+@pytest.fixture(scope="module")
+def quick(people: GraspSet) -> QuickAccuracy:
+    return QuickAccuracy(people)
+
+
+def by_density(people: GraspSet, sensors: list[int]) -> np.ndarray:
+    """Return the type of the largest density of each row, by the rows of other people."""
+    samples = samples_of(people, Recipe())
+    X = np.concatenate([samples.switches.T, lines(samples.codes)]).T[:, sensors]
+    found = np.empty(len(X), np.intp)
+    for fold in cuts_of(people, Recipe())[0].folds:
+        y, learnt = samples.labels[fold.train], X[fold.train]
+        means = np.array([learnt[y == one].mean(axis=0) for one in range(3)])
+        inside = learnt - means[y]
+        scatter = inside.T @ inside / len(y)
+        scatter += np.eye(len(sensors)) * SHRINKAGE * np.trace(scatter) / len(sensors)
+        densities = [
+            multivariate_normal(mean, scatter).logpdf(X[fold.test]) + np.log((y == one).mean())
+            for one, mean in enumerate(means)
+        ]
+        found[fold.test] = np.argmax(np.atleast_2d(densities), axis=0)
+    return found
+
+
+@settings(max_examples=25)
+@given(sensors=st.lists(st.integers(0, 9), min_size=1, max_size=6, unique=True))
+def test_a_row_is_read_as_the_type_of_the_largest_density(
+    people: GraspSet, quick: QuickAccuracy, sensors: list[int]
+) -> None:
+    """Each row is a trial."""
+    expected = by_density(people, sorted(sensors))
+    confusion = np.zeros((3, 3), int)
+    np.add.at(confusion, (samples_of(people, Recipe()).labels, expected), 1)
+    found = quick.of(sensors)
+    assert np.array(found.confusion).tolist() == confusion.tolist()
+    assert found.mean == np.trace(confusion) / 72
+    assert found.low <= found.mean <= found.high
+    assert len(found.misread) == 72 - np.trace(confusion)
+    assert quick.of(sensors[::-1]) == found
+
+
+def test_misread_trials_are_those_of_the_matrix(people: GraspSet, quick: QuickAccuracy) -> None:
+    found = quick.of([0, 1])
+    assert found.misread
+    for one in found.misread:
+        assert (one.subject, one.truth) == (people.subjects[one.trial], people.grasps[one.trial])
+        assert one.read != one.truth
+        counted = sum((other.truth, other.read) == (one.truth, one.read) for other in found.misread)
+        assert found.confusion[quick.grasps.index(one.truth)][quick.grasps.index(one.read)] == counted
+
+
+def test_the_best_next_and_the_least_are_those_of_all_trials(quick: QuickAccuracy) -> None:
+    """Every row is a trial here, so the accuracies of both are the same."""
+    best, least = quick.best_next([2]), quick.least([0, 2, 8])
+    assert best is not None
+    assert least is not None
+    assert quick.of([2, best]).mean == max(quick.of([2, one]).mean for one in range(10) if one != 2)
+    assert quick.of([one for one in (0, 2, 8) if one != least]).mean == max(
+        quick.of([one for one in (0, 2, 8) if one != other]).mean for other in (0, 2, 8)
+    )
+    assert quick.best_next(range(10)) is None
+    assert quick.least([]) is None
+
+
+def test_no_sensor_reads_the_most_frequent_type(quick: QuickAccuracy) -> None:
+    assert quick.of([]).mean == pytest.approx(1 / 3)
+
+
+def test_a_trial_shows_its_switches_and_joints(people: GraspSet, quick: QuickAccuracy) -> None:
+    shown = quick.trial(5)
+    assert shown[:8] == tuple(people.switches[5].astype(float))
+    low, high = people.codes.min(axis=0), people.codes.max(axis=0)
+    assert shown[8:] == pytest.approx((people.codes[5] - low) / (high - low), abs=5e-3)
+
+
+@pytest.mark.parametrize("sensors", [[10], [-1], [0, 99]])
+def test_a_sensor_that_does_not_exist_is_refused(quick: QuickAccuracy, sensors: list[int]) -> None:
+    with pytest.raises(EvaluationError, match="there are 10 sensors"):
+        quick.of(sensors)
+    with pytest.raises(EvaluationError, match="there are 72 trials"):
+        quick.trial(72)
