@@ -15,8 +15,8 @@ from .parameters import Command, ListOf, Number, OneOf, comma_separated, existin
 from .printing import warning
 
 if TYPE_CHECKING:
+    from thenar.compiler.glove.prices import Part
     from thenar.compiler.hand import HandShape
-    from thenar.compiler.placement.prices import Part
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.compiler.trainers.base import Setting
     from thenar.runtime.harness.wiring import GloveWiring
@@ -111,7 +111,7 @@ prices_option = click.option(
 
 def parts_of(grasp_set: "GraspSet", prices: Path | None) -> "Mapping[str, Part]":
     """Return the part for each sensor of a set by a file; none without a file."""
-    from thenar.compiler.placement.prices import load_prices
+    from thenar.compiler.glove.prices import load_prices
 
     return {} if prices is None else load_prices(prices, (*grasp_set.element_names, *grasp_set.joint_names))
 

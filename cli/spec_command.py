@@ -50,8 +50,8 @@ def command(
         thenar spec build/ --layout layout.toml -o spec/
     """
     from thenar.compiler.glove.files import check_output, expectations, files_of, write_spec
+    from thenar.compiler.glove.prices import load_prices
     from thenar.compiler.glove.spec import glove_spec
-    from thenar.compiler.placement.prices import load_prices
     from thenar.runtime.build import Build
 
     loaded = Build.load(build)

@@ -22,8 +22,8 @@ from ..recordings.graspset import GraspSet
 
 if TYPE_CHECKING:
     from ..frontier.points import Frontier
+    from ..glove.prices import Part
     from ..movements.transitions import Transitions
-    from ..placement.prices import Part
 
 REPORT_NAME, TRY_NAME, SPEC_FOLDER = "report.html", "try.html", "spec"
 

@@ -16,8 +16,8 @@ from thenar.drivers.i2c.chips.base import RESET, ChipPackage
 from thenar.drivers.i2c.chips.base import SUPPLY as SUPPLY_PINS
 from thenar.runtime.harness.wiring import ChipWiring, Harness, MuxChannel, SpiWiring
 
-from ..placement.prices import Part
 from .layout import GROUND, PUSH_BUTTON, SUPPLY, GloveWire, PlacedSensor, Unit, WireEnd, net_of
+from .prices import Part
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,12 +16,12 @@ from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..hand import HandShape
-from ..placement.prices import Part
 from ..publication import check_folder, entries, publish_folder
 from ..text import cells, sentence
 from .circuit import BillLine, Circuit, Component, ComponentKind
 from .layout import CONTACT_MM, counted_sensors
 from .pattern import svg_of
+from .prices import Part
 from .spec import GloveSpec, SpecSummary, glove_spec
 
 Row = Sequence[object]

@@ -18,7 +18,6 @@ from thenar.runtime.scanning.timing import glove_us, scan_us
 
 from ..facts import Fact, SensorCount, facts
 from ..hand import HandShape
-from ..placement.prices import Part
 from .circuit import BillLine, Circuit, bill_of, bill_of_joints, bill_of_parts, glove_circuit
 from .layout import (
     GloveWire,
@@ -33,6 +32,7 @@ from .layout import (
     wires_of,
 )
 from .pattern import Pattern, pattern_of
+from .prices import Part
 from .propose import propose_cyberglove, propose_harness
 
 

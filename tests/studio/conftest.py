@@ -65,7 +65,7 @@ def chromium(new_chromium: Callable[..., webdriver.Chrome]) -> Iterator[Browser]
 
 @pytest.fixture
 def browser(chromium: Browser, studio: Callable[..., ChoosePage]) -> Iterator[Browser]:
-    """Return the browser, which leaves the page before its server ends. The page may not have complained of anything."""
+    """Return the browser, which leaves a page before its server ends; the page may not have complained of anything."""
     yield chromium
     complaints = chromium.log()
     chromium.driver.get("about:blank")

@@ -14,10 +14,9 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from thenar.drivers.errors import SettingError
 from thenar.runtime.toml_source import read_source
 from thenar.runtime.toml_struct import check_finite, convert
-
-from ..samples import TrainingError
 
 
 class Part(Struct, frozen=True, forbid_unknown_fields=True):
@@ -40,9 +39,9 @@ class PriceList(Struct, frozen=True, forbid_unknown_fields=True):
 def load_prices(path: Path, names: Sequence[str]) -> dict[str, Part]:
     """Return the part for each of the sensors `names`: the first in the file that is for it.
 
-    Raises TrainingError, with the line, for a file that is no price list, and for a sensor without a part.
+    Raises SettingError, with the line, for a file that is no price list, and for a sensor without a part.
     """
-    source = read_source(path, TrainingError)
+    source = read_source(path, SettingError)
     tables = source.tables()
     check_finite(source, (), tables)
     parts = convert(source, (), tables, PriceList).part
@@ -51,5 +50,5 @@ def load_prices(path: Path, names: Sequence[str]) -> dict[str, Part]:
         for name in names
     }
     if lost := [name for name, part in found.items() if part is None]:
-        raise TrainingError(f"{path.name} has no part for {lost[0]!r}: add the name to the sensors of one")
+        raise SettingError(f"{path.name} has no part for {lost[0]!r}: add the name to the sensors of one")
     return {name: part for name, part in found.items() if part is not None}
