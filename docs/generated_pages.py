@@ -1,0 +1,99 @@
+"""A mkdocs hook that adds two pages: all commands, with the choices of a recipe, and all effects of scenes."""
+
+import inspect
+import re
+from collections.abc import Iterator
+from sys import modules
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+import click
+import msgspec
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+from thenar.cli.choices import choices
+from thenar.cli.group import COMMANDS, thenar
+from thenar.simulator.pipeline.effect import EFFECTS, Effect
+
+COMMANDS_PAGE = "reference/all-commands.md"
+EFFECTS_PAGE = "reference/effects.md"
+BEFORE_COMMANDS = """# All commands and options
+
+This page is made from the commands themselves: `thenar COMMAND --help` prints the same. The rules that all of them
+follow are described in [the command line](commands.md).
+
+## The recipe
+
+`compile`, `place` and `evaluate` share these choices, and `thenar.compiler.Recipe` has them as fields. If you change
+one, its part and all later parts are computed again: placement and limits, training, tables, rates.
+
+"""
+
+
+def help_of(name: str) -> str:
+    """Return the output of `thenar NAME --help`, 88 columns wide."""
+    command = thenar.get_command(click.Context(thenar), name)
+    assert command is not None
+    context = click.Context(command, info_name=f"thenar {name}", terminal_width=88, max_content_width=88)
+    return command.get_help(context)
+
+
+def recipe_table() -> str:
+    """Return the table of all choices of a recipe."""
+    lines = ["| option | parameter | part | default | range | what it is |", "|---|---|---|---|---|---|"]
+    for choice in choices().values():
+        ends = ["" if end is None else f"{end:g}" for end in (choice.least, choice.most)]
+        span = ", ".join(map(str, choice.names)) or (" to ".join(ends) if any(ends) else "")
+        default = choice.usual or ("" if choice.default in (None, (), {}) else choice.default)
+        # Settings of a trainer have an option each.
+        option = "" if choice.kind is dict else f"`--{choice.option.replace('_', '-')}`"
+        lines.append(f"| {option} | `{choice.name}` | {choice.part} | {default} | {span} | {choice.help} |")
+    return "\n".join(lines)
+
+
+def limits(annotation: Any) -> str:
+    """Return the limits of a parameter's type in words; "" if it has none."""
+    if get_origin(annotation) is not Annotated:
+        return "; ".join(filter(None, map(limits, get_args(annotation))))
+    words = []
+    for meta in (extra for extra in annotation.__metadata__ if isinstance(extra, msgspec.Meta)):
+        ends = (("from", meta.ge), ("above", meta.gt), ("to", meta.le), ("below", meta.lt))
+        words += [f"{word} {end:g}" for word, end in ends if end is not None]
+        words += ["at least one"] * (meta.min_length is not None)
+    return " ".join(words)
+
+
+def effect_section(name: str, effect: Effect) -> Iterator[str]:
+    """Yield the paragraphs of an effect: what its module and its function say, and a table of its parameters."""
+    function = effect.prepare or effect.model or effect.together
+    assert function is not None
+    yield f"## {name}"
+    yield inspect.cleandoc(modules[function.__module__].__doc__ or effect.summary)
+    for part in (inspect.getdoc(function) or "").split("\n\n")[1:]:
+        if not part.startswith("Raises"):
+            # A line for each parameter becomes an item of a list.
+            yield re.sub(r"^(\w+(?:, \w+)*)  +", r"- `\1`: ", part, flags=re.MULTILINE)
+    kinds = get_type_hints(effect.parameters(), include_extras=True)
+    lines = ["| parameter | default | limits |", "|---|---|---|"]
+    for field in msgspec.structs.fields(effect.parameters()):
+        default = {msgspec.NODEFAULT: "required", None: "drawn"}.get(field.default, field.default)
+        lines.append(f"| `{field.name}` | {default} | {limits(kinds[field.name])} |")
+    if len(lines) > 2:
+        yield "\n".join(lines)
+
+
+def effects() -> str:
+    """Return the page of all effects."""
+    parts = ["# Effects", "This page is made from the effects themselves. [Scene files](scenes.md) use them."]
+    for name, effect in EFFECTS.items():
+        parts += effect_section(name, effect)
+    return "\n\n".join(parts) + "\n"
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages; called by mkdocs."""
+    sections = [f"\n## {name}\n\n```text\n{help_of(name)}\n```\n" for name in COMMANDS]
+    commands = BEFORE_COMMANDS + recipe_table() + "\n" + "".join(sections)
+    files.append(File.generated(config, COMMANDS_PAGE, content=commands))
+    files.append(File.generated(config, EFFECTS_PAGE, content=effects()))
+    return files
