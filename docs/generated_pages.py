@@ -1,4 +1,7 @@
-"""A mkdocs hook that adds two pages: all commands, with the choices of a recipe, and all effects of scenes."""
+"""A mkdocs hook that adds pages: all commands, with the choices of a recipe; all effects of scenes; all of Python.
+
+The table of Python's names is in docs/reference/python/index.md itself, where a test compares it with `api_tables()`.
+"""
 
 import inspect
 import re
@@ -11,12 +14,14 @@ import msgspec
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
+from thenar import compiler, runtime
 from thenar.cli.choices import choices
 from thenar.cli.group import COMMANDS, thenar
 from thenar.simulator.pipeline.effect import EFFECTS, Effect
 
 COMMANDS_PAGE = "reference/all-commands.md"
 EFFECTS_PAGE = "reference/effects.md"
+PYTHON_PAGE = "reference/python/signatures.md"
 BEFORE_COMMANDS = """# All commands and options
 
 This page is made from the commands themselves: `thenar COMMAND --help` prints the same. The rules that all of them
@@ -90,10 +95,43 @@ def effects() -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def api_names() -> dict[str, Any]:
+    """Return what `thenar.compiler`, and in addition `thenar.runtime`, offer, by full names."""
+    found = {f"thenar.compiler.{name}": getattr(compiler, name) for name in compiler.__all__}
+    others = {f"thenar.runtime.{name}": getattr(runtime, name) for name in runtime.__all__}
+    return found | {name: value for name, value in others.items() if value not in found.values()}
+
+
+def api_tables() -> str:
+    """Return the tables of functions, with the arguments that they need, of classes, of registries and of errors."""
+    calls, classes, others = [], [], []
+    for name, value in api_names().items():
+        short = name.removeprefix("thenar.compiler.")
+        said = " ".join(re.split(r"[.;](?:\s|$)|\n\n", inspect.getdoc(value) or "", maxsplit=1)[0].split())
+        if not callable(value) or (isinstance(value, type) and issubclass(value, Exception)):
+            others.append(f"`{short}`")
+        elif isinstance(value, type):
+            classes.append(f"| `{short}` | {said} |")
+        else:
+            arguments = [one for one in inspect.signature(value).parameters.values() if one.kind is not one.VAR_KEYWORD]
+            needed = [one.name for one in arguments if one.default is one.empty]
+            shown = ", ".join(needed + ["..."] * (len(needed) < len(arguments)))
+            calls.append(f"| `{short}({shown})` | {said} |")
+    parts = (
+        *("| function | what it does |", "|---|---|", *calls, ""),
+        *("| class | what it is |", "|---|---|", *classes, ""),
+        "Registries of members by name, and errors, which derive from `ThenarError` and the nearest builtin:",
+        ", ".join(others) + ".",
+    )
+    return "\n".join(parts) + "\n"
+
+
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages; called by mkdocs."""
     sections = [f"\n## {name}\n\n```text\n{help_of(name)}\n```\n" for name in COMMANDS]
     commands = BEFORE_COMMANDS + recipe_table() + "\n" + "".join(sections)
     files.append(File.generated(config, COMMANDS_PAGE, content=commands))
     files.append(File.generated(config, EFFECTS_PAGE, content=effects()))
+    signatures = "".join(f"\n::: {name}\n" for name, value in api_names().items() if callable(value))
+    files.append(File.generated(config, PYTHON_PAGE, content=f"# All signatures\n{signatures}"))
     return files

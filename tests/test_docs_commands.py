@@ -189,9 +189,10 @@ def test_all_commands_of_the_readme_print_what_it_shows_and_end_in_a_live_page(
 ) -> None:
     path = ROOT / "README.md"
     check(path, steps_of(path.read_text(encoding="utf-8")), clone, update_golden)
-    free_port = f"exec {LIVE} 127.0.0.1:0"
-    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
-    with subprocess.Popen(["sh", "-c", free_port], cwd=clone.folder, env=clone.environment, text=True, **pipes) as live:
+    with subprocess.Popen(
+        ["sh", "-c", f"exec {LIVE} 127.0.0.1:0"], cwd=clone.folder, env=clone.environment,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    ) as live:  # fmt: skip
         assert live.stderr is not None
         try:
             (address,) = re.findall(r"the page is at (\S+)", next(line for line in live.stderr if "page" in line))

@@ -88,7 +88,7 @@ def test_every_kind_of_chip_is_named() -> None:
 
 
 def test_the_times_are_those_of_the_arithmetic() -> None:
-    found = {}
+    found: dict[str, tuple[str, str, str]] = {}
     for names, _, _, _, _, size, slow, fast in rows("chip | addresses", DEVICES):
         found |= dict.fromkeys(names.split(", "), (size, slow, fast))
     expanders = {name: chip for name, chip in CHIPS.items() if not isinstance(chip.readings[0], Conversion)}
