@@ -1,4 +1,4 @@
-"""A mkdocs hook that adds pages: all commands, with the choices of a recipe; all effects of scenes; all of Python.
+"""A mkdocs hook that adds pages: all commands, with the choices of a recipe; effects of scenes; Python; file layouts.
 
 The table of Python's names is in docs/reference/python/index.md itself, where a test compares it with `api_tables()`.
 """
@@ -17,11 +17,18 @@ from mkdocs.structure.files import File, Files
 from thenar import compiler, runtime
 from thenar.cli.choices import choices
 from thenar.cli.group import COMMANDS, thenar
+from thenar.compiler.artifact import ensemble
+from thenar.compiler.recordings import graspset
+from thenar.runtime import sealed
+from thenar.runtime.model import integers
 from thenar.simulator.pipeline.effect import EFFECTS, Effect
 
 COMMANDS_PAGE = "reference/all-commands.md"
 EFFECTS_PAGE = "reference/effects.md"
 PYTHON_PAGE = "reference/python/signatures.md"
+LAYOUTS_PAGE = "reference/layouts.md"
+# The modules whose docstrings describe binary files.
+LAYOUTS = {"Envelope": sealed, "tables.bin": integers, "ensemble.bin": ensemble, ".grasps": graspset}
 BEFORE_COMMANDS = """# All commands and options
 
 This page is made from the commands themselves: `thenar COMMAND --help` prints the same. The rules that all of them
@@ -126,6 +133,12 @@ def api_tables() -> str:
     return "\n".join(parts) + "\n"
 
 
+def layouts() -> str:
+    """Return the page of the layouts of binary files."""
+    sections = (f"## {name}\n\n```text\n{module.__doc__}```\n" for name, module in LAYOUTS.items())
+    return "# Layouts of binary files\n\n" + "\n".join(sections)
+
+
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages; called by mkdocs."""
     sections = [f"\n## {name}\n\n```text\n{help_of(name)}\n```\n" for name in COMMANDS]
@@ -134,4 +147,5 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     files.append(File.generated(config, EFFECTS_PAGE, content=effects()))
     signatures = "".join(f"\n::: {name}\n" for name, value in api_names().items() if callable(value))
     files.append(File.generated(config, PYTHON_PAGE, content=f"# All signatures\n{signatures}"))
+    files.append(File.generated(config, LAYOUTS_PAGE, content=layouts()))
     return files

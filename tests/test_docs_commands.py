@@ -37,8 +37,6 @@ IN_A_CLONE = ("Makefile", "README.md", "docs", "examples")
 LIVE = "thenar emulate set.grasps --glove glove.toml --period-ms 100 -- thenar run build/ --glove {glove} --web"
 # Commands that no page's steps run, each with the reason.
 NOT_RUN = {
-    "make .venv/installed": "installs thenar, which the tests already run from",
-    ". .venv/bin/activate": "the scratch folder has no .venv: `thenar` and `python` are on the PATH",
     "make demo": "takes minutes; it consists of commands that have tests",
     "make test": "would run these tests",
     'pip install ".[compiler,web]"': "installs thenar, which tests/test_packaging.py does from the wheel",

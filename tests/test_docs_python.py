@@ -1,4 +1,7 @@
-"""docs/reference/python/index.md: its table is made of the names that can be imported, and its examples name such."""
+"""docs/reference/python/index.md: its table is made of the names that can be imported, and its examples name such.
+
+The page of file layouts is made of docstrings that describe them.
+"""
 
 import re
 import runpy
@@ -37,3 +40,17 @@ def test_the_examples_import_what_is_there() -> None:
     assert {room for room, _ in found} == rooms.keys()
     for room, names in found:
         assert {*names.split(", ")} <= {*rooms[room].__all__}
+
+
+def test_the_page_of_layouts_describes_each_binary_file() -> None:
+    layouts = runpy.run_path(str(DOCS / "generated_pages.py"))["layouts"]()
+    for words in (
+        "SHA-256 of bytes 0..23",
+        "thresholds, uint16, joint after",
+        "Format 1, LogitBoost",
+        "switches  (n, ",
+    ):
+        assert words in layouts
+    page = (DOCS / "reference" / "files.md").read_text(encoding="utf-8")
+    for module in re.findall(r"`((?:runtime|compiler)/[\w/]+\.py)`", page):
+        assert (DOCS.parent / module).exists()
