@@ -110,22 +110,33 @@ def api_names() -> dict[str, Any]:
 
 
 def api_tables() -> str:
-    """Return the tables of functions, with the arguments that they need, of classes, of registries and of errors."""
-    calls, classes, others = [], [], []
-    for name, value in api_names().items():
-        short = name.removeprefix("thenar.compiler.")
-        said = " ".join(re.split(r"[.;](?:\s|$)|\n\n", inspect.getdoc(value) or "", maxsplit=1)[0].split())
-        if not callable(value) or (isinstance(value, type) and issubclass(value, Exception)):
-            others.append(f"`{short}`")
-        elif isinstance(value, type):
-            classes.append(f"| `{short}` | {said} |")
-        else:
-            arguments = [one for one in inspect.signature(value).parameters.values() if one.kind is not one.VAR_KEYWORD]
-            needed = [one.name for one in arguments if one.default is one.empty]
-            shown = ", ".join(needed + ["..."] * (len(needed) < len(arguments)))
-            calls.append(f"| `{short}({shown})` | {said} |")
+    """Return the tables of functions, with needed arguments and results, and of classes; the names of all others.
+
+    A class that only is a result has no row, since its function has one.
+    """
+    names = {name.removeprefix("thenar.compiler."): value for name, value in api_names().items()}
+    said = {
+        name: " ".join(re.split(r"[.;](?:\s|$)|\n\n", inspect.getdoc(value) or "", maxsplit=1)[0].split())
+        for name, value in names.items()
+    }
+    functions = {name: inspect.signature(value) for name, value in names.items() if inspect.isfunction(value)}
+    results = {
+        name: str(getattr(one.return_annotation, "__name__", one.return_annotation)) for name, one in functions.items()
+    }
+    calls = []
+    for name, signature in functions.items():
+        arguments = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+        needed = [one.name for one in arguments if one.default is one.empty]
+        shown = ", ".join(needed + ["..."] * (len(needed) < len(arguments)))
+        result = f"`{results[name]}`" if results[name] in names else ""
+        calls.append(f"| `{name}({shown})` | {result} | {said[name]} |")
+    kinds = {name for name, value in names.items() if inspect.isclass(value) and not issubclass(value, Exception)}
+    taken = {str(one.annotation) for signature in functions.values() for one in signature.parameters.values()}
+    only_results = {name for name in results.values() if not any(name in annotation for annotation in taken)}
+    classes = [f"| `{name}` | {said[name]} |" for name in names if name in kinds - only_results]
+    others = [f"`{name}`" for name in names if name not in {*functions, *kinds}]
     parts = (
-        *("| function | what it does |", "|---|---|", *calls, ""),
+        *("| function | result | what it does |", "|---|---|---|", *calls, ""),
         *("| class | what it is |", "|---|---|", *classes, ""),
         "Registries of members by name, and errors, which derive from `ThenarError` and the nearest builtin:",
         ", ".join(others) + ".",
