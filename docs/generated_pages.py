@@ -128,8 +128,8 @@ def api_tables() -> str:
         arguments = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
         needed = [one.name for one in arguments if one.default is one.empty]
         shown = ", ".join(needed + ["..."] * (len(needed) < len(arguments)))
-        result = f"`{results[name]}`" if results[name] in names else ""
-        calls.append(f"| `{name}({shown})` | {result} | {said[name]} |")
+        result = f" `{results[name]}`" if results[name] in names else ""
+        calls.append(f"| `{name}({shown})` |{result} | {said[name]} |")
     kinds = {name for name, value in names.items() if inspect.isclass(value) and not issubclass(value, Exception)}
     taken = {str(one.annotation) for signature in functions.values() for one in signature.parameters.values()}
     only_results = {name for name in results.values() if not any(name in annotation for annotation in taken)}
