@@ -103,7 +103,7 @@ def effects() -> str:
 
 
 def api_names() -> dict[str, Any]:
-    """Return what `thenar.compiler`, and in addition `thenar.runtime`, offer, by full names."""
+    """Return the public names of `thenar.compiler`, and the further ones of `thenar.runtime`, with their values."""
     found = {f"thenar.compiler.{name}": getattr(compiler, name) for name in compiler.__all__}
     others = {f"thenar.runtime.{name}": getattr(runtime, name) for name in runtime.__all__}
     return found | {name: value for name, value in others.items() if value not in found.values()}
