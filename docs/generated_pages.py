@@ -133,7 +133,9 @@ def api_tables() -> str:
     kinds = {name for name, value in names.items() if inspect.isclass(value) and not issubclass(value, Exception)}
     taken = {str(one.annotation) for signature in functions.values() for one in signature.parameters.values()}
     only_results = {name for name in results.values() if not any(name in annotation for annotation in taken)}
-    classes = [f"| `{name}` | {said[name]} |" for name in names if name in kinds - only_results]
+    terms = {name for name in kinds if issubclass(names[name], compiler.Term)} - {"Term"}
+    classes = [f"| `{name}` | {said[name]} |" for name in names if name in kinds - only_results - terms]
+    classes.append(f"| {', '.join(f'`{name}`' for name in sorted(terms))} | The kinds of `Term` that boards read |")
     others = [f"`{name}`" for name in names if name not in {*functions, *kinds}]
     parts = (
         *("| function | result | what it does |", "|---|---|---|", *calls, ""),
