@@ -19,6 +19,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.request import urlopen
 
 import pytest
 
@@ -32,14 +33,14 @@ LIMIT_S = 600
 # What a reader of a clone has, apart from thenar itself.
 IN_A_CLONE = ("Makefile", "README.md", "docs", "examples")
 
-# Commands that no test here runs, each with the reason.
+# The last command of README's story, which shows a page until the table has been played.
+LIVE = "thenar emulate set.grasps --glove glove.toml --period-ms 100 -- thenar run build/ --glove {glove} --web"
+# Commands that no page's steps run, each with the reason.
 NOT_RUN = {
-    "make .venv/installed": "installs thenar, which the tests already run from",
-    ". .venv/bin/activate": "the scratch folder has no .venv: `thenar` and `python` are on the PATH",
     "make demo": "takes minutes; it consists of commands that have tests",
     "make test": "would run these tests",
-    'pip install ".[compiler]"': "installs thenar, which tests/test_packaging.py does from the wheel",
-    "thenar doctor --line /dev/ttyUSB0 --propose glove.toml": "needs a glove",
+    'pip install ".[compiler,web]"': "installs thenar, which tests/test_packaging.py does from the wheel",
+    LIVE: "lasts minutes; a test opens its page",
     "thenar run build/ --glove glove.toml --sink ros:/thenar": "needs a glove",
     "thenar simulate crowd --subjects 20 --repetitions 6 -o hands.grasps": "is for the rates below",
     "thenar evaluate hands.grasps --by subject --tables compositions --prune 30 --trainer logit": (
@@ -48,9 +49,8 @@ NOT_RUN = {
 }
 # Commands that take too long for `make test`: there a page runs up to the first of them.
 SLOW = {
-    "thenar place set.grasps --sensors 8",
-    "thenar evaluate set.grasps --tables compositions --baselines none",
-    "thenar compile set.grasps -o build/",
+    "thenar place set.grasps --draw curve.svg",
+    "thenar compile set.grasps -o build/ --sensors 11 --glove glove.toml",
 }
 
 FENCE = re.compile(r"```(\w+)(?: title=\"([^\"]+)\")?\n(.*?)```\n", re.DOTALL)
@@ -182,9 +182,22 @@ def test_commands_print_what_the_page_shows(path: Path, clone: Clone, update_gol
 
 
 @pytest.mark.slow
-def test_all_commands_of_the_readme_print_what_it_shows(clone: Clone, update_golden: bool) -> None:
+def test_all_commands_of_the_readme_print_what_it_shows_and_end_in_a_live_page(
+    clone: Clone, update_golden: bool
+) -> None:
     path = ROOT / "README.md"
     check(path, steps_of(path.read_text(encoding="utf-8")), clone, update_golden)
+    with subprocess.Popen(
+        ["sh", "-c", f"exec {LIVE} 127.0.0.1:0"], cwd=clone.folder, env=clone.environment,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    ) as live:  # fmt: skip
+        assert live.stderr is not None
+        try:
+            (address,) = re.findall(r"the page is at (\S+)", next(line for line in live.stderr if "page" in line))
+            with urlopen(address, timeout=LIMIT_S) as page:
+                assert b"thenar" in page.read()
+        finally:
+            live.terminate()
 
 
 def every_line() -> Iterator[str]:

@@ -1,4 +1,7 @@
-"""docs/reference/harness.md: its examples load, its keys and defaults are the structs', its times are computed."""
+"""docs/reference/harness.md: its examples load, its keys and defaults are the structs', its times are computed.
+
+So are the times of chips in devices.md.
+"""
 
 import re
 from collections.abc import Iterator
@@ -7,7 +10,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, Conversion
 from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import load_harness
@@ -25,7 +28,9 @@ from thenar.runtime.harness.wiring import (
 from thenar.runtime.scanning.timing import port_us, select_us
 from thenar.runtime.taxels import TaxelSettings
 
-PAGE = (Path(__file__).parents[1] / "docs" / "reference" / "harness.md").read_text(encoding="utf-8")
+REFERENCE = Path(__file__).parents[1] / "docs" / "reference"
+PAGE = (REFERENCE / "harness.md").read_text(encoding="utf-8")
+DEVICES = (REFERENCE / "devices.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 TABLES: dict[str, type[msgspec.Struct]] = {
     "": Harness,
@@ -41,9 +46,9 @@ TABLES: dict[str, type[msgspec.Struct]] = {
 }
 
 
-def rows(heading: str) -> list[list[str]]:
+def rows(heading: str, page: str = PAGE) -> list[list[str]]:
     """Return the cells of the table whose heading begins with `heading`."""
-    lines = PAGE[PAGE.index(f"\n| {heading}") + 1 :].split("\n\n")[0].splitlines()
+    lines = page[page.index(f"\n| {heading}") + 1 :].split("\n\n")[0].splitlines()
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
 
 
@@ -83,12 +88,19 @@ def test_every_kind_of_chip_is_named() -> None:
 
 
 def test_the_times_are_those_of_the_arithmetic() -> None:
-    times = {(int(size), int(periods)): us for _, size, periods, us in rows("transaction | bytes")}
-    readings = [reading for chip in CHIPS.values() for reading in chip.readings]
-    known = {(reading.wire_bytes, reading.scl_periods): port_us(reading, 400_000) for reading in readings}
-    for place, us in times.items():
-        assert us == f"{known[place]:.1f}"
-    assert f"{select_us(400_000):.1f}" == "51.3"
+    found: dict[str, tuple[str, str, str]] = {}
+    for names, _, _, _, _, size, slow, fast in rows("chip | addresses", DEVICES):
+        found |= dict.fromkeys(names.split(", "), (size, slow, fast))
+    expanders = {name: chip for name, chip in CHIPS.items() if not isinstance(chip.readings[0], Conversion)}
+    assert found.keys() == expanders.keys()
+    for name, chip in expanders.items():
+        whole = max(chip.readings, key=lambda reading: len(reading.pins))
+        fast = f"{port_us(whole, 400_000):.1f}" if chip.clock_hz >= 400_000 else ""
+        assert found[name] == (str(whole.wire_bytes), f"{port_us(whole, 100_000):.1f}", fast)
+    one_port = {f"{port_us(CHIPS[name].readings[0], 400_000):.1f}" for name in ("mcp23017", "pca9555")}
+    times = r"one port of an MCP23017 or PCA9555 takes (\S+) us, a selection\son a TCA9548A (\S+) us"
+    (said,) = re.findall(times, PAGE)
+    assert said == (*one_port, f"{select_us(400_000):.1f}")
 
 
 def test_the_error_shown_is_the_error_raised(tmp_path: Path) -> None:

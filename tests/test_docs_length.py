@@ -1,4 +1,4 @@
-"""README has at most 700 words, docs/ 35,000, the page on the architecture 500; and all that this page names exists."""
+"""README has at most 600 words, docs/ 25,000, the page on the architecture 500; and all that this page names exists."""
 
 import re
 from importlib import import_module
@@ -14,14 +14,14 @@ def words(text: str) -> int:
     return len(re.sub(r"\||-{2,}", " ", text).split())
 
 
-def test_the_readme_has_at_most_700_words_table_marks_included() -> None:
-    assert len((ROOT / "README.md").read_text(encoding="utf-8").split()) <= 700
+def test_the_readme_has_at_most_600_words_table_marks_included() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").split()) <= 600
 
 
-def test_all_pages_together_have_at_most_35_000_words() -> None:
+def test_all_pages_together_have_at_most_25_000_words() -> None:
     pages = {page: words(page.read_text(encoding="utf-8")) for page in (ROOT / "docs").rglob("*.md")}
     assert len(pages) > 30
-    assert sum(pages.values()) <= 35_000, sorted(pages.items(), key=lambda item: -item[1])[:5]
+    assert sum(pages.values()) <= 25_000, sorted(pages.items(), key=lambda item: -item[1])[:5]
 
 
 ARCHITECTURE = (ROOT / "docs" / "project" / "architecture.md").read_text(encoding="utf-8")

@@ -1,7 +1,10 @@
-"""docs/reference/scenes.md against the structs that decode a scene: every key, default and limit."""
+"""docs/reference/scenes.md, and the page made of effects, against the structs that decode a scene: every key, default
+and limit.
+"""
 
 import json
 import re
+import runpy
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
@@ -11,13 +14,13 @@ import pytest
 
 from thenar.simulator.body.shapes import Box, Cylinder, Sphere
 from thenar.simulator.pipeline.effect import EFFECTS
-from thenar.simulator.pipeline.scene_file import _SceneFile, load_scene
-from thenar.simulator.scenes import shipped
+from thenar.simulator.pipeline.scene_file import _SceneFile
 from thenar.simulator.scenes.scene import SURVEYS, Recording, SceneGlove, SceneObject, Subject, SurveyPopulation
 
 NAMES = tuple(EFFECTS)
 
-PAGE = (Path(__file__).parents[1] / "docs" / "reference" / "scenes.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[1] / "docs"
+PAGE = (DOCS / "reference" / "scenes.md").read_text(encoding="utf-8")
 
 Documented = dict[str, dict[str, str]]  # key -> column -> cell
 
@@ -31,7 +34,7 @@ def table(heading: str) -> list[dict[str, str]]:
 
 def keyed(rows: list[dict[str, str]], column: str) -> Documented:
     """Return rows by the keys that `column` names, which may be several."""
-    return {key: row for row in rows for key in re.findall(r"`(\w+)`", row[column].partition(":")[0])}
+    return {key: row for row in rows for key in re.findall(r"`([\w.]+)`", row[column].partition(":")[0])}
 
 
 def metas(annotation: Any) -> Iterator[msgspec.Meta]:
@@ -79,25 +82,30 @@ def shown(value: object) -> set[str]:
     return {str(value), f"{value:g}"}
 
 
-def effect_rows() -> Iterator[tuple[str, dict[str, str]]]:
-    name = ""
-    for row in table("effect |"):
-        name = row["effect"].strip("`") or name
-        yield name, row
+def test_every_effect_is_on_the_page_and_none_that_is_not_there() -> None:
+    assert sorted(keyed(table("effects | simulate"), "effects")) == sorted(NAMES)
 
 
-def test_every_effect_is_documented_and_none_that_is_not_there() -> None:
-    assert sorted({name for name, _ in effect_rows()}) == sorted(NAMES)
+@pytest.fixture
+def generated(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Return the names of the hook that makes the page of effects."""
+    return runpy.run_path(str(DOCS / "generated_pages.py"))
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_effect_has_the_parameters_defaults_and_limits_of_the_page(name: str) -> None:
+def test_the_generated_page_has_every_parameter_with_its_default_and_limits(
+    name: str, generated: dict[str, Any]
+) -> None:
     kind = EFFECTS[name].parameters()
-    documented = keyed([row for effect, row in effect_rows() if effect == name], "parameter")
-    assert documented.keys() == {*kind.__struct_fields__} - {"after"}
-    for key, row in documented.items():
-        assert row["default"].removesuffix(" (fit)") in shown(default(kind, key)), key
-        assert row["limits"] == limits(kind, key), key
+    start = rf"^## {re.escape(name)}\n\n(.*?)(?=^## |\Z)"
+    (section,) = re.findall(start, generated["effects"](), re.DOTALL | re.MULTILINE)
+    found = {key: cells for key, *cells in re.findall(r"^\| `(\w+)` \| (.*) \| (.*) \|$", section, re.MULTILINE)}
+    assert found.keys() == {*kind.__struct_fields__}
+    hints = get_type_hints(kind, include_extras=True)
+    for key, (value, limit) in found.items():
+        assert value in shown(default(kind, key)), key
+        ends = (end for meta in metas(hints[key]) for end in (meta.ge, meta.gt, meta.le, meta.lt))
+        assert set(re.findall(r"\d\S*", limit)) == {f"{end:g}" for end in ends if end is not None}, key
 
 
 TABLES: dict[str, type[msgspec.Struct]] = {
@@ -145,15 +153,3 @@ def test_the_surveys_are_those_of_the_page() -> None:
         spreads = (men[0], women[0], men[1], women[1])
         cells = [cell.removesuffix(" (ours)") for cell in rows[survey]]
         assert cells == [f"{spread.mean:.1f} ± {spread.sd:g}" for spread in spreads]
-
-
-def test_every_shipped_scene_is_on_the_page_with_its_hands_and_repetitions() -> None:
-    rows = {name: row["what it is"] for row in table("scene |") for name in re.findall(r"`([\w-]+)`", row["scene"])}
-    assert rows.keys() == shipped().keys()
-    for name in ("kamakura", "cutkosky", "kamakura-def", "cutkosky-def"):
-        sizes = [f"{one.hand_length_mm:g} x {one.hand_breadth_mm:g}" for one in load_scene(name).subjects]
-        assert f"({', '.join(sizes)} mm)" in rows[name]
-    assert f"{load_scene('quick').repetitions} repetitions" in rows["quick"]
-    crowd = load_scene("crowd")
-    assert f"{len(crowd.subjects)} hands" in rows["crowd"]
-    assert f"{crowd.repetitions} repetitions" in rows["crowd"]
