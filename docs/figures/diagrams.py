@@ -35,6 +35,7 @@ STYLE = """text { font: 13px "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-s
 # Who imports whom, topmost first, with what each folder holds; tests compare this with tests/test_imports.py.
 FOLDERS = {
     "cli": "the command: parse, call, print",
+    "studio": "pages that train and show errors",
     "stability": "hard cases and their reference",
     "simulator": "scenes: grasps, hands, faults",
     "compiler": "from recordings to a build",
@@ -47,7 +48,8 @@ IMPORTS = {
     "compiler": ("drivers", "runtime", "firmware_templates"),
     "simulator": ("drivers", "runtime", "compiler"),
     "stability": ("drivers", "runtime", "compiler", "simulator"),
-    "cli": ("drivers", "runtime", "firmware_templates", "compiler", "simulator", "stability"),
+    "studio": ("drivers", "runtime", "compiler"),
+    "cli": ("drivers", "runtime", "firmware_templates", "compiler", "simulator", "stability", "studio"),
 }
 
 
