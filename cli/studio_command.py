@@ -1,34 +1,44 @@
 """`thenar studio`: choose sensors on a page in the browser."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from .options import hand_of, layout_option, prices_of, prices_option
-from .parameters import WEB_ADDRESS, existing_file, jobs_option, web_token_option
+from .parameters import WEB_ADDRESS, OutputFolder, existing_file, jobs_option, web_token_option
 from .printing import say_page
 
 
 @click.command("studio")
 @click.argument("grasps", metavar="SET.grasps", type=existing_file)
+@click.option("-o", "--output", type=OutputFolder(), help="Folder of the build that the page trains.")
 @layout_option
 @prices_option
 @jobs_option()
 @click.option("--web", metavar="ADDRESS", default=WEB_ADDRESS, show_default=True, help="Address of the page.")
 @web_token_option
-def command(grasps: Path, layout: Path | None, prices: Path | None, jobs: int, web: str, web_token: str | None) -> None:
+def command(
+    grasps: Path,
+    output: Path | None,
+    layout: Path | None,
+    prices: Path | None,
+    jobs: int,
+    web: str,
+    web_token: str | None,
+) -> None:
     """Choose sensors on a page in the browser: click them on and off, and see what they recognise.
 
     The hand is the control. The accuracy of a new subject, the weakest pair, the time of a scan and the price follow
-    each click. Measure runs nested folds; the curve shows what each sensor is worth. A click on a number of the
-    confusion matrix shows its trials.
+    each click. Measure runs nested folds; the curve shows what each sensor is worth; Train writes a build. A click on
+    a number of the matrix of errors shows its trials.
 
     SIGINT, SIGTERM and SIGHUP end it, with exit code 0.
 
     \b
     Example:
         thenar studio set.grasps
-        thenar studio set.grasps --layout layout.toml --prices prices.toml
+        thenar studio set.grasps -o build/ --layout layout.toml --prices prices.toml
     """
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.studio import ChoosePage
@@ -37,9 +47,7 @@ def command(grasps: Path, layout: Path | None, prices: Path | None, jobs: int, w
 
     grasp_set = GraspSet.load(grasps)
     hand, priced = hand_of(layout).fitted(grasp_set.element_names), prices_of(grasp_set, prices)
-    with (
-        ended_by_signals() as stop,
-        ChoosePage(grasp_set, grasps.name, web, token=web_token, hand=hand, prices=priced, jobs=jobs) as page,
-    ):
+    choices: dict[str, Any] = {"hand": hand, "prices": priced, "output": output, "jobs": jobs}
+    with ended_by_signals() as stop, ChoosePage(grasp_set, grasps.name, web, token=web_token, **choices) as page:
         say_page(page.server.url)
         page.run(stop)

@@ -9,9 +9,12 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from shlex import quote
 from threading import Event
+from typing import Any
 
 import msgspec
 
+from thenar.compiler.artifact.compile import check_target, compile_build
+from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
 from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.hand import HandShape, grid_places, places_of, shape_of
@@ -35,8 +38,8 @@ _LOOK_S = 0.2
 
 
 class _Asked(msgspec.Struct, frozen=True):
-    """What a page asks for: "choose", "measure", "add" (the best) or "drop" (the least) for sensors by their numbers,
-    "trial" by its number, or the "curve".
+    """What a page asks for: "choose", "measure", "train", "add" (the best) or "drop" (the least) for sensors by their
+    numbers, "trial" by its number, or the "curve".
     """
 
     do: str
@@ -59,6 +62,8 @@ class ChoosePage(Closing):
         The glove laid flat, with the positions of all switches and pads. Without, they are drawn in a grid.
     prices : mapping of str to float, optional
         The price of every sensor, by name.
+    output : Path, optional
+        The folder of the builds that the page trains; without one it trains none.
     jobs : int
         Worker processes of a measurement.
 
@@ -70,7 +75,7 @@ class ChoosePage(Closing):
     Raises
     ------
     CompileError, EvaluationError
-        If the recordings have a single grasp type, or cannot be cut into folds.
+        If the recordings have a single grasp type, or cannot be cut into folds, or `output` holds other things.
     SettingError, SinkError
         As `Server` does.
     """
@@ -84,18 +89,20 @@ class ChoosePage(Closing):
         token: str | None,
         hand: HandShape | None = None,
         prices: Mapping[str, float] | None = None,
+        output: Path | None = None,
         jobs: int = -1,
     ) -> None:
         self._name, self._set, self._prices, self._jobs = name, grasp_set, prices or {}, jobs
+        self._hand, self._output = hand, None if output is None else check_target(output)
         self._quick = QuickAccuracy(self._set)
         self._levels = self._levels_of()
         self._queue = SimpleQueue[_Asked]()
-        self._stop = Event()
         drawn = _drawn(self._set, hand)
         kinds = ["switch"] * len(self._set.switch_names) + ["pad"] * len(self._set.taxel_columns)
         kinds += ["joint"] * len(self._set.joints)
         about = {
             "name": name,
+            "trains": output is not None,
             "grasps": self._quick.grasps,
             "sensors": [
                 {"name": name, "kind": kind, "price": self._prices.get(name)}
@@ -137,10 +144,12 @@ class ChoosePage(Closing):
             return message(asked.do, sensor=find(asked.sensors))
         if asked.do == "trial":
             return message("trial", trial=asked.trial, shown=self._quick.trial(asked.trial))
-        if asked.do not in ("measure", "curve"):
+        if asked.do not in ("measure", "curve", "train"):
             raise ThenarError(f"a page cannot {asked.do}")
-        if asked.do == "measure" and not asked.sensors:
-            raise ThenarError("choose a sensor first: without any, nothing can be measured")
+        if asked.do == "train" and self._output is None:
+            raise ThenarError("no folder is known for a build: start the studio with ``output``")
+        if asked.do != "curve" and not asked.sensors:
+            raise ThenarError("choose a sensor first: without any, nothing can be learnt")
         if self._queue.qsize() >= _MOST_QUEUED:
             raise ThenarError(f"{_MOST_QUEUED} measurements are waiting already: let them finish")
         self._names(asked.sensors)
@@ -168,8 +177,8 @@ class ChoosePage(Closing):
         """Return the command that compiles a build of these sensors."""
         if not names:
             return ""
-        have = quote(",".join(names))
-        return f"thenar compile {quote(self._name)} -o build/ --sensors {len(names)} --have {have}"
+        folder, have = quote(str(self._output or "build")), quote(",".join(names))
+        return f"thenar compile {quote(self._name)} -o {folder} --sensors {len(names)} --have {have}"
 
     def _scan_us(self, names: Sequence[str]) -> float:
         """Return the time on the wire of a scan of the switches and pads in `names`, on the chips that are proposed."""
@@ -185,17 +194,24 @@ class ChoosePage(Closing):
         return {every[one.column]: name for one, name in zip(elements, names_of(held, elements), strict=True)}
 
     def _measure(self, asked: _Asked) -> None:
-        """Measure the curve, or the accuracy of chosen sensors, and send it to all pages."""
+        """Measure the curve, or the accuracy of chosen sensors, or train a build of these; tell all pages."""
 
         def report(done: int, total: int) -> None:
             self.server.publish("work", message("work", done=done, total=total, what=asked.do))
 
         report(0, 1)
         names = self._names(asked.sensors)
-        recipe = Recipe(sensors=len(names), have=names) if asked.do == "measure" else Recipe()
-        limits = Limits.of(recipe, self._set, {}, prices=self._prices)
-        study = study_sensors(self._set, recipe, limits=limits, jobs=self._jobs, report=report)
-        self.server.publish(asked.do, message(asked.do, sensors=asked.sensors, **self._content(study)))
+        recipe = Recipe() if asked.do == "curve" else Recipe(sensors=len(names), have=names)
+        many: dict[str, Any] = {"jobs": self._jobs}
+        if asked.do == "train":
+            assert self._output is not None
+            documents = Documents(self._hand)
+            built = compile_build(self._set, self._output, recipe, documents=documents, progress=report, **many)
+            content: dict[str, Any] = {"folder": str(self._output), "facts": [str(fact) for fact in built.facts]}
+        else:
+            limits = Limits.of(recipe, self._set, {}, prices=self._prices)
+            content = self._content(study_sensors(self._set, recipe, limits=limits, report=report, **many))
+        self.server.publish(asked.do, message(asked.do, sensors=asked.sensors, **content))
         report(1, 1)
 
     def _content(self, study: SensorStudy) -> dict[str, object]:

@@ -111,7 +111,7 @@ def architecture() -> tuple[int, str, list[str]]:
     """Return the folders, and a column of dots for each that imports others."""
     row, edge, top = 50, 416, 8
     y = {name: top + row * n for n, name in enumerate(FOLDERS)}
-    column = {name: edge + 46 + 48 * n for n, name in enumerate(IMPORTS)}
+    column = {name: edge + 46 + 40 * n for n, name in enumerate(IMPORTS)}
     shapes = []
     for name, holds in FOLDERS.items():
         importers = [column[other] for other, imported in IMPORTS.items() if name in imported]

@@ -1,6 +1,6 @@
 // The page Choose: sensors are clicked on and off, and the server answers with what they recognise.
 import { drawHand } from "./hand.js";
-import { cell, connect, say } from "./wire.js";
+import { cell, connect, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 const percent = (share) => (100 * share).toFixed(1);
@@ -22,7 +22,8 @@ const send = connect({
     set = message;
     say($("name"), `${set.name}: choose sensors`);
     chosen = chosen.filter((sensor) => sensor < set.sensors.length);
-    list();
+    $("train").hidden = !set.trains;
+    listSensors();
     choose(chosen);
   },
   hand: (message) => {
@@ -42,8 +43,13 @@ const send = connect({
     certify();
   },
   curve: (curve) => drawCurve(curve),
+  train: ({ folder, facts }) => {
+    $("build").hidden = false;
+    say($("build-heading"), `Trained: ${folder}`);
+    list($("facts"), facts);
+  },
   work: ({ done, total, what, why }) => {
-    const busy = { measure: "measuring", curve: "measuring the curve" }[what];
+    const busy = { measure: "measuring", curve: "measuring the curve", train: "training" }[what];
     say($("work"), why ?? (done < total ? `${busy}: ${Math.round((100 * done) / total)} %` : ""));
   },
   trial: ({ trial, shown: values }) => showTrial(trial, values),
@@ -80,7 +86,7 @@ function mark() {
   boxes.forEach((box, sensor) => (box.checked = bits[sensor]));
 }
 
-function list() {
+function listSensors() {
   boxes = [];
   const groups = Object.entries(KINDS).map(([kind, title]) => {
     const group = document.createElement("fieldset"), legend = document.createElement("legend");
@@ -115,7 +121,7 @@ function show(answer) {
   say($("weakest"), weakest(answer));
   say($("command"), answer.command || "choose a sensor");
   say($("spoken"), `${chosen.length} sensors, ${percent(answer.mean)} percent`);
-  $("measure").disabled = !chosen.length;
+  $("measure").disabled = $("train").disabled = !chosen.length;
   $("trial").hidden = true;
   $("trials").replaceChildren();
   confusion(answer);
@@ -238,4 +244,5 @@ $("add").addEventListener("click", () => ask("add", { sensors: chosen }));
 $("drop").addEventListener("click", () => ask("drop", { sensors: chosen }));
 $("clear").addEventListener("click", () => choose([]));
 $("measure").addEventListener("click", () => ask("measure", { sensors: chosen }));
+$("train").addEventListener("click", () => ask("train", { sensors: chosen }));
 $("curve").addEventListener("click", () => ask("curve"));

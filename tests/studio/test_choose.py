@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -9,10 +10,12 @@ import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from thenar.compiler.artifact.sensor_study import study_sensors
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.runtime import Build
 from thenar.runtime.recipe import Recipe
 from thenar.studio import ChoosePage
 
@@ -25,7 +28,9 @@ PATIENCE_S = 30
 def answers(page: ChoosePage, *asked: dict[str, Any]) -> list[dict[str, Any]]:
     """Return what the page is told on opening and, in this order, on what it asks for."""
     parts = urlsplit(page.server.url)
-    with connect(f"ws://{parts.netloc}/live", origin=f"http://{parts.netloc}", compression=None, proxy=None) as live:
+    with connect(
+        f"ws://{parts.netloc}/live", origin=Origin(f"http://{parts.netloc}"), compression=None, proxy=None
+    ) as live:
         found = [json.loads(live.recv(timeout=PATIENCE_S)) for _ in range(2)]
         for one in asked:
             live.send(json.dumps(one))
@@ -33,28 +38,33 @@ def answers(page: ChoosePage, *asked: dict[str, Any]) -> list[dict[str, Any]]:
         return found
 
 
+def counts(browser: Browser, number: int) -> None:
+    """Wait until so many sensors are chosen, and the page has its answer."""
+    browser.wait(lambda: browser.text("count") == f"{number} of 10")
+
+
 def test_sensors_are_chosen_on_the_hand_and_in_the_list(browser: Browser, studio: Studio, people: GraspSet) -> None:
     """By mouse and by keyboard; accuracy, count, command, list and hand follow each time."""
     page = studio(prices=dict.fromkeys((*people.element_names, *people.joint_names), 2.5))
     browser.open(page.server.url)
-    browser.wait(lambda: browser.text("count") == "0 of 10")
+    counts(browser, 0)
     none = browser.text("rate")
     first = browser.driver.find_element(By.CSS_SELECTOR, "#hand [role=button]")
     name = first.get_attribute("aria-label")
     first.send_keys(Keys.ENTER)
-    browser.wait(lambda: browser.text("count") == "1 of 10")
+    counts(browser, 1)
     assert first.get_attribute("aria-pressed") == "true"
     boxes = browser.driver.find_elements(By.CSS_SELECTOR, "#list input")
     assert [box.is_selected() for box in boxes].count(True) == 1
-    assert browser.text("command") == f"thenar compile set.grasps -o build/ --sensors 1 --have {name}"
+    assert browser.text("command") == f"thenar compile set.grasps -o build --sensors 1 --have {name}"
     assert browser.text("price") == "2.50"
     assert browser.text("scan").endswith("µs on the wire")
     boxes[-1].send_keys(Keys.SPACE)
-    browser.wait(lambda: browser.text("count") == "2 of 10")
+    counts(browser, 2)
     assert browser.text("rate") != none
     assert "quick: not nested" in browser.text("change")
     browser.click("clear")
-    browser.wait(lambda: browser.text("count") == "0 of 10")
+    counts(browser, 0)
     assert not any(box.is_selected() for box in boxes)
     assert browser.text("rate") == none
 
@@ -64,12 +74,12 @@ def test_the_best_is_added_measured_and_compared_with_the_curve(
 ) -> None:
     page = studio()
     browser.open(page.server.url)
-    browser.wait(lambda: browser.text("count") == "0 of 10")
+    counts(browser, 0)
     for number in (1, 2, 3):
         browser.click("add")
-        browser.wait(lambda number=number: browser.text("count") == f"{number} of 10")
+        counts(browser, number)
     browser.click("drop")
-    browser.wait(lambda: browser.text("count") == "2 of 10")
+    counts(browser, 2)
     have = tuple(browser.text("command").rpartition(" ")[2].split(","))
     browser.click("measure")
     browser.wait(lambda: browser.text("measured"))
@@ -85,15 +95,30 @@ def test_the_best_is_added_measured_and_compared_with_the_curve(
     ]
     assert browser.texts("#points [aria-current] th") == [f"{curve.enough}: more matter little"]
     browser.driver.find_elements(By.CSS_SELECTOR, "#points button")[4].click()
-    browser.wait(lambda: browser.text("count") == "5 of 10")
+    counts(browser, 5)
     assert set(browser.text("command").rpartition(" ")[2].split(",")) == {*curve.points[4].sensors}
+
+
+def test_train_writes_the_build_of_the_chosen_sensors(browser: Browser, studio: Studio, tmp_path: Path) -> None:
+    browser.open(studio(output=tmp_path / "build").server.url)
+    counts(browser, 0)
+    for number in (1, 2):
+        browser.click("add")
+        counts(browser, number)
+    have = set(browser.text("command").rpartition(" ")[2].split(","))
+    browser.click("train")
+    browser.wait(lambda: browser.texts("#facts li"))
+    manifest = Build.load(tmp_path / "build").manifest
+    assert {*(kept.name for kept in manifest.switches), *(joint.name for joint in manifest.joints)} == have
+    assert any("accuracy, new subject: " in fact for fact in browser.texts("#facts li"))
+    assert (tmp_path / "build" / "report.html").exists()
 
 
 def test_a_number_of_the_matrix_shows_its_trials(browser: Browser, studio: Studio) -> None:
     browser.open(studio().server.url)
-    browser.wait(lambda: browser.text("count") == "0 of 10")
+    counts(browser, 0)
     browser.click("add")
-    browser.wait(lambda: browser.text("count") == "1 of 10")
+    counts(browser, 1)
     cell = browser.driver.find_element(By.CSS_SELECTOR, "#confusion button")
     said, count = str(cell.get_attribute("aria-label")), int(cell.text)
     cell.click()
@@ -111,9 +136,9 @@ def test_nothing_keeps_people_out_and_a_phone_sees_all(
     browser: Browser, studio: Studio, width: int, scheme: str
 ) -> None:
     browser.open(studio().server.url, width=width, scheme=scheme)
-    browser.wait(lambda: browser.text("count") == "0 of 10")
+    counts(browser, 0)
     browser.click("add")
-    browser.wait(lambda: browser.text("count") == "1 of 10")
+    counts(browser, 1)
     browser.driver.find_element(By.CSS_SELECTOR, "#confusion button").click()
     browser.driver.find_element(By.CSS_SELECTOR, "#trials button").click()
     browser.wait(lambda: browser.driver.find_element(By.ID, "trial").is_displayed())
@@ -134,6 +159,7 @@ def test_two_browsers_do_not_move_each_other(studio: Studio) -> None:
         ({"do": "add", "sensors": [-1]}, "there are 10 sensors"),
         ({"do": "measure", "sensors": [99]}, "there are 10 sensors"),
         ({"do": "measure", "sensors": []}, "choose a sensor first"),
+        ({"do": "train", "sensors": [1]}, "no folder is known for a build"),
         ({"do": "choose", "sensors": ["../../etc/passwd"]}, "invalid message"),
         ({"do": "choose", "sensors": 1}, "invalid message"),
         ({"do": "trial", "trial": 72}, "there are 72 trials"),
