@@ -39,6 +39,8 @@ class Misread(msgspec.Struct, frozen=True):
 class Quick(msgspec.Struct, frozen=True):
     """The result for some sensors: the accuracy of trials, 0..1, and its 95 % interval, and what it is of; how many
     trials of each type (rows) were read as each (columns); and those that were misread.
+
+    map  for every trial its type's number, and its place on the two axes on which the types are furthest apart
     """
 
     of: str
@@ -47,6 +49,7 @@ class Quick(msgspec.Struct, frozen=True):
     high: float
     confusion: tuple[tuple[int, ...], ...]
     misread: tuple[Misread, ...]
+    map: tuple[tuple[int, float, float], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +93,8 @@ class QuickAccuracy:
         rows = self._samples
         self._inputs = np.concatenate([rows.switches.T, lines(rows.taxels), lines(rows.codes)]).T
         self._folds = [self._summed(fold.train, fold.test) for fold in self._cut.folds]
+        every = np.arange(len(rows.labels))
+        self._every = self._summed(every, every)
 
     def of(self, sensors: Sequence[int]) -> Quick:
         """Return the accuracy of sensors by their numbers. Raises EvaluationError if there is no such number."""
@@ -112,6 +117,9 @@ class QuickAccuracy:
             misread=tuple(
                 Misread(one, str(self._set.subjects[first[one]]), self.grasps[truth[one]], self.grasps[read[one]])
                 for one in wrong
+            ),
+            map=tuple(
+                (int(kind), x, y) for kind, (x, y) in zip(truth, self._places(columns, trial).tolist(), strict=True)
             ),
         )
 
@@ -146,6 +154,23 @@ class QuickAccuracy:
             shares = np.log(counts / counts.sum())
         return _Sums(test, means, inside.T @ inside / len(train), shares)
 
+    def _places(self, columns: list[int], trial: NDArray[np.intp]) -> Floats:
+        """Return where each trial (m,) lies on the first two axes (m, 2) of a discriminant of all rows."""
+        places = np.zeros((trial.max() + 1, 2))
+        if not columns:
+            return places
+        inputs = self._inputs[:, columns]
+        means = self._every.means[:, columns]
+        # Where the types' rows are equally wide in all directions, their means are furthest apart on the main axes.
+        width, turn = np.linalg.eigh(_shrunk(self._every.scatter[columns][:, columns]))
+        whitened = turn / np.sqrt(width)
+        axes = whitened @ np.linalg.svd((means - means.mean(axis=0)) @ whitened, full_matrices=False)[2][:2].T
+        along = (inputs - inputs.mean(axis=0)) @ axes
+        counts = np.bincount(trial)
+        for axis in range(along.shape[1]):
+            places[:, axis] = np.bincount(trial, weights=along[:, axis]) / counts
+        return places.round(3)
+
     def _right(self, columns: list[int]) -> int:
         return int((self._all_predicted(columns) == self._samples.labels).sum())
 
@@ -156,11 +181,15 @@ class QuickAccuracy:
         return predicted
 
     def _predicted(self, fold: _Sums, columns: list[int]) -> NDArray[np.intp]:
-        scatter = fold.scatter[columns][:, columns]
-        scatter = scatter + np.eye(len(columns)) * (SHRINKAGE * np.trace(scatter) / max(len(columns), 1) + 1e-9)
         means = fold.means[:, columns]
-        weights = np.linalg.solve(scatter, means.T)
+        weights = np.linalg.solve(_shrunk(fold.scatter[columns][:, columns]), means.T)
         offsets = fold.shares - 0.5 * (means * weights.T).sum(axis=1)
         scores = self._inputs[fold.test][:, columns] @ weights + offsets
         best: NDArray[np.intp] = scores.argmax(axis=1)
         return best
+
+
+def _shrunk(scatter: Floats) -> Floats:
+    size = len(scatter)
+    shrunk: Floats = scatter + np.eye(size) * (SHRINKAGE * np.trace(scatter) / max(size, 1) + 1e-9)
+    return shrunk

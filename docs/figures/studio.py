@@ -1,4 +1,5 @@
 """Takes the picture of the live page: python docs/figures/studio.py [--dark] [--width 1400] docs/figures/studio.png
+or, with --choose docs/figures/choose.png, that of `thenar studio` with six sensors of the scene `kamakura`.
 
 The shipped scene `quick` plays on an emulated glove, `thenar run --web` shows it, and Chromium takes the picture once
 twenty grasps have been seen and one has been held for half a second. It needs Debian's chromium and chromium-driver,
@@ -46,18 +47,43 @@ def page(folder: Path) -> Iterator[str]:
             process.terminate()
 
 
+@contextmanager
+def choose_page(folder: Path) -> Iterator[str]:
+    """Yield the address of the page on which sensors are chosen."""
+    thenar, grasps = [sys.executable, "-m", "thenar.cli"], str(folder / "set.grasps")
+    subprocess.run(
+        [*thenar, "simulate", "kamakura", "--repetitions", "10", "-o", grasps], check=True, capture_output=True
+    )
+    command = [*thenar, "studio", grasps, "--web", "127.0.0.1:0"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stderr is not None
+            yield next(line.partition("the page is at ")[2].strip() for line in process.stderr)
+        finally:
+            process.terminate()
+
+
+def choose_sensors(driver: webdriver.Chrome, wait: WebDriverWait[webdriver.Chrome]) -> None:
+    """Let the page add the best sensor six times."""
+    for number in range(7):
+        wait.until(lambda _, number=number: driver.find_element("id", "count").text.startswith(f"{number} of "))
+        if number < 6:
+            driver.find_element("id", "add").click()
+
+
 def main() -> None:
     """Take the picture."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("picture", type=Path)
     parser.add_argument("--dark", action="store_true")
+    parser.add_argument("--choose", action="store_true")
     parser.add_argument("--width", type=int, default=1400)
     options = parser.parse_args()
     chrome = webdriver.ChromeOptions()
     chrome.binary_location = shutil.which("chromium") or ""
     for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"):
         chrome.add_argument(flag)
-    with TemporaryDirectory() as name, page(Path(name)) as url:
+    with TemporaryDirectory() as name, (choose_page if options.choose else page)(Path(name)) as url:
         driver = webdriver.Chrome(options=chrome, service=Service(executable_path=shutil.which("chromedriver") or ""))
         try:
             scheme = {"name": "prefers-color-scheme", "value": "dark" if options.dark else "light"}
@@ -66,9 +92,12 @@ def main() -> None:
             driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", sized)
             driver.get(url)
             wait = WebDriverWait(driver, PATIENCE_S, poll_frequency=0.05)
-            sized["height"] = driver.execute_script("return document.documentElement.scrollHeight")
-            driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", sized)
-            wait.until(lambda _: driver.execute_script(_READY, GRASPS))
+            if options.choose:
+                choose_sensors(driver, wait)
+            else:
+                sized["height"] = driver.execute_script("return document.documentElement.scrollHeight")
+                driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", sized)
+                wait.until(lambda _: driver.execute_script(_READY, GRASPS))
             with Image.open(BytesIO(driver.get_screenshot_as_png())) as taken:
                 taken.convert("RGB").quantize(48, dither=Image.Dither.NONE).save(options.picture, optimize=True)
         finally:

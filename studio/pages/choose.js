@@ -126,6 +126,8 @@ function show(answer) {
   $("trials").replaceChildren();
   confusion(answer);
   certify();
+  // After the accuracy is painted: a map may have thousands of marks.
+  setTimeout(() => answer === shown && drawMap(answer));
 }
 
 function weakest({ confusion: counts }) {
@@ -174,6 +176,61 @@ function confusion({ confusion: counts, misread }) {
   $("confusion").replaceChildren(table);
 }
 
+/* ---- The map of trials ---- */
+
+const SVG = "http://www.w3.org/2000/svg";
+const SHAPES = ["M-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0Z", "M-4-4H4V4H-4Z", "M0-5L5 4H-5Z", "M0-5L5 0L0 5L-5 0Z"];
+const COLOURS = 7;
+
+function glyph(parent, kind) {
+  const made = document.createElementNS(SVG, "path");
+  made.setAttribute("d", SHAPES[Math.floor(kind / COLOURS) % SHAPES.length]);
+  made.classList.add("trial", `kind-${kind % COLOURS}`);
+  parent.append(made);
+  return made;
+}
+
+function drawMap({ map, misread }) {
+  const wrong = new Map(misread.map((one) => [one.trial, one]));
+  const [xs, ys] = [1, 2].map((axis) => map.map((place) => place[axis]));
+  const scale = (values, from, to) => {
+    const low = Math.min(...values), wide = Math.max(...values) - low || 1;
+    return (value) => from + ((value - low) / wide) * (to - from);
+  };
+  const across = scale(xs, 12, 588), down = scale(ys, 388, 12);
+  const marks = map.map(([kind, x, y], trial) => {
+    const group = document.createElementNS(SVG, "g"), title = document.createElementNS(SVG, "title");
+    const error = wrong.get(trial), name = set.grasps[kind];
+    group.setAttribute("transform", `translate(${across(x).toFixed(1)} ${down(y).toFixed(1)})`);
+    title.textContent = `trial ${trial + 1}: ${name}${error ? `, read as ${error.read}` : ""}`;
+    group.append(title);
+    glyph(group, kind);
+    if (error) {
+      const ring = document.createElementNS(SVG, "circle");
+      ring.setAttribute("r", 7);
+      ring.classList.add("ring");
+      group.append(ring);
+    }
+    group.addEventListener("click", () => askTrial(trial, title.textContent));
+    return group;
+  });
+  $("map").replaceChildren(...marks);
+  const entries = set.grasps.map((name, kind) => {
+    const item = document.createElement("li"), sign = document.createElementNS(SVG, "svg");
+    sign.setAttribute("viewBox", "-7 -7 14 14");
+    sign.setAttribute("aria-hidden", "true");
+    glyph(sign, kind);
+    item.append(sign, name);
+    return item;
+  });
+  $("legend").replaceChildren(...entries);
+}
+
+function askTrial(trial, words) {
+  say($("trial-heading"), words);
+  ask("trial", { trial });
+}
+
 function column(name) {
   const made = cell("th", name);
   made.scope = "col";
@@ -186,10 +243,7 @@ function listTrials(trials) {
     button.type = "button";
     button.className = "plain";
     button.textContent = `trial ${trial + 1} of ${subject}`;
-    button.addEventListener("click", () => {
-      say($("trial-heading"), `Trial ${trial + 1} of ${subject}: ${truth}, read as ${read}`);
-      ask("trial", { trial });
-    });
+    button.addEventListener("click", () => askTrial(trial, `Trial ${trial + 1} of ${subject}: ${truth}, read as ${read}`));
     return button;
   });
   const row = document.createElement("p");

@@ -129,6 +129,12 @@ def test_a_number_of_the_matrix_shows_its_trials(browser: Browser, studio: Studi
     truth, read = said.partition(" trials of ")[2].split(" read as ")
     assert browser.text("trial-heading").endswith(f": {truth}, read as {read}")
     assert len(browser.texts("#trial-joints li")) == 2
+    browser.wait(lambda: len(browser.texts("#map title")) == 72)
+    marks = browser.texts("#map title")
+    misread = [mark for mark in marks if "read as" in mark]
+    assert len(browser.texts("#map .ring")) == len(misread) == sum(map(int, browser.texts("#confusion button")))
+    browser.script("document.querySelector('#map g').dispatchEvent(new MouseEvent('click'))")
+    browser.wait(lambda: browser.text("trial-heading") == marks[0])
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (400, "dark")])

@@ -78,6 +78,23 @@ def test_the_best_next_and_the_least_are_those_of_all_trials(quick: QuickAccurac
     assert quick.least([]) is None
 
 
+def test_on_the_map_types_are_as_far_apart_as_scikit_learn_finds_them(people: GraspSet, quick: QuickAccuracy) -> None:
+    """The same axes but for their signs, if nothing is shrunk: switches alone, of which none is constant."""
+    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+
+    sensors = [0, 1, 2, 8, 9]
+    samples = samples_of(people, Recipe())
+    X = np.concatenate([samples.switches.T, lines(samples.codes)]).T[:, sensors]
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("thenar.studio.quick.SHRINKAGE", 0.0)
+        found = np.array([place[1:] for place in quick.of(sensors).map])
+    # Equal shares, so the mean of the types' means is that of all rows.
+    expected = LinearDiscriminantAnalysis(solver="svd").fit(X, samples.labels).transform(X)
+    for axis in range(2):
+        assert abs(np.corrcoef(found[:, axis], expected[:, axis])[0, 1]) > 0.999
+    assert [place[0] for place in quick.of(sensors).map] == samples.labels.tolist()
+
+
 def test_no_sensor_reads_the_most_frequent_type(quick: QuickAccuracy) -> None:
     assert quick.of([]).mean == pytest.approx(1 / 3)
 
