@@ -48,9 +48,7 @@ _OF_METHODS = {"placement", "keep", "prune", "keep_joints", "apart_mm", "at_most
 @layout_option
 @prices_option
 @glove_option
-@recipe_options(
-    "folds", default=0, help="Folds of trials; 0: with a method, measure no accuracy; with sensors, 4 folds."
-)
+@recipe_options("folds", least=2)
 @recipe_options("seed", "by")
 @trainer_option(AUTO)
 @jobs_option()
@@ -83,7 +81,7 @@ def command(
 
     With --method, or --prune, it lists what a placement method keeps instead: the paper's ID3 the switches of its tree,
     in the order of their decisions, with their information gain; other methods a given number of switches, best first.
-    Joints are then counted apart, and --folds measures the accuracy.
+    Joints are then counted apart; `thenar evaluate` measures the accuracy.
 
     \b
     Example:
@@ -97,7 +95,6 @@ def command(
         thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
         thenar place set.grasps --method elimination --keep 16 --have thumb_distal_5 --apart-mm 8
     """
-    from thenar.compiler.artifact.training import fold_results, samples_of
     from thenar.compiler.placement.placement import place
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.recipe import Recipe, changed
@@ -112,27 +109,19 @@ def command(
         return
     if drop or instead_of:
         raise click.UsageError("--drop and --instead-of are for sensors: leave --method and its options out")
-    _check(context, recipe, training, show_tree, draw)
+    _check(asked, recipe, training, show_tree, draw)
     grasp_set = GraspSet.load(grasps)
     terms = terms_of(recipe, grasp_set, layout, glove, prices)
-    with progress(f"choosing switches by {recipe.placement}") as report:
+    with progress(f"choosing switches by {recipe.placement}"):
         placement = place(grasp_set, recipe, **terms)
-        tested = None
-        if recipe.folds:
-            samples = samples_of(grasp_set, recipe)
-            tested = fold_results(grasp_set, samples, recipe, **terms, jobs=jobs, report=report)
-    rates = () if tested is None else tested.rates
-    document = placement.document() | ({"rates": rates} if rates else {})
     if output is not None:
-        write_json(output, document)
+        write_json(output, placement.document())
     if wants_json():
-        print_json(document)
+        print_json(placement.document())
         return
     if show_tree and placement.tree is not None:
         echo(placement.tree.text(placement.all_names, placement.grasps))
     _print(placement)
-    for rate in rates:
-        out().print(f"accuracy, {rate}")
 
 
 def _check_sensors(glove: Path | None, layout: Path | None, draw: Path | None) -> None:
@@ -156,13 +145,12 @@ def _place_sensors(
 ) -> None:
     """Print the worth of sensors: of each number, or of those that are asked for."""
     from thenar.compiler.artifact.sensor_study import draw_curve, number_without, study_sensors, without_one
-    from thenar.runtime.recipe import Recipe, changed
+    from thenar.runtime.recipe import changed
 
     if drop:
         if recipe.sensors is not None or recipe.price is not None:
             raise click.UsageError("--drop says how many sensors are left: leave --sensors and --price out")
         recipe = changed(recipe, {"sensors": number_without(grasp_set, recipe, drop)})
-    recipe = changed(recipe, {"folds": recipe.folds or Recipe().folds})
     terms = terms_of(recipe, grasp_set, None, None, prices)
     if instead_of:
         recipe = without_one(grasp_set, recipe, terms["limits"], instead_of)
@@ -235,9 +223,7 @@ def _where_it_ends(study: "SensorStudy") -> str:
     return f"after {counted(study.enough, 'sensor')} the next is worth {later} points"
 
 
-def _check(
-    context: click.Context, recipe: "Recipe", training: dict[str, Any], show_tree: bool, draw: Path | None
-) -> None:
+def _check(asked: set[str], recipe: "Recipe", training: dict[str, Any], show_tree: bool, draw: Path | None) -> None:
     """Raise UsageError if options conflict, or are for an accuracy that is not measured."""
     from thenar.compiler.placement.methods.base import PAPERS
 
@@ -247,9 +233,8 @@ def _check(
         raise click.UsageError("--tree prints the tree of the paper's ID3 only: leave it out")
     if draw is not None:
         raise click.UsageError("--draw draws what sensors are worth: leave --method and its options out")
-    for name in () if recipe.folds else ("by", "seed", *training):
-        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"--{name.replace('_', '-')} is for an accuracy: add --folds, or leave it out.")
+    for name in sorted(asked & {"by", "seed", "folds", *training}):
+        raise click.UsageError(f"--{name.replace('_', '-')} is for an accuracy, which evaluate measures: leave it out")
 
 
 def _print(placement: "Placement") -> None:

@@ -88,8 +88,8 @@ def test_the_kept_switches_of_a_choice_of_sensors_can_be_drawn(set_file: Path, t
             "--draw draws what sensors are worth: leave --method and its options out",
         ),
         (["--inputs", "joints", "--prune", "2"], "there are no switches to place"),
-        (["--trainer", "logit", "--prune", "2"], "--trainer is for an accuracy: add --folds"),
-        (["--by", "trial", "--prune", "2"], "--by is for an accuracy: add --folds"),
+        (["--trainer", "logit", "--prune", "2"], "--trainer is for an accuracy, which evaluate measures"),
+        (["--by", "trial", "--prune", "2"], "--by is for an accuracy, which evaluate measures"),
         (["--glove", "GLOVE"], "--glove gives scan costs, and sensors are chosen without"),
         (["--glove", "GLOVE", "--prune", "2"], "--glove gives the scan costs"),
         (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "weighs them: elimination-cost, id3-cost"),
@@ -125,14 +125,3 @@ def test_place_keeps_what_compile_keeps(set_file: Path, tmp_path: Path, options:
     assert [switch["name"] for switch in manifest["switches"]] == [switch["name"] for switch in placed["switches"]]
     if "kept_joints" in placed:
         assert [joint["name"] for joint in manifest["joints"]] == placed["kept_joints"]
-
-
-def test_place_measures_what_compile_measures(set_file: Path, tmp_path: Path, capsys: Captured) -> None:
-    options = ["--method", "elimination", "--keep", "3", "--trainer", "logitboost", "--rounds", "3", "--folds", "3"]
-    assert run(["place", str(set_file), *options, "--json"]) == 0
-    rates = json.loads(capsys.readouterr().out)["rates"]
-    assert run(["compile", str(set_file), "-o", str(tmp_path / "build"), *options, "--no-report", "--json"]) == 0
-    measured = json.loads(capsys.readouterr().out)["rates"]
-    assert rates == [rate for rate in measured if rate["protocol"] == "nested"]
-    assert run(["place", str(set_file), *options]) == 0
-    assert "accuracy, " in capsys.readouterr().out

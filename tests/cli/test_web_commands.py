@@ -178,6 +178,19 @@ def test_a_recording_is_shown_from_any_moment_of_it(
     assert monitor.end() == 0
 
 
+def test_the_studio_answers_until_a_signal_ends_it(start: Callable[..., Command], set_file: Path) -> None:
+    studio = start("studio", set_file, "--jobs", "1", "--web", "127.0.0.1:0")
+    with studio.page() as live:
+        assert [sensor["kind"] for sensor in told(live, "set")["sensors"]] == 6 * ["switch"] + 2 * ["joint"]
+        ask(live, do="choose", sensors=[0, 7])
+        answer = told(live, "quick")
+        assert (answer["sensors"], answer["of"]) == ([0, 7], "within subject")
+        assert answer["command"] == "thenar compile set.grasps -o build --sensors 2 --have s0,j1"
+        ask(live, do="train", sensors=[0])
+        assert "no folder is known for a build: start the studio with" in told(live, "refused")["why"]
+    assert studio.end() == 0
+
+
 def test_what_is_no_recording_is_refused(build_folder: Path, recording: Path, tmp_path: Path) -> None:
     (tmp_path / "text.mcap").write_text("no")
     for name, said in (("none.mcap", "does not exist"), ("text.mcap", "does not begin like an MCAP file")):
