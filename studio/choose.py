@@ -39,7 +39,7 @@ _LOOK_S = 0.2
 
 class _Asked(msgspec.Struct, frozen=True):
     """What a page asks for: "choose", "measure", "train", "add" (the best) or "drop" (the least) for sensors by their
-    numbers, "trial" by its number, or the "curve".
+    numbers, a "trial" by its number as they read it, or the "curve".
     """
 
     do: str
@@ -143,11 +143,11 @@ class ChoosePage(Closing):
             find = self._quick.best_next if asked.do == "add" else self._quick.least
             return message(asked.do, sensor=find(asked.sensors))
         if asked.do == "trial":
-            return message("trial", trial=asked.trial, shown=self._quick.trial(asked.trial))
+            return message("trial", self._quick.trial(asked.trial, asked.sensors), trial=asked.trial)
         if asked.do not in ("measure", "curve", "train"):
             raise ThenarError(f"a page cannot {asked.do}")
         if asked.do == "train" and self._output is None:
-            raise ThenarError("no folder is known for a build: start the studio with ``output``")
+            raise ThenarError("no folder is known for a build: start thenar studio with -o")
         if asked.do != "curve" and not asked.sensors:
             raise ThenarError("choose a sensor first: without any, nothing can be learnt")
         if self._queue.qsize() >= _MOST_QUEUED:

@@ -25,6 +25,7 @@ from thenar.runtime.recipe import Recipe
 Floats = NDArray[np.float64]
 # The share of the mean variance that is added to each: sensors are few, and trials fewer.
 SHRINKAGE = 0.1
+_DECISIVE = 3
 
 
 class Misread(msgspec.Struct, frozen=True):
@@ -50,6 +51,18 @@ class Quick(msgspec.Struct, frozen=True):
     confusion: tuple[tuple[int, ...], ...]
     misread: tuple[Misread, ...]
     map: tuple[tuple[int, float, float], ...]
+
+
+class SeenTrial(msgspec.Struct, frozen=True):
+    """A trial: what each sensor showed in it, 0 to 1 of its range in the set, and typically in trials of the true and
+    of the recognised type; the numbers of these types; and the sensors that decided for the wrong one, most first.
+    """
+
+    shown: tuple[float, ...]
+    truth: int
+    read: int
+    typical: tuple[tuple[float, ...], ...]
+    decisive: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,9 +111,7 @@ class QuickAccuracy:
 
     def of(self, sensors: Sequence[int]) -> Quick:
         """Return the accuracy of sensors by their numbers. Raises EvaluationError if there is no such number."""
-        columns = sorted(set(sensors))
-        if columns and not 0 <= columns[0] <= columns[-1] < len(self.names):
-            raise EvaluationError(f"there are {len(self.names)} sensors, numbered from 0")
+        columns = self._columns(sensors)
         rows, predicted = self._samples, self._all_predicted(columns)
         rate = Rate.predicted(predicted, rows.labels, rows.trials, of=self._cut.of, groups=self._cut.groups)
         _, first, trial = np.unique(rows.trials, return_index=True, return_inverse=True)
@@ -132,17 +143,47 @@ class QuickAccuracy:
         """Return the sensor without which the accuracy of rows falls least; None if there is none."""
         return max(sensors, key=lambda one: self._right([other for other in sensors if other != one]), default=None)
 
-    def trial(self, number: int) -> tuple[float, ...]:
-        """Return what each sensor showed in a trial, on average: 0 to 1 of its range in the set.
+    def trial(self, number: int, sensors: Sequence[int]) -> SeenTrial:
+        """Return what was seen in a trial, and how these sensors read it.
 
-        Raises EvaluationError if there is no such trial.
+        Raises EvaluationError if there is no such trial or sensor.
         """
-        trials = np.unique(self._samples.trials)
+        columns, rows = self._columns(sensors), self._samples
+        trials = np.unique(rows.trials)
         if not 0 <= number < len(trials):
             raise EvaluationError(f"there are {len(trials)} trials, numbered from 0")
-        rows = self._inputs[self._samples.trials == trials[number]].mean(axis=0)
+        own = np.flatnonzero(rows.trials == trials[number])
+        truth = int(rows.labels[own[0]])
+        fold = next(fold for fold in self._folds if own[0] in fold.test)
+        read = int(
+            decided(self._predicted(fold, columns)[np.isin(fold.test, own)][np.newaxis], np.zeros(len(own), np.intp))[
+                0, 0
+            ]
+        )
+        inputs, decisive = self._inputs[own].mean(axis=0), list[int]()
+        if columns and read != truth:
+            means, weights = fold.means[:, columns], self._weights(fold, columns)
+            middle = 0.5 * (means[read] + means[truth])
+            shares = (weights[:, read] - weights[:, truth]) * (inputs[columns] - middle)
+            decisive = [columns[place] for place in np.argsort(-shares, kind="stable")[:_DECISIVE] if shares[place] > 0]
+        return SeenTrial(
+            shown=self._of_range(inputs),
+            truth=truth,
+            read=read,
+            typical=tuple(self._of_range(self._every.means[one]) for one in (truth, read)),
+            decisive=tuple(decisive),
+        )
+
+    def _of_range(self, inputs: Floats) -> tuple[float, ...]:
         low, high = self._inputs.min(axis=0), self._inputs.max(axis=0)
-        return tuple(np.round((rows - low) / np.maximum(high - low, 1e-9), 3).tolist())
+        return tuple(((inputs - low) / np.maximum(high - low, 1e-9)).round(3).tolist())
+
+    def _columns(self, sensors: Sequence[int]) -> list[int]:
+        """Return the sensors in their order. Raises EvaluationError if there is no such number."""
+        columns = sorted(set(sensors))
+        if columns and not 0 <= columns[0] <= columns[-1] < len(self.names):
+            raise EvaluationError(f"there are {len(self.names)} sensors, numbered from 0")
+        return columns
 
     def _summed(self, train: NDArray[np.intp], test: NDArray[np.intp]) -> _Sums:
         labels, inputs = self._samples.labels[train], self._inputs[train]
@@ -180,9 +221,12 @@ class QuickAccuracy:
             predicted[fold.test] = self._predicted(fold, columns)
         return predicted
 
+    @staticmethod
+    def _weights(fold: _Sums, columns: list[int]) -> Floats:
+        return np.linalg.solve(_shrunk(fold.scatter[columns][:, columns]), fold.means[:, columns].T).astype(np.float64)
+
     def _predicted(self, fold: _Sums, columns: list[int]) -> NDArray[np.intp]:
-        means = fold.means[:, columns]
-        weights = np.linalg.solve(_shrunk(fold.scatter[columns][:, columns]), means.T)
+        means, weights = fold.means[:, columns], self._weights(fold, columns)
         offsets = fold.shares - 0.5 * (means * weights.T).sum(axis=1)
         scores = self._inputs[fold.test][:, columns] @ weights + offsets
         best: NDArray[np.intp] = scores.argmax(axis=1)

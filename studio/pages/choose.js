@@ -9,7 +9,8 @@ const KINDS = { switch: "Switches", pad: "Pads", joint: "Joints" };
 
 let set = null; // the message on the set
 let drawn = null; // the message on the hand
-let hand = null, trialHand = null;
+let hand = null;
+let error = -1; // the place among the misread trials of the one that is shown
 let boxes = [];
 let chosen = []; // numbers of sensors, in the order in which they were chosen
 let shown = null; // the last answer
@@ -30,7 +31,6 @@ const send = connect({
     drawn = message;
     $("drawn").hidden = !drawn.switches.length;
     hand = drawHand($("hand"), drawn, { onSwitch: (sensor) => toggle(sensor) });
-    trialHand = drawHand($("trial-hand"), drawn);
     mark();
   },
   quick: (answer) => {
@@ -52,7 +52,7 @@ const send = connect({
     const busy = { measure: "measuring", curve: "measuring the curve", train: "training" }[what];
     say($("work"), why ?? (done < total ? `${busy}: ${Math.round((100 * done) / total)} %` : ""));
   },
-  trial: ({ trial, shown: values }) => showTrial(trial, values),
+  trial: (seen) => showTrial(seen),
   refused: ({ why }) => say($("refused"), why),
 });
 
@@ -117,13 +117,14 @@ function show(answer) {
   if (answer.price !== null) say($("price"), answer.price.toFixed(2));
   const change = before && before.sensors.length !== chosen.length ? 100 * (answer.mean - before.mean) : null;
   const moved = change === null ? "" : `; ${change >= 0 ? "+" : ""}${change.toFixed(1)} points by the last click`;
-  say($("change"), `trials of a ${answer.of}, quick: not nested, and chosen while looking at it${moved}`);
+  say($("change"), `trials, ${answer.of}; quick: not nested, and chosen while looking at it${moved}`);
   say($("weakest"), weakest(answer));
   say($("command"), answer.command || "choose a sensor");
   say($("spoken"), `${chosen.length} sensors, ${percent(answer.mean)} percent`);
   $("measure").disabled = $("train").disabled = !chosen.length;
   $("trial").hidden = true;
   $("trials").replaceChildren();
+  error = -1;
   confusion(answer);
   certify();
   // After the accuracy is painted: a map may have thousands of marks.
@@ -211,7 +212,7 @@ function drawMap({ map, misread }) {
       ring.classList.add("ring");
       group.append(ring);
     }
-    group.addEventListener("click", () => askTrial(trial, title.textContent));
+    group.addEventListener("click", () => ask("trial", { trial, sensors: chosen }));
     return group;
   });
   $("map").replaceChildren(...marks);
@@ -226,11 +227,6 @@ function drawMap({ map, misread }) {
   $("legend").replaceChildren(...entries);
 }
 
-function askTrial(trial, words) {
-  say($("trial-heading"), words);
-  ask("trial", { trial });
-}
-
 function column(name) {
   const made = cell("th", name);
   made.scope = "col";
@@ -238,12 +234,12 @@ function column(name) {
 }
 
 function listTrials(trials) {
-  const items = trials.map(({ trial, subject, truth, read }) => {
+  const items = trials.map(({ trial, subject }) => {
     const button = document.createElement("button");
     button.type = "button";
     button.className = "plain";
     button.textContent = `trial ${trial + 1} of ${subject}`;
-    button.addEventListener("click", () => askTrial(trial, `Trial ${trial + 1} of ${subject}: ${truth}, read as ${read}`));
+    button.addEventListener("click", () => ask("trial", { trial, sensors: chosen }));
     return button;
   });
   const row = document.createElement("p");
@@ -253,22 +249,48 @@ function listTrials(trials) {
   items[0]?.focus();
 }
 
-/** Show what the sensors saw in a trial: closed where they were for more than half of it, or of their range. */
-function showTrial(trial, values) {
+/** Show what the sensors saw in a trial, beside what they typically see in its true and in its recognised type. */
+function showTrial({ trial, shown: values, truth, read, typical, decisive }) {
+  const [name, other] = [set.grasps[truth], set.grasps[read]];
+  say($("trial-heading"), `Trial ${trial + 1}: ${name}${read === truth ? "" : `, read as ${other}`}`);
+  const names = decisive.map((sensor) => set.sensors[sensor].name);
+  say($("decisive"), names.length ? `decided by ${names.join(", ")}` : "");
   $("trial").hidden = false;
-  trialHand?.setClosed(values.map((value) => value > 0.5));
-  const joints = set.sensors.map(({ name, kind }, sensor) => ({ name, kind, value: values[sensor] }));
-  const items = joints
-    .filter(({ kind }) => kind === "joint")
-    .map(({ name, value }) => {
-      const item = document.createElement("li"), label = document.createElement("label");
-      const meter = document.createElement("meter");
-      meter.value = value;
-      label.append(`${name} `, meter, ` ${Math.round(100 * value)} % of its range`);
-      item.append(label);
-      return item;
-    });
-  $("trial-joints").replaceChildren(...items);
+  const parts = [seen(`trial ${trial + 1}`, values), seen(`${name}, typically`, typical[0])];
+  if (read !== truth) parts.push(seen(`${other}, typically`, typical[1]));
+  // Before it is on the page, a drawing has no width.
+  $("hands").replaceChildren(...parts.map(({ figure }) => figure));
+  for (const { draw } of parts) draw();
+}
+
+/** Return a figure of what sensors saw: a hand with those closed for more than half of the time, and all joints. */
+function seen(words, values) {
+  const figure = document.createElement("figure"), caption = document.createElement("figcaption");
+  const svg = document.createElementNS(SVG, "svg"), joints = document.createElement("ul");
+  caption.textContent = words;
+  set.sensors.forEach(({ name, kind }, sensor) => {
+    if (kind !== "joint") return;
+    const item = document.createElement("li"), label = document.createElement("label");
+    const meter = document.createElement("meter");
+    meter.value = values[sensor];
+    label.append(meter, `${name} ${Math.round(100 * values[sensor])} %`);
+    item.append(label);
+    joints.append(item);
+  });
+  figure.append(caption, ...(drawn.switches.length ? [svg] : []), joints);
+  const draw = () => {
+    if (!drawn.switches.length) return;
+    drawHand(svg, drawn).setClosed(values.map((value) => value > 0.5));
+    svg.setAttribute("aria-label", `hand: ${words}`);
+  };
+  return { figure, draw };
+}
+
+function nextError(step) {
+  const errors = shown?.misread ?? [];
+  if (!errors.length) return;
+  error = (error + step + errors.length) % errors.length;
+  ask("trial", { trial: errors[error].trial, sensors: chosen });
 }
 
 function drawCurve({ points, of, enough }) {
@@ -300,3 +322,7 @@ $("clear").addEventListener("click", () => choose([]));
 $("measure").addEventListener("click", () => ask("measure", { sensors: chosen }));
 $("train").addEventListener("click", () => ask("train", { sensors: chosen }));
 $("curve").addEventListener("click", () => ask("curve"));
+document.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.altKey || event.metaKey) return;
+  if (event.key === "n" || event.key === "p") nextError(event.key === "n" ? 1 : -1);
+});

@@ -19,6 +19,14 @@ def quick(people: GraspSet) -> QuickAccuracy:
     return QuickAccuracy(people)
 
 
+def discriminant(X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the means of the types, and the shrunk scatter of rows around them."""
+    means = np.array([X[y == one].mean(axis=0) for one in range(3)])
+    inside = X - means[y]
+    scatter = inside.T @ inside / len(y)
+    return means, scatter + np.eye(X.shape[1]) * SHRINKAGE * np.trace(scatter) / X.shape[1]
+
+
 def by_density(people: GraspSet, sensors: list[int]) -> np.ndarray:
     """Return the type of the largest density of each row, by the rows of other people."""
     samples = samples_of(people, Recipe())
@@ -26,10 +34,7 @@ def by_density(people: GraspSet, sensors: list[int]) -> np.ndarray:
     found = np.empty(len(X), np.intp)
     for fold in cuts_of(people, Recipe())[0].folds:
         y, learnt = samples.labels[fold.train], X[fold.train]
-        means = np.array([learnt[y == one].mean(axis=0) for one in range(3)])
-        inside = learnt - means[y]
-        scatter = inside.T @ inside / len(y)
-        scatter += np.eye(len(sensors)) * SHRINKAGE * np.trace(scatter) / len(sensors)
+        means, scatter = discriminant(learnt, y)
         densities = [
             multivariate_normal(mean, scatter).logpdf(X[fold.test]) + np.log((y == one).mean())
             for one, mean in enumerate(means)
@@ -99,11 +104,25 @@ def test_no_sensor_reads_the_most_frequent_type(quick: QuickAccuracy) -> None:
     assert quick.of([]).mean == pytest.approx(1 / 3)
 
 
-def test_a_trial_shows_its_switches_and_joints(people: GraspSet, quick: QuickAccuracy) -> None:
-    shown = quick.trial(5)
-    assert shown[:8] == tuple(people.switches[5].astype(float))
+def test_a_trial_shows_its_switches_and_joints_and_what_decided(people: GraspSet, quick: QuickAccuracy) -> None:
+    sensors = [0, 1, 8]
+    one = quick.of(sensors).misread[0]
+    seen = quick.trial(one.trial, sensors)
+    assert (quick.grasps[seen.truth], quick.grasps[seen.read]) == (one.truth, one.read)
+    assert seen.shown[:8] == tuple(people.switches[one.trial].astype(float))
     low, high = people.codes.min(axis=0), people.codes.max(axis=0)
-    assert shown[8:] == pytest.approx((people.codes[5] - low) / (high - low), abs=5e-3)
+    assert seen.shown[8:] == pytest.approx((people.codes[one.trial] - low) / (high - low), abs=5e-3)
+    for kind, typical in zip((one.truth, one.read), seen.typical, strict=True):
+        shares = people.switches[people.grasps == kind].mean(axis=0)
+        assert typical[:8] == pytest.approx(shares, abs=1e-3)
+    # By the inverse of the scatter, the share of each sensor in the difference of both types' scores.
+    samples = samples_of(people, Recipe())
+    X = np.concatenate([samples.switches.T, lines(samples.codes)]).T[:, sensors]
+    others = samples.subjects != samples.subjects[one.trial]
+    means, scatter = discriminant(X[others], samples.labels[others])
+    between = means[seen.read] - means[seen.truth]
+    shares = np.linalg.inv(scatter) @ between * (X[one.trial] - (means[seen.read] + means[seen.truth]) / 2)
+    assert seen.decisive == tuple(sensors[place] for place in np.argsort(-shares) if shares[place] > 0)
 
 
 @pytest.mark.parametrize("sensors", [[10], [-1], [0, 99]])
@@ -111,4 +130,4 @@ def test_a_sensor_that_does_not_exist_is_refused(quick: QuickAccuracy, sensors: 
     with pytest.raises(EvaluationError, match="there are 10 sensors"):
         quick.of(sensors)
     with pytest.raises(EvaluationError, match="there are 72 trials"):
-        quick.trial(72)
+        quick.trial(72, [])
