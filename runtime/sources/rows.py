@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from thenar.drivers.lines import SEQUENCES, Row, RowReader
+from thenar.drivers.lines import CLOCK_US, SEQUENCES, UNITS_US, Row, RowReader
 from thenar.drivers.senders import SILENCE_US
 
 from ..frames import PERIODS, GloveFrame, Mask, SwitchFrame, now_us
@@ -21,7 +21,6 @@ from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of
 # closer numbers are coded in this many steps.
 JOINT_CODES = (1, 255)
 _TAXEL_STEPS, _FEWEST_STEPS, _MOST_STEPS = 4095, 255, 65_534
-_UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
 # A clock that goes back further, or ahead of ours by more, has restarted, or is another sender's.
 _BACK_US, _AHEAD_US = 1_000_000, 10_000_000
 # Boards count milliseconds and microseconds in 32 bits. Above the limit, a float has no whole microseconds.
@@ -249,7 +248,8 @@ class RowSource(Source):
         self._begin()
 
     def _begin(self) -> None:
-        self._clock = SenderClock(self.wiring.period_us, _TURN_US[self.wiring.time_unit])
+        turn_us = CLOCK_US if self.wiring.time is None else _TURN_US[self.wiring.time_unit]
+        self._clock = SenderClock(self.wiring.period_us, turn_us)
         # When a row came last; when the sender's clock changed last.
         self._came_us = self._ticked_us = now_us()
         # A fault of single rows, and until when it is reported.
@@ -310,7 +310,7 @@ class RowSource(Source):
     def _sent_us(self, row: Row, values: Sequence[float | None]) -> float | None:
         """Return the sender's time of a row, which may be anything; None: it has no clock."""
         if self.wiring.time is not None:
-            return math.nan if values[-1] is None else values[-1] * _UNITS_US[self.wiring.time_unit]
+            return math.nan if values[-1] is None else values[-1] * UNITS_US[self.wiring.time_unit]
         return None if row.time_s is None else row.time_s * 1e6
 
     def _known_us(self, sent_us: float, came_us: int, values: Sequence[float | None]) -> int | None:

@@ -210,6 +210,7 @@ def _moved(harness: Harness, folder: Path, ports: Sequence[str]) -> Harness:
         harness,
         cyberglove=None if glove is None else msgspec.structs.replace(glove, port=str(folder / "cyberglove")),
         streams=tuple(
-            msgspec.structs.replace(wiring, port=port) for wiring, port in zip(harness.streams, ports, strict=True)
+            msgspec.structs.replace(wiring, port=port, frame="")
+            for wiring, port in zip(harness.streams, ports, strict=True)
         ),
     )

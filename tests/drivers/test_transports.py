@@ -14,7 +14,8 @@ import pytest
 from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender, LineServer, lines_like
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.lines import LineReader, Row
+from thenar.drivers.lines import Row
+from thenar.drivers.readers import LineReader
 from thenar.drivers.transports import line_port_fault
 
 LONG_S = 10.0
@@ -138,12 +139,12 @@ def test_datagrams_are_dated_when_they_come_not_when_they_are_read() -> None:
 def test_bytes_without_a_row_are_counted() -> None:
     with DatagramLines() as sender, LineReader(sender.port) as reader:
         reader.open()
-        sender.send(b"A512B300")
+        sender.send(b"A512,B300")
         end = monotonic() + LONG_S
         while not reader.received:
             assert monotonic() < end
             assert not reader.read(0.1)
-        assert (reader.counts().misfits, reader.odd) == (1, "'A512B300'")
+        assert (reader.counts().misfits, reader.odd) == (1, "'A512,B300'")
 
 
 def test_half_a_line_before_a_break_spoils_no_later_line() -> None:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.lines import SEQUENCES, LineCounts, LineParser, Row, RowReader, checked
+from thenar.drivers.lines import CLOCK_US, SEQUENCES, LineCounts, LineParser, Row, RowReader, checked
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
@@ -216,6 +216,18 @@ def test_a_clock_of_32_bits_that_begins_again_costs_no_row(play: Play, unit: str
     assert [frame.time_us for frame in frames if isinstance(frame, SwitchFrame)] == [10_000 * n for n in range(100)]
 
 
+@given(st.integers(0, CLOCK_US - 1), st.lists(st.integers(1, 9_000_000), max_size=20))
+def test_the_clock_of_a_board_goes_on_where_it_begins_again(first: int, steps: list[int]) -> None:
+    harness = parse_harness(BOARD, "glove.toml")
+    source, time_us = RowSource(Script([]), harness, 0, ("a",), whole_scan(harness, ("a",))), 0
+    source.read_only(())
+    for step in (0, *steps):
+        time_us += step
+        source.take(Row(("a",), (1.0,), (first + time_us) % CLOCK_US / 1e6, sequence=0), time_us)
+        assert source._ready.pop().time_us == time_us
+    assert source.watch.counts.rows == 1 + len(steps)
+
+
 @pytest.mark.parametrize("clock", [b"1e305", b"-1e305", b"nan", b"inf", b"1e17", b""])
 def test_a_row_whose_clock_is_no_time_is_left_out_and_said(play: Play, clock: bytes) -> None:
     good = [(10_000 * n, b"%d,1,0,0,0,0,0\n" % (10 * n)) for n in range(4)]
@@ -338,8 +350,8 @@ def test_what_is_wrong_with_all_rows_is_said(play: Play) -> None:
         == "its rows have other columns than glove.toml: column 1, column 2, column 3, not "
         + ("ms, thumb, index, pad, flex and 1 more")
     )
-    source, _ = play([(0, b"rst:0x10\n")])
-    assert source.fault_message() == "the data holds no rows: 'rst:0x10'"
+    source, _ = play([(0, b"rst:0x10 (POWERON_RESET)\n")])
+    assert source.fault_message() == "the data holds no rows: 'rst:0x10 (POWERON_RESET)'"
     source, _ = play([(100_000 * n, b"%d,0,0,0,0,0,0\n" % (100 * n)) for n in range(12)])
     assert source.fault_message() == "10 rows a second arrive, but glove.toml says 100: set rate_hz = 10"
 
@@ -353,8 +365,8 @@ def test_a_sender_that_falls_silent_or_sends_something_else_is_said(play: Play) 
     assert source.counts()[0].value == 0
     source, _ = play([(1_000_000, row), (3_100_000, b"1,2\n")])
     assert source.fault_message().startswith("its rows have other columns than glove.toml: column 1, column 2, not ms")
-    source, _ = play([(1_000_000, row), (3_100_000, b"rst:0x10\n")])
-    assert source.fault_message() == "the data holds no rows: 'rst:0x10'"
+    source, _ = play([(1_000_000, row), (3_100_000, b"rst:0x10 (POWERON_RESET)\n")])
+    assert source.fault_message() == "the data holds no rows: 'rst:0x10 (POWERON_RESET)'"
     source, _ = play([(1_000_000, row), (3_100_000, b"\x80\x00\x80")])
     assert source.fault_message() == "bytes come, but no row: check the line ends and, of a serial port, the baud rate"
 
