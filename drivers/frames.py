@@ -24,6 +24,8 @@ _SHOWN = 16
 # A guess takes 16 frames at least, and at most so long ones, so much data, and so long runs of fixed bytes; another
 # type of numbers must be clearly better.
 _FEWEST, _LONGEST, _MOST, _HEADER, _BETTER = 16, 128, 8_192, 4, 0.7
+# Bytes with which no frame begins or ends, unless there is nothing else.
+_UNUSUAL = bytes(byte for byte in range(128) if byte not in b"\r\nUZ~#$<>{}")
 _TYPES = ("B", "H", ">H", "h", ">h", "f", ">f", "i", ">i")
 
 
@@ -126,7 +128,8 @@ def _headers(window: bytes, size: int, first: int | None) -> list[tuple[bytes, b
         run = bytes(window[(start + place) % size] for place in range(length))
         for at in range(length):
             # A part of a run may be of numbers: of sensors that did not move, or of their high bytes.
-            whole = [(run[at:], run[:at].lstrip(b"\0")), (run[at:], b"")] if length <= _HEADER else []
+            before, after = run[at : at + 1] + run[at + 1 :].rstrip(_UNUSUAL), run[:at].lstrip(_UNUSUAL)
+            whole = [(before, after), (before, b"")] if length <= _HEADER else []
             headers += dict.fromkeys([*whole, (run[at : at + 1], b"")])
     return sorted(headers, key=lambda ends: (ends[0][0] != first, -ends[0][0]))
 

@@ -60,6 +60,7 @@ _CHECKED = re.compile(rb"\$([^$*]*)\*([0-9A-Fa-f]{2})")
 _CHECKSUM = re.compile(rb"\*[0-9A-Fa-f]{2}$")
 _COUNT, _READING = re.compile("[0-9]{1,10}"), re.compile("(-?[0-9]{1,10})?")
 _SWITCHES = re.compile("[0-9A-F]*")
+_OF_BOARD = (b"row", b"columns")
 # OpenGloves: the column of each letter with a number, then of each button, whose letter comes only while it is pressed.
 _NUMBERED = {
     **{letter: f"flex_{finger}" for letter, finger in zip("ABCDE", FINGERS, strict=True)},
@@ -118,24 +119,36 @@ def parsed(line: bytes, columns: int = 0) -> Row | ColumnHeader | Damaged | None
     """Parse a line; None for a misfit. `columns` is the known number of columns; 0: unknown, and then a board's row is
     a misfit, too. The time of a board's row is that of its clock, which begins again after CLOCK_US.
     """
-    found = _CHECKED.fullmatch(line) if (checks := _is_checked(line)) else None
-    if checks and (found is None or reduce(xor, found[1], 0) != int(found[2], 16)):
-        return Damaged()
+    if _is_checked(line):
+        found = _CHECKED.fullmatch(line)
+        if found is None or reduce(xor, found[1], 0) != int(found[2], 16):
+            return Damaged()
+        line = found[1]
+        if line.partition(b",")[0] in _OF_BOARD:
+            return _of_board(line, columns)
     try:
-        text = (line if found is None else found[1]).decode("utf-8")
+        text = line.decode("utf-8").strip("\ufeff \r\t\0")
     except UnicodeDecodeError:
-        return Damaged() if checks else None
-    kind, *fields = text.split(",") if checks else ("",)
-    if kind == "row":
-        return _of_board_row(fields, columns)
-    if kind == "columns":
-        sound = _sound(fields) and all(map(str.isprintable, fields))
-        return ColumnHeader(tuple(fields)) if fields and sound else Damaged()
-    text = text.strip("\ufeff \r\t\0")
-    if text[:1] == "<" and text[-1:] == ">":
-        text = text[1:-1].strip()
+        return None
     if _PLAIN.fullmatch(text):
         return Row(None, tuple(map(float, text.split(","))))
+    return _of_text(text[1:-1].strip() if text[:1] == "<" and text[-1:] == ">" else text, columns)
+
+
+def _of_board(line: bytes, columns: int) -> Row | ColumnHeader | Damaged | None:
+    """Parse the content of a board's line."""
+    try:
+        kind, *fields = line.decode("utf-8").split(",")
+    except UnicodeDecodeError:
+        return Damaged()
+    if kind == "row":
+        return _of_board_row(fields, columns)
+    sound = _sound(fields) and all(map(str.isprintable, fields))
+    return ColumnHeader(tuple(fields)) if fields and sound else Damaged()
+
+
+def _of_text(text: str, columns: int) -> Row | ColumnHeader | None:
+    """Parse a line that has no checksum and is not of a board."""
     if text[-1:] in ("}", "]"):
         text = _WORD_OF_JSON.sub("", text)
     if text[:1] in ("{", "["):
@@ -342,7 +355,7 @@ class LineParser:
             self.counts.damaged += 1
             return None
         self._checked = True
-        if not line.startswith((b"$row,", b"$columns,")):
+        if line[1:].partition(b",")[0] not in _OF_BOARD:
             return self._of_line(line)
         self._board = True
         if isinstance(found, Row):
@@ -353,9 +366,9 @@ class LineParser:
     def _of_line(self, line: bytes) -> Row | None:
         found = None
         if not self._board and self._checked == _is_checked(line):
-            found = parsed(line, self._known)
+            found = parsed(line, len(self._header) or self._known)
             if found is None and self._header:
-                found = parsed(line, len(self._header))
+                found = parsed(line, self._known)
         if isinstance(found, Row):
             return self._with_names(found)
         header = found if isinstance(found, ColumnHeader) else None

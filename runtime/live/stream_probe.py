@@ -28,9 +28,11 @@ _WAIT_S = 0.1
 # A sender that leaves no pause is read as fast as it sends after this time.
 _BACKLOG_US = 100_000
 _JOINT = re.compile(
-    r"flex|bend|splay|joint|angle|deg|enc|mcp|mpj|pip|pij|dip|dij|abduct|wrist|pitch|roll|yaw", re.IGNORECASE
+    r"flex|bend|splay|joint|angle|deg|enc|mcp|mpj|pip|pij|dip|dij|(^|_)ip($|_)|abduct|wrist|pitch|roll|yaw",
+    re.IGNORECASE,
 )
 _TAXEL = re.compile(r"fsr|pad|force|press|taxel|adc|analog|raw|newton", re.IGNORECASE)
+_UNIT = {unit: re.compile(named) for unit, named in (("s", "^s$|(^|_)sec"), ("ms", "ms|milli"), ("us", "us|micro"))}
 _TIME = re.compile(r"^(t|ts|ms|us|s)$|time|milli|micro|stamp|clock|(^|_)secs?$|seconds", re.IGNORECASE)
 _HIGHEST = (255, 1023, 4095, 16_383, 32_767, 65_534)
 _PARTS = (1.0, 3.3, 5.0, 10.0, 100.0, 180.0, 360.0)
@@ -92,6 +94,7 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
         bare, parser = msgspec.structs.replace(bare, frame=frame), FrameParser(frame)
         came = [(time_us, row) for time_us, chunk in chunks for row in parser.feed(chunk)]
         counts, odd = parser.counts, parser.odd
+        other = other or f"frames of {frame}: bytes that never changed are taken as fixed, so move every sensor"
     if not came:
         raise DeviceError(f"{port}: {_no_rows(bare, reader) or other or 'no data received'}")
     wrong, such = counts.misfits + counts.overlong, f", such as {odd}" if odd else ""
@@ -223,7 +226,7 @@ def _clock(values: dict[str, list[float | None]], span_s: float) -> tuple[str | 
             going = sum(step for step in steps if 0 < step <= 10 * median(steps)) or 1.0
             for unit, unit_us in UNITS_US.items():
                 if span_s < _LEAST_S:
-                    fits = name == "s" if unit == "s" else unit in name.lower()
+                    fits = _UNIT[unit].search(name.lower()) is not None
                 else:
                     fits = 0.5 < going * unit_us / 1e6 / span_s < 2.0
                 if fits:

@@ -139,6 +139,8 @@ def test_a_text_in_a_row_of_known_width_is_a_missing_value() -> None:
     assert LineParser(3).feed(row) == [Row(None, (5, 1, None))]
     assert LineParser().feed(row) == []
     assert LineParser(3).feed(b"booting\n" + row) == [Row(None, (5, 1, None))]
+    labels = b"label,flex,pad\nfist,5,1\nopen,4,0\n"
+    assert [found.values for found in LineParser().feed(labels)] == [(None, 5, 1), (None, 4, 0)]
     assert parser.feed(b"ready\n" + row) == [Row(("ms", "flex [deg]", "label"), (5, 1, None))]
 
 

@@ -1,0 +1,135 @@
+"""Rows by Bluetooth Low Energy, from an emulated peripheral: real packets of HCI, ATT and GATT, on both sides."""
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from queue import Empty, Queue
+from time import monotonic
+
+import bleak
+import pytest
+
+from thenar.drivers import ble
+from thenar.drivers.emulated.ble import ADDRESS, EmulatedPeripheral
+from thenar.drivers.errors import DeviceError, SettingError
+from thenar.drivers.lines import OPENGLOVES, Row
+from thenar.drivers.readers import LineReader
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.live.sources import DeviceThread
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.sources.base import SOURCES
+
+from . import bumble_backend
+
+LONG_S = 10.0
+OWN = ["0000ffe1-0000-1000-8000-00805f9b34fb", "2b9c1e40-54a1-4c5f-a7a1-0d3f1f3f0a11"]
+
+
+@pytest.fixture
+def adapter(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Let bleak use an adapter of bumble's; return what sets its port."""
+    monkeypatch.setattr(bleak, "get_platform_scanner_backend_type", lambda: (bumble_backend.Scanner, "bumble"))
+    monkeypatch.setattr(bleak, "get_platform_client_backend_type", lambda: (bumble_backend.Client, "bumble"))
+    return monkeypatch
+
+
+@pytest.fixture
+def glove(adapter: pytest.MonkeyPatch) -> Iterator[EmulatedPeripheral]:
+    with EmulatedPeripheral("My Glove") as peripheral:
+        adapter.setenv(bumble_backend.ADAPTER, str(peripheral.hci))
+        yield peripheral
+
+
+def heard(reader: LineReader, rows: int) -> list[Row]:
+    end, found = monotonic() + LONG_S, list[Row]()
+    while len(found) < rows:
+        assert monotonic() < end
+        found += reader.read(0.1)
+    return found
+
+
+@pytest.mark.parametrize(
+    "name", ["My Glove", "my glove", ADDRESS, ADDRESS.lower(), f"My Glove/{ble.NORDIC_UART.upper()}"]
+)
+def test_lines_over_several_notifications_are_whole(glove: EmulatedPeripheral, name: str) -> None:
+    with LineReader(f"ble://{name}") as reader:
+        reader.open()
+        glove.send(b"A2048B1990C12D0E7F2047G2047(AB)300H\n" * 9)
+        rows = heard(reader, 9)
+        assert {row.names for row in rows} == {(*OPENGLOVES[:7], "splay_thumb", *OPENGLOVES[-8:])}
+        assert {row.values[:5] for row in rows} == {(2048, 1990, 12, 0, 7)}
+        assert reader.counts().misfits == 0
+
+
+def test_a_connection_that_is_lost_is_said_and_may_be_opened_again(glove: EmulatedPeripheral) -> None:
+    with LineReader("ble://My Glove") as reader:
+        for _ in range(2):
+            reader.open()
+            glove.send(b"1,2\n7")
+            assert heard(reader, 1) == [Row(None, (1, 2))]
+            glove.hang_up()
+            with pytest.raises(DeviceError, match="ble://My Glove: the connection is lost"):
+                heard(reader, 1)
+            reader.close()
+
+
+def test_notifications_without_line_ends_are_lines_and_frames_need_none(glove: EmulatedPeripheral) -> None:
+    with LineReader("ble://My Glove") as lines, LineReader("ble://My Glove", frame="F0 B2 F7") as frames:
+        lines.open()
+        for number in range(40):
+            glove.send(b"%d,7" % number)
+        assert heard(lines, 9)[-9:] == [Row(None, (number, 7)) for number in range(31, 40)]
+        lines.close()
+        frames.open()
+        glove.send(b"\xf0\x0a\x0d\xf7" * 3)
+        assert heard(frames, 3) == [Row(None, (10, 13))] * 3
+
+
+def test_which_of_several_characteristics_is_meant_has_to_be_said(adapter: pytest.MonkeyPatch) -> None:
+    with EmulatedPeripheral("two", OWN) as peripheral:
+        adapter.setenv(bumble_backend.ADAPTER, str(peripheral.hci))
+        for port in ("ble://two", "ble://two/1234"):
+            with pytest.raises(SettingError, match=f"ble://two/{OWN[0]} or ble://two/{OWN[1]}"):
+                LineReader(port).open()
+        for way in (OWN[0], "ffe1"):
+            with LineReader(f"ble://two/{way}") as reader:
+                reader.open()
+                peripheral.send(b"1,2\n")
+                assert heard(reader, 1) == [Row(None, (1, 2))]
+
+
+def test_what_is_missing_is_said(glove: EmulatedPeripheral, adapter: pytest.MonkeyPatch) -> None:
+    adapter.setattr(ble, "_SEARCH_S", 0.3)
+    with pytest.raises(DeviceError, match=r"ble://other: it does not advertise.*: others are My Glove$"):
+        LineReader("ble://other").open()
+    adapter.setenv(bumble_backend.ADAPTER, "1")
+    with pytest.raises(DeviceError, match="is this computer's Bluetooth on"):
+        LineReader("ble://My Glove").open()
+    adapter.setitem(sys.modules, "bleak", None)
+    with pytest.raises(SettingError, match=r'ble://My Glove: bleak is not installed: pip install "thenar\[ble\]"'):
+        LineReader("ble://My Glove").open()
+    for port in ("ble://", "ble:x", "ble://a/b", "ble://a\n"):
+        with pytest.raises(SettingError, match="names no peripheral"):
+            LineReader(port).open()
+
+
+def test_a_stream_by_bluetooth_is_read_again_when_it_returns(glove: EmulatedPeripheral) -> None:
+    text = '[[stream]]\nport = "ble://My Glove"\njoints = { flex = [0, 254] }\ncolumns = ["flex"]\n'
+    harness, frames = parse_harness(text, "glove.toml"), Queue[SwitchFrame | GloveFrame]()
+    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, (), whole_scan(harness, ())))
+    keeper = DeviceThread("glove", source, frames.put)
+    keeper.start()
+    try:
+        for number in (1, 2):
+            end, code = monotonic() + LONG_S, b""
+            while code != bytes([1 + number]):
+                assert monotonic() < end
+                glove.send(b"%d\n" % number)
+                with contextlib.suppress(Empty):
+                    frame = frames.get(timeout=0.02)
+                    code = frame.sensors if isinstance(frame, GloveFrame) else b""
+            glove.hang_up()
+        assert keeper.faults == 0
+    finally:
+        keeper.close()

@@ -1,0 +1,129 @@
+"""Encodings of lines that makers print: what is written in one comes back, and garbage loses only what it touches."""
+
+import json
+from datetime import UTC, datetime, timedelta
+from functools import reduce
+from operator import xor
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.drivers.lines import FINGERS, OPENGLOVES, LineParser, Row, parsed
+
+counts = st.integers(0, 4095)
+values = st.lists(st.floats(-1e6, 1e6).map(lambda number: round(number, 3)), min_size=2, max_size=8)
+
+
+@st.composite
+def gloves(draw: st.DrawFn) -> dict[str, int]:
+    """Return readings of a glove that speaks OpenGloves: flexion, and some of the others."""
+    some = draw(st.sets(st.sampled_from([name for name in OPENGLOVES if not name.startswith("button")])))
+    flexion = {f"flex_{finger}": draw(counts) for finger in FINGERS}
+    others = {name: draw(counts) for name in OPENGLOVES if name in some and name not in flexion}
+    return flexion | others | {name: draw(st.integers(0, 1)) for name in OPENGLOVES if name.startswith("button")}
+
+
+def alpha(glove: dict[str, int]) -> str:
+    """Write readings as the firmware of LucidGloves does: a button has a letter only while it is pressed."""
+    flexion = "".join(f"{letter}{glove[f'flex_{finger}']}" for letter, finger in zip("ABCDE", FINGERS, strict=True))
+    named = {"F": "joystick_x", "G": "joystick_y", "P": "trigger"}
+    named |= {f"({letter}B)": f"splay_{finger}" for letter, finger in zip("ABCDE", FINGERS, strict=True)}
+    numbers = "".join(f"{letter}{glove[name]}" for letter, name in named.items() if name in glove)
+    buttons = [name for name in OPENGLOVES if name.startswith("button")]
+    return flexion + numbers + "".join(letter for letter, name in zip("HIJKLMNO", buttons, strict=True) if glove[name])
+
+
+@given(gloves())
+def test_alpha_comes_back(glove: dict[str, int]) -> None:
+    row = parsed(alpha(glove).encode())
+    assert isinstance(row, Row)
+    assert row.names is not None
+    assert dict(zip(row.names, row.values, strict=True)) == glove
+
+
+@given(gloves())
+def test_legacy_comes_back_with_the_same_names(glove: dict[str, int]) -> None:
+    stick = {"joystick_x": 2047, "joystick_y": 2048}
+    pressed = [f"button_{name}" for name in ("joystick", "trigger", "a", "b", "grab", "pinch")]
+    sent = {name: (glove | stick)[name] for name in (*[f"flex_{finger}" for finger in FINGERS], *stick, *pressed)}
+    assert parsed("&".join(map(str, sent.values())).encode()) == Row(tuple(sent), tuple(map(float, sent.values())))
+
+
+def nmea(text: str) -> str:
+    return f"${text}*{reduce(xor, text.encode(), 0):02x}"
+
+
+@pytest.mark.parametrize(
+    "framed", [nmea, "<{}>".format, "DATA: {}".format, "DATA,{}".format, lambda text: nmea(f"GLV,{text}")]
+)
+@given(numbers=values)
+def test_a_frame_or_a_word_around_a_row_changes_nothing(framed: "type[str]", numbers: list[float]) -> None:
+    assert parsed(framed(",".join(map(repr, numbers))).encode()) == Row(None, tuple(numbers))
+
+
+@pytest.mark.parametrize("unit", ["deg", "V", " °C", "%", "mA", "kOhm", "m/s^2", "rad/s"])
+@given(numbers=values)
+def test_units_behind_numbers_are_left_out(unit: str, numbers: list[float]) -> None:
+    assert parsed(",".join(f"{number!r}{unit}" for number in numbers).encode()) == Row(None, tuple(numbers))
+    named = ", ".join(f"a{place} = {number!r}{unit}" for place, number in enumerate(numbers))
+    assert parsed(named.encode()) == Row(tuple(f"a{place}" for place in range(len(numbers))), tuple(numbers))
+
+
+@given(st.lists(counts, min_size=1, max_size=8), st.lists(st.booleans(), min_size=1), st.sampled_from("xX"))
+def test_hexadecimal_numbers_and_truths_come_back(numbers: list[int], truths: list[bool], x: str) -> None:
+    written = [*(f"0{x}{number:03X}" for number in numbers), *map(str, truths)]
+    for line in (",".join(written), " ".join(word.lower() for word in written)):
+        assert parsed(line.encode()) == Row(None, tuple(map(float, [*numbers, *truths])))
+
+
+@given(st.datetimes(datetime(1970, 1, 2), datetime(2100, 1, 1)), st.integers(-12, 12), counts)
+def test_times_are_seconds(date: datetime, zone: int, number: int) -> None:
+    seconds = date.replace(tzinfo=UTC).timestamp()
+    written = date.isoformat()
+    for text, wanted in (
+        (written, seconds),
+        (f"{written}Z", seconds),
+        (f"{written}{zone:+03}:00", seconds - 3600 * zone),
+    ):
+        assert parsed(f"{text},{number}".encode()) == Row(None, (wanted, number))
+        assert parsed(f"t:{text} a:{number}".encode()) == Row(("t", "a"), (wanted, number))
+    midnight = date - datetime(date.year, date.month, date.day)
+    assert parsed(f"{written[11:]},{number}".encode()) == Row(None, (midnight / timedelta(seconds=1), number))
+
+
+keys = st.from_regex(r"[a-z]{1,4}", fullmatch=True)
+leaves = st.floats(-1e6, 1e6) | st.booleans() | st.integers(-(10**6), 10**6) | st.none()
+nested = st.recursive(leaves, lambda inner: st.dictionaries(keys, inner, max_size=3) | st.lists(inner, max_size=3))
+
+
+@given(st.dictionaries(keys, nested, min_size=1, max_size=3), st.sampled_from(["", "DATA: ", "imu="]))
+def test_nested_json_has_names_with_dots(sent: dict[str, object], word: str) -> None:
+    def flat(value: object, path: tuple[str, ...]) -> dict[str, object]:
+        inner = value if isinstance(value, dict) else dict(enumerate(value)) if isinstance(value, list) else None
+        if inner is None:
+            return {".".join(path): value}
+        return {name: leaf for key, one in inner.items() for name, leaf in flat(one, (*path, str(key))).items()}
+
+    wanted = flat(sent, ())
+    found = parsed((word + json.dumps(sent)).encode())
+    assert found == (Row(tuple(wanted), tuple(wanted.values())) if wanted else None)  # type: ignore[arg-type]
+
+
+@given(st.lists(gloves(), min_size=1, max_size=6), st.data())
+def test_garbage_between_lines_loses_only_what_it_touches(sent: list[dict[str, int]], data: st.DataObject) -> None:
+    lines = [alpha(glove) for glove in sent]
+    garbage = [data.draw(st.binary(max_size=30)).replace(b"\n", b"").replace(b"\r", b"") + b"#\n" for _ in lines]
+    stream = b"".join(noise + line.encode() + b"\r" for noise, line in zip(garbage, lines, strict=True))
+    parser = LineParser()
+    rows = [row for row in parser.feed(stream) if row.names and row.names[0] == "flex_thumb"]
+    assert [dict(zip(row.names or (), row.values, strict=True)) for row in rows] == sent
+
+
+def test_once_a_line_had_a_checksum_others_are_no_rows_and_none_is_once_a_board_spoke() -> None:
+    parser = LineParser()
+    assert parser.feed(f"1,2\n{nmea('1,2')}\n3,4\n".encode()) == 2 * [Row(None, (1, 2))]
+    assert parser.feed(f"{nmea('columns,a')}\n{nmea('1,2')}\n{nmea('row,0,5,1')}\n".encode()) == [
+        Row(("a",), (1.0,), 5e-6, sequence=0)
+    ]
+    assert parser.counts.misfits == 2

@@ -1,0 +1,136 @@
+"""Binary frames by a pattern, and the pattern of a sender that nobody has described."""
+
+import math
+from collections.abc import Sequence
+from random import Random
+from struct import Struct, pack
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from thenar.drivers.errors import SettingError
+from thenar.drivers.frames import FrameParser, frame_format, guess_frame
+from thenar.drivers.lines import LineCounts
+
+TYPES = {"b": (-128, 127), "B": (0, 255), "h": (-(2**15), 2**15 - 1), "H": (0, 2**16 - 1), "i": (-(2**31), 2**31 - 1)}
+TYPES["I"] = (0, 2**32 - 1)
+Frame = tuple[bytes, tuple[float, ...]]
+
+
+@st.composite
+def patterns(draw: st.DrawFn) -> tuple[str, Struct, list[bytes], list[str]]:
+    """Return a pattern with two fixed bytes in front, its packing, its fixed bytes and the types of its numbers."""
+    order = draw(st.sampled_from(["", "<", ">"]))
+    words, packed, types = ["AA", "55"], (order or "<") + "2B", list[str]()
+    for kind in draw(st.lists(st.sampled_from([*TYPES, "f"]), min_size=1, max_size=4)):
+        count = draw(st.integers(1, 3))
+        words.append(kind if count == 1 and draw(st.booleans()) else f"{kind}{count}")
+        packed, types = f"{packed}{count}{kind}", types + [kind] * count
+    return " ".join([order, *words, "0xB5"]).strip(), Struct(f"{packed}B"), [b"\xaa\x55", b"\xb5"], types
+
+
+@st.composite
+def streams(draw: st.DrawFn) -> tuple[str, list[Frame]]:
+    """Return a pattern, and frames in whose numbers the first fixed byte does not occur."""
+    pattern, packing, _, types = draw(patterns())
+    frames = list[Frame]()
+    for _ in range(draw(st.integers(1, 6))):
+        numbers = [
+            draw(st.floats(width=32, allow_nan=False, allow_infinity=False))
+            if kind == "f"
+            else draw(st.integers(*TYPES[kind]))
+            for kind in types
+        ]
+        frame = packing.pack(0xAA, 0x55, *numbers, 0xB5)
+        assume(0xAA not in frame[1:])
+        frames.append((frame, tuple(map(float, numbers))))
+    return pattern, frames
+
+
+def cut(stream: bytes, data: st.DataObject) -> list[bytes]:
+    places = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
+    return [stream[a:b] for a, b in zip([0, *places], [*places, len(stream)], strict=True)]
+
+
+@given(streams(), st.data())
+def test_frames_come_back_however_they_are_cut(case: tuple[str, list[Frame]], data: st.DataObject) -> None:
+    pattern, frames = case
+    parser = FrameParser(pattern)
+    rows = [row for chunk in cut(b"".join(frame for frame, _ in frames), data) for row in parser.feed(chunk)]
+    assert [row.values for row in rows] == [numbers for _, numbers in frames]
+    assert (parser.counts, frame_format(pattern).numbers) == (LineCounts(), len(frames[0][1]))
+
+
+@given(streams(), st.data())
+def test_truncated_frames_and_garbage_lose_only_what_they_touch(
+    case: tuple[str, list[Frame]], data: st.DataObject
+) -> None:
+    pattern, frames = case
+    stream, sound, damages = b"", list[Sequence[float]](), 0
+    for frame, numbers in frames:
+        noise = data.draw(st.binary(max_size=9)).replace(b"\xaa", b"")
+        short = frame[: data.draw(st.integers(1, len(frame) - 1))] if data.draw(st.booleans()) else b""
+        damages += bool(noise + short)
+        stream += noise + short + frame
+        sound.append(numbers)
+    parser = FrameParser(pattern)
+    rows = [row.values for chunk in cut(stream, data) for row in parser.feed(chunk)]
+    assert rows == sound
+    assert parser.counts.misfits == damages
+    assert bool(parser.odd) == bool(damages)
+
+
+@given(st.binary(max_size=400), st.data())
+def test_whatever_comes_no_more_than_a_frame_is_kept(stream: bytes, data: st.DataObject) -> None:
+    whole, parts = FrameParser("F0 B10 F7"), FrameParser("F0 B10 F7")
+    rows = [row for chunk in cut(stream, data) for row in parts.feed(chunk)]
+    assert rows == whole.feed(stream)
+    assert parts.counts == whole.counts
+    assert len(parts._rest) < 12
+
+
+@pytest.mark.parametrize("pattern", ["", "F0", "B3", "F0 X3", "F0 B3 F", "F0 B9999 B9999", "F0,B3"])
+def test_what_is_no_pattern_is_said(pattern: str) -> None:
+    with pytest.raises(SettingError, match=r"needs a fixed byte and a number|neither a byte nor a type"):
+        FrameParser(pattern)
+
+
+def moving(number: int, place: int, low: float, high: float) -> float:
+    return low + (high - low) * (0.5 + 0.45 * math.sin(number / (9 + 2 * place) + place))
+
+
+# By the pattern: how it is packed, the bytes in front and at the end, how many numbers there are, and their range.
+SENDERS = {
+    "F0 B10 F7": ("<12B", b"\xf0", b"\xf7", 10, (10, 200)),
+    "AA 55 H5": ("<2B5H", b"\xaa\x55", b"", 5, (100, 4000)),
+    "> AA 55 H5 0D 0A": (">2B5H2B", b"\xaa\x55", b"\r\n", 5, (100, 4000)),
+    "AA h6": ("<B6h", b"\xaa", b"", 6, (-3000, 3000)),
+    "0xB5 f4": ("<B4f", b"\xb5", b"", 4, (-90, 90)),
+    "AA 55 i3": ("<2B3i", b"\xaa\x55", b"", 3, (-9e6, 9e6)),
+}
+
+
+@pytest.mark.parametrize("pattern", SENDERS)
+@pytest.mark.parametrize("every", [0, 37])
+def test_the_pattern_of_a_sender_is_found(pattern: str, every: int) -> None:
+    packing, before, after, count, limits = SENDERS[pattern]
+    frames = []
+    for number in range(200):
+        numbers = [moving(number, place, *limits) for place in range(count)]
+        frames.append(pack(packing, *before, *(numbers if "f" in packing else map(round, numbers)), *after))
+    stream = b"".join(frames)[5:]
+    found = guess_frame([stream[at : at + every] for at in range(0, len(stream), every)] if every else frames)
+    # Where no chunk shows which byte is the first one, any is right.
+    assert found == pattern or (every and sorted(found.split()) == sorted(pattern.split()))
+    assert len(FrameParser(found).feed(stream)) >= 198
+
+
+def test_no_pattern_is_found_in_noise_and_in_what_does_not_move() -> None:
+    noise = Random(1).randbytes(4000)
+    assert [guess_frame([data]) for data in (noise, b"\0" * 4000, b"\xf0\x01\x02\xf7" * 400, b"")] == [""] * 4
+
+
+def test_a_sensor_that_does_not_move_is_a_number_of_a_frame() -> None:
+    frames = [bytes([0xF0, round(moving(number, 0, 9, 200)), 77, 0xF7]) for number in range(200)]
+    assert guess_frame(frames) == "F0 B2 F7"
