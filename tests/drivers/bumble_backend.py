@@ -3,6 +3,8 @@
 import os
 from typing import Any
 
+import bleak
+import pytest
 from bleak.backends.characteristic import BleakGATTCharacteristic
 from bleak.backends.client import BaseBleakClient, NotifyCallback
 from bleak.backends.scanner import AdvertisementData, BaseBleakScanner
@@ -13,6 +15,13 @@ from bumble.hci import Address
 from bumble.transport import open_transport
 
 ADAPTER = "THENAR_TEST_ADAPTER"
+
+
+def use(monkeypatch: pytest.MonkeyPatch, hci: int) -> None:
+    """Let bleak use the adapter whose HCI is at this port of 127.0.0.1."""
+    monkeypatch.setattr(bleak, "get_platform_scanner_backend_type", lambda: (Scanner, "bumble"))
+    monkeypatch.setattr(bleak, "get_platform_client_backend_type", lambda: (Client, "bumble"))
+    monkeypatch.setenv(ADAPTER, str(hci))
 
 
 async def _opened() -> tuple[Any, Device]:
@@ -59,13 +68,15 @@ class Client(BaseBleakClient):
         self._connection.on("disconnection", self._lost)
         self._peer = Peer(self._connection)
         await self._peer.request_mtu(64)
-        await self._peer.discover_all()
+        await self._peer.discover_all()  # type: ignore[no-untyped-call]
         self.services = BleakGATTServiceCollection()
         for service in self._peer.services:
             known = BleakGATTService(service, service.handle, service.uuid.to_hex_str("-").lower())
             self.services.add_service(known)
             for one in service.characteristics:
-                flags = [flag.name.lower() for flag in type(one.properties) if flag in one.properties and flag.name]
+                flags: Any = [
+                    flag.name.lower() for flag in type(one.properties) if flag in one.properties and flag.name
+                ]
                 uuid = one.uuid.to_hex_str("-").lower()
                 uuid = uuid if len(uuid) > 8 else f"{uuid:0>8}-0000-1000-8000-00805f9b34fb"
                 self.services.add_characteristic(

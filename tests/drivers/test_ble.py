@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from queue import Empty, Queue
 from time import monotonic
 
-import bleak
 import pytest
 
 from thenar.drivers import ble
@@ -27,17 +26,9 @@ OWN = ["0000ffe1-0000-1000-8000-00805f9b34fb", "2b9c1e40-54a1-4c5f-a7a1-0d3f1f3f
 
 
 @pytest.fixture
-def adapter(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
-    """Let bleak use an adapter of bumble's; return what sets its port."""
-    monkeypatch.setattr(bleak, "get_platform_scanner_backend_type", lambda: (bumble_backend.Scanner, "bumble"))
-    monkeypatch.setattr(bleak, "get_platform_client_backend_type", lambda: (bumble_backend.Client, "bumble"))
-    return monkeypatch
-
-
-@pytest.fixture
-def glove(adapter: pytest.MonkeyPatch) -> Iterator[EmulatedPeripheral]:
+def glove(monkeypatch: pytest.MonkeyPatch) -> Iterator[EmulatedPeripheral]:
     with EmulatedPeripheral("My Glove") as peripheral:
-        adapter.setenv(bumble_backend.ADAPTER, str(peripheral.hci))
+        bumble_backend.use(monkeypatch, peripheral.hci)
         yield peripheral
 
 
@@ -86,9 +77,9 @@ def test_notifications_without_line_ends_are_lines_and_frames_need_none(glove: E
         assert heard(frames, 3) == [Row(None, (10, 13))] * 3
 
 
-def test_which_of_several_characteristics_is_meant_has_to_be_said(adapter: pytest.MonkeyPatch) -> None:
+def test_which_of_several_characteristics_is_meant_has_to_be_said(monkeypatch: pytest.MonkeyPatch) -> None:
     with EmulatedPeripheral("two", OWN) as peripheral:
-        adapter.setenv(bumble_backend.ADAPTER, str(peripheral.hci))
+        bumble_backend.use(monkeypatch, peripheral.hci)
         for port in ("ble://two", "ble://two/1234"):
             with pytest.raises(SettingError, match=f"ble://two/{OWN[0]} or ble://two/{OWN[1]}"):
                 LineReader(port).open()
@@ -99,14 +90,14 @@ def test_which_of_several_characteristics_is_meant_has_to_be_said(adapter: pytes
                 assert heard(reader, 1) == [Row(None, (1, 2))]
 
 
-def test_what_is_missing_is_said(glove: EmulatedPeripheral, adapter: pytest.MonkeyPatch) -> None:
-    adapter.setattr(ble, "_SEARCH_S", 0.3)
+def test_what_is_missing_is_said(glove: EmulatedPeripheral, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ble, "_SEARCH_S", 0.3)
     with pytest.raises(DeviceError, match=r"ble://other: it does not advertise.*: others are My Glove$"):
         LineReader("ble://other").open()
-    adapter.setenv(bumble_backend.ADAPTER, "1")
+    bumble_backend.use(monkeypatch, 1)
     with pytest.raises(DeviceError, match="is this computer's Bluetooth on"):
         LineReader("ble://My Glove").open()
-    adapter.setitem(sys.modules, "bleak", None)
+    monkeypatch.setitem(sys.modules, "bleak", None)
     with pytest.raises(SettingError, match=r'ble://My Glove: bleak is not installed: pip install "thenar\[ble\]"'):
         LineReader("ble://My Glove").open()
     for port in ("ble://", "ble:x", "ble://a/b", "ble://a\n"):
