@@ -25,10 +25,10 @@ class LineReader(RowReader):
     chunks  None; or, if set to a list, the first chunks of bytes that came, and when, by the monotonic clock
     """
 
-    def __init__(self, port: str, baud: int = 115_200, columns: int = 0, frame: str = "") -> None:
+    def __init__(self, port: str, baud: int = 115_200, columns: int = 0, frame: str | None = None) -> None:
         self.port, self._baud = port, baud
         self._line: Transport | None = None
-        self._parser = FrameParser(frame) if frame else LineParser(columns)
+        self._parser = LineParser(columns) if frame is None else FrameParser(frame)
         self._senders = FirstSender()
         self._unended: int | None = None
         self.chunks: list[tuple[int, bytes]] | None = None

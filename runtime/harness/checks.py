@@ -109,7 +109,7 @@ def _of_spi(place: Place, chip: SpiWiring) -> Iterator[Fault]:
 def _of_stream(place: Place, stream: StreamWiring) -> Iterator[Fault]:
     if not stream.used:
         yield place, "must have one of the keys switches, joints and taxels; doctor --line proposes them"
-    if stream.frame:
+    if stream.frame is not None:
         try:
             numbers = frame_format(stream.frame).numbers
         except SettingError as reason:

@@ -210,7 +210,7 @@ def _moved(harness: Harness, folder: Path, ports: Sequence[str]) -> Harness:
         harness,
         cyberglove=None if glove is None else msgspec.structs.replace(glove, port=str(folder / "cyberglove")),
         streams=tuple(
-            msgspec.structs.replace(wiring, port=port, frame="")
+            msgspec.structs.replace(wiring, port=port, frame=None)
             for wiring, port in zip(harness.streams, ports, strict=True)
         ),
     )

@@ -89,7 +89,7 @@ def test_doctor_finds_how_rows_are_written_and_its_proposal_reads_them(
         assert list(stream.taxels if stream.taxels else stream.joints) == moving
         assert any(still in remark and "did not move" in remark for remark in found["remarks"])
         assert (stream.time, stream.time_unit) == (("c1", "s") if encoding == "times" else (None, "ms"))
-        assert stream.frame == ("AA 55 H5" if encoding == "frames" else "")
+        assert stream.frame == ("AA 55 H5" if encoding == "frames" else None)
         (rows,) = [one for one in json.loads(thenar("doctor", path, "--json").stdout) if not one["part"]]
         assert rows["present"]
         assert 8_000 < rows["measured_us"] < 40_000
