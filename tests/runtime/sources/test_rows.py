@@ -386,6 +386,8 @@ def test_a_clock_that_stands_still_is_said(play: Play, moving: int) -> None:
         (("index = 512", "inde = 512"), "no switch 'inde'"),
         (('switches = ["thumb", "index"]', 'switches = ["thumb", "ring"]'), "no column 'ring'"),
         (('time = "ms"', 'time = "us"'), "no column 'us'"),
+        (('time = "ms"', 'time = "ms"\nframe = "F0 X7"'), "'X7' is neither a byte nor a type of numbers: write fixed"),
+        (('time = "ms"', 'time = "ms"\nframe = "F0 B5"'), "7 columns are named, but a frame has 5 numbers: name every"),
         (('time = "ms"', 'time = "pad"'), "'pad' is the sender's clock"),
         (("[0, 4095]", "[7, 7]"), "a range from 7"),
         (('"ms", "thumb", ""', '"ms", "thumb", "pad"'), "column 'pad' is already stream"),
