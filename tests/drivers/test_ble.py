@@ -20,8 +20,8 @@ from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.base import SOURCES
 
 from . import bumble_backend
+from .test_transports import LONG_S, heard
 
-LONG_S = 10.0
 OWN = ["0000ffe1-0000-1000-8000-00805f9b34fb", "2b9c1e40-54a1-4c5f-a7a1-0d3f1f3f0a11"]
 
 
@@ -32,32 +32,12 @@ def glove(monkeypatch: pytest.MonkeyPatch) -> Iterator[EmulatedPeripheral]:
         yield peripheral
 
 
-def heard(reader: LineReader, rows: int) -> list[Row]:
-    end, found = monotonic() + LONG_S, list[Row]()
-    while len(found) < rows:
-        assert monotonic() < end
-        found += reader.read(0.1)
-    return found
-
-
 @pytest.mark.parametrize("name", ["my glove", ADDRESS.lower(), f"My Glove/{ble.NORDIC_UART.upper()}"])
 def test_a_peripheral_is_found_by_name_and_by_address(glove: EmulatedPeripheral, name: str) -> None:
     with LineReader(f"ble://{name}") as reader:
         reader.open()
         glove.send(b"A2048B1990(AB)300H\n")
         assert heard(reader, 1)[0].values[:3] == (2048, 1990, 300)
-
-
-def test_a_connection_that_is_lost_is_said_and_may_be_opened_again(glove: EmulatedPeripheral) -> None:
-    with LineReader("ble://My Glove") as reader:
-        for _ in range(2):
-            reader.open()
-            glove.send(b"1,2\n7")
-            assert heard(reader, 1) == [Row(None, (1, 2))]
-            glove.hang_up()
-            with pytest.raises(DeviceError, match="ble://My Glove: the connection is lost"):
-                heard(reader, 1)
-            reader.close()
 
 
 def test_notifications_without_line_ends_are_lines_and_frames_need_none(glove: EmulatedPeripheral) -> None:
@@ -113,6 +93,9 @@ def test_a_stream_by_bluetooth_is_read_again_when_it_returns(glove: EmulatedPeri
                     frame = frames.get(timeout=0.02)
                     code = frame.sensors if isinstance(frame, GloveFrame) else b""
             glove.hang_up()
+            while keeper.state.connected and keeper.opened == number:
+                assert monotonic() < end
+            assert keeper.opened > number or "ble://My Glove: the connection is lost" in keeper.state.error
         assert keeper.faults == 0
     finally:
         keeper.close()

@@ -1,7 +1,6 @@
 """Binary frames by a pattern, and the pattern of a sender that nobody has described."""
 
 import math
-from collections.abc import Sequence
 from random import Random
 from struct import pack
 
@@ -10,8 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from thenar.drivers.errors import SettingError
-from thenar.drivers.frames import FrameParser, frame_format, guess_frame
-from thenar.drivers.lines import LineCounts
+from thenar.drivers.frames import FrameParser, guess_frame
 
 # How patterns pack numbers, and what each of the numbers may be.
 BYTES, SHORTS, FLOATS = st.integers(0, 255), st.integers(-(2**15), 2**15 - 1), st.floats(-1e9, 1e9, width=32)
@@ -42,35 +40,24 @@ def cut(stream: bytes, data: st.DataObject) -> list[bytes]:
 
 
 @given(streams(), st.data())
-def test_frames_come_back_however_they_are_cut(case: tuple[str, list[Frame]], data: st.DataObject) -> None:
-    pattern, frames = case
-    parser = FrameParser(pattern)
-    rows = [row for chunk in cut(b"".join(frame for frame, _ in frames), data) for row in parser.feed(chunk)]
-    assert [row.values for row in rows] == [numbers for _, numbers in frames]
-    assert (parser.counts, frame_format(pattern).numbers) == (LineCounts(), len(frames[0][1]))
-
-
-@given(streams(), st.data())
 def test_truncated_frames_and_garbage_lose_only_what_they_touch(
     case: tuple[str, list[Frame]], data: st.DataObject
 ) -> None:
     pattern, frames = case
-    stream, sound, damages = b"", list[Sequence[float]](), 0
-    for frame, numbers in frames:
-        noise = data.draw(st.binary(max_size=9)).replace(b"\xaa", b"")
-        short = frame[: data.draw(st.integers(1, len(frame) - 1))] if data.draw(st.booleans()) else b""
+    stream, damages = b"", 0
+    for frame, _ in frames:
+        noise = data.draw(st.binary(max_size=9)).replace(b"\xaa", b"") * data.draw(st.integers(0, 1))
+        short = frame[: data.draw(st.integers(0, len(frame) - 1))]
         damages += bool(noise + short)
         stream += noise + short + frame
-        sound.append(numbers)
     parser = FrameParser(pattern)
     rows = [row.values for chunk in cut(stream, data) for row in parser.feed(chunk)]
-    assert rows == sound
-    assert parser.counts.misfits == damages
-    assert bool(parser.odd) == bool(damages)
+    assert rows == [numbers for _, numbers in frames]
+    assert (parser.counts.misfits, bool(parser.odd)) == (damages, bool(damages))
     assert len(parser._rest) < len(frames[0][0])
 
 
-@pytest.mark.parametrize("pattern", ["", "F0", "B3", "F0 X3", "F0 B3 F", "F0 B9999 B9999", "F0,B3"])
+@pytest.mark.parametrize("pattern", ["", "F0", "B3", "F0 B3 F", "F0 B9999 B9999"])
 def test_what_is_no_pattern_is_said(pattern: str) -> None:
     with pytest.raises(SettingError, match=r"needs a fixed byte and a number|neither a byte nor a type"):
         FrameParser(pattern)
