@@ -6,6 +6,7 @@ ble://NAME/UUID             its characteristic with this UUID
 """
 
 import re
+from contextlib import suppress
 from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import TYPE_CHECKING, Any
@@ -72,16 +73,13 @@ class BleLine(Closing):
         if self._loop.is_closed():
             return
         client, self._client = self._client, None
-        try:
-            if client is not None:
+        if client is not None:
+            with suppress(DeviceError):  # it is gone already
                 self._wait(client.disconnect(), _LEAVE_S)
-        except DeviceError:  # it is gone already
-            pass
-        finally:
-            self._loop.call_soon_threadsafe(self._loop.stop)
-            self._thread.join()
-            self._loop.close()
-            self._came.put(None)
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+        self._came.put(None)
 
     def _wait(self, work: "Coroutine[Any, Any, None]", timeout_s: float) -> None:
         """Do work in the thread of the connection. Raises its errors as DeviceError."""

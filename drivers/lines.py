@@ -371,21 +371,17 @@ class LineParser:
                 found = parsed(line, self._known)
         if isinstance(found, Row):
             return self._with_names(found)
-        header = found if isinstance(found, ColumnHeader) else None
-        if header is None or header.names != self._names:
-            self._take_misfit(line, header)
+        header = found.names if isinstance(found, ColumnHeader) else ()
+        if not header or header != self._names:
+            self.counts.misfits += 1
+            if len(header) > 1:  # a word alone is a message
+                self._header, self._odd_before = header, self.odd
+            self.odd = shortened(repr(line[: LONGEST_SHOWN + 1].decode("utf-8", "replace")))
         return None
 
     @property
     def _known(self) -> int:
         return len(self._names or ()) or self._columns
-
-    def _take_misfit(self, line: bytes, header: ColumnHeader | None) -> None:
-        """Count a line that is no row, or not yet the header of one; a word alone is a message."""
-        self.counts.misfits += 1
-        if header is not None and len(header.names) > 1:
-            self._header, self._odd_before = header.names, self.odd
-        self.odd = shortened(repr(line[: LONGEST_SHOWN + 1].decode("utf-8", "replace")))
 
     def _with_names(self, row: Row) -> Row:
         if row.names is not None:

@@ -52,6 +52,11 @@ def line_port_fault(port: str) -> str:
     return port_fault(port)
 
 
+def is_serial(port: str) -> bool:
+    """Return whether a port is a serial line's: a device, not standard input or an address."""
+    return not (port == "-" or re.match("[a-z0-9]+:", port))
+
+
 def open_transport(port: str, baud: int) -> "Transport":
     """Return the open port. Raises DeviceError if a retry may help, SettingError if it does not."""
     if port == "-":

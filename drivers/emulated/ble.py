@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
 ADDRESS = "F0:F1:F2:F3:F4:F5"
+_SERVICE = "6E400001-B5A3-F393-E0A9-E50E24DCCA9E"  # of the Nordic UART
 _OVERHEAD = 3  # of a notification, of the bytes that a packet of ATT may have
 
 
@@ -76,12 +77,9 @@ class EmulatedPeripheral(Closing):
         self.hci: int = self._adapters.sockets[0].getsockname()[1]
         own = Controller("peripheral", link=air)
         self._device = Device(name, Address(ADDRESS), host=Host(own, AsyncPipeSink(own)))
-        notify = Characteristic.Properties.NOTIFY
-        self._sent: list[Characteristic[bytes]] = [
-            Characteristic(uuid, notify, Characteristic.READABLE) for uuid in uuids
-        ]
-        # Of the Nordic UART service, or of any other.
-        self._device.add_service(Service("6E400001-B5A3-F393-E0A9-E50E24DCCA9E", self._sent))
+        notify, read = Characteristic.Properties.NOTIFY, Characteristic.READABLE
+        self._sent: list[Characteristic[bytes]] = [Characteristic(uuid, notify, read) for uuid in uuids]
+        self._device.add_service(Service(_SERVICE, self._sent))
         self._device.advertising_data = bytes(AdvertisingData([(AdvertisingData.COMPLETE_LOCAL_NAME, name.encode())]))
         await self._device.power_on()
         await self._device.start_advertising(auto_restart=True, advertising_interval_min=20.0)

@@ -14,6 +14,7 @@ from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.frames import FrameParser, guess_frame
 from thenar.drivers.lines import UNITS_US, Row, RowReader
 from thenar.drivers.readers import LineReader
+from thenar.drivers.transports import is_serial
 
 from ..frames import now_us
 from ..harness.wiring import Range, StreamWiring
@@ -80,7 +81,7 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
     Raises SettingError for an invalid port, DeviceError if no rows come.
     """
     bare = StreamWiring(port=port, columns=tuple(columns))
-    if _is_serial(port):
+    if is_serial(port):
         bare = msgspec.structs.replace(bare, baud=baud)
     with reader_of(bare) as reader:
         chunks: list[tuple[int, bytes]] = []
@@ -105,10 +106,6 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
     return _proposed(bare, came, reader.kind, remarks)
 
 
-def _is_serial(port: str) -> bool:
-    return not (port == "-" or re.match("[a-z0-9]+:", port))
-
-
 def _is_binary(chunks: Sequence[bytes]) -> bool:
     """Return whether more than a few bytes are not of text."""
     return 20 * sum(byte < 9 or byte > 126 for chunk in chunks for byte in chunk) > sum(map(len, chunks))
@@ -116,7 +113,7 @@ def _is_binary(chunks: Sequence[bytes]) -> bool:
 
 def _no_rows(bare: StreamWiring, reader: RowReader) -> str:
     """Return the reason why no row came, and advice; "" if nothing came at all."""
-    baud = f"is {bare.baud} its baud rate? " if _is_serial(bare.port) else ""
+    baud = f"is {bare.baud} its baud rate? " if is_serial(bare.port) else ""
     if reader.odd:
         wanted = "a row is numbers with commas between, name:value, or JSON"
         more = "--names says how many columns rows with texts have"
