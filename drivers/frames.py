@@ -11,7 +11,6 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
-from statistics import fmean
 from struct import Struct
 from typing import NamedTuple
 
@@ -142,9 +141,9 @@ def _roughness(frames: Sequence[bytes], start: int, kind: str, count: int) -> fl
     rows = [packed.unpack_from(frame, start) for frame in frames]
     if not all(value == 0 or 1e-4 < abs(value) < 1e10 for row in rows for value in row):
         return math.inf
-    steps = [
-        fmean((later - earlier) ** 2 for earlier, later in pairwise(column)) / (max(column) - min(column)) ** 2
-        for column in zip(*rows, strict=True)
-        if min(column) < max(column)
-    ]
-    return fmean(steps) if steps else math.inf
+    columns = [column for column in zip(*rows, strict=True) if min(column) < max(column)]
+    steps = (
+        sum((later - earlier) ** 2 for earlier, later in pairwise(column)) / (max(column) - min(column)) ** 2
+        for column in columns
+    )
+    return sum(steps) / len(columns) / len(rows) if columns else math.inf
