@@ -61,17 +61,18 @@ _CHECKSUM = re.compile(rb"\*[0-9A-Fa-f]{2}$")
 _COUNT, _READING = re.compile("[0-9]{1,10}"), re.compile("(-?[0-9]{1,10})?")
 _SWITCHES = re.compile("[0-9A-F]*")
 _OF_BOARD = (b"row", b"columns")
-# OpenGloves: the column of each letter with a number, then of each button, whose letter comes only while it is pressed.
-_NUMBERED = {
-    **{letter: f"flex_{finger}" for letter, finger in zip("ABCDE", FINGERS, strict=True)},
-    **{"F": "joystick_x", "G": "joystick_y", "P": "trigger"},
-    **{f"({letter}B)": f"splay_{finger}" for letter, finger in zip("ABCDE", FINGERS, strict=True)},
-}
-_BUTTON_NAMES = ("joystick", "trigger", "a", "b", "grab", "pinch", "menu", "calibrate")
-_BUTTONS = {letter: f"button_{name}" for letter, name in zip("HIJKLMNO", _BUTTON_NAMES, strict=True)}
-OPENGLOVES = (*_NUMBERED.values(), *_BUTTONS.values())
-_LETTER = re.compile(r"([A-GP]|\([A-E]B\))(\d{1,5})|([H-O])")
-_ALPHA, _LEGACY = re.compile(rf"(?:{_LETTER.pattern})+"), re.compile(r"\d{1,5}(?:&\d{1,5}){12}")
+# OpenGloves: the letters, and their columns. Those of the buttons have no number: they come only while one is pressed.
+_BUTTONS = "HIJKLMNO"
+_LETTERS = (*"ABCDEFGP", *(f"({letter}B)" for letter in "ABCDE"), *_BUTTONS)
+OPENGLOVES = (
+    *(f"flex_{finger}" for finger in FINGERS),
+    *("joystick_x", "joystick_y", "trigger"),
+    *(f"splay_{finger}" for finger in FINGERS),
+    *(f"button_{name}" for name in ("joystick", "trigger", "a", "b", "grab", "pinch", "menu", "calibrate")),
+)
+_COLUMN = dict(zip(_LETTERS, OPENGLOVES, strict=True))
+_ALPHA, _LETTER = re.compile(r"(?:(?:[A-GP]|\([A-E]B\))\d{1,5}|[H-O])+"), re.compile(r"([A-P]|\(.B\))(\d*)")
+_LEGACY = re.compile(r"\d{1,5}(?:&\d{1,5}){12}")
 # The first of a board's sequence numbers, and of its clock's microseconds, that does not exist.
 SEQUENCES, CLOCK_US = 1 << 16, 1 << 32
 # The units of senders' clocks, in microseconds.
@@ -141,31 +142,9 @@ def _of_board(line: bytes, columns: int) -> Row | ColumnHeader | Damaged | None:
         kind, *fields = line.decode("utf-8").split(",")
     except UnicodeDecodeError:
         return Damaged()
-    if kind == "row":
-        return _of_board_row(fields, columns)
-    sound = _sound(fields) and all(map(str.isprintable, fields))
-    return ColumnHeader(tuple(fields)) if fields and sound else Damaged()
-
-
-def _of_text(text: str, columns: int) -> Row | ColumnHeader | None:
-    """Parse a line that has no checksum and is not of a board."""
-    if text[-1:] in ("}", "]"):
-        text = _WORD_OF_JSON.sub("", text)
-    if text[:1] in ("{", "["):
-        return _of_json(text)
-    if _ALPHA.fullmatch(text) or _LEGACY.fullmatch(text):
-        return _of_opengloves(text)
-    return _of_fields(_fields(text), columns, text)
-
-
-def _is_checked(line: bytes) -> bool:
-    """Return whether a line has the beginning or the end of one with a checksum: damage of one byte leaves one of
-    them.
-    """
-    return line[:1] == b"$" or _CHECKSUM.search(line) is not None
-
-
-def _of_board_row(fields: Sequence[str], columns: int) -> Row | Damaged | None:
+    if kind == "columns":
+        sound = _sound(fields) and all(map(str.isprintable, fields))
+        return ColumnHeader(tuple(fields)) if fields and sound else Damaged()
     if len(fields) < 3 or not all(map(_COUNT.fullmatch, fields[:2])):
         return Damaged()
     sequence, clock_us, closed, readings = int(fields[0]), int(fields[1]), fields[2], fields[3:]
@@ -182,6 +161,22 @@ def _of_board_row(fields: Sequence[str], columns: int) -> Row | Damaged | None:
     return Row(None, tuple(values), clock_us / 1e6, sequence=sequence)
 
 
+def _of_text(text: str, columns: int) -> Row | ColumnHeader | None:
+    """Parse a line that has no checksum and is not of a board."""
+    if text[-1:] in ("}", "]"):
+        text = _WORD_OF_JSON.sub("", text)
+    if text[:1] in ("{", "["):
+        return _of_json(text)
+    if _ALPHA.fullmatch(text) or _LEGACY.fullmatch(text):
+        return _of_opengloves(text)
+    return _of_fields(_fields(text), columns, text)
+
+
+def _is_checked(line: bytes) -> bool:
+    """Return whether a line begins or ends like one with a checksum: damage of one byte leaves one of the two."""
+    return line[:1] == b"$" or _CHECKSUM.search(line) is not None
+
+
 def _fields(text: str) -> list[str]:
     text = _SIGN.sub(":", text)
     if ";" in text:  # where a comma is the decimal point
@@ -192,9 +187,7 @@ def _fields(text: str) -> list[str]:
 
 
 def _of_fields(fields: Sequence[str], columns: int, text: str) -> Row | ColumnHeader | None:
-    """Parse the fields of a line: name:value, names of columns, or values, of which the first may have a word in
-    front.
-    """
+    """Parse the fields of a line: names with values, names of columns, or values, maybe with a word in front."""
     pairs = [None if _VALUE.fullmatch(field) else _PAIR.fullmatch(field) for field in fields]
     if fields and all(pairs):
         return _row([pair[2] for pair in pairs if pair], tuple(pair[1] for pair in pairs if pair))
@@ -246,13 +239,14 @@ def finite(value: float) -> float | None:
 
 def _of_opengloves(text: str) -> Row | None:
     if "&" in text:
-        names = (*OPENGLOVES[:7], *list(_BUTTONS.values())[:6])
-        return Row(names, tuple(map(float, text.split("&"))))
+        pressed = (_COLUMN[letter] for letter in _BUTTONS[:6])
+        return Row((*OPENGLOVES[:7], *pressed), tuple(map(float, text.split("&"))))
     found = _LETTER.findall(text)
-    values = [(_NUMBERED[letter], float(number)) for letter, number, _ in found if number]
-    values += [(name, float(("", "", letter) in found)) for letter, name in _BUTTONS.items()]
-    names = tuple(name for name, _ in values)
-    return Row(names, tuple(value for _, value in values)) if found[1:] and found[0][1] and _sound(names) else None
+    row = {_COLUMN[letter]: float(number) for letter, number in found if number}
+    if len(row) < 2 or len(row) < sum(number != "" for _, number in found):
+        return None
+    row |= {_COLUMN[letter]: float((letter, "") in found) for letter in _BUTTONS}
+    return Row(tuple(row), tuple(row.values()))
 
 
 def _of_json(text: str) -> Row | None:

@@ -12,7 +12,7 @@ from .senders import FirstSender
 from .transports import Datagrams, Transport, line_port_fault, open_transport
 
 # If none of the first notifications by Bluetooth has a line end, each of them is a line: this number of them.
-_UNENDED = 32
+_UNENDED = 16
 # How many of the bytes that come are kept, if any are.
 _KEPT = 1 << 20
 
@@ -40,7 +40,8 @@ class LineReader(RowReader):
         self._parser.begin()
         self._senders = FirstSender()
         self._line = open_transport(self.port, self._baud)
-        self._unended = 0 if isinstance(self._line, BleLine) and isinstance(self._parser, LineParser) else None
+        by_notification = isinstance(self._line, BleLine) and isinstance(self._parser, LineParser)
+        self._unended = (self._unended or 0) if by_notification else None
 
     def read(self, timeout_s: float) -> Sequence[Row]:
         """Return the received rows."""
