@@ -148,7 +148,7 @@ def _of_board(line: bytes, columns: int) -> Row | ColumnHeader | Damaged | None:
     if len(fields) < 3 or not all(map(_COUNT.fullmatch, fields[:2])):
         return Damaged()
     sequence, clock_us, closed, readings = int(fields[0]), int(fields[1]), fields[2], fields[3:]
-    sound = sequence < SEQUENCES and clock_us < CLOCK_US and _SWITCHES.fullmatch(closed)
+    sound = sequence < SEQUENCES and clock_us < CLOCK_US and _SWITCHES.fullmatch(closed) is not None
     if not sound or not all(map(_READING.fullmatch, readings)):
         return Damaged()
     if not columns:
@@ -207,20 +207,20 @@ def _row(fields: Sequence[str], names: tuple[str, ...] | None = None, columns: i
     """Return the row of these texts; None if one is neither a number nor a spelling of a missing value, unless there
     are as many as `columns`, and most are numbers.
     """
-    known = sum(map(bool, map(_VALUE.fullmatch, fields)))
+    found = list(map(_VALUE.fullmatch, fields))
+    known = len(fields) - found.count(None)
     if not fields or (known < len(fields) and (len(fields) != columns or 2 * known <= columns)):
         return None
-    return Row(names, tuple(map(_number, fields))) if names is None or _sound(names) else None
+    return Row(names, tuple(map(_number, found))) if names is None or _sound(names) else None
 
 
-def _number(field: str) -> float | None:
-    """Return the number that a text is; None if it is none, or none that is finite."""
-    found = _VALUE.fullmatch(field)
-    kind = None if found is None else found.lastgroup
-    if found is None or kind in (None, "none"):
+def _number(found: re.Match[str] | None) -> float | None:
+    """Return the number of a text that matches _VALUE; None if it is none, or none that is finite."""
+    if found is None or (kind := found.lastgroup) == "none":
         return None
     if kind == "number":
         return finite(float(found["number"]))
+    field = found[0]
     if kind == "hex":
         return float(int(field, 16))
     if kind == "truth":
@@ -269,7 +269,7 @@ def _leaves(value: Any, name: str) -> Iterator[tuple[str, float | None]]:
         except OverflowError:
             yield name, None
     else:
-        yield name, _number(value.strip()) if isinstance(value, str) else None
+        yield name, _number(_VALUE.fullmatch(value.strip())) if isinstance(value, str) else None
 
 
 def _sound(names: Sequence[str]) -> bool:
