@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 from thenar.drivers.errors import SettingError
 from thenar.drivers.frames import FrameParser, guess_frame
 
-# How patterns pack numbers, and what each of the numbers may be.
-BYTES, SHORTS, FLOATS = st.integers(0, 255), st.integers(-(2**15), 2**15 - 1), st.floats(-1e9, 1e9, width=32)
-PATTERNS: dict[str, tuple[str, tuple[st.SearchStrategy[float], ...]]] = {
-    "AA B10 F7": ("<B10BB", (BYTES,) * 10),
-    "> AA 55 h b H2 0xB5": (">2BhbHHB", (SHORTS, st.integers(-128, 127), *[st.integers(0, 2**16 - 1)] * 2)),
-    "< AA f3 0xB5": ("<BfffB", (FLOATS,) * 3),
-    "AA B i I 55": ("<BBiIB", (BYTES, st.integers(-(2**31), 2**31 - 1), st.integers(0, 2**32 - 1))),
+# By the pattern: how it is packed, the bytes in front and at the end, how many numbers there are, and their range.
+SENDERS = {
+    "F0 B10 F7": ("<12B", b"\xf0", b"\xf7", 10, (10, 200)),
+    "AA 55 H5": ("<2B5H", b"\xaa\x55", b"", 5, (100, 4000)),
+    "> AA 55 H5 0D 0A": (">2B5H2B", b"\xaa\x55", b"\r\n", 5, (100, 4000)),
+    "AA h6": ("<B6h", b"\xaa", b"", 6, (-3000, 3000)),
+    "0xB5 f4": ("<B4f", b"\xb5", b"", 4, (-90, 90)),
+    "AA 55 i3": ("<2B3i", b"\xaa\x55", b"", 3, (-9e6, 9e6)),
 }
 Frame = tuple[bytes, tuple[float, ...]]
 
@@ -25,12 +26,12 @@ Frame = tuple[bytes, tuple[float, ...]]
 @st.composite
 def streams(draw: st.DrawFn) -> tuple[str, list[Frame]]:
     """Return a pattern, and frames in whose numbers the first fixed byte does not occur."""
-    pattern = draw(st.sampled_from(sorted(PATTERNS)))
-    packing, numbers = PATTERNS[pattern]
-    fixed = bytes(int(word[-2:], 16) for word in pattern.split() if word in ("AA", "55", "F7", "0xB5"))
-    rows = draw(st.lists(st.tuples(*numbers), min_size=1, max_size=6))
-    frames = [(pack(packing, *fixed[:-1], *row, fixed[-1]), tuple(map(float, row))) for row in rows]
-    assume(all(0xAA not in frame[1:] for frame, _ in frames))
+    pattern = draw(st.sampled_from(sorted(SENDERS)))
+    packing, before, after, count, (low, high) = SENDERS[pattern]
+    number = st.floats(low, high, width=32) if "f" in packing else st.integers(round(low), round(high))
+    rows = draw(st.lists(st.tuples(*[number] * count), min_size=1, max_size=6))
+    frames = [(pack(packing, *before, *row, *after), tuple(map(float, row))) for row in rows]
+    assume(all(before[0] not in frame[1:] for frame, _ in frames))
     return pattern, frames
 
 
@@ -46,15 +47,17 @@ def test_truncated_frames_and_garbage_lose_only_what_they_touch(
     pattern, frames = case
     stream, damages = b"", 0
     for frame, _ in frames:
-        noise = data.draw(st.binary(max_size=9)).replace(b"\xaa", b"") * data.draw(st.integers(0, 1))
+        noise = data.draw(st.just(b"") | st.binary(max_size=9)).replace(frame[:1], b"")
         short = frame[: data.draw(st.integers(0, len(frame) - 1))]
         damages += bool(noise + short)
         stream += noise + short + frame
     parser = FrameParser(pattern)
     rows = [row.values for chunk in cut(stream, data) for row in parser.feed(chunk)]
-    assert rows == [numbers for _, numbers in frames]
-    assert (parser.counts.misfits, bool(parser.odd)) == (damages, bool(damages))
+    if SENDERS[pattern][2]:  # without a fixed byte at its end, a short frame may take bytes of the next one
+        assert rows == [numbers for _, numbers in frames]
+        assert (parser.counts.misfits, bool(parser.odd)) == (damages, bool(damages))
     assert len(parser._rest) < len(frames[0][0])
+    assert parser.feed(2 * frames[-1][0])[-1].values == frames[-1][1]
 
 
 @pytest.mark.parametrize("pattern", ["", "F0", "B3", "F0 B3 F", "F0 B9999 B9999"])
@@ -65,17 +68,6 @@ def test_what_is_no_pattern_is_said(pattern: str) -> None:
 
 def moving(number: int, place: int, low: float, high: float) -> float:
     return low + (high - low) * (0.5 + 0.45 * math.sin(number / (9 + 2 * place) + place))
-
-
-# By the pattern: how it is packed, the bytes in front and at the end, how many numbers there are, and their range.
-SENDERS = {
-    "F0 B10 F7": ("<12B", b"\xf0", b"\xf7", 10, (10, 200)),
-    "AA 55 H5": ("<2B5H", b"\xaa\x55", b"", 5, (100, 4000)),
-    "> AA 55 H5 0D 0A": (">2B5H2B", b"\xaa\x55", b"\r\n", 5, (100, 4000)),
-    "AA h6": ("<B6h", b"\xaa", b"", 6, (-3000, 3000)),
-    "0xB5 f4": ("<B4f", b"\xb5", b"", 4, (-90, 90)),
-    "AA 55 i3": ("<2B3i", b"\xaa\x55", b"", 3, (-9e6, 9e6)),
-}
 
 
 @pytest.mark.parametrize("pattern", SENDERS)
