@@ -2,18 +2,12 @@
 
 from thenar.drivers.readers import LineReader
 
-from ..harness.wiring import StreamWiring
 from .rows import row_kinds
-
-
-def _reader(wiring: StreamWiring) -> LineReader:
-    return LineReader(wiring.port, wiring.baud, len(wiring.columns), wiring.frame)
-
 
 MEMBER = row_kinds(
     "line",
     "Lines or frames of numbers over serial, TCP, UDP, Bluetooth or stdin: [[stream]].",
     lambda port: not port.startswith(("lsl:", "ros:")),
-    _reader,
+    lambda wiring: LineReader(wiring.port, wiring.baud, len(wiring.columns), wiring.frame),
     3,
 )

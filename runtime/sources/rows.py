@@ -4,7 +4,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from typing import Literal
 
 from thenar.drivers.lines import CLOCK_US, SEQUENCES, UNITS_US, Row, RowReader
 from thenar.drivers.senders import SILENCE_US
@@ -489,25 +489,18 @@ def row_kinds(
 ) -> tuple[RowKind, RowKind]:
     """Return a kind for streams with switches or taxels, and one for those with joints only."""
 
-    def of(joints: bool) -> Callable[[Harness, Sequence[str], ScanMap], Iterator[Source]]:
+    def kind(name: str, *, joints: bool) -> RowKind:
         def sources(harness: Harness, names: Sequence[str], scan: ScanMap) -> Iterator[Source]:
             for number, wiring in enumerate(harness.streams):
                 if takes(wiring.port) and joints != bool(wiring.switches or wiring.taxels):
                     yield RowSource(reader(wiring), harness, number, names, scan)
 
-        return sources
+        def periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
+            for wiring, read in zip(harness.streams, scan.streams, strict=True):
+                if takes(wiring.port) and (wiring.joints if joints else read.switches or read.levels):
+                    yield stream_period_us(wiring)
 
-    return (
-        RowKind(name, help_, "switches", of(False), partial(_switch_periods_us, takes), rank, takes, reader),
-        RowKind(f"{name} of joints", help_, "joints", of(True), partial(_joint_periods_us, takes), rank, takes, reader),
-    )
+        reads: Literal["joints", "switches"] = "joints" if joints else "switches"
+        return RowKind(name, help_, reads, sources, periods_us, rank, takes, reader)
 
-
-def _switch_periods_us(takes: Callable[[str], bool], harness: Harness, scan: ScanMap) -> Iterator[int]:
-    rows = zip(harness.streams, scan.streams, strict=True)
-    read = (wiring for wiring, read in rows if read.switches or read.levels)
-    return (stream_period_us(wiring) for wiring in read if takes(wiring.port))
-
-
-def _joint_periods_us(takes: Callable[[str], bool], harness: Harness, _scan: ScanMap) -> Iterator[int]:
-    return (stream_period_us(wiring) for wiring in harness.streams if wiring.joints and takes(wiring.port))
+    return kind(name, joints=False), kind(f"{name} of joints", joints=True)
