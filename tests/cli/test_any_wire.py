@@ -39,6 +39,7 @@ def alpha(number: int) -> str:
 
 # How a row is written, and its columns, of which the last does not move.
 ENCODINGS: dict[str, tuple[Callable[[int], str], list[str]]] = {
+    "alpha by Bluetooth": (alpha, FLEXION),
     "legacy": (lambda number: f"{row(number, '&')}&2047&2047&{number // 20 % 2}&0&0&0&0&0\n", FLEXION),
     "checksum": (lambda number: f"{nmea(f'GLV,{row(number)}')}\r\n", PLAIN),
     "brackets": (lambda number: f"<{row(number)}>\r", PLAIN),
@@ -58,26 +59,17 @@ def test_doctor_finds_how_rows_are_written_and_its_proposal_reads_them(
     monkeypatch.setattr(stream_probe, "_PATIENCE_US", 1_500_000)
     monkeypatch.setattr(checkup, "_LISTEN_S", 0.3)
     path, (write, (*moving, still)) = tmp_path / "glove.toml", ENCODINGS[encoding]
-    with PtyLine(tmp_path / "port") as line, sending(lambda number: line.send(write(number).encode("latin-1"))):
-        done = thenar("doctor", "--line", line.link, "--seconds", "1.5", "--propose", path, "--json")
-        assert done.returncode == 0, done.stderr
-        stream = load_harness(path).streams[0]
-        timed = encoding == "times"
-        assert list(stream.taxels or stream.joints) == [f"c{name}" if timed else name for name in moving]
-        assert any(still in remark and "did not move" in remark for remark in json.loads(done.stdout)["remarks"])
-        assert (stream.time, stream.time_unit) == (("c1", "s") if timed else (None, "ms"))
-        assert stream.frame == ("AA 55 H5" if encoding == "frames" else None)
-        (rows,) = [one for one in json.loads(thenar("doctor", path, "--json").stdout) if not one["part"]]
-        assert rows["present"]
-        assert 8_000 < rows["measured_us"] < 40_000
-
-
-def test_doctor_finds_a_glove_by_bluetooth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "glove.toml"
-    with EmulatedPeripheral("lucid") as glove, sending(lambda number: glove.send(alpha(number).encode())):
-        bumble_backend.use(monkeypatch, glove.hci)
-        done = thenar("doctor", "--line", "ble://lucid", "--seconds", "1", "--propose", path)
-        assert done.returncode == 0, done.stderr
-        (stream,) = load_harness(path).streams
-        assert (stream.port, list(stream.joints), stream.switches) == ("ble://lucid", FLEXION[:4], ("button_joystick",))
-        assert json.loads(thenar("doctor", path, "--json").stdout)[0]["present"]
+    with PtyLine(tmp_path / "port") as line, EmulatedPeripheral("lucid") as peripheral:
+        bumble_backend.use(monkeypatch, peripheral.hci)
+        send, port = (peripheral.send, "ble://lucid") if "Bluetooth" in encoding else (line.send, line.link)
+        with sending(lambda number: send(write(number).encode("latin-1"))):
+            done = thenar("doctor", "--line", port, "--seconds", "1.5", "--propose", path, "--json")
+            assert done.returncode == 0, done.stderr
+            (rows,) = [one for one in json.loads(thenar("doctor", path, "--json").stdout) if not one["part"]]
+    stream, timed = load_harness(path).streams[0], encoding == "times"
+    assert list(stream.taxels or stream.joints) == [f"c{name}" if timed else name for name in moving]
+    assert any(still in remark and "did not move" in remark for remark in json.loads(done.stdout)["remarks"])
+    assert (stream.port, stream.time, stream.time_unit) == (str(port), *(("c1", "s") if timed else (None, "ms")))
+    assert stream.frame == ("AA 55 H5" if encoding == "frames" else None)
+    assert rows["present"]
+    assert 8_000 < rows["measured_us"] < 40_000

@@ -1,7 +1,6 @@
 """Backends of bleak whose adapter is one of bumble's, over HCI by TCP: they do what bleak's own do through BlueZ."""
 
 from typing import Any
-from uuid import UUID
 
 import bleak
 import pytest
@@ -9,6 +8,7 @@ from bleak.backends.characteristic import BleakGATTCharacteristic
 from bleak.backends.client import BaseBleakClient
 from bleak.backends.scanner import AdvertisementData, BaseBleakScanner
 from bleak.backends.service import BleakGATTService, BleakGATTServiceCollection
+from bleak.uuids import normalize_uuid_str
 from bumble.core import AdvertisingData
 from bumble.device import Advertisement, Device, Peer
 from bumble.hci import Address
@@ -64,11 +64,13 @@ class _Client(_Host, BaseBleakClient):
         await self._peer.request_mtu(64)
         await self._peer.discover_all()  # type: ignore[no-untyped-call]
         for service in self._peer.services:
-            known = BleakGATTService(service, service.handle, _uuid(service))
+            known = BleakGATTService(service, service.handle, normalize_uuid_str(service.uuid.to_hex_str("-")))
             self.services.add_service(known)
             for one in service.characteristics:
                 flags: Any = [flag.name.lower() for flag in one.properties if flag.name]
-                found = BleakGATTCharacteristic(one, one.handle, _uuid(one), flags, lambda: 61, known)
+                found = BleakGATTCharacteristic(
+                    one, one.handle, normalize_uuid_str(one.uuid.to_hex_str("-")), flags, lambda: 61, known
+                )
                 self.services.add_characteristic(found)
 
     async def disconnect(self) -> None:
@@ -88,7 +90,3 @@ class _Client(_Host, BaseBleakClient):
 
     pair = unpair = stop_notify = read_gatt_char = read_gatt_descriptor = _never
     write_gatt_char = write_gatt_descriptor = _never
-
-
-def _uuid(attribute: Any) -> str:
-    return str(UUID(bytes=attribute.uuid.to_bytes(force_128=True)[::-1]))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.lines import CLOCK_US, SEQUENCES, LineCounts, LineParser, Row, RowReader, checked
+from thenar.drivers.lines import SEQUENCES, LineCounts, LineParser, Row, RowReader, checked
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
@@ -207,25 +207,18 @@ def test_rows_of_another_clock_count_once_the_first_one_is_silent(play: Play, be
     assert source.fault_message() == "its clock has restarted: was the board reset, or does another program send?"
 
 
-@pytest.mark.parametrize(("unit", "ticks"), [("ms", 1), ("us", 1000)])
+@pytest.mark.parametrize(("unit", "ticks"), [("ms", 1), ("us", 1000), ("board", 1000)])
 def test_a_clock_of_32_bits_that_begins_again_costs_no_row(play: Play, unit: str, ticks: int) -> None:
     stamps = [(ticks * (10 * n - 505)) % 2**32 for n in range(100)]
     chunks = [(10_000 * n, b"%d,0,0,0,0,0,0\n" % stamp) for n, stamp in enumerate(stamps)]
-    source, frames = play(chunks, GLOVE.replace('time = "ms"', f'time = "ms"\ntime_unit = "{unit}"'))
+    if unit == "board":
+        head = board_line("columns", "a", "b")
+        chunks = [(10_000 * n, head + board_line("row", n, stamp, n % 4)) for n, stamp in enumerate(stamps)]
+        source, frames = play(chunks, BOARD, ("a",), ())
+    else:
+        source, frames = play(chunks, GLOVE.replace('time = "ms"', f'time = "ms"\ntime_unit = "{unit}"'))
     assert counted(source) == {"rows": 100}
     assert [frame.time_us for frame in frames if isinstance(frame, SwitchFrame)] == [10_000 * n for n in range(100)]
-
-
-@given(st.integers(0, CLOCK_US - 1), st.lists(st.integers(1, 9_000_000), max_size=20))
-def test_the_clock_of_a_board_goes_on_where_it_begins_again(first: int, steps: list[int]) -> None:
-    harness = parse_harness(BOARD, "glove.toml")
-    source, time_us = RowSource(Script([]), harness, 0, ("a",), whole_scan(harness, ("a",))), 0
-    source.read_only(())
-    for step in (0, *steps):
-        time_us += step
-        source.take(Row(("a",), (1.0,), (first + time_us) % CLOCK_US / 1e6, sequence=0), time_us)
-        assert source._ready.pop().time_us == time_us
-    assert source.watch.counts.rows == 1 + len(steps)
 
 
 @pytest.mark.parametrize("clock", [b"1e305", b"-1e305", b"nan", b"inf", b"1e17", b""])
