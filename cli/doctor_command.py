@@ -37,9 +37,9 @@ def command(
 ) -> None:
     """Open every device of glove.toml and report whether it is there, its speed, and the speed that its wire allows.
 
-    With --line, listen to a board or program that sends lines of numbers (CSV, JSON, name:value), and show each column:
+    With --line, listen to a board or program that sends numbers, in lines or binary frames, and show each column:
     meanwhile press every switch and pad, and bend every finger. PORT is a serial port, tcp://HOST:PORT,
-    udp://HOST:PORT, - (stdin), lsl:NAME or ros:/TOPIC.
+    udp://HOST:PORT, ble://NAME, - (stdin), lsl:NAME or ros:/TOPIC.
 
     Exit code 1 if something is missing; with --build, also if the glove's calibration does not fit the build.
 

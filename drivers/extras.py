@@ -14,6 +14,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "stability": ("mpmath",),
     "ros": ("cyclonedds",),
     "lsl": ("pylsl",),
+    "ble": ("bleak",),
     "web": ("aiohttp",),
     "foxglove": ("foxglove",),
 }

@@ -3,10 +3,14 @@
     12,0,1,1023                          numbers in the order of the columns; also separated by ; tabs or blanks
     ms,thumb,index,flex                  a header: names of the columns of the lines that follow
     ms:12,thumb:0,flex:1023              names with their values, as the Arduino IDE's plotter reads them
-    {"ms": 12, "thumb": 0, "flex": 1023} a JSON object, or a JSON list of numbers in the order of the columns
+    {"ms": 12, "pads": [7, 9]}           JSON; what is nested has names with dots: pads.0, pads.1
+    A2048B1990C12D0E7F2047G2047(AB)300H  OpenGloves, alpha encoding: letters of flexion, splay, joystick and buttons
+    2048&1990&12&0&7&2047&2047&0&0&1&0&0&0    OpenGloves, legacy encoding; both get the names in OPENGLOVES
 
-Any other line is a misfit. A value that is not a finite number, such as nan, is None; the rest of its line counts. So
-is a text, such as a label, in a row whose number of columns is known.
+A row may be framed, <1,2,3> or $1,2,3*CS with a checksum, and have a word in front: "DATA: 1,2,3". A number may be
+hexadecimal (0x3F), true or false, an ISO 8601 time (seconds since 1970, or since midnight), or have a unit behind it
+(12.5deg). Any other line is a misfit. A value that is not a finite number, such as nan, is None; the rest of its line
+counts. So is a text, such as a label, in a row whose number of columns is known.
 
 The boards whose sketches thenar writes print lines in the style of NMEA 0183, with a checksum:
 
@@ -21,33 +25,58 @@ import json
 import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import reduce
 from operator import xor
-from time import monotonic_ns
 from typing import Any, NamedTuple
 
 from .closing import Closing
-from .errors import SettingError
 from .names import LONGEST_SHOWN, shortened
-from .senders import FirstSender
-from .transports import Datagrams, Transport, line_port_fault, open_transport
 
+FINGERS = ("thumb", "index", "middle", "ring", "little")
 # Long enough for two thousand columns of five digits.
 LONGEST = 16_384
 # Most rows: finite numbers with commas between.
 _PLAIN = re.compile(r"-?\d{1,20}(?:\.\d{1,20})?(?:,-?\d{1,20}(?:\.\d{1,20})?)*", re.ASCII)
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
-_NO_NUMBER = re.compile(r"|[+-]?nan|[+-]?inf(inity)?|null|none|na|-", re.IGNORECASE)
+_TIME = r"(?:\d{4}-\d\d-\d\d[T ])?\d\d:\d\d:\d\d(?:\.\d{1,9})?(?:Z|[+-]\d\d:?\d\d)?"
+# One letter that is a hexadecimal digit, too, is no unit.
+_UNIT = (
+    r"%|°[CF]?|deg(?:rees|[CF])?|rad|(?:deg|rad|m)/s(?:\^?2|²)?|dps|rpm|mA|m?bar"
+    r"|[munkMµμ]?(?:V|N|g|Pa|s|m|Hz|Ohms?|Ω)"
+)
+# A value: the group that matches says how it is written.
+_VALUE = re.compile(
+    rf"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{{1,3}})?)(?: ?(?:{_UNIT}))?|(?P<hex>0[xX][0-9A-Fa-f]{{1,12}})"
+    rf"|(?P<truth>(?i:true|false))|(?P<time>{_TIME})|(?P<none>(?i:|[+-]?nan|[+-]?inf(?:inity)?|null|none|na|-))"
+)
 _NAME = re.compile(r"[^\W\d][^,;:\t\"{}]*")
-_DIGITS = 400
-_CHECKED = re.compile(rb"\$([^$*]*)\*([0-9A-F]{2})")
-_CHECKSUM = re.compile(rb"\*[0-9A-F]{2}$")
+_WORD = re.compile(r"[^\W\d]\w*")
+_PAIR = re.compile(rf"(.*?):({_TIME}|[^:]*)")
+_SIGN = re.compile(r"\s*[:=]\s*")
+_WORD_OF_JSON = re.compile(r"\A[^\W\d]\w*\s*[:=]\s*(?=[{\[])")
+_CHECKED = re.compile(rb"\$([^$*]*)\*([0-9A-Fa-f]{2})")
+_CHECKSUM = re.compile(rb"\*[0-9A-Fa-f]{2}$")
 _COUNT, _READING = re.compile("[0-9]{1,10}"), re.compile("(-?[0-9]{1,10})?")
 _SWITCHES = re.compile("[0-9A-F]*")
+_OF_BOARD = (b"row", b"columns")
+# OpenGloves: the letters, and their columns. Those of the buttons have no number: they come only while one is pressed.
+_BUTTONS = "HIJKLMNO"
+_LETTERS = (*"ABCDEFGP", *(f"({letter}B)" for letter in "ABCDE"), *_BUTTONS)
+OPENGLOVES = (
+    *(f"flex_{finger}" for finger in FINGERS),
+    *("joystick_x", "joystick_y", "trigger"),
+    *(f"splay_{finger}" for finger in FINGERS),
+    *(f"button_{name}" for name in ("joystick", "trigger", "a", "b", "grab", "pinch", "menu", "calibrate")),
+)
+_COLUMN = dict(zip(_LETTERS, OPENGLOVES, strict=True))
+_ALPHA, _LETTER = re.compile(r"(?:(?:[A-GP]|\([A-E]B\))\d{1,5}|[H-O])+"), re.compile(r"([A-P]|\(.B\))(\d*)")
+_LEGACY = re.compile(r"\d{1,5}(?:&\d{1,5}){12}")
 # The first of a board's sequence numbers, and of its clock's microseconds, that does not exist.
 SEQUENCES, CLOCK_US = 1 << 16, 1 << 32
+# The units of senders' clocks, in microseconds.
+UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
 
 
 class Row(NamedTuple):
@@ -91,52 +120,35 @@ def parsed(line: bytes, columns: int = 0) -> Row | ColumnHeader | Damaged | None
     """Parse a line; None for a misfit. `columns` is the known number of columns; 0: unknown, and then a board's row is
     a misfit, too. The time of a board's row is that of its clock, which begins again after CLOCK_US.
     """
-    if _is_of_board(line):
-        return _of_board(line, columns)
+    if _is_checked(line):
+        found = _CHECKED.fullmatch(line)
+        if found is None or reduce(xor, found[1], 0) != int(found[2], 16):
+            return Damaged()
+        line = found[1]
+        if line.partition(b",")[0] in _OF_BOARD:
+            return _of_board(line, columns)
     try:
-        text = line.decode("utf-8")
+        text = line.decode("utf-8").strip("\ufeff \r\t\0")
     except UnicodeDecodeError:
         return None
-    text = text.strip("\ufeff \r\t\0")
     if _PLAIN.fullmatch(text):
         return Row(None, tuple(map(float, text.split(","))))
-    if text[:1] in ("{", "["):
-        return _of_json(text)
-    fields = _fields(text)
-    if any(":" in field for field in fields):
-        return _of_pairs(fields)
-    # Words separated by blanks are a message.
-    worded = len(fields) == 1 or len(text.split()) < len(fields) or not set(text).isdisjoint(",;\t")
-    if worded and all(map(_NAME.fullmatch, fields)) and not all(map(_NO_NUMBER.fullmatch, fields)):
-        return ColumnHeader(tuple(fields)) if _sound(fields) else None
-    return _row(None, fields, columns)
-
-
-def _is_of_board(line: bytes) -> bool:
-    """Return whether a line has the beginning or the end of a board's: damage of one byte leaves one of them."""
-    return line[:1] == b"$" or _CHECKSUM.search(line) is not None
+    return _of_text(text[1:-1].strip() if text[:1] == "<" and text[-1:] == ">" else text, columns)
 
 
 def _of_board(line: bytes, columns: int) -> Row | ColumnHeader | Damaged | None:
-    """Parse a line with a checksum, or what is left of one."""
-    found = _CHECKED.fullmatch(line)
-    if found is None or reduce(xor, found[1], 0) != int(found[2], 16):
-        return Damaged()
+    """Parse the content of a board's line."""
     try:
-        kind, *fields = found[1].decode("utf-8").split(",")
+        kind, *fields = line.decode("utf-8").split(",")
     except UnicodeDecodeError:
         return Damaged()
     if kind == "columns":
         sound = _sound(fields) and all(map(str.isprintable, fields))
         return ColumnHeader(tuple(fields)) if fields and sound else Damaged()
-    return _of_board_row(fields, columns) if kind == "row" else None
-
-
-def _of_board_row(fields: Sequence[str], columns: int) -> Row | Damaged | None:
     if len(fields) < 3 or not all(map(_COUNT.fullmatch, fields[:2])):
         return Damaged()
     sequence, clock_us, closed, readings = int(fields[0]), int(fields[1]), fields[2], fields[3:]
-    sound = sequence < SEQUENCES and clock_us < CLOCK_US and _SWITCHES.fullmatch(closed)
+    sound = sequence < SEQUENCES and clock_us < CLOCK_US and _SWITCHES.fullmatch(closed) is not None
     if not sound or not all(map(_READING.fullmatch, readings)):
         return Damaged()
     if not columns:
@@ -149,33 +161,75 @@ def _of_board_row(fields: Sequence[str], columns: int) -> Row | Damaged | None:
     return Row(None, tuple(values), clock_us / 1e6, sequence=sequence)
 
 
+def _of_text(text: str, columns: int) -> Row | ColumnHeader | None:
+    """Parse a line that has no checksum and is not of a board."""
+    if text[-1:] in ("}", "]"):
+        text = _WORD_OF_JSON.sub("", text)
+    if text[:1] in ("{", "["):
+        return _of_json(text)
+    if _ALPHA.fullmatch(text) or _LEGACY.fullmatch(text):
+        return _of_opengloves(text)
+    return _of_fields(_fields(text), columns, text)
+
+
+def _is_checked(line: bytes) -> bool:
+    """Return whether a line begins or ends like one with a checksum: damage of one byte leaves one of the two."""
+    return line[:1] == b"$" or _CHECKSUM.search(line) is not None
+
+
 def _fields(text: str) -> list[str]:
+    text = _SIGN.sub(":", text)
     if ";" in text:  # where a comma is the decimal point
         return [field.strip().replace(",", ".") for field in text.split(";")]
-    if "," in text or "\t" in text:
-        return [field.strip().strip('"') for field in re.split("[,\t]", text)]
+    if not set(text).isdisjoint(",\t&"):
+        return [field.strip().strip('"') for field in re.split("[,\t&]", text)]
     return text.split()
 
 
-def _of_pairs(fields: Sequence[str]) -> Row | None:
-    pairs = [field.rpartition(":") for field in fields]
-    return _row(tuple(name.strip() for name, _, _ in pairs), [value.strip() for _, _, value in pairs])
+def _of_fields(fields: Sequence[str], columns: int, text: str) -> Row | ColumnHeader | None:
+    """Parse the fields of a line: names with values, names of columns, or values, maybe with a word in front."""
+    pairs = [None if _VALUE.fullmatch(field) else _PAIR.fullmatch(field) for field in fields]
+    if fields and all(pairs):
+        return _row([pair[2] for pair in pairs if pair], tuple(pair[1] for pair in pairs if pair))
+    # Words separated by blanks are a message.
+    worded = len(fields) == 1 or len(text.split()) < len(fields) or not set(text).isdisjoint(",;\t")
+    if worded and all(map(_NAME.fullmatch, fields)) and not all(map(_VALUE.fullmatch, fields)):
+        return ColumnHeader(tuple(fields)) if _sound(fields) else None
+    row = _row(fields, None, columns)
+    if row is not None or not _WORD.match(text):
+        return row
+    word, sign, value = fields[0].partition(":")
+    row = _row([value, *fields[1:]] if sign else fields[1:])
+    return row if row and _WORD.fullmatch(word) and len(row.values) > 1 and None not in row.values else None
 
 
-def _row(names: tuple[str, ...] | None, fields: Sequence[str], columns: int = 0) -> Row | None:
+def _row(fields: Sequence[str], names: tuple[str, ...] | None = None, columns: int = 0) -> Row | None:
     """Return the row of these texts; None if one is neither a number nor a spelling of a missing value, unless there
     are as many as `columns`, and most are numbers.
     """
-    known = sum(bool(_NUMBER.fullmatch(field) or _NO_NUMBER.fullmatch(field)) for field in fields)
+    found = list(map(_VALUE.fullmatch, fields))
+    known = len(fields) - found.count(None)
     if not fields or (known < len(fields) and (len(fields) != columns or 2 * known <= columns)):
         return None
-    if names is not None and not _sound(names):
+    return Row(names, tuple(map(_number, found))) if names is None or _sound(names) else None
+
+
+def _number(found: re.Match[str] | None) -> float | None:
+    """Return the number of a text that matches _VALUE; None if it is none, or none that is finite."""
+    if found is None or (kind := found.lastgroup) == "none":
         return None
-    return Row(names, tuple(_number(field) for field in fields))
-
-
-def _number(field: str) -> float | None:
-    return finite(float(field)) if len(field) < _DIGITS and _NUMBER.fullmatch(field) else None
+    if kind == "number":
+        return finite(float(found["number"]))
+    field = found[0]
+    if kind == "hex":
+        return float(int(field, 16))
+    if kind == "truth":
+        return float(field.lower() == "true")
+    try:
+        time = datetime.fromisoformat(field if field[4] == "-" else f"1970-01-01T{field}")
+    except ValueError:  # there is no such day or hour
+        return None
+    return time.replace(tzinfo=time.tzinfo or UTC).timestamp()
 
 
 def finite(value: float) -> float | None:
@@ -183,25 +237,39 @@ def finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
+def _of_opengloves(text: str) -> Row | None:
+    if "&" in text:
+        pressed = (_COLUMN[letter] for letter in _BUTTONS[:6])
+        return Row((*OPENGLOVES[:7], *pressed), tuple(map(float, text.split("&"))))
+    found = _LETTER.findall(text)
+    row = {_COLUMN[letter]: float(number) for letter, number in found if number}
+    if len(row) < 2 or len(row) < sum(number != "" for _, number in found):
+        return None
+    row |= {_COLUMN[letter]: float((letter, "") in found) for letter in _BUTTONS}
+    return Row(tuple(row), tuple(row.values()))
+
+
 def _of_json(text: str) -> Row | None:
     try:
-        found: Any = json.loads(text)  # accepts NaN, which Python's json writes
+        found = list(_leaves(json.loads(text), ""))  # accepts NaN, which Python's json writes
     except (ValueError, RecursionError):
         return None
-    names = tuple(found) if isinstance(found, dict) else None
-    values = tuple(map(_of_value, found if names is None else found.values()))
-    return Row(names, values) if values and (names is None or _sound(names)) else None
+    names = tuple(name for name, _ in found) if text[0] == "{" else None
+    return Row(names, tuple(value for _, value in found)) if found and (names is None or _sound(names)) else None
 
 
-def _of_value(value: Any) -> float | None:
-    if isinstance(value, str):
-        return _number(value.strip())
-    if not isinstance(value, int | float):  # a bool is an int
-        return None
-    try:
-        return finite(float(value))
-    except OverflowError:
-        return None
+def _leaves(value: Any, name: str) -> Iterator[tuple[str, float | None]]:
+    """Yield the numbers in a value of JSON, None for what is none, with their names."""
+    if isinstance(value, dict | list):
+        for key, one in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _leaves(one, f"{name}.{key}" if name else str(key))
+    elif isinstance(value, int | float):  # a bool is an int
+        try:
+            yield name, finite(float(value))
+        except OverflowError:
+            yield name, None
+    else:
+        yield name, _number(_VALUE.fullmatch(value.strip())) if isinstance(value, str) else None
 
 
 def _sound(names: Sequence[str]) -> bool:
@@ -229,7 +297,7 @@ class LineParser:
     """Parses rows from chunks of bytes; odd is the last misfit, for display.
 
     Once a line with a right checksum has come, only such lines are rows: what is left of a damaged one may look like a
-    row of numbers.
+    row of numbers. Once a line of a board has come, only its rows are.
 
     columns  how many columns rows have until a header says otherwise; 0: unknown, and then a board's rows are left out
     """
@@ -239,20 +307,19 @@ class LineParser:
         self.begin()
 
     def begin(self) -> None:
-        """Reset: an incomplete line, the names of the columns and the clock of a board are forgotten."""
+        """Reset: an incomplete line and the names of the columns are forgotten."""
         self._rest, self._dropping = b"", False
         self._names: tuple[str, ...] | None = None
         # A header that no row has followed yet, and the misfit before it: it may be a message.
         self._header: tuple[str, ...] = ()
         self._odd_before = ""
-        self._checked = False
-        self._clock_us: int | None = None
+        self._checked = self._board = False
 
     def feed(self, chunk: bytes) -> list[Row]:
         """Return the rows whose lines `chunk` completes, with names if a header came before them."""
         rows = []
         for line in self._lines(chunk):
-            found = self._of_board(line) if _is_of_board(line) else self._of_line(line)
+            found = self._of_checked(line) if _is_checked(line) else self._of_line(line)
             if found is not None:
                 rows.append(found)
         return rows
@@ -276,49 +343,39 @@ class LineParser:
         self.counts.overlong += len(pieces) - len(lines)
         return [line for line in lines if line]
 
-    def _of_board(self, line: bytes) -> Row | None:
+    def _of_checked(self, line: bytes) -> Row | None:
         found = parsed(line, self._known)
         if isinstance(found, Damaged):
             self.counts.damaged += 1
             return None
         self._checked = True
+        if line[1:].partition(b",")[0] not in _OF_BOARD:
+            return self._of_line(line)
+        self._board = True
         if isinstance(found, Row):
-            return found._replace(names=self._names, time_s=self._unwrapped_s(round((found.time_s or 0.0) * 1e6)))
-        if isinstance(found, ColumnHeader):
-            self._names = found.names
-        elif not line.startswith(b"$row,"):
-            self._take_misfit(line, None)
+            return found._replace(names=self._names)
+        self._names = self._names if found is None else found.names
         return None
-
-    def _unwrapped_s(self, clock_us: int) -> float:
-        """Return the time of a board's clock, which has made less than half a turn since its last row."""
-        last_us = clock_us if self._clock_us is None else self._clock_us
-        self._clock_us = last_us + (clock_us - last_us + CLOCK_US // 2) % CLOCK_US - CLOCK_US // 2
-        return self._clock_us / 1e6
 
     def _of_line(self, line: bytes) -> Row | None:
         found = None
-        if not self._checked:
-            found = parsed(line, self._known)
+        if not self._board and self._checked == _is_checked(line):
+            found = parsed(line, len(self._header) or self._known)
             if found is None and self._header:
-                found = parsed(line, len(self._header))
+                found = parsed(line, self._known)
         if isinstance(found, Row):
             return self._with_names(found)
-        header = found if isinstance(found, ColumnHeader) else None
-        if header is None or header.names != self._names:
-            self._take_misfit(line, header)
+        header = found.names if isinstance(found, ColumnHeader) else ()
+        if not header or header != self._names:
+            self.counts.misfits += 1
+            if len(header) > 1:  # a word alone is a message
+                self._header, self._odd_before = header, self.odd
+            self.odd = shortened(repr(line[: LONGEST_SHOWN + 1].decode("utf-8", "replace")))
         return None
 
     @property
     def _known(self) -> int:
         return len(self._names or ()) or self._columns
-
-    def _take_misfit(self, line: bytes, header: ColumnHeader | None) -> None:
-        """Count a line that is no row, or not yet the header of one; a word alone is a message."""
-        self.counts.misfits += 1
-        if header is not None and len(header.names) > 1:
-            self._header, self._odd_before = header.names, self.odd
-        self.odd = shortened(repr(line[: LONGEST_SHOWN + 1].decode("utf-8", "replace")))
 
     def _with_names(self, row: Row) -> Row:
         if row.names is not None:
@@ -356,62 +413,3 @@ class RowReader(Closing, ABC):
     def other_sender(self) -> str:
         """Return a sentence on another sender whose rows do not count; "" if nobody else sends."""
         return ""
-
-
-class LineReader(RowReader):
-    """Rows of the lines from `port`, of `columns` columns; 0: unknown. The constructor does not open it."""
-
-    def __init__(self, port: str, baud: int = 115_200, columns: int = 0) -> None:
-        self.port, self._baud = port, baud
-        self._line: Transport | None = None
-        self._parser = LineParser(columns)
-        self._senders = FirstSender()
-
-    def open(self) -> None:
-        """Open the port."""
-        if reason := line_port_fault(self.port):
-            raise SettingError(f"{shortened(repr(self.port))} {reason}")
-        self._parser.begin()
-        self._senders = FirstSender()
-        self._line = open_transport(self.port, self._baud)
-
-    def read(self, timeout_s: float) -> Sequence[Row]:
-        """Return the received rows."""
-        if isinstance(self._line, Datagrams):
-            came = self._line.read(timeout_s)
-            return () if came is None else self._of_datagram(*came)
-        assert self._line is not None
-        return self._rows(self._line.read(timeout_s))
-
-    def _rows(self, data: bytes) -> list[Row]:
-        self.received += len(data)
-        rows = self._parser.feed(data)
-        self.odd = self._parser.odd
-        return rows
-
-    def _of_datagram(self, data: bytes, sender: str, came_us: int) -> Sequence[Row]:
-        """Return the rows of a datagram, each of which begins and ends lines; none if it is from another sender."""
-        before = self._senders.current
-        if not self._senders.admits(sender, came_us):
-            self._parser.counts.foreign += data.strip().count(b"\n") + 1
-            return ()
-        if self._senders.current != before:
-            self._parser.begin()
-        return [row._replace(came_us=came_us) for row in self._rows(data + b"\n")]
-
-    def other_sender(self) -> str:
-        """Return a sentence on another sender of datagrams."""
-        other = self._senders.other(monotonic_ns() // 1000)
-        if other is None:
-            return ""
-        return f"{other} sends, too, and its lines are left out: those of {self._senders.current} count; stop it"
-
-    def counts(self) -> LineCounts:
-        """Return the counts of input that was not a row."""
-        return self._parser.counts
-
-    def close(self) -> None:
-        """Close the port."""
-        if self._line is not None:
-            self._line.close()
-            self._line = None

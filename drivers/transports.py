@@ -1,9 +1,10 @@
-"""Ports of lines: a serial port, TCP, UDP or stdin, all read in the same way.
+"""Ports of lines: a serial port, TCP, UDP, Bluetooth or stdin, all read in the same way.
 
 /dev/ttyUSB0          a serial port
 tcp://HOST:PORT       a server that sends lines to whoever connects
 udp://HOST:PORT       datagrams that come to this port; HOST is this computer's own address: 127.0.0.1, or 0.0.0.0
 for all; a datagram holds one line or more; datagrams of a second sender are left out
+ble://NAME            what a peripheral of Bluetooth Low Energy notifies, see `ble`
 -                     standard input
 """
 
@@ -17,6 +18,7 @@ import sys
 from collections.abc import Sequence
 from time import monotonic_ns, time_ns
 
+from .ble import BLE, BleLine
 from .closing import Closing
 from .errors import DeviceError, SettingError
 from .ports import port_fault
@@ -30,7 +32,10 @@ _TIMESPEC = struct.Struct("@ll")
 # Labels of a host's name are not empty, and at most 63 characters long: getaddrinfo raises UnicodeError for others.
 _HOST = r"[A-Za-z0-9_-]{1,63}(?:\.[A-Za-z0-9_-]{1,63})*\.?"
 _NET = re.compile(rf"(tcp|udp)://(\[[0-9A-Fa-f:.%]+\]|{_HOST}):(\d{{1,5}})/?")
-_WAYS = "lines come from a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, udp://HOST:PORT or - (standard input)"
+_WAYS = (
+    "lines come from a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, udp://HOST:PORT, ble://NAME "
+    "or - (standard input)"
+)
 
 
 def line_port_fault(port: str) -> str:
@@ -40,15 +45,24 @@ def line_port_fault(port: str) -> str:
     if port.startswith(("tcp:", "udp:")):
         found = _NET.fullmatch(port)
         return "" if found and 0 < int(found[3]) < 65536 else f"is not an address: {_WAYS}"
+    if port.startswith("ble:"):
+        return "" if BLE.fullmatch(port) else "names no peripheral: write ble://NAME, ble://ADDRESS or ble://NAME/UUID"
     if "://" in port and not port.startswith("socket://"):
         return f"is not a supported port: {_WAYS}"
     return port_fault(port)
+
+
+def is_serial(port: str) -> bool:
+    """Return whether a port is a serial line's: a device, not standard input or an address."""
+    return not (port == "-" or re.match("[a-z0-9]+:", port))
 
 
 def open_transport(port: str, baud: int) -> "Transport":
     """Return the open port. Raises DeviceError if a retry may help, SettingError if it does not."""
     if port == "-":
         return Descriptor(port, None)
+    if port.startswith("ble:"):
+        return BleLine(port)
     try:
         if found := _NET.fullmatch(port):
             host, number = found[2].strip("[]"), int(found[3])
@@ -147,4 +161,4 @@ def _waited_us(notes: Sequence[tuple[int, int, bytes]]) -> int:
     return 0
 
 
-Transport = SerialLine | Descriptor | Datagrams
+Transport = SerialLine | Descriptor | Datagrams | BleLine

@@ -9,9 +9,8 @@ from threading import Event, Lock, Thread
 from time import monotonic
 
 from ..closing import Closing
-from ..lines import CLOCK_US, SEQUENCES, ColumnHeader, checked, parsed, switches_field
+from ..lines import CLOCK_US, SEQUENCES, UNITS_US, ColumnHeader, checked, parsed, switches_field
 
-_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 # A client that does not accept a line within this time is dropped.
 _SEND_S = 0.2
 # Columns are named once in this time.
@@ -35,7 +34,7 @@ class LineSender(Closing):
         *,
         named: bool = False,
     ) -> None:
-        self._send, self._columns, self._time, self._scale = send, tuple(columns), time, _UNITS[unit]
+        self._send, self._columns, self._time, self._scale = send, tuple(columns), time, 1e6 / UNITS_US[unit]
         header = ",".join(self._columns).encode()
         self._header = (
             header + b"\n" if named and parsed(header) == ColumnHeader(self._columns) and len(columns) > 1 else b""

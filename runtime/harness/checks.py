@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from thenar.drivers import cd74hc4067
 from thenar.drivers.errors import SettingError
+from thenar.drivers.frames import frame_format
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.ports import device_fault, port_fault
@@ -108,6 +109,15 @@ def _of_spi(place: Place, chip: SpiWiring) -> Iterator[Fault]:
 def _of_stream(place: Place, stream: StreamWiring) -> Iterator[Fault]:
     if not stream.used:
         yield place, "must have one of the keys switches, joints and taxels; doctor --line proposes them"
+    if stream.frame is not None:
+        try:
+            numbers = frame_format(stream.frame).numbers
+        except SettingError as reason:
+            yield (*place, "frame"), str(reason)
+        else:
+            if numbers != len(stream.columns):
+                said = f"{len(stream.columns)} columns are named, but a frame has {numbers} numbers"
+                yield (*place, "frame"), f'{said}: name every one in order, "" for unused ones'
     known = tuple(filter(None, stream.columns)) or (*stream.used, *([] if stream.time is None else [stream.time]))
     named: list[tuple[Place, str]] = [(("time",), stream.time)] if stream.time is not None else []
     named += [(("switches", number), name) for number, name in enumerate(stream.switches)]

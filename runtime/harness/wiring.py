@@ -154,6 +154,7 @@ Range = tuple[float, float]
 class StreamWiring(_Table, frozen=True):
     """Rows of numbers sent by a board or a program: lines (`thenar.drivers.transports`), LSL, a ROS topic.
 
+    frame        the pattern of binary frames (`thenar.drivers.frames`); None: lines
     columns      the columns in order, "" for unused ones; (): the sender names them
     time         the column with the sender's clock, in `time_unit`
     rate_hz      rows per second
@@ -167,6 +168,7 @@ class StreamWiring(_Table, frozen=True):
 
     port: Text
     baud: Baud = 115_200
+    frame: Text | None = None
     columns: Annotated[tuple[str, ...], Meta(max_length=MOST_COLUMNS)] = ()
     time: Text | None = None
     time_unit: Literal["s", "ms", "us"] = "ms"

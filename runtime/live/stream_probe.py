@@ -11,7 +11,10 @@ from statistics import median
 import msgspec
 
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.lines import Row, RowReader
+from thenar.drivers.frames import FrameParser, guess_frame
+from thenar.drivers.lines import UNITS_US, Row, RowReader
+from thenar.drivers.readers import LineReader
+from thenar.drivers.transports import is_serial
 
 from ..frames import now_us
 from ..harness.wiring import Range, StreamWiring
@@ -25,10 +28,13 @@ _MOST_ROWS = 100_000
 _WAIT_S = 0.1
 # A sender that leaves no pause is read as fast as it sends after this time.
 _BACKLOG_US = 100_000
-_JOINT = re.compile(r"flex|bend|joint|angle|deg|enc|mcp|mpj|pip|pij|dip|dij|abduct|wrist|pitch|roll|yaw", re.IGNORECASE)
+_JOINT = re.compile(
+    r"flex|bend|splay|joint|angle|deg|enc|mcp|mpj|pip|pij|dip|dij|(^|_)ip($|_)|abduct|wrist|pitch|roll|yaw",
+    re.IGNORECASE,
+)
 _TAXEL = re.compile(r"fsr|pad|force|press|taxel|adc|analog|raw|newton", re.IGNORECASE)
+_UNIT = {unit: re.compile(named) for unit, named in (("s", "^s$|(^|_)sec"), ("ms", "ms|milli"), ("us", "us|micro"))}
 _TIME = re.compile(r"^(t|ts|ms|us|s)$|time|milli|micro|stamp|clock|(^|_)secs?$|seconds", re.IGNORECASE)
-_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 _HIGHEST = (255, 1023, 4095, 16_383, 32_767, 65_534)
 _PARTS = (1.0, 3.3, 5.0, 10.0, 100.0, 180.0, 360.0)
 # A joint or a taxel that moved over this share of its converter's range was moved on purpose.
@@ -75,12 +81,21 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
     Raises SettingError for an invalid port, DeviceError if no rows come.
     """
     bare = StreamWiring(port=port, columns=tuple(columns))
-    if _is_serial(port):
+    if is_serial(port):
         bare = msgspec.structs.replace(bare, baud=baud)
     with reader_of(bare) as reader:
+        chunks: list[tuple[int, bytes]] = []
+        if isinstance(reader, LineReader):
+            reader.chunks = chunks
         reader.open()
         came = list(_listened(reader, listen_s))
         counts, odd, other = reader.counts(), reader.odd, reader.other_sender()
+    sent = [chunk for _, chunk in chunks]
+    if len(came) <= counts.misfits + counts.damaged and _is_binary(sent) and (frame := guess_frame(sent)):
+        bare, parser = msgspec.structs.replace(bare, frame=frame), FrameParser(frame)
+        came = [(time_us, row) for time_us, chunk in chunks for row in parser.feed(chunk)]
+        counts, odd = parser.counts, parser.odd
+        other = other or f"frames of {frame}: bytes that never changed are taken as fixed, so move every sensor"
     if not came:
         raise DeviceError(f"{port}: {_no_rows(bare, reader) or other or 'no data received'}")
     wrong, such = counts.misfits + counts.overlong, f", such as {odd}" if odd else ""
@@ -91,13 +106,14 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
     return _proposed(bare, came, reader.kind, remarks)
 
 
-def _is_serial(port: str) -> bool:
-    return not (port == "-" or re.match("[a-z0-9]+:", port))
+def _is_binary(chunks: Sequence[bytes]) -> bool:
+    """Return whether more than a few bytes are not of text."""
+    return 20 * sum(byte < 9 or byte > 126 for chunk in chunks for byte in chunk) > sum(map(len, chunks))
 
 
 def _no_rows(bare: StreamWiring, reader: RowReader) -> str:
     """Return the reason why no row came, and advice; "" if nothing came at all."""
-    baud = f"is {bare.baud} its baud rate? " if _is_serial(bare.port) else ""
+    baud = f"is {bare.baud} its baud rate? " if is_serial(bare.port) else ""
     if reader.odd:
         wanted = "a row is numbers with commas between, name:value, or JSON"
         more = "--names says how many columns rows with texts have"
@@ -111,7 +127,7 @@ def _listened(reader: RowReader, listen_s: float) -> Iterator[tuple[int, Row]]:
     """Yield rows and when they came. Those that had been waiting, in buffers between the sender and this program, when
     the first one was read came at the same time.
     """
-    end_us, count, waited_us = now_us() + _PATIENCE_US, 0, 0
+    end_us, count, waited_us, received = now_us() + _PATIENCE_US, 0, 0, 0
     while (time_us := now_us()) < end_us and count < _MOST_ROWS:
         try:
             rows = reader.read(0.0 if waited_us else _WAIT_S)
@@ -119,6 +135,9 @@ def _listened(reader: RowReader, listen_s: float) -> Iterator[tuple[int, Row]]:
             if not (count or reader.received or sum(astuple(reader.counts()))):
                 raise
             return
+        if reader.received and not received:
+            end_us = max(end_us, time_us + round(listen_s * 1e6))
+        received = reader.received
         if rows and not count:
             waited_us, end_us = time_us, time_us + round(listen_s * 1e6)
         elif not rows or time_us - waited_us > _BACKLOG_US:
@@ -202,13 +221,13 @@ def _clock(values: dict[str, list[float | None]], span_s: float) -> tuple[str | 
             if bool(_TIME.search(name)) != named or not _rises(numbers) or (not named and set(steps) == {1.0}):
                 continue
             going = sum(step for step in steps if 0 < step <= 10 * median(steps)) or 1.0
-            for unit, scale in _UNITS.items():
+            for unit, unit_us in UNITS_US.items():
                 if span_s < _LEAST_S:
-                    fits = name == "s" if unit == "s" else unit in name.lower()
+                    fits = _UNIT[unit].search(name.lower()) is not None
                 else:
-                    fits = 0.5 < going / scale / span_s < 2.0
+                    fits = 0.5 < going * unit_us / 1e6 / span_s < 2.0
                 if fits:
-                    return name, unit, going / scale
+                    return name, unit, going * unit_us / 1e6
     return None, "ms", 0.0
 
 

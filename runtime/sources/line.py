@@ -1,19 +1,13 @@
-"""Lines of a board or a program: CSV, JSON or name:value, over serial, TCP, UDP or stdin."""
+"""Lines or binary frames of a board or a program, over serial, TCP, UDP, Bluetooth or stdin."""
 
-from thenar.drivers.lines import LineReader
+from thenar.drivers.readers import LineReader
 
-from ..harness.wiring import StreamWiring
 from .rows import row_kinds
-
-
-def _reader(wiring: StreamWiring) -> LineReader:
-    return LineReader(wiring.port, wiring.baud, len(wiring.columns))
-
 
 MEMBER = row_kinds(
     "line",
-    "Lines of numbers over serial, TCP, UDP or stdin: [[stream]].",
+    "Lines or frames of numbers over serial, TCP, UDP, Bluetooth or stdin: [[stream]].",
     lambda port: not port.startswith(("lsl:", "ros:")),
-    _reader,
+    lambda wiring: LineReader(wiring.port, wiring.baud, len(wiring.columns), wiring.frame),
     3,
 )

@@ -11,7 +11,6 @@ from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.lines import Row, RowReader, finite
 from thenar.drivers.lsl import load_pylsl
 
-from ..harness.wiring import StreamWiring
 from .rows import row_kinds
 
 _RESOLVE_S, _FORGET_S = 1.0, 2.0
@@ -76,14 +75,10 @@ class LslReader(RowReader):
             self._inlet = None
 
 
-def _reader(wiring: StreamWiring) -> LslReader:
-    return LslReader(wiring.port)
-
-
 MEMBER = row_kinds(
     "lsl",
     "A stream of the Lab Streaming Layer: [[stream]] from lsl:NAME.",
     lambda port: port.startswith("lsl:"),
-    _reader,
+    lambda wiring: LslReader(wiring.port),
     4,
 )

@@ -19,7 +19,6 @@ from thenar.drivers.names import shortened
 from thenar.drivers.senders import FirstSender
 
 from ..frames import now_us
-from ..harness.wiring import StreamWiring
 from .rows import row_kinds
 
 _TYPES = ("JointState", "UInt8MultiArray", "Float32MultiArray")
@@ -106,14 +105,10 @@ class RosReader(RowReader):
         self._domain = None
 
 
-def _reader(wiring: StreamWiring) -> RosReader:
-    return RosReader(wiring.port)
-
-
 MEMBER = row_kinds(
     "ros",
     "A topic of ROS 2, JointState, UInt8MultiArray or Float32MultiArray: [[stream]] from ros:/TOPIC.",
     lambda port: port.startswith("ros:"),
-    _reader,
+    lambda wiring: RosReader(wiring.port),
     5,
 )

@@ -4,9 +4,9 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from typing import Literal
 
-from thenar.drivers.lines import SEQUENCES, Row, RowReader
+from thenar.drivers.lines import CLOCK_US, SEQUENCES, UNITS_US, Row, RowReader
 from thenar.drivers.senders import SILENCE_US
 
 from ..frames import PERIODS, GloveFrame, Mask, SwitchFrame, now_us
@@ -21,7 +21,6 @@ from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of
 # closer numbers are coded in this many steps.
 JOINT_CODES = (1, 255)
 _TAXEL_STEPS, _FEWEST_STEPS, _MOST_STEPS = 4095, 255, 65_534
-_UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
 # A clock that goes back further, or ahead of ours by more, has restarted, or is another sender's.
 _BACK_US, _AHEAD_US = 1_000_000, 10_000_000
 # Boards count milliseconds and microseconds in 32 bits. Above the limit, a float has no whole microseconds.
@@ -249,7 +248,8 @@ class RowSource(Source):
         self._begin()
 
     def _begin(self) -> None:
-        self._clock = SenderClock(self.wiring.period_us, _TURN_US[self.wiring.time_unit])
+        turn_us = CLOCK_US if self.wiring.time is None else _TURN_US[self.wiring.time_unit]
+        self._clock = SenderClock(self.wiring.period_us, turn_us)
         # When a row came last; when the sender's clock changed last.
         self._came_us = self._ticked_us = now_us()
         # A fault of single rows, and until when it is reported.
@@ -310,7 +310,7 @@ class RowSource(Source):
     def _sent_us(self, row: Row, values: Sequence[float | None]) -> float | None:
         """Return the sender's time of a row, which may be anything; None: it has no clock."""
         if self.wiring.time is not None:
-            return math.nan if values[-1] is None else values[-1] * _UNITS_US[self.wiring.time_unit]
+            return math.nan if values[-1] is None else values[-1] * UNITS_US[self.wiring.time_unit]
         return None if row.time_s is None else row.time_s * 1e6
 
     def _known_us(self, sent_us: float, came_us: int, values: Sequence[float | None]) -> int | None:
@@ -489,25 +489,18 @@ def row_kinds(
 ) -> tuple[RowKind, RowKind]:
     """Return a kind for streams with switches or taxels, and one for those with joints only."""
 
-    def of(joints: bool) -> Callable[[Harness, Sequence[str], ScanMap], Iterator[Source]]:
+    def kind(name: str, *, joints: bool) -> RowKind:
         def sources(harness: Harness, names: Sequence[str], scan: ScanMap) -> Iterator[Source]:
             for number, wiring in enumerate(harness.streams):
                 if takes(wiring.port) and joints != bool(wiring.switches or wiring.taxels):
                     yield RowSource(reader(wiring), harness, number, names, scan)
 
-        return sources
+        def periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
+            for wiring, read in zip(harness.streams, scan.streams, strict=True):
+                if takes(wiring.port) and (wiring.joints if joints else read.switches or read.levels):
+                    yield stream_period_us(wiring)
 
-    return (
-        RowKind(name, help_, "switches", of(False), partial(_switch_periods_us, takes), rank, takes, reader),
-        RowKind(f"{name} of joints", help_, "joints", of(True), partial(_joint_periods_us, takes), rank, takes, reader),
-    )
+        reads: Literal["joints", "switches"] = "joints" if joints else "switches"
+        return RowKind(name, help_, reads, sources, periods_us, rank, takes, reader)
 
-
-def _switch_periods_us(takes: Callable[[str], bool], harness: Harness, scan: ScanMap) -> Iterator[int]:
-    rows = zip(harness.streams, scan.streams, strict=True)
-    read = (wiring for wiring, read in rows if read.switches or read.levels)
-    return (stream_period_us(wiring) for wiring in read if takes(wiring.port))
-
-
-def _joint_periods_us(takes: Callable[[str], bool], harness: Harness, _scan: ScanMap) -> Iterator[int]:
-    return (stream_period_us(wiring) for wiring in harness.streams if wiring.joints and takes(wiring.port))
+    return kind(name, joints=False), kind(f"{name} of joints", joints=True)

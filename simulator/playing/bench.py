@@ -13,6 +13,7 @@ from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
 from thenar.drivers.emulated.lines import BoardSender, LineSender, lines_like
 from thenar.drivers.emulated.serial_line import PtyLine
+from thenar.drivers.transports import is_serial
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, SpiWiring, StreamWiring
 from thenar.runtime.sources.rows import joint_number, steps_of
@@ -122,7 +123,7 @@ class Bench(Closing):
 
     def _stream(self, number: int, wiring: StreamWiring, stack: ExitStack) -> tuple[LineSender, str]:
         """Return the sender of a stream's rows, and its port; LSL and ROS streams are also sent as lines."""
-        if "://" in wiring.port or wiring.port.startswith(("-", "lsl:", "ros:")):
+        if not is_serial(wiring.port):
             way = lines_like(wiring.port)
             stack.callback(way.close)
             send, port = way.send, way.port
@@ -210,6 +211,7 @@ def _moved(harness: Harness, folder: Path, ports: Sequence[str]) -> Harness:
         harness,
         cyberglove=None if glove is None else msgspec.structs.replace(glove, port=str(folder / "cyberglove")),
         streams=tuple(
-            msgspec.structs.replace(wiring, port=port) for wiring, port in zip(harness.streams, ports, strict=True)
+            msgspec.structs.replace(wiring, port=port, frame=None)
+            for wiring, port in zip(harness.streams, ports, strict=True)
         ),
     )

@@ -11,18 +11,27 @@ from time import monotonic, monotonic_ns
 
 import pytest
 
+from thenar.drivers.emulated.ble import EmulatedPeripheral
 from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender, LineServer, lines_like
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.lines import LineReader, Row
+from thenar.drivers.lines import Row
+from thenar.drivers.readers import LineReader
 from thenar.drivers.transports import line_port_fault
+
+from . import bumble_backend
 
 LONG_S = 10.0
 Send = Callable[[bytes], None]
 
 
-@pytest.fixture(params=["serial", "tcp://h:1", "udp://h:1"])
-def way(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str, Send]]:
+@pytest.fixture(params=["serial", "tcp://h:1", "udp://h:1", "ble"])
+def way(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[str, Send]]:
+    if request.param == "ble":
+        with EmulatedPeripheral("lines") as peripheral:
+            bumble_backend.use(monkeypatch, peripheral.hci)
+            yield "ble://lines", peripheral.send
+        return
     if request.param == "serial":
         with PtyLine(tmp_path / "port") as line:
             yield str(line.link), line.send
@@ -138,12 +147,12 @@ def test_datagrams_are_dated_when_they_come_not_when_they_are_read() -> None:
 def test_bytes_without_a_row_are_counted() -> None:
     with DatagramLines() as sender, LineReader(sender.port) as reader:
         reader.open()
-        sender.send(b"A512B300")
+        sender.send(b"A512,B300")
         end = monotonic() + LONG_S
         while not reader.received:
             assert monotonic() < end
             assert not reader.read(0.1)
-        assert (reader.counts().misfits, reader.odd) == (1, "'A512B300'")
+        assert (reader.counts().misfits, reader.odd) == (1, "'A512,B300'")
 
 
 def test_half_a_line_before_a_break_spoils_no_later_line() -> None:
@@ -193,7 +202,16 @@ def test_nobody_there_is_a_device_error_that_says_what_to_look_at() -> None:
     "port",
     [
         *("", "tcp://:80", "tcp://h", "udp://h:0", "udp://h:99999", "ws://h/", "spy://x"),
-        *("http://h:1", "tcp://a..b:1", f"tcp://{'a' * 64}.x:1", "udp://.a:1"),
+        *(
+            "ble://",
+            "ble:x",
+            "ble://a/b",
+            "ble://a\n",
+            "http://h:1",
+            "tcp://a..b:1",
+            f"tcp://{'a' * 64}.x:1",
+            "udp://.a:1",
+        ),
     ],
 )
 def test_what_is_no_port_is_refused_before_anything_is_opened(port: str) -> None:

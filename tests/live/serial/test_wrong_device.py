@@ -13,7 +13,7 @@ import pytest
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.drivers.lines import LineReader
+from thenar.drivers.readers import LineReader
 from thenar.runtime.harness.wiring import GloveWiring, Harness, StreamWiring
 from thenar.runtime.live.sources import DeviceThread
 from thenar.runtime.scanning.ports import whole_scan

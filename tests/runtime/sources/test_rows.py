@@ -207,11 +207,16 @@ def test_rows_of_another_clock_count_once_the_first_one_is_silent(play: Play, be
     assert source.fault_message() == "its clock has restarted: was the board reset, or does another program send?"
 
 
-@pytest.mark.parametrize(("unit", "ticks"), [("ms", 1), ("us", 1000)])
+@pytest.mark.parametrize(("unit", "ticks"), [("ms", 1), ("us", 1000), ("board", 1000)])
 def test_a_clock_of_32_bits_that_begins_again_costs_no_row(play: Play, unit: str, ticks: int) -> None:
     stamps = [(ticks * (10 * n - 505)) % 2**32 for n in range(100)]
     chunks = [(10_000 * n, b"%d,0,0,0,0,0,0\n" % stamp) for n, stamp in enumerate(stamps)]
-    source, frames = play(chunks, GLOVE.replace('time = "ms"', f'time = "ms"\ntime_unit = "{unit}"'))
+    if unit == "board":
+        head = board_line("columns", "a", "b")
+        chunks = [(10_000 * n, head + board_line("row", n, stamp, n % 4)) for n, stamp in enumerate(stamps)]
+        source, frames = play(chunks, BOARD, ("a",), ())
+    else:
+        source, frames = play(chunks, GLOVE.replace('time = "ms"', f'time = "ms"\ntime_unit = "{unit}"'))
     assert counted(source) == {"rows": 100}
     assert [frame.time_us for frame in frames if isinstance(frame, SwitchFrame)] == [10_000 * n for n in range(100)]
 
@@ -338,8 +343,8 @@ def test_what_is_wrong_with_all_rows_is_said(play: Play) -> None:
         == "its rows have other columns than glove.toml: column 1, column 2, column 3, not "
         + ("ms, thumb, index, pad, flex and 1 more")
     )
-    source, _ = play([(0, b"rst:0x10\n")])
-    assert source.fault_message() == "the data holds no rows: 'rst:0x10'"
+    source, _ = play([(0, b"rst:0x10 (POWERON_RESET)\n")])
+    assert source.fault_message() == "the data holds no rows: 'rst:0x10 (POWERON_RESET)'"
     source, _ = play([(100_000 * n, b"%d,0,0,0,0,0,0\n" % (100 * n)) for n in range(12)])
     assert source.fault_message() == "10 rows a second arrive, but glove.toml says 100: set rate_hz = 10"
 
@@ -353,8 +358,8 @@ def test_a_sender_that_falls_silent_or_sends_something_else_is_said(play: Play) 
     assert source.counts()[0].value == 0
     source, _ = play([(1_000_000, row), (3_100_000, b"1,2\n")])
     assert source.fault_message().startswith("its rows have other columns than glove.toml: column 1, column 2, not ms")
-    source, _ = play([(1_000_000, row), (3_100_000, b"rst:0x10\n")])
-    assert source.fault_message() == "the data holds no rows: 'rst:0x10'"
+    source, _ = play([(1_000_000, row), (3_100_000, b"rst:0x10 (POWERON_RESET)\n")])
+    assert source.fault_message() == "the data holds no rows: 'rst:0x10 (POWERON_RESET)'"
     source, _ = play([(1_000_000, row), (3_100_000, b"\x80\x00\x80")])
     assert source.fault_message() == "bytes come, but no row: check the line ends and, of a serial port, the baud rate"
 
@@ -374,6 +379,8 @@ def test_a_clock_that_stands_still_is_said(play: Play, moving: int) -> None:
         (("index = 512", "inde = 512"), "no switch 'inde'"),
         (('switches = ["thumb", "index"]', 'switches = ["thumb", "ring"]'), "no column 'ring'"),
         (('time = "ms"', 'time = "us"'), "no column 'us'"),
+        (('time = "ms"', 'time = "ms"\nframe = "F0 X7"'), "'X7' is neither a byte nor a type of numbers: write fixed"),
+        (('time = "ms"', 'time = "ms"\nframe = "F0 B5"'), "7 columns are named, but a frame has 5 numbers: name every"),
         (('time = "ms"', 'time = "pad"'), "'pad' is the sender's clock"),
         (("[0, 4095]", "[7, 7]"), "a range from 7"),
         (('"ms", "thumb", ""', '"ms", "thumb", "pad"'), "column 'pad' is already stream"),
