@@ -23,7 +23,7 @@ help:           ## list the targets
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --editable ".[compiler,stability,ros,lsl,web,foxglove]" --group dev
+	$(BIN)/python -m pip install --quiet --editable ".[compiler,stability,ros,lsl,mqtt,osc,web,foxglove]" --group dev
 	touch $@
 
 demo: $(VENV)/installed  ## recordings, rates, frontier, build, report, run: SCENE=crowd, or TABLE=examples/home_glove.csv

@@ -14,6 +14,8 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "stability": ("mpmath",),
     "ros": ("cyclonedds",),
     "lsl": ("pylsl",),
+    "mqtt": ("paho",),
+    "osc": ("pythonosc",),
     "web": ("aiohttp",),
     "foxglove": ("foxglove",),
 }

@@ -12,6 +12,7 @@ import msgspec
 
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.lines import Row, RowReader
+from thenar.drivers.transports import OTHER_PORTS
 
 from ..frames import now_us
 from ..harness.wiring import Range, StreamWiring
@@ -65,7 +66,7 @@ def reader_of(wiring: StreamWiring) -> RowReader:
     for kind in SOURCES.values():
         if isinstance(kind, RowKind) and kind.reader is not None and kind.takes(port):
             return kind.reader(wiring)
-    raise SettingError(f"{shortened(repr(port))} is not a port for rows{nearest(port, ['lsl:', 'ros:'])}")
+    raise SettingError(f"{shortened(repr(port))} is not a port for rows{nearest(port, OTHER_PORTS)}")
 
 
 def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str] = ()) -> Proposal:

@@ -61,9 +61,13 @@ class Sink(ABC):
     ----------
     pace : PublishPace or None
         When it gets a result; None: it gets every frame's. `open_sink` sets it.
+    where, sent, lost, error
+        Its part of a `SinkReport`, for a sink that does not make one of its own.
     """
 
     pace: "PublishPace | None" = None
+    where = error = ""
+    sent = lost = 0
 
     def begin(self, build: "Build") -> None:  # noqa: B027
         """Take the build that recognises, before the first frame."""
@@ -81,9 +85,22 @@ class Sink(ABC):
     def health(self, report: HealthReport) -> None:  # noqa: B027
         """Send the glove's health, about once a second."""
 
+    def attempt(self, send: Callable[[], object]) -> None:
+        """Call `send`, and count what it sends; as lost if it raises."""
+        try:
+            send()
+            self.sent += 1
+        except Exception as reason:  # packages raise many kinds for what cannot be sent
+            self.lost += 1
+            self.error = getattr(reason, "strerror", None) or str(reason)
+
     def report(self) -> SinkReport:
         """Return the state of the sink itself."""
-        return SinkReport(type(self).__name__, None, 0, 0)
+        return SinkReport(self.where or type(self).__name__, self.readers(), self.sent, self.lost, self.error)
+
+    def readers(self) -> int | None:
+        """Return the number of current readers; None if unknown."""
+        return None
 
     def close(self) -> None:  # noqa: B027
         """Release everything; may be called twice."""

@@ -25,7 +25,7 @@ import msgspec
 from thenar.drivers.extras import optional
 
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
-from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+from .base import Sink, SinkError, SinkKind, SinkPlace
 from .sockets import check_readers, resolve
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ class FoxgloveServer(Sink):
         import foxglove
         from foxglove.websocket import ServerListener
 
-        self._where = where or f"foxglove:{host}:{port}"
+        self.where = where or f"foxglove:{host}:{port}"
         # Channels end when it is garbage-collected.
         self._context = context = foxglove.Context()
         self._channels = {
@@ -130,15 +130,13 @@ class FoxgloveServer(Sink):
         except (RuntimeError, OSError) as reason:
             said = re.sub(r" \(os error [0-9]+\)", "", str(reason).removeprefix("FoxgloveError: "))
             hint = ": another process serves that port; use another" if "in use" in said else ""
-            raise SinkError(f"{self._where} cannot be opened: {said}{hint}") from None
+            raise SinkError(f"{self.where} cannot be opened: {said}{hint}") from None
         self.port: int = self._server.port
         self._closed = False
         self._repeated_us = self._unix_us = self._time_us = 0
         # By topic: late readers get them within a second.
         self._kept: dict[str, msgspec.Struct] = {}
         self._build: Build | None = None
-        self._sent = self._lost = 0
-        self._error = ""
 
     def begin(self, build: "Build") -> None:
         """Take the names of switches, joints and grasp types."""
@@ -173,20 +171,13 @@ class FoxgloveServer(Sink):
 
     def _log(self, topic: str, content: msgspec.Struct | dict[str, Any], later_us: int = 0) -> None:
         """Pass a message to the server if its topic has readers, stamped `later_us` after the newest frame."""
-        channel = self._channels[topic]
-        if self._closed or not channel.has_sinks():
-            return
-        try:
-            channel.log(encode(content), log_time=1000 * max(0, self._unix_us + later_us))
-            self._sent += 1
-        except Exception as reason:  # of the SDK's own kinds
-            self._lost += 1
-            self._error = str(reason)
+        channel, log_time = self._channels[topic], 1000 * max(0, self._unix_us + later_us)
+        if not self._closed and channel.has_sinks():
+            self.attempt(lambda: channel.log(encode(content), log_time=log_time))
 
-    def report(self) -> SinkReport:
-        """Return the state of this sink; the server does not report the messages that it drops for slow readers."""
-        readers = 0 if self._closed else len(self._subscribed)
-        return SinkReport(self._where, readers, self._sent, self._lost, self._error)
+    def readers(self) -> int:
+        """Return the number of readers; the server does not report the messages that it drops for slow ones."""
+        return 0 if self._closed else len(self._subscribed)
 
     def close(self) -> None:
         """Stop the server and its connections."""

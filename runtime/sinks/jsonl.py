@@ -84,9 +84,8 @@ class JsonLines(Sink):
         self._file = file
         self._rest = b""
         self._owned = owned
-        self._where = where
-        self._sent = self._lost = 0
-        self._error, self._gone = "", False
+        self.where = where
+        self._gone = False
         self._joints: tuple[str, ...] = ()
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
@@ -108,13 +107,13 @@ class JsonLines(Sink):
                 left = left[self._write(left) :]
             self._rest, sent = b"", not self._gone
         except (OSError, ValueError) as reason:  # ValueError: somebody closed the file
-            self._error = getattr(reason, "strerror", None) or str(reason)
+            self.error = getattr(reason, "strerror", None) or str(reason)
             self._gone = isinstance(reason, BrokenPipeError)
             torn = len(line) - len(left)
             self._rest = left[: max(-torn, 0)] if torn <= 0 or self._takes_back(torn) else left
         if line:
-            self._sent += sent
-            self._lost += not sent
+            self.sent += sent
+            self.lost += not sent
 
     def _write(self, data: bytes) -> int:
         try:
@@ -139,7 +138,7 @@ class JsonLines(Sink):
 
     def report(self) -> SinkReport:
         """Return how this sink is doing."""
-        return SinkReport(self._where, None, self._sent, self._lost, self._error, gone=self._gone)
+        return structs.replace(super().report(), gone=self._gone)
 
     def close(self) -> None:
         """Finish the line that was begun, if the reader allows, and close the file if it was opened here."""

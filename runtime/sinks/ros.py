@@ -1,120 +1,99 @@
-"""ROS 2 topics without a ROS installation, through Eclipse Cyclone DDS (extra `ros`).
+"""Topics of ROS 2, by rclpy where ROS is installed, by Eclipse Cyclone DDS otherwise (extra `ros`).
 
     NAMESPACE/grasp     std_msgs/String                  the grasp type, "unknown" and "none" included
-    NAMESPACE/segment   diagnostic_msgs/DiagnosticArray  the same with its stamp, probability, state, segment and health
+    NAMESPACE/state     thenar_msgs/Grasp                the same with its stamp, probability, state, segment and health
     NAMESPACE/preshape  trajectory_msgs/JointTrajectory  when it changes
     NAMESPACE/angles    sensor_msgs/JointState           the glove's calibrated joints, in rad
     NAMESPACE/health    std_msgs/String                  once a second, if requested: the glove's health, as JSON
 
-Grasp, segment and angles are published on change and 20 times a second, unless the sink's options set another pace.
-Reliable, with the last 10 kept, which serves reliable and best-effort readers alike. Grasp, segment and preshape
-are transient local: late readers get the newest at once. Nodes of this machine can read, others if CYCLONEDDS_URI or
-`?public` allows them; ROS_DOMAIN_ID sets the domain, as for a ROS 2 node.
+Grasp, state and angles are published on change and 20 times a second, unless the sink's options set another pace.
+Reliable, with the last 10 kept, which serves reliable and best-effort readers alike. Grasp, state and preshape
+are transient local: late readers get the newest at once. Nodes of this machine can read, others if `?public` or the
+settings of ROS or Cyclone DDS (CYCLONEDDS_URI) allow them; ROS_DOMAIN_ID sets the domain, as for any node.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 from msgspec import json
 
-from thenar.drivers.extras import optional
+from thenar.drivers.errors import DeviceError
 
+from .. import ros
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
-from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+from .base import Sink, SinkError, SinkKind
 
 _RATE_HZ = 20
+_STRING, _GRASP = "std_msgs/String", "thenar_msgs/Grasp"
+_TRAJECTORY, _JOINTS = "trajectory_msgs/JointTrajectory", "sensor_msgs/JointState"
 
 
 class RosTopics(Sink):
-    """Publishes under a namespace of ROS. Messages that DDS refuses are counted as lost in the report."""
+    """Publishes under a namespace of ROS. Messages that ROS refuses are counted as lost in the report."""
 
     def __init__(self, name: str = "/thenar", *, public: bool = False) -> None:
-        """Publish under `name` to this machine, or to all networks that Cyclone DDS finds if `public`.
+        """Publish under `name` to this machine, or also to others if `public`.
 
-        Raise SettingError for an invalid name or domain, SinkError if DDS does not start.
+        Raise SettingError for an invalid name or domain, SinkError if ROS does not start.
         """
-        # Cyclone DDS, which these import, is an extra.
-        from cyclonedds.core import DDSException
-
-        from .. import ros
-
-        self._where = f"ros:{ros.namespace(name)}" + "?public" * public
-        self._name, self._ros = name, ros
-        number = ros.domain()
+        self.where = f"ros:{ros.namespace(name)}" + "?public" * public
         try:
-            self._domain, participant = ros.join(number, public=public)
-            self._grasp = ros.writer(participant, f"{name}/grasp", ros.String, kept=True)
-            self._segment = ros.writer(participant, f"{name}/segment", ros.DiagnosticArray, kept=True)
-            self._preshape = ros.writer(participant, f"{name}/preshape", ros.JointTrajectory, kept=True)
-            self._angles = ros.writer(participant, f"{name}/angles", ros.JointState)
-            self._health = ros.writer(participant, f"{name}/health", ros.String)
-        except DDSException as reason:
-            raise SinkError(
-                f"{self._where} cannot be opened in domain {number}: {reason} "
-                "Check CYCLONEDDS_URI, and the network interfaces that it names."
-            ) from None
-        except OSError as reason:
-            raise SinkError(
-                f"{self._where} cannot be limited to this machine: {reason.strerror}. That takes Linux 5.7 or newer; "
-                f"ros:{name}?public lets other machines read"
-            ) from None
+            self._node = ros.open_node(self.where, public=public)
+        except DeviceError as reason:
+            raise SinkError(f"{self.where} cannot be opened {reason}") from None
+        self._kind = self._node.kind
+        self._grasp = self._node.writer(f"{name}/grasp", _STRING, kept=True)
+        self._state = self._node.writer(f"{name}/state", _GRASP, kept=True)
+        self._preshape = self._node.writer(f"{name}/preshape", _TRAJECTORY, kept=True)
+        self._angles = self._node.writer(f"{name}/angles", _JOINTS)
+        self._health = self._node.writer(f"{name}/health", _STRING)
         self._closed = False
         self._told: Preshape | None = None
-        self._sent = self._lost = 0
-        self._error = ""
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish everything, but the preshape only if it changed."""
-        self._try(lambda: self._write(grasp, preshape, angles))
+        self._write(lambda: self._publish(grasp, preshape, angles))
 
     def health(self, report: HealthReport) -> None:
         """Publish the glove's health."""
-        self._try(lambda: self._health.write(self._ros.String(json.encode(report).decode())))
+        self._write(lambda: self._health(self._text(json.encode(report).decode())))
 
-    def _try(self, write: Callable[[], None]) -> None:
+    def _write(self, write: Callable[[], object]) -> None:
         if self._closed:
-            self._lost += 1
-            return
-        try:
-            write()
-            self._sent += 1
-        except Exception as reason:  # Cyclone's Python side raises many kinds for what it cannot serialise
-            self._lost += 1
-            self._error = str(reason)
+            self.lost += 1
+        else:
+            self.attempt(write)
 
-    def _write(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        ros = self._ros
-        self._grasp.write(ros.String(grasp.grasp))
-        self._segment.write(ros.segment(self._name, grasp))
+    def _publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
+        self._grasp(self._text(grasp.grasp))
+        self._state(ros.state(self._kind, grasp))
         if angles is not None:
-            self._angles.write(ros.joint_state(grasp.unix_us, angles))
+            self._angles(ros.joint_state(self._kind, grasp.unix_us, angles))
         if preshape is not None and preshape != self._told:
-            self._preshape.write(ros.trajectory(preshape))
+            self._preshape(ros.trajectory(self._kind, preshape))
             self._told = preshape
 
-    def report(self) -> SinkReport:
-        """Return the state of this sink; its readers are those of the grasp type."""
-        readers = 0 if self._closed else self._grasp.get_publication_matched_status().current_count
-        return SinkReport(self._where, readers, self._sent, self._lost, self._error)
+    def _text(self, text: str) -> Any:
+        return self._kind(_STRING)(data=text)
+
+    def readers(self) -> int:
+        """Return the number of readers of the grasp type."""
+        return 0 if self._closed else self._node.readers()
 
     def close(self) -> None:
         """Leave the domain."""
         if not self._closed:
             self._closed = True
-            # Each entity ends with its last name; the domain, which ends all that is left in it, goes last.
-            del self._grasp, self._segment, self._preshape, self._angles, self._health
-            del self._domain
-
-
-def _open(where: SinkPlace) -> Sink:
-    with optional(SinkError, f"ros:{where.place}"):
-        return RosTopics(where.place, public="public" in where.options)
+            # What a topic is written by ends with its last name, before its node.
+            del self._grasp, self._state, self._preshape, self._angles, self._health
+            self._node.close()
 
 
 MEMBER = SinkKind(
     "ros",
     "/NAMESPACE",
     "topics of ROS 2 on this machine; with public also for others",
-    _open,
+    lambda where: RosTopics(where.place, public="public" in where.options),
     ("public",),
     _RATE_HZ,
     rank=4,

@@ -17,6 +17,8 @@ from contextlib import suppress
 from time import monotonic
 from typing import Any
 
+from msgspec.structs import replace
+
 from thenar.drivers.errors import SettingError
 
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
@@ -45,11 +47,10 @@ class SocketLines(Sink):
         self._listener = listener
         self._listener_poll = select.poll()
         self._listener_poll.register(listener, select.POLLIN)
-        self._where = where
+        self.where = where
         self._clock = clock
-        self._readers: list[_Reader] = []
-        self._sent = self._lost = self._dropped = 0
-        self._error = ""
+        self._clients: list[_Reader] = []
+        self._dropped = 0
         self._joints: tuple[str, ...] = ()
         self._header = b""
 
@@ -65,13 +66,13 @@ class SocketLines(Sink):
         if angles is not None and angles.names != self._joints:
             self._joints, self._header = angles.names, encode_header(angles)
             self._send_all(self._header)
-        if self._readers:
+        if self._clients:
             self._send_all(encode(grasp, preshape, angles))
 
     def health(self, report: HealthReport) -> None:
         """Accept new readers, and send every reader the report's line."""
         self._accept_clients()
-        if self._readers:
+        if self._clients:
             self._send_all(encode_health(report))
 
     def _accept_clients(self) -> None:
@@ -82,61 +83,65 @@ class SocketLines(Sink):
                 for _ in range(_KNOCKS):
                     self._add_client(*self._listener.accept())
         except OSError as reason:  # gone before it was accepted, or no descriptors left
-            self._error = reason.strerror or str(reason)
+            self.error = reason.strerror or str(reason)
 
     def _add_client(self, reader: socket.socket, peer: Any) -> None:
         host = _host(peer)
         if self._has_room(host):
-            self._readers.append(_Reader(reader, host))
+            self._clients.append(_Reader(reader, host))
             if self._header:
-                self._send(self._readers[-1], self._header, self._clock())
+                self._send(self._clients[-1], self._header, self._clock())
         else:
             reader.close()
 
     def _has_room(self, host: str) -> bool:
         """Return whether one more reader of `host` has a place."""
-        if host and sum(reader.host == host for reader in self._readers) >= MAX_OF_ONE:
+        if host and sum(reader.host == host for reader in self._clients) >= MAX_OF_ONE:
             full = f"more than {MAX_OF_ONE} readers on {host}"
-        elif len(self._readers) >= MAX_READERS:
+        elif len(self._clients) >= MAX_READERS:
             full = f"more than {MAX_READERS} readers"
         else:
             return True
-        self._error = f"{full}: the newest were rejected"
+        self.error = f"{full}: the newest were rejected"
         return False
 
     def _send_all(self, line: bytes) -> None:
         now_s = self._clock()
-        for reader in tuple(self._readers):
+        for reader in tuple(self._clients):
             sent = self._send(reader, line, now_s)
-            self._sent += sent
-            self._lost += not sent
+            self.sent += sent
+            self.lost += not sent
 
     def _send(self, reader: "_Reader", line: bytes, now_s: float) -> bool:
         try:
             sent = reader.send(line, now_s)
         except OSError:
-            self._readers.remove(reader)
+            self._clients.remove(reader)
             reader.close()
             return False
         if reader.hangs(now_s):
-            self._readers.remove(reader)
+            self._clients.remove(reader)
             reader.close()
             self._dropped += 1
-            self._error = f"a reader that took nothing for {HANGING_S:g} s was dropped"
+            self.error = f"a reader that took nothing for {HANGING_S:g} s was dropped"
         return sent
 
     def report(self) -> SinkReport:
         """Return the state of this sink."""
-        return SinkReport(self._where, len(self._readers), self._sent, self._lost, self._error, dropped=self._dropped)
+        return replace(super().report(), dropped=self._dropped)
+
+    def readers(self) -> int:
+        """Return the number of readers."""
+        return len(self._clients)
 
     def close(self) -> None:
         """Close the socket and every reader's."""
         if self._listener.fileno() < 0:
             return
         self._listener.close()
-        for reader in self._readers:
+        for reader in self._clients:
             reader.close()
-        self._readers.clear()
+        self._clients.clear()
 
 
 class _Reader:

@@ -1,6 +1,7 @@
 """Lines of a board or a program: CSV, JSON or name:value, over serial, TCP, UDP or stdin."""
 
 from thenar.drivers.lines import LineReader
+from thenar.drivers.transports import OTHER_PORTS
 
 from ..harness.wiring import StreamWiring
 from .rows import row_kinds
@@ -13,7 +14,7 @@ def _reader(wiring: StreamWiring) -> LineReader:
 MEMBER = row_kinds(
     "line",
     "Lines of numbers over serial, TCP, UDP or stdin: [[stream]].",
-    lambda port: not port.startswith(("lsl:", "ros:")),
+    lambda port: not port.startswith(OTHER_PORTS),
     _reader,
     3,
 )

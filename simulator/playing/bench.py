@@ -13,6 +13,7 @@ from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
 from thenar.drivers.emulated.lines import BoardSender, LineSender, lines_like
 from thenar.drivers.emulated.serial_line import PtyLine
+from thenar.drivers.transports import OTHER_PORTS
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, SpiWiring, StreamWiring
 from thenar.runtime.sources.rows import joint_number, steps_of
@@ -121,8 +122,8 @@ class Bench(Closing):
         return line
 
     def _stream(self, number: int, wiring: StreamWiring, stack: ExitStack) -> tuple[LineSender, str]:
-        """Return the sender of a stream's rows, and its port; LSL and ROS streams are also sent as lines."""
-        if "://" in wiring.port or wiring.port.startswith(("-", "lsl:", "ros:")):
+        """Return the sender of a stream's rows, and its port; those of other readers are also sent as lines."""
+        if "://" in wiring.port or wiring.port.startswith(("-", *OTHER_PORTS)):
             way = lines_like(wiring.port)
             stack.callback(way.close)
             send, port = way.send, way.port

@@ -13,7 +13,7 @@ from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
 from cyclonedds.core import ReadCondition, WaitSet
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import byte, float64, int32, uint32
+from cyclonedds.idl.types import float64, int32, int64, uint32
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 else:
     from cyclonedds.idl.types import sequence
 
-KEPT = ("grasp", "segment", "preshape")
+KEPT = ("grasp", "state", "preshape")
 ANY = 0xFFFFFFFF  # samples, views and instances of all states
 
 
@@ -76,29 +76,24 @@ class TrajectoryMsgsJointTrajectory(IdlStruct, typename="trajectory_msgs::msg::d
 
 
 @dataclass
-class DiagnosticMsgsKeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
-    key: str
-    value: str
-
-
-@dataclass
-class DiagnosticMsgsDiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
-    level: byte
-    name: str
-    message: str
-    hardware_id: str
-    values: sequence[DiagnosticMsgsKeyValue]
-
-
-@dataclass
-class DiagnosticMsgsDiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
+class ThenarMsgsGrasp(IdlStruct, typename="thenar_msgs::msg::dds_::Grasp_"):
     header: StdMsgsHeader
-    status: sequence[DiagnosticMsgsDiagnosticStatus]
+    grasp: str
+    probability: float64
+    health: str
+    state: str
+    segment: uint32
+    segment_type: str
+    segment_probability: float64
+    segment_stamp: BuiltinInterfacesTime
+    candidate: str
+    margin: int64
+    lost: sequence[str]
 
 
 TYPES: dict[str, Any] = {
     "grasp": StdMsgsString,
-    "segment": DiagnosticMsgsDiagnosticArray,
+    "state": ThenarMsgsGrasp,
     "preshape": TrajectoryMsgsJointTrajectory,
     "angles": SensorMsgsJointState,
     "health": StdMsgsString,

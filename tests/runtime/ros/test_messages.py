@@ -13,9 +13,10 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from thenar.runtime.published import Health, LiveGrasp, Preshape
+from thenar.runtime.published import LiveGrasp, Preshape
+from thenar.runtime.ros import PACKAGE, state, trajectory
 
-# As they stand in builtin_interfaces, std_msgs, sensor_msgs, trajectory_msgs and diagnostic_msgs, without comments and
+# As they stand in builtin_interfaces, std_msgs, sensor_msgs, trajectory_msgs and our package, without comments and
 # constants, which are no part of a type's description.
 MSG = {
     "builtin_interfaces/msg/Time": "int32 sec\nuint32 nanosec",
@@ -36,22 +37,20 @@ MSG = {
     "std_msgs/msg/MultiArrayLayout": "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset",
     "std_msgs/msg/UInt8MultiArray": "std_msgs/MultiArrayLayout layout\nuint8[] data",
     "std_msgs/msg/Float32MultiArray": "std_msgs/MultiArrayLayout layout\nfloat32[] data",
-    "diagnostic_msgs/msg/KeyValue": "string key\nstring value",
-    "diagnostic_msgs/msg/DiagnosticStatus": (
-        "byte level\nstring name\nstring message\nstring hardware_id\ndiagnostic_msgs/KeyValue[] values"
+    "thenar_msgs/msg/Grasp": "\n".join(
+        line for line in (PACKAGE / "msg" / "Grasp.msg").read_text("utf-8").splitlines() if not line.startswith("#")
     ),
-    "diagnostic_msgs/msg/DiagnosticArray": "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status",
 }
 PUBLISHED = (
     "std_msgs/msg/String",
     "sensor_msgs/msg/JointState",
     "trajectory_msgs/msg/JointTrajectory",
-    "diagnostic_msgs/msg/DiagnosticArray",
+    "thenar_msgs/msg/Grasp",
     "std_msgs/msg/UInt8MultiArray",
     "std_msgs/msg/Float32MultiArray",
 )
 # type_description_interfaces/msg/FieldType: 48 more is an array, 144 more an unbounded sequence.
-FIELD_TYPES = {"uint8": 3, "float32": 10, "int32": 6, "uint32": 7, "float64": 11, "byte": 16, "string": 17}
+FIELD_TYPES = {"uint8": 3, "float32": 10, "int32": 6, "uint32": 7, "int64": 8, "float64": 11, "string": 17}
 NESTED, SEQUENCE = 1, 144
 
 
@@ -93,7 +92,7 @@ def dds_name(name: str) -> str:
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_a_types_hash_is_that_of_its_description(ros: ModuleType, name: str) -> None:
-    assert ros.TYPE_HASHES[dds_name(name)] == rihs01(name)
+    assert ros.TYPE_HASHES[name.replace("/msg/", "/")] == rihs01(name)
 
 
 @pytest.mark.parametrize(
@@ -106,9 +105,6 @@ def test_a_types_hash_is_that_of_its_description(ros: ModuleType, name: str) -> 
             "trajectory_msgs/msg/JointTrajectoryPoint",
             "de8907036d8bd45aac6f30cc9044a3d4a329c42cbf719aff7d95a584cfa532d7",
         ),
-        ("diagnostic_msgs/msg/KeyValue", "d68081eaa540288c5440753baecef0c4e16e81a5f78ad68902ded5100413bb42"),
-        ("diagnostic_msgs/msg/DiagnosticStatus", "b0e3e692ea2d54a8af2f4ef1930e81556a2db55216b771f8a7d2724ed47bf0e4"),
-        ("diagnostic_msgs/msg/DiagnosticArray", "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"),
     ],
 )
 def test_hashes_computed_here_are_those_of_ross_packages(name: str, known: str) -> None:
@@ -117,17 +113,16 @@ def test_hashes_computed_here_are_those_of_ross_packages(name: str, known: str) 
 
 def test_every_type_has_ross_name_and_fields(ros: ModuleType) -> None:
     for name, text in MSG.items():
-        kind = getattr(ros, name.rpartition("/")[2])
+        kind = ros.TYPES[name.replace("/msg/", "/")]
         assert kind.__idl_typename__ == dds_name(name)
         assert list(kind.__dataclass_fields__) == [line.split()[1] for line in text.splitlines()]
 
 
 def test_a_preshape_is_a_trajectory_of_one_point_that_starts_at_once(ros: ModuleType, preshape: Preshape) -> None:
-    from thenar.runtime.ros import trajectory
-
     point = ros.JointTrajectoryPoint([0.0, 0.5], [], [], [], ros.Duration(1, 250_000_000))
     names = ["finger_1/prox_joint", "finger_1/med_joint"]
-    assert trajectory(preshape) == ros.JointTrajectory(ros.Header(ros.Time(0, 0), ""), names, [point])
+    expected = ros.TYPES["trajectory_msgs/JointTrajectory"](ros.Header(ros.Time(0, 0), ""), names, [point])
+    assert trajectory(ros.TYPES.__getitem__, preshape) == expected
 
 
 def decoded(name: str, message: Any) -> SimpleNamespace:
@@ -140,42 +135,23 @@ def decoded(name: str, message: Any) -> SimpleNamespace:
 
 
 def test_the_tools_of_ros_2_read_a_preshape(ros: ModuleType, preshape: Preshape) -> None:
-    read = decoded("trajectory_msgs/msg/JointTrajectory", ros.trajectory(preshape))
+    read = decoded("trajectory_msgs/msg/JointTrajectory", trajectory(ros.TYPES.__getitem__, preshape))
     assert tuple(read.joint_names) == preshape.joint_names
     assert tuple(read.points[0].positions) == preshape.positions
     assert (read.points[0].time_from_start.sec, read.points[0].time_from_start.nanosec) == (1, 250_000_000)
 
 
-@pytest.mark.parametrize(("health", "level"), [("ok", 0), ("changing", 0), ("degraded", 1), ("unknown", 2)])
-def test_the_tools_of_ros_2_read_a_segment(
-    ros: ModuleType, make_grasp: Callable[..., LiveGrasp], health: Health, level: int
+@pytest.mark.parametrize("segment_us", [None, 50_000])
+def test_the_tools_of_ros_2_read_a_grasp(
+    ros: ModuleType, make_grasp: Callable[..., LiveGrasp], segment_us: int | None
 ) -> None:
     of_frame = make_grasp(0, "PoS", ("s001", "index_mpj"))
-    grasp = replace(
-        of_frame, time_us=70_000, health=health, state="held", segment=3, segment_type="PMF", segment_us=50_000
-    )
-    grasp = replace(grasp, segment_probability=0.25)
-    read = decoded("diagnostic_msgs/msg/DiagnosticArray", ros.segment("/thenar", grasp))
+    grasp = replace(of_frame, time_us=70_000, state="held", segment=3, segment_type="PMF", segment_us=segment_us)
+    grasp = replace(grasp, segment_probability=0.25, margin=-(2**40))
+    read = decoded("thenar_msgs/msg/Grasp", state(ros.TYPES.__getitem__, grasp))
     assert (read.header.stamp.sec, read.header.stamp.nanosec) == (1_700_000_000, 123_456_000)
-    (status,) = read.status
-    assert (status.level, status.name, status.message) == (level, "/thenar", "PoS")
-    assert {pair.key: pair.value for pair in status.values} == {
-        "grasp": "PoS",
-        "probability": "0.937500",
-        "health": health,
-        "state": "held",
-        "segment": "3",
-        "segment_type": "PMF",
-        "segment_probability": "0.250000",
-        "segment_stamp": "1700000000.103456",
-        "candidate": "PoS",
-        "margin": "120",
-        "lost": "s001, index_mpj",
-    }
-
-
-def test_before_the_first_segment_there_is_no_time_at_which_it_began(
-    ros: ModuleType, make_grasp: Callable[..., LiveGrasp]
-) -> None:
-    (status,) = ros.segment("/thenar", make_grasp(0)).status
-    assert {pair.key: pair.value for pair in status.values}["segment_stamp"] == ""
+    began = (read.segment_stamp.sec, read.segment_stamp.nanosec)
+    assert began == ((0, 0) if segment_us is None else (1_700_000_000, 103_456_000))
+    for name in ("grasp", "probability", "health", "state", "segment", "segment_type", "segment_probability"):
+        assert getattr(read, name) == getattr(grasp, name)
+    assert (read.candidate, read.margin, tuple(read.lost)) == (grasp.candidate, -(2**40), grasp.lost)

@@ -1,0 +1,62 @@
+"""Topics of an MQTT broker (extra `mqtt`): the JSON lines of `jsonl`, each sent at most once (quality of service 0).
+
+    TOPIC/grasp   the line of a grasp
+    TOPIC/joints  the header that names the joints of its angles; retained, so that late readers have it, too
+    TOPIC/health  once a second, if requested: the glove's health
+
+A broker that goes away is connected to again; what comes meanwhile is lost.
+"""
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from .. import mqtt
+from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
+from .base import LATE_US, Sink, SinkError, SinkKind, SinkPlace
+from .jsonl import encode, encode_header, encode_health
+
+if TYPE_CHECKING:
+    from paho.mqtt.client import Client
+
+_RATE_HZ = 20
+# How long a broker may take nothing before a line is lost, live and in a replay.
+_LIVE_S, _REPLAY_S = LATE_US / 1e6, 10.0
+
+
+class MqttTopics(Sink):
+    """Publishes below a topic, through a connected client."""
+
+    def __init__(self, client: "Client", where: str, longest_s: float = _LIVE_S) -> None:
+        self.where, self._client, self._longest_s = where, client, longest_s
+        self._topic = mqtt.topic_of(where)
+        self._joints: tuple[str, ...] = ()
+
+    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
+        """Publish the line, after a header if the joints are others than before."""
+        if angles is not None and angles.names != self._joints:
+            self._joints = angles.names
+            self.attempt(partial(self._send, "joints", encode_header(angles), retain=True))
+        self.attempt(partial(self._send, "grasp", encode(grasp, preshape, angles)))
+
+    def health(self, report: HealthReport) -> None:
+        """Publish the report's line."""
+        self.attempt(partial(self._send, "health", encode_health(report)))
+
+    def _send(self, topic: str, line: bytes, *, retain: bool = False) -> None:
+        sent = self._client.publish(f"{self._topic}/{topic}", line.rstrip(), retain=retain)
+        sent.wait_for_publish(self._longest_s)
+        if not sent.is_published():
+            raise TimeoutError("the broker takes nothing")
+
+    def close(self) -> None:
+        """Leave the broker, once all is sent."""
+        self._client.disconnect()
+        self._client.loop_stop()
+
+
+def _open(where: SinkPlace) -> Sink:
+    place = f"mqtt:{where.place}"
+    return MqttTopics(mqtt.connect(place, SinkError), place, _REPLAY_S if where.wait else _LIVE_S)
+
+
+MEMBER = SinkKind("mqtt", "HOST[:PORT]/TOPIC", "JSON lines to topics of an MQTT broker", _open, rate=_RATE_HZ, rank=7)
