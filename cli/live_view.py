@@ -1,8 +1,7 @@
 """The live terminal view of `thenar run`: the grasp, its confidence, and the state of the devices."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from threading import Event, Thread
+from time import monotonic
 from typing import Self
 
 from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, OutputTrouble, Quarantined
@@ -17,48 +16,26 @@ _SHOWN = 6
 
 
 class LiveView:
-    """Draws the newest grasp ten times a second, in place.
-
-    It draws in a separate thread: a terminal that is held (Ctrl-S), slow or closed delays nothing else.
-    """
+    """Draws the newest grasp ten times a second, in place, on a console whose stream keeps nobody waiting."""
 
     def __init__(self, console: Console) -> None:
-        self._live = Live(console)
-        self._newest: tuple[LiveGrasp, Devices, HealthReport | None] | None = None
-        self._closing = Event()
-        self._thread = Thread(target=self._draw, name="thenar view", daemon=True)
+        self._live, self._due_s = Live(console), 0.0
 
     def __enter__(self) -> Self:
-        self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._closing.set()
-        self._thread.join()
-        with suppress(OSError):
-            self._live.__exit__()
+        self._live.__exit__()
 
-    def show(
-        self,
-        grasp: LiveGrasp,
-        devices: Devices,
-        health: HealthReport | None = None,
-    ) -> None:
-        """Draw this next, unless something newer arrives first; the devices are queried then."""
-        self._newest = grasp, devices, health
-
-    def _draw(self) -> None:
-        shown = None
-        # The thread also ends when the terminal closes.
-        with suppress(OSError):
-            while not self._closing.wait(_REDRAW_S):
-                newest = self._newest
-                if newest is not None and newest is not shown:
-                    grasp, devices, health = shown = newest
-                    wrong = list[Quarantined | OutputTrouble]()
-                    if health is not None:
-                        wrong += [*health.quarantined, *health.outputs]
-                    self._live.update(drawn(grasp, devices(), wrong))
+    def show(self, grasp: LiveGrasp, devices: Devices, health: HealthReport | None = None) -> None:
+        """Draw this if it is time; the devices are queried then."""
+        if monotonic() < self._due_s:
+            return
+        self._due_s = monotonic() + _REDRAW_S
+        wrong: tuple[Quarantined | OutputTrouble, ...] = ()
+        if health is not None:
+            wrong = (*health.quarantined, *health.outputs)
+        self._live.update(drawn(grasp, devices(), wrong))
 
 
 def drawn(

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from thenar.runtime.sinks import SinkReport
 
 
+# From row to row of a set, which has no times of frames.
+_PERIOD_US = 10_000
+
+
 def selecting(build: "Build", preshape: str | None, **how: bool) -> "PreshapeSelector | None":
     """Return the selector of preshapes, if one was requested."""
     if preshape is None:
@@ -67,7 +71,6 @@ def replay_set(
     sinks: Sequence[str],
     selector: "PreshapeSelector | None",
     frames: int | None,
-    period_us: int,
 ) -> None:
     """Classify every row of a set of grasps alone and send it to each sink, or as a JSON line to stdout if there is
     none; on stderr, print the accuracy, and whether the build was trained on these trials.
@@ -93,7 +96,7 @@ def replay_set(
         return msgspec.json.encode(shown if selector is None else shown | {"preshape": shape}) + b"\n"
 
     with _published(build, sinks, selector, line) as publish:
-        for grasp in replayed(build, grasp_set, period_us):
+        for grasp in replayed(build, grasp_set, _PERIOD_US):
             found.append(grasp.grasp)
             publish(grasp, None)
     rows = len(grasp_set)

@@ -50,13 +50,6 @@ def _sinks_help() -> str:
 @click.option(
     "--replay", metavar="FILE", type=existing_file, help="Recorded frames: a .grasps set, or the .mcap of a live run."
 )
-@click.option(
-    "--period-us",
-    type=click.IntRange(1),
-    default=10_000,
-    show_default=True,
-    help="Time between two rows of a .grasps set.",
-)
 @click.option("--sink", "sinks", metavar="SINK", multiple=True, cls=LazyOption, describe=_sinks_help)
 @click.option(
     "--preshape", metavar="NAME", help="Preshapes to send with grasps: barrett_bh8, parallel_gripper or a .toml file."
@@ -76,11 +69,6 @@ def _sinks_help() -> str:
 @click.option("--lead", type=Number(0), help="Lead in score units that a new grasp type needs.")
 @click.option("--dwell-ms", type=Number(0, 10_000), help="Time for which a new grasp type must keep the lead.")
 @click.option("--max-lost", type=Number(0, 1), help="Share of the build's weight that may be missing.")
-@click.option(
-    "--grace-ms",
-    type=Number(0, 10_000),
-    help="Maximum age of a late CyberGlove record.  [default: four periods, at least 60]",
-)
 @click.option("--no-quarantine", is_flag=True, help="Use switches even if they are stuck or chatter.")
 @click.option(
     "--lag-ms", type=Number(0, 10_000), help="Time after which the state of a segment is final.  [default: 150]"
@@ -89,7 +77,6 @@ def command(
     build: Path,
     glove: Path | None,
     replay: Path | None,
-    period_us: int,
     sinks: tuple[str, ...],
     preshape: str | None,
     change_while_held: bool,
@@ -119,7 +106,7 @@ def command(
         raise click.UsageError("name either a glove to run on (--glove) or recorded frames (--replay)")
     from thenar.runtime import Build
 
-    _refuse_idle(glove, replay)
+    _refuse_idle(replay)
     loaded = Build.load(build)
     policy = _policy(deciding)
     if replay is None:
@@ -139,24 +126,22 @@ def command(
         selector = selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
         replay_recording(loaded, replay, sinks, selector, frames, policy)
     else:
-        replay_set(loaded, replay, sinks, selecting(loaded, preshape, segments=False), frames, period_us)
+        replay_set(loaded, replay, sinks, selecting(loaded, preshape, segments=False), frames)
 
 
 _LIVE = ("record", "web", "web_token", "status")
-_POLICY = ("lead", "dwell_ms", "max_lost", "grace_ms", "no_quarantine", "lag_ms")
+_POLICY = ("lead", "dwell_ms", "max_lost", "no_quarantine", "lag_ms")
 
 
-def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
+def _refuse_idle(replay: Path | None) -> None:
     """Raise UsageError for an option that would have no effect."""
     if click.get_current_context().params["preshape"] is None:
         _refuse("without --preshape", "change_while_held")
     if click.get_current_context().params["web"] is None:
         _refuse("without --web", "web_token")
-    if glove is not None:
-        _refuse("on a glove", "period_us")
-    elif replay is not None and replay.suffix == ".mcap":
-        _refuse("for a recording, which has the times of its frames", "period_us", *_LIVE)
-    else:
+    if replay is not None and replay.suffix == ".mcap":
+        _refuse("for a recording", *_LIVE)
+    elif replay is not None:
         alone = "for a set of grasps, each row of which is classified alone"
         _refuse(alone, "change_while_held", *_LIVE, *_POLICY)
 
@@ -228,8 +213,11 @@ def _run_live(
 
 def _look_on(glove: "Glove", view: "LiveView | None", page: "LivePage | None", frames: int | None) -> None:
     """Let the glove run, and check its health once a second."""
-    said, health = dict[str, str](), None
+    from .service_command import watchdog
+
+    said, health, alive = dict[str, str](), None, watchdog()
     for moment in islice(glove, frames):
+        alive(moment.grasp)
         if page is not None:
             page.show(moment)
         if glove.health is not health and glove.health is not None:
