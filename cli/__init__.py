@@ -13,7 +13,7 @@ from threading import Event, Thread, current_thread, main_thread
 from types import FrameType
 
 # A shell reports a command ended by a signal as this plus the signal's number.
-_SIGNALLED = 128
+SIGNALLED = 128
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -29,7 +29,7 @@ def run(arguments: Sequence[str]) -> int:
             return run_group(arguments)
     except KeyboardInterrupt:
         sys.stderr.write("thenar: interrupted\n" if came[-1] == signal.SIGINT else "thenar: terminated\n")
-        return _SIGNALLED + came[-1]
+        return SIGNALLED + came[-1]
 
 
 @contextmanager

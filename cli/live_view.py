@@ -2,11 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from time import monotonic
-from typing import Self
 
 from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, OutputTrouble, Quarantined
 
-from .consoles import Console, Live, Printed, Text, bar, grid
+from .consoles import Live, Printed, Text, bar, grid
 
 Devices = Callable[[], Sequence[DeviceHealth]]
 
@@ -15,17 +14,10 @@ _STYLES = {"ok": "bold green", "changing": "bold cyan", "degraded": "bold yellow
 _SHOWN = 6
 
 
-class LiveView:
+class LiveView(Live):
     """Draws the newest grasp ten times a second, in place, on a console whose stream keeps nobody waiting."""
 
-    def __init__(self, console: Console) -> None:
-        self._live, self._due_s = Live(console), 0.0
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._live.__exit__()
+    _due_s = 0.0
 
     def show(self, grasp: LiveGrasp, devices: Devices, health: HealthReport | None = None) -> None:
         """Draw this if it is time; the devices are queried then."""
@@ -35,7 +27,7 @@ class LiveView:
         wrong: tuple[Quarantined | OutputTrouble, ...] = ()
         if health is not None:
             wrong = (*health.quarantined, *health.outputs)
-        self._live.update(drawn(grasp, devices(), wrong))
+        self.update(drawn(grasp, devices(), wrong))
 
 
 def drawn(

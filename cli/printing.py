@@ -47,11 +47,6 @@ def say(line: str) -> None:
         echo(line, err=True)
 
 
-def say_page(url: str) -> None:
-    """Print the address of the page."""
-    echo(f"thenar: the page is at {url}", err=True)
-
-
 def out() -> Console:
     """Return the console for results; its lines are 200 characters wide outside a terminal."""
     console = Console()

@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 _PERIOD_US = 10_000
 
 
-def selecting(build: "Build", preshape: str | None, **how: bool) -> "PreshapeSelector | None":
+def selecting(build: "Build", preshape: str | None, *, segments: bool) -> "PreshapeSelector | None":
     """Return the selector of preshapes, if one was requested."""
     if preshape is None:
         return None
     from thenar.runtime.preshape import preshape_selector
 
-    selector, lacking = preshape_selector(preshape, build, **how)
+    selector, lacking = preshape_selector(preshape, build, segments=segments)
     if lacking:
         err().print(f"thenar: {lacking}")
     return selector
@@ -158,18 +158,12 @@ def _published(
         click.get_current_context().exit(1)
 
 
-def nobody_listens(reports: Sequence["SinkReport"]) -> bool:
-    """Return whether every reader has gone for good (`| head`)."""
-    return bool(reports) and all(report.gone for report in reports)
-
-
 def say_what_was_lost(reports: Sequence["SinkReport"]) -> None:
     """Print on stderr what was not sent."""
     for report in reports:
         if report.lost or report.error:
             why = f": {report.error}" if report.error else ""
-            dropped = f", {report.dropped} readers dropped" if report.dropped else ""
-            say(f"{report.where}: {report.sent} frames sent, {report.lost} lost{dropped}{why}")
+            say(f"{report.where}: {report.sent} frames sent, {report.lost} lost{why}")
 
 
 def spoilt(reports: Sequence["SinkReport"]) -> bool:

@@ -6,10 +6,9 @@ import socket
 import stat
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -18,9 +17,6 @@ from thenar.drivers.names import fault
 from .parameters import OutputFolder
 from .printing import echo, warning
 
-if TYPE_CHECKING:
-    from thenar.runtime.published import LiveGrasp
-
 # Where each file of the folder `service` belongs.
 _PLACES = {
     "thenar.conf": "etc/sysusers.d/thenar.conf",
@@ -28,12 +24,10 @@ _PLACES = {
     "thenar.service": "etc/systemd/system/thenar.service",
 }
 _RELOAD = ("udevadm control --reload", "udevadm trigger", "systemctl daemon-reload")
-_BEFORE = {"uninstall": ("systemctl disable --now thenar",)}
 _AFTER = {
     "install": ("systemd-sysusers", *_RELOAD, "systemctl enable thenar", "systemctl restart thenar"),
     "uninstall": _RELOAD,
 }
-_LONGEST_PATH = 4095  # of Linux
 
 
 @click.command("service", context_settings={"ignore_unknown_options": True})
@@ -61,8 +55,8 @@ def command(action: str, words: tuple[str, ...], root: Path, dry_run: bool) -> N
         texts = {path: _filled(name, words) for path, name in paths.items()}
     elif not texts:
         raise click.UsageError(f"no service of thenar is installed in {root}")
-    shown, before, after = dry_run or action == "show", _BEFORE.get(action, ()), _AFTER.get(action, ())
-    _run(before, root, dry_run)
+    shown = dry_run or action == "show"
+    _run(["systemctl disable --now thenar"] * (action == "uninstall"), root, dry_run)
     try:
         for path, text in texts.items():
             if shown:
@@ -74,7 +68,7 @@ def command(action: str, words: tuple[str, ...], root: Path, dry_run: bool) -> N
                 path.unlink()
     except PermissionError as reason:
         raise click.UsageError(f"{reason.filename}: {reason.strerror}: use sudo, or name a --root") from None
-    _run(after, root, dry_run)
+    _run(_AFTER.get(action, ()), root, dry_run)
 
 
 def _filled(name: str, words: tuple[str, ...]) -> str:
@@ -87,7 +81,7 @@ def _filled(name: str, words: tuple[str, ...]) -> str:
     asked = run.make_context("thenar run", [*words]).params
     if asked["glove"] is None:
         raise click.UsageError("a service runs on a glove: name its --glove")
-    if reason := fault(str(Path.cwd()), _LONGEST_PATH):
+    if reason := fault(str(Path.cwd()), 4095):
         raise click.UsageError(f"the path of this folder {reason}, so no service can name it: go to another")
     for path in (Path(sys.executable), asked["build"], asked["glove"]):
         if closed := [above for above in path.absolute().parents if not above.stat().st_mode & stat.S_IXOTH]:
@@ -111,30 +105,9 @@ def _run(lines: Iterable[str], root: Path, dry_run: bool) -> None:
             raise click.ClickException(f"{line} has failed: see above")
 
 
-def watchdog() -> "Callable[[LiveGrasp], None]":
-    """Tell systemd, if that started this program and asks for it, that it runs.
-
-    Return what to call with each grasp: it reports those of current frames, four times in the time after which systemd
-    starts the program anew.
-    """
-    from thenar.runtime.sinks.base import LATE_US
-
-    place, period_us, due_us = os.environ.get("NOTIFY_SOCKET", ""), int(os.environ.get("WATCHDOG_USEC", 0)) // 4, 0
-    if not place:
-        return lambda _grasp: None
-    line = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-    line.setblocking(False)
-
-    def tell(state: bytes) -> None:
-        with suppress(OSError):
-            line.sendto(state, place.replace("@", "\0", 1) if place[0] == "@" else place)
-
-    def alive(grasp: "LiveGrasp") -> None:
-        nonlocal due_us
-        ages_us = [age_us for age_us in (grasp.switch_age_us, grasp.glove_age_us) if age_us is not None]
-        if grasp.time_us >= due_us and min(ages_us, default=LATE_US) < LATE_US:
-            due_us = grasp.time_us + period_us
-            tell(b"WATCHDOG=1")
-
-    tell(b"READY=1")
-    return alive
+def notify(state: bytes) -> None:
+    """Tell systemd a state of this program, if that has started it."""
+    if place := os.environ.get("NOTIFY_SOCKET"):
+        with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
+            line.setblocking(False)
+            line.sendto(state, f"\0{place[1:]}" if place[0] == "@" else place)

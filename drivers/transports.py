@@ -30,8 +30,7 @@ _TIMESPEC = struct.Struct("@ll")
 # Labels of a host's name are not empty, and at most 63 characters long: getaddrinfo raises UnicodeError for others.
 _HOST = r"[A-Za-z0-9_-]{1,63}(?:\.[A-Za-z0-9_-]{1,63})*\.?"
 _NET = re.compile(rf"(tcp|udp)://(\[[0-9A-Fa-f:.%]+\]|{_HOST}):(\d{{1,5}})/?")
-# Ports of rows that other readers open.
-OTHER_PORTS = ("lsl:", "ros:", "mqtt:", "osc:")
+OTHER_PORTS = ("lsl:", "ros:", "mqtt:", "osc:")  # of rows that other readers open
 _WAYS = "lines come from a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, udp://HOST:PORT or - (standard input)"
 
 

@@ -28,6 +28,7 @@ _NO_WHEEL = (
     "setup.bash, and make the venv with --system-site-packages; or send grasps by mqtt: to a computer with ROS"
 )
 Kind = Callable[[str], Any]
+Read = Callable[[float], list[tuple[Any, Hashable]]]
 
 
 class Node(ABC):
@@ -44,16 +45,10 @@ class Node(ABC):
         """
 
     @abstractmethod
-    def readers(self) -> int:
-        """Return the number of readers of the first topic that is written."""
-
-    @abstractmethod
-    def subscribe(self, topic: str, kind: str) -> None:
-        """Let `read` return the messages of a topic, from reliable and best-effort writers."""
-
-    @abstractmethod
-    def read(self, timeout_s: float) -> list[tuple[Any, Hashable]]:
-        """Return the messages that came, and who sent each, as far as that is known; wait until the timeout for one."""
+    def reader(self, topic: str, kind: str) -> Read:
+        """Return what reads messages of a topic, from reliable and best-effort writers: until a time in seconds is over
+        it waits for some, and it returns them with who sent each, as far as that is known.
+        """
 
     @abstractmethod
     def close(self) -> None:
@@ -95,20 +90,10 @@ def domain() -> int:
 def state(kind: Kind, grasp: LiveGrasp) -> Any:
     """Return a prediction as thenar_msgs/Grasp, stamped with its moment."""
     began_us = 0 if grasp.segment_us is None else grasp.unix_us - grasp.time_us + grasp.segment_us
-    return kind("thenar_msgs/Grasp")(
-        header=_header(kind, grasp.unix_us),
-        grasp=grasp.grasp,
-        probability=grasp.probability,
-        health=grasp.health,
-        state=grasp.state,
-        segment=grasp.segment,
-        segment_type=grasp.segment_type,
-        segment_probability=grasp.segment_probability,
-        segment_stamp=_time(kind, began_us),
-        candidate=grasp.candidate,
-        margin=grasp.margin,
-        lost=list(grasp.lost),
-    )
+    same = ("grasp", "probability", "health", "state", "segment", "segment_type", "segment_probability")
+    values = {name: getattr(grasp, name) for name in (*same, "candidate", "margin")}
+    header, began = _header(kind, grasp.unix_us), _time(kind, began_us)
+    return kind("thenar_msgs/Grasp")(header=header, segment_stamp=began, lost=list(grasp.lost), **values)
 
 
 def joint_state(kind: Kind, unix_us: int, angles: JointAngles) -> Any:

@@ -8,14 +8,14 @@ rmw_fastrtps send theirs. A participant is on this machine only, unless it is pu
 import os
 import socket
 from collections.abc import Callable, Hashable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
 from thenar.drivers.errors import DeviceError
 from thenar.drivers.extras import optional
 
-from .ros import DEPTH, READ_DEPTH, Node
+from .ros import DEPTH, PACKAGE, READ_DEPTH, Node, Read
 
 with optional():
     from cyclonedds.core import DDSException, ReadCondition, WaitSet
@@ -30,79 +30,45 @@ with optional():
     from cyclonedds.topic import Topic
 
 _sequence: Any = types.sequence  # Cyclone's says nothing to a type checker
-TYPES: dict[str, Any] = {}
+_PLAIN = {"string": str, "float32": float32, "float64": float64, "int32": int32, "int64": int64}
+_PLAIN |= {"uint8": uint8, "uint32": uint32}
+# Their .msg files, and type hashes of those that are sent by themselves. Positions are in rad or m; what is unknown is
+# empty; a stamp of zero in a trajectory's header means: start now.
+_MESSAGES = {
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec",
+    "builtin_interfaces/Duration": "int32 sec\nuint32 nanosec",
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id",
+    "std_msgs/String": "string data",
+    "sensor_msgs/JointState": """
+        std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort""",
+    "trajectory_msgs/JointTrajectoryPoint": """
+        float64[] positions\nfloat64[] velocities\nfloat64[] accelerations\nfloat64[] effort
+        builtin_interfaces/Duration time_from_start""",
+    "trajectory_msgs/JointTrajectory": """
+        std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/JointTrajectoryPoint[] points""",
+    "std_msgs/MultiArrayDimension": "string label\nuint32 size\nuint32 stride",
+    "std_msgs/MultiArrayLayout": "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset",
+    "std_msgs/UInt8MultiArray": "std_msgs/MultiArrayLayout layout\nuint8[] data",
+    "std_msgs/Float32MultiArray": "std_msgs/MultiArrayLayout layout\nfloat32[] data",
+    "thenar_msgs/Grasp": (PACKAGE / "msg" / "Grasp.msg").read_text(encoding="utf-8"),
+}
 # REP-2011: ROS 2 from Iron on expects it in the endpoint's user data, and warns if it is missing.
-TYPE_HASHES: dict[str, str] = {}
-
-
-def _message(name: str, type_hash: str = "", /, **fields: Any) -> Any:
-    """Return the type of a message, a dataclass; only those that are sent by themselves need a hash."""
-    package, _, kind = name.partition("/")
-    made: Any = final(make_idl_struct(kind, f"{package}::msg::dds_::{kind}_", fields))
-    TYPES[name], TYPE_HASHES[name] = made, f"RIHS01_{type_hash}"
-    return made
-
-
-Time = _message("builtin_interfaces/Time", sec=int32, nanosec=uint32)
-Duration = _message("builtin_interfaces/Duration", sec=int32, nanosec=uint32)
-Header = _message("std_msgs/Header", stamp=Time, frame_id=str)
-_message("std_msgs/String", "df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18", data=str)
-# Positions in rad or m; what is unknown is empty.
-_message(
-    "sensor_msgs/JointState",
-    "a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e",
-    header=Header,
-    name=_sequence[str],
-    position=_sequence[float64],
-    velocity=_sequence[float64],
-    effort=_sequence[float64],
-)
-JointTrajectoryPoint = _message(
-    "trajectory_msgs/JointTrajectoryPoint",
-    positions=_sequence[float64],
-    velocities=_sequence[float64],
-    accelerations=_sequence[float64],
-    effort=_sequence[float64],
-    time_from_start=Duration,
-)
-# A stamp of zero in the header means: start now.
-_message(
-    "trajectory_msgs/JointTrajectory",
-    "179b33eba59d676f6d967ac71fe35e7ca2f64b2f3928f4a018cec115e213796e",
-    header=Header,
-    joint_names=_sequence[str],
-    points=_sequence[JointTrajectoryPoint],
-)
-MultiArrayDimension = _message("std_msgs/MultiArrayDimension", label=str, size=uint32, stride=uint32)
-MultiArrayLayout = _message("std_msgs/MultiArrayLayout", dim=_sequence[MultiArrayDimension], data_offset=uint32)
-_message(
-    "std_msgs/UInt8MultiArray",
-    "5687e861b8d307a5e48b7515467ae7a5fc2daf805bd0ce6d8e9e604bade9f385",
-    layout=MultiArrayLayout,
-    data=_sequence[uint8],
-)
-_message(
-    "std_msgs/Float32MultiArray",
-    "0599f6f85b4bfca379873a0b4375a0aca022156bd2d7021275d116ed1fa8bfe0",
-    layout=MultiArrayLayout,
-    data=_sequence[float32],
-)
-_message(
-    "thenar_msgs/Grasp",
-    "0b5789eb17a6e4b7a7199a37912d6174c762ca7a6d22d6a72da0591454f6047c",
-    header=Header,
-    grasp=str,
-    probability=float64,
-    health=str,
-    state=str,
-    segment=uint32,
-    segment_type=str,
-    segment_probability=float64,
-    segment_stamp=Time,
-    candidate=str,
-    margin=int64,
-    lost=_sequence[str],
-)
+TYPE_HASHES = {
+    "std_msgs/String": "df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
+    "sensor_msgs/JointState": "a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e",
+    "trajectory_msgs/JointTrajectory": "179b33eba59d676f6d967ac71fe35e7ca2f64b2f3928f4a018cec115e213796e",
+    "std_msgs/UInt8MultiArray": "5687e861b8d307a5e48b7515467ae7a5fc2daf805bd0ce6d8e9e604bade9f385",
+    "std_msgs/Float32MultiArray": "0599f6f85b4bfca379873a0b4375a0aca022156bd2d7021275d116ed1fa8bfe0",
+    "thenar_msgs/Grasp": "0b5789eb17a6e4b7a7199a37912d6174c762ca7a6d22d6a72da0591454f6047c",
+}
+TYPES: dict[str, Any] = {}
+for _name, _text in _MESSAGES.items():
+    _fields = {}
+    for _kind, _field in (line.split() for line in _text.splitlines() if line.strip() and not line.startswith("#")):
+        _type = (_PLAIN | TYPES)[_kind.removesuffix("[]")]
+        _fields[_field] = _sequence[_type] if _kind.endswith("[]") else _type
+    _package, _, _short = _name.partition("/")
+    TYPES[_name] = final(make_idl_struct(_short, f"{_package}::msg::dds_::{_short}_", _fields))
 
 _UNLIMITED = -1
 _ANY = 0xFFFFFFFF  # samples, views and instances of all states
@@ -124,20 +90,8 @@ _LOOPBACK = _FORM.format(
 _DESCRIPTORS = Path("/proc/self/fd")
 
 
-def join(number: int, *, public: bool) -> tuple[Domain | None, DomainParticipant]:
-    """Return the domain, if it is ours to end, and a participant in it.
-
-    CYCLONEDDS_URI selects the network if it is set. Otherwise it is loopback only, unless `public`. Raises
-    DDSException, and OSError if the system does not limit a socket to loopback.
-    """
-    users = os.environ.get("CYCLONEDDS_URI", "")
-    if users or public:
-        return _join(number, f"{users},{_SETTINGS}" if users else _SETTINGS)
-    with _kept_to_loopback():
-        return _join(number, f"{_LOOPBACK},{_SETTINGS}")
-
-
-def _join(number: int, settings: str) -> tuple[Domain | None, DomainParticipant]:
+def join(number: int, settings: str) -> tuple[Domain | None, DomainParticipant]:
+    """Return the domain, if it is ours to end, and a participant in it."""
     try:
         ours = Domain(number, settings)
     except DDSException as reason:
@@ -176,21 +130,24 @@ def _sockets() -> dict[int, str]:
 
 
 class DdsNode(Node):
-    """A participant in the domain of ROS's nodes."""
+    """A participant in the domain of ROS's nodes.
+
+    CYCLONEDDS_URI selects the network if it is set. Otherwise it is loopback only, unless `public`.
+    """
 
     def __init__(self, number: int, *, public: bool) -> None:
         self._participant: Any
+        users = os.environ.get("CYCLONEDDS_URI", "")
+        network = users or ("" if public else _LOOPBACK)
         try:
-            self._domain, self._participant = join(number, public=public)
+            with nullcontext() if users or public else _kept_to_loopback():
+                self._domain, self._participant = join(number, f"{network},{_SETTINGS}".lstrip(","))
         except DDSException as reason:
             advice = "Check CYCLONEDDS_URI, and the network interfaces that it names."
             raise DeviceError(f"in domain {number}: {reason} {advice}") from None
         except OSError as reason:
             need = "That takes Linux 5.7 or newer; ?public lets other machines read"
             raise DeviceError(f"for this machine alone: {reason.strerror}. {need}") from None
-        self._writers: list[Any] = []
-        self._reader: Any = None
-        self._waiting: Any = None
 
     def kind(self, name: str) -> Any:
         """Return the type."""
@@ -206,34 +163,28 @@ class DdsNode(Node):
             Policy.History.KeepLast(DEPTH),
             Policy.WriterDataLifecycle(autodispose=False),
         ]
-        made = DataWriter(self._participant, self._topic(topic, kind), qos=_qos(kind, *policies))
-        self._writers.append(made)
-        return made.write
+        return DataWriter(self._participant, self._topic(topic, kind), qos=_qos(kind, *policies)).write
 
-    def readers(self) -> int:
-        """Return the number of readers of the first topic that is written."""
-        return self._writers[0].get_publication_matched_status().current_count if self._writers else 0
-
-    def subscribe(self, topic: str, kind: str) -> None:
-        """Let `read` return the messages of a topic."""
+    def reader(self, topic: str, kind: str) -> Read:
+        """Return what reads messages of this type."""
         policies = Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(READ_DEPTH)
         try:
             made = DataReader(self._participant, self._topic(topic, kind), qos=_qos(kind, *policies))
-            self._waiting = WaitSet(self._participant)
-            self._waiting.attach(ReadCondition(made, _ANY))
+            waiting = WaitSet(self._participant)
+            waiting.attach(ReadCondition(made, _ANY))
         except DDSException as reason:
             raise DeviceError(f"with {topic}: {reason}") from None
-        self._reader = made
 
-    def read(self, timeout_s: float) -> list[tuple[Any, Hashable]]:
-        """Return the messages that came, and who sent each."""
-        try:
-            self._waiting.wait(timeout=max(1, round(timeout_s * 1e9)))
-            samples = self._reader.take(N=READ_DEPTH)
-        except DDSException as reason:
-            raise DeviceError(str(reason)) from None
-        # Others say that a writer has gone.
-        return [(one, one.sample_info.publication_handle) for one in samples if one.sample_info.valid_data]
+        def read(timeout_s: float) -> list[tuple[Any, Hashable]]:
+            try:
+                waiting.wait(timeout=max(1, round(timeout_s * 1e9)))
+                samples = made.take(N=READ_DEPTH)
+            except DDSException as reason:
+                raise DeviceError(str(reason)) from None
+            # Others say that a writer has gone.
+            return [(one, one.sample_info.publication_handle) for one in samples if one.sample_info.valid_data]
+
+        return read
 
     def _topic(self, name: str, kind: str) -> Any:
         return Topic(self._participant, f"rt{name}", TYPES[kind])
@@ -241,8 +192,7 @@ class DdsNode(Node):
     def close(self) -> None:
         """Leave the domain."""
         # Each entity ends with its last name; the domain, which ends all that is left in it, goes last.
-        self._writers.clear()
-        self._reader = self._waiting = self._participant = None
+        self._participant = None
         self._domain = None
 
 
@@ -250,5 +200,5 @@ def _qos(kind: str, *policies: Any) -> Qos:
     return Qos(
         *policies,
         Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
-        Policy.Userdata(f"typehash={TYPE_HASHES[kind]};".encode()),
+        Policy.Userdata(f"typehash=RIHS01_{TYPE_HASHES[kind]};".encode()),
     )

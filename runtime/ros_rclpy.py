@@ -1,7 +1,6 @@
 """ROS 2 by rclpy, which comes with a ROS installation."""
 
 import os
-from collections import deque
 from collections.abc import Callable, Hashable
 from importlib import import_module
 from typing import Any
@@ -12,7 +11,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from thenar.drivers.errors import SettingError
 
-from .ros import DEPTH, PACKAGE, READ_DEPTH, Node
+from .ros import DEPTH, PACKAGE, READ_DEPTH, Node, Read
 
 
 class RclpyNode(Node):
@@ -29,8 +28,6 @@ class RclpyNode(Node):
         self._node = rclpy.create_node("thenar", context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        self._topics: list[str] = []
-        self._came = deque[Any](maxlen=READ_DEPTH)
 
     def kind(self, name: str) -> Any:
         """Return the type. Raises SettingError if its package is not built."""
@@ -46,30 +43,24 @@ class RclpyNode(Node):
     def writer(self, topic: str, kind: str, *, kept: bool = False) -> Callable[[Any], object]:
         """Return what publishes messages of this type."""
         durability = DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE
-        made = self._node.create_publisher(self.kind(kind), topic, QoSProfile(depth=DEPTH, durability=durability))
-        self._topics.append(topic)
-        return made.publish  # type: ignore[no-any-return]
+        profile = QoSProfile(depth=DEPTH, durability=durability)
+        return self._node.create_publisher(self.kind(kind), topic, profile).publish  # type: ignore[no-any-return]
 
-    def readers(self) -> int:
-        """Return the number of readers of the first topic that is written."""
-        return self._node.count_subscribers(self._topics[0]) if self._topics else 0
+    def reader(self, topic: str, kind: str) -> Read:
+        """Return what reads messages of this type."""
+        came, profile = list[Any](), QoSProfile(depth=READ_DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self._node.create_subscription(self.kind(kind), topic, came.append, profile)
 
-    def subscribe(self, topic: str, kind: str) -> None:
-        """Let `read` return the messages of a topic."""
-        profile = QoSProfile(depth=READ_DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self._node.create_subscription(self.kind(kind), topic, self._came.append, profile)
+        def read(timeout_s: float) -> list[tuple[Any, Hashable]]:
+            came.clear()
+            self._executor.spin_once(timeout_sec=timeout_s)
+            return [(message, None) for message in came]
 
-    def read(self, timeout_s: float) -> list[tuple[Any, Hashable]]:
-        """Return the messages that came."""
-        self._executor.spin_once(timeout_sec=timeout_s)
-        came: list[tuple[Any, Hashable]] = [(message, None) for message in self._came]
-        self._came.clear()
-        return came
+        return read
 
     def close(self) -> None:
         """End the node and its context."""
         if self._context.ok():
-            self._topics.clear()
             self._executor.shutdown()
             self._node.destroy_node()
             rclpy.shutdown(context=self._context)

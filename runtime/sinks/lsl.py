@@ -15,7 +15,7 @@ from thenar.drivers.lsl import load_pylsl
 from thenar.drivers.names import fault
 
 from ..published import JointAngles, LiveGrasp, Preshape
-from .base import Sink, SinkError, SinkKind, SinkPlace
+from .base import Sink, SinkError, SinkKind
 
 
 class LslStreams(Sink):
@@ -63,8 +63,10 @@ class LslStreams(Sink):
         self._closed, self._grasps, self._angles = True, None, None
 
 
-def _open(where: SinkPlace) -> Sink:
-    return LslStreams(where.place, stamped=not where.wait)
-
-
-MEMBER = SinkKind("lsl", "NAME", "grasp types and joints as streams of the Lab Streaming Layer", _open, rank=5)
+MEMBER = SinkKind(
+    "lsl",
+    "NAME",
+    "grasp types and joints as streams of the Lab Streaming Layer",
+    lambda where: LslStreams(where.place, stamped=not where.wait),
+    rank=5,
+)

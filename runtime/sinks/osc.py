@@ -10,8 +10,7 @@ PREFIX is /thenar unless the place ends in another one.
 
 import re
 import socket
-from collections.abc import Callable, Iterable
-from functools import partial
+from collections.abc import Iterable
 from typing import Any
 
 from msgspec import json
@@ -32,12 +31,7 @@ class OscMessages(Sink):
     """Sends bundles to an address; a receiver that is not there is reported, as far as the system notices it."""
 
     def __init__(self, where: str, place: str) -> None:
-        from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
-        from pythonosc.osc_message_builder import OscMessageBuilder
-
         self.where = where
-        self._bundle: Callable[[], Any] = partial(OscBundleBuilder, IMMEDIATELY)
-        self._message: Callable[[str], Any] = OscMessageBuilder
         host, slash, prefix = place.partition("/")
         self._prefix = f"/{prefix}" if slash else "/thenar"
         if not _PREFIX.fullmatch(self._prefix):
@@ -64,9 +58,12 @@ class OscMessages(Sink):
         self.attempt(lambda: self._send([("health", (json.encode(report).decode(),))]))
 
     def _send(self, messages: Iterable[tuple[str, Iterable[Any]]]) -> None:
-        bundle = self._bundle()
+        from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
+        from pythonosc.osc_message_builder import OscMessageBuilder
+
+        bundle = OscBundleBuilder(IMMEDIATELY)
         for address, values in messages:
-            message = self._message(f"{self._prefix}/{address}")
+            message = OscMessageBuilder(f"{self._prefix}/{address}")
             for value in values:
                 message.add_arg(value)
             bundle.add_content(message.build())
@@ -79,7 +76,8 @@ class OscMessages(Sink):
 
 def _open(where: SinkPlace) -> Sink:
     with optional(SinkError, where.text):
-        return OscMessages(f"osc:{where.place}", where.place)
+        import pythonosc.osc_bundle_builder  # noqa: F401
+    return OscMessages(f"osc:{where.place}", where.place)
 
 
 MEMBER = SinkKind("osc", "HOST:PORT[/PREFIX]", "bundles of Open Sound Control by UDP", _open, rate=_RATE_HZ, rank=8)

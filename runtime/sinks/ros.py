@@ -12,7 +12,6 @@ are transient local: late readers get the newest at once. Nodes of this machine 
 settings of ROS or Cyclone DDS (CYCLONEDDS_URI) allow them; ROS_DOMAIN_ID sets the domain, as for any node.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 from msgspec import json
@@ -24,8 +23,14 @@ from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
 from .base import Sink, SinkError, SinkKind
 
 _RATE_HZ = 20
-_STRING, _GRASP = "std_msgs/String", "thenar_msgs/Grasp"
-_TRAJECTORY, _JOINTS = "trajectory_msgs/JointTrajectory", "sensor_msgs/JointState"
+_TOPICS = {
+    "grasp": "std_msgs/String",
+    "state": "thenar_msgs/Grasp",
+    "preshape": "trajectory_msgs/JointTrajectory",
+    "angles": "sensor_msgs/JointState",
+    "health": "std_msgs/String",
+}
+_KEPT = ("grasp", "state", "preshape")
 
 
 class RosTopics(Sink):
@@ -42,51 +47,37 @@ class RosTopics(Sink):
         except DeviceError as reason:
             raise SinkError(f"{self.where} cannot be opened {reason}") from None
         self._kind = self._node.kind
-        self._grasp = self._node.writer(f"{name}/grasp", _STRING, kept=True)
-        self._state = self._node.writer(f"{name}/state", _GRASP, kept=True)
-        self._preshape = self._node.writer(f"{name}/preshape", _TRAJECTORY, kept=True)
-        self._angles = self._node.writer(f"{name}/angles", _JOINTS)
-        self._health = self._node.writer(f"{name}/health", _STRING)
-        self._closed = False
+        self._writers = {
+            topic: self._node.writer(f"{name}/{topic}", kind, kept=topic in _KEPT) for topic, kind in _TOPICS.items()
+        }
         self._told: Preshape | None = None
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish everything, but the preshape only if it changed."""
-        self._write(lambda: self._publish(grasp, preshape, angles))
+        messages = {"grasp": self._kind("std_msgs/String")(data=grasp.grasp), "state": ros.state(self._kind, grasp)}
+        if angles is not None:
+            messages["angles"] = ros.joint_state(self._kind, grasp.unix_us, angles)
+        if preshape is not None and preshape != self._told:
+            messages["preshape"] = ros.trajectory(self._kind, preshape)
+            self._told = preshape
+        self.attempt(lambda: self._write(messages))
 
     def health(self, report: HealthReport) -> None:
         """Publish the glove's health."""
-        self._write(lambda: self._health(self._text(json.encode(report).decode())))
+        message = self._kind("std_msgs/String")(data=json.encode(report).decode())
+        self.attempt(lambda: self._write({"health": message}))
 
-    def _write(self, write: Callable[[], object]) -> None:
-        if self._closed:
-            self.lost += 1
-        else:
-            self.attempt(write)
-
-    def _publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        self._grasp(self._text(grasp.grasp))
-        self._state(ros.state(self._kind, grasp))
-        if angles is not None:
-            self._angles(ros.joint_state(self._kind, grasp.unix_us, angles))
-        if preshape is not None and preshape != self._told:
-            self._preshape(ros.trajectory(self._kind, preshape))
-            self._told = preshape
-
-    def _text(self, text: str) -> Any:
-        return self._kind(_STRING)(data=text)
-
-    def readers(self) -> int:
-        """Return the number of readers of the grasp type."""
-        return 0 if self._closed else self._node.readers()
+    def _write(self, messages: dict[str, Any]) -> None:
+        if not self._writers:
+            raise DeviceError("the node has ended")
+        for topic, message in messages.items():
+            self._writers[topic](message)
 
     def close(self) -> None:
         """Leave the domain."""
-        if not self._closed:
-            self._closed = True
-            # What a topic is written by ends with its last name, before its node.
-            del self._grasp, self._state, self._preshape, self._angles, self._health
-            self._node.close()
+        # What a topic is written by ends with its last name, before its node.
+        self._writers.clear()
+        self._node.close()
 
 
 MEMBER = SinkKind(

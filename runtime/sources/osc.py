@@ -16,7 +16,6 @@ from thenar.drivers.extras import optional
 from thenar.drivers.lines import LineParser, LineReader, Row, finite
 from thenar.drivers.names import shortened
 
-from ..harness.wiring import StreamWiring
 from .rows import row_kinds
 
 _PORT = re.compile(r"osc:([^/]+:[0-9]{1,5})(/[^ #*,?\[\]{}]*[^ #*,?\[\]{}/])")
@@ -74,14 +73,10 @@ class OscReader(LineReader):
         super().open()
 
 
-def _reader(wiring: StreamWiring) -> OscReader:
-    return OscReader(wiring.port)
-
-
 MEMBER = row_kinds(
     "osc",
     "Messages of Open Sound Control: [[stream]] from osc:HOST:PORT/ADDRESS.",
     lambda port: port.startswith("osc:"),
-    _reader,
+    lambda wiring: OscReader(wiring.port),
     7,
 )

@@ -20,7 +20,6 @@ from thenar.drivers.senders import FirstSender
 
 from .. import ros
 from ..frames import now_us
-from ..harness.wiring import StreamWiring
 from .rows import row_kinds
 
 _JOINTS = "JointState"
@@ -37,6 +36,7 @@ class RosReader(RowReader):
         found = _PORT.fullmatch(port)
         self.kind = "joint" if found and (found[2] or _JOINTS) == _JOINTS else ""
         self._node: ros.Node | None = None
+        self._read: ros.Read = lambda _timeout_s: []
         self._senders = FirstSender()
 
     def open(self) -> None:
@@ -48,15 +48,14 @@ class RosReader(RowReader):
         self._senders, name = FirstSender(), ros.namespace(found[1])
         try:
             self._node = ros.open_node(self._port, public=bool(found[3]))
-            self._node.subscribe(name, _TYPES[found[2] or _JOINTS])
+            self._read = self._node.reader(name, _TYPES[found[2] or _JOINTS])
         except DeviceError as reason:
             raise DeviceError(f"{self._port} cannot be opened {reason}") from None
 
     def read(self, timeout_s: float) -> Sequence[Row]:
         """Return the rows of the messages that arrived."""
-        assert self._node is not None
         try:
-            return list(self._rows(self._node.read(timeout_s)))
+            return list(self._rows(self._read(timeout_s)))
         except DeviceError as reason:
             raise DeviceError(f"{self._port}: {reason}") from None
 
@@ -97,14 +96,10 @@ class RosReader(RowReader):
             self._node = None
 
 
-def _reader(wiring: StreamWiring) -> RosReader:
-    return RosReader(wiring.port)
-
-
 MEMBER = row_kinds(
     "ros",
     "A topic of ROS 2, JointState, UInt8MultiArray or Float32MultiArray: [[stream]] from ros:/TOPIC.",
     lambda port: port.startswith("ros:"),
-    _reader,
+    lambda wiring: RosReader(wiring.port),
     5,
 )

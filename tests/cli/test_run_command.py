@@ -120,10 +120,8 @@ def test_a_reader_that_goes_away_leaves_no_traceback(set_file: Path, build_folde
         ("set.grasps", "--status", ()),
         ("set.grasps", "--lead", ("1",)),
         ("set.grasps", "--lag-ms", ("100",)),
-        ("set.grasps", "--change-while-held", ()),
         ("run.mcap", "--web", ()),
         ("set.grasps", "--web", ("127.0.0.1:0",)),
-        ("--glove", "--change-while-held", ()),
     ],
 )
 def test_an_option_that_would_change_nothing_is_refused(

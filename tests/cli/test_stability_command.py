@@ -11,7 +11,6 @@ from thenar.cli import run
 from thenar.stability import cases
 from thenar.stability import report as catalogue
 from thenar.stability.finding import Case
-from thenar.stability.report import CASES
 
 from .conftest import thenar
 
