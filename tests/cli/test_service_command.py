@@ -1,0 +1,178 @@
+"""`thenar service`: files below a folder, judged by systemd's own tools; and what a run tells systemd."""
+
+import json
+import os
+import shlex
+import socket
+import subprocess
+import sys
+from configparser import ConfigParser
+from contextlib import suppress
+from pathlib import Path
+from shutil import which
+
+import pytest
+
+from thenar.cli import run
+from thenar.cli.service_command import notify
+from thenar.runtime import Build
+
+from ..conftest import lacking
+
+Captured = pytest.CaptureFixture[str]
+UNIT = "etc/systemd/system/thenar.service"
+FILES = {UNIT, "etc/udev/rules.d/70-thenar.rules", "etc/sysusers.d/thenar.conf"}
+
+
+@pytest.fixture(autouse=True)
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "a b"
+    (folder / "build").mkdir(parents=True)
+    (folder / "glove.toml").touch()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def files(root: Path) -> set[str]:
+    return {str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()}
+
+
+def unit(root: Path) -> ConfigParser:
+    found = ConfigParser(interpolation=None)
+    found.optionxform = str  # type: ignore[assignment]
+    found.read(root / UNIT)
+    return found
+
+
+def install(root: Path, *words: str) -> int:
+    return run(["service", "install", "build", "--glove", "glove.toml", *words, "--root", str(root)])
+
+
+def test_a_service_is_installed_shown_and_gone_again(tmp_path: Path, capsys: Captured) -> None:
+    root = tmp_path / "root"
+    assert install(root, "--sink", "tcp:7777") == 0
+    assert files(root) == FILES
+    assert run(["service", "show", "--root", str(root)]) == 0
+    shown = capsys.readouterr().out
+    assert all(f"# {root / name}\n{(root / name).read_text()}" in shown for name in FILES)
+    assert run(["service", "uninstall", "--root", str(root), "--dry-run"]) == 0
+    assert "$ systemctl disable --now thenar" in capsys.readouterr().out
+    assert files(root) == FILES
+    assert run(["service", "uninstall", "--root", str(root)]) == 0
+    assert not files(root)
+    assert run(["service", "show", "--root", str(root)]) == 2
+    assert f"no service of thenar is installed in {root}" in capsys.readouterr().err
+
+
+def test_it_runs_in_this_folder_without_root_and_is_watched(tmp_path: Path, place: Path) -> None:
+    assert install(tmp_path) == 0
+    service = unit(tmp_path)["Service"]
+    assert service["WorkingDirectory"] == str(place)
+    assert (service["User"], service["Type"], service["Restart"]) == ("thenar", "notify", "always")
+    assert int(service["WatchdogSec"]) > 2  # a run reports once a second
+    assert shlex.split(service["ExecStart"])[1:] == ["-m", "thenar.cli", "run", "build", "--glove", "glove.toml"]
+
+
+def test_a_dry_run_writes_nothing_and_says_every_command(tmp_path: Path, capsys: Captured) -> None:
+    before = files(tmp_path)
+    assert install(tmp_path, "--dry-run") == 0
+    assert files(tmp_path) == before
+    printed = capsys.readouterr().out.splitlines()
+    assert [line for line in printed if line.startswith("$")][-1] == "$ systemctl restart thenar"
+    assert f"# {tmp_path / UNIT}" in printed
+
+
+def test_systemds_own_tools_find_no_fault(tmp_path: Path) -> None:
+    assert install(tmp_path, "--sink", 'jsonl:50 % of "$HOME"\n[Install]\\') == 0
+    if which("systemd-analyze") is None:
+        lacking("program systemd-analyze")
+    checked = subprocess.run(
+        ["systemd-analyze", "verify", tmp_path / UNIT], capture_output=True, text=True, check=False
+    )
+    assert (checked.returncode, checked.stderr) == (0, "")
+    users = ["systemd-sysusers", "--dry-run", tmp_path / "etc/sysusers.d/thenar.conf"]
+    dry = subprocess.run(users, capture_output=True, text=True, check=True)
+    assert "Creating user 'thenar'" in dry.stderr + dry.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("install",), "name the build and options of thenar run after install"),
+        (("show", "build"), "name the build and options of thenar run after install"),
+        (("install", "build"), "a service runs on a glove: name its --glove"),
+        (("install", "build", "--replay", "glove.toml"), "a service runs on a glove: name its --glove"),
+        (("install", "other", "--glove", "glove.toml"), "'other' does not exist"),
+        (("install", "build", "--glove", "glove.toml", "--lead", "high"), "'--lead': 'high' is not a valid float"),
+    ],
+)
+def test_what_thenar_run_would_refuse_is_refused(
+    tmp_path: Path, capsys: Captured, words: tuple[str, ...], said: str
+) -> None:
+    assert run(["service", *words, "--root", str(tmp_path / "root")]) == 2
+    assert said in capsys.readouterr().err
+    assert not files(tmp_path / "root")
+
+
+def test_a_folder_that_is_closed_to_others_is_said(tmp_path: Path, place: Path, capsys: Captured) -> None:
+    place.chmod(0o700)
+    assert install(tmp_path) == 0
+    said = capsys.readouterr().err
+    assert "warning: the user thenar cannot reach build: /" in said
+    assert said.count("is closed to others; move it to /opt/thenar") >= 2
+
+
+@pytest.mark.parametrize("abstract", [False, True])
+def test_states_reach_the_socket_that_systemd_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, abstract: bool
+) -> None:
+    notify(b"READY=1")  # to nobody
+    name = f"\0{tmp_path}" if abstract else str(tmp_path / "notify")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(name)
+        systemd.settimeout(10.0)
+        monkeypatch.setenv("NOTIFY_SOCKET", name.replace("\0", "@"))
+        notify(b"READY=1")
+        assert systemd.recv(100) == b"READY=1"
+    notify(b"WATCHDOG=1")  # to nobody any more
+
+
+def test_a_live_run_reports_to_systemd_while_frames_come_and_no_longer(build_folder: Path, tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        address = free.getsockname()
+    manifest = Build.load(build_folder).manifest
+    switches = [switch.name for switch in manifest.switches]
+    joints = ", ".join(f"{joint.name} = [0, 255]" for joint in manifest.joints)
+    harness, place = tmp_path / "glove.toml", str(tmp_path / "notify")
+    stream = f'port = "udp://127.0.0.1:{address[1]}"\nswitches = {json.dumps(switches)}\njoints = {{ {joints} }}\n'
+    harness.write_text(f"[[stream]]\n{stream}")
+    row = json.dumps(dict.fromkeys(switches, 0) | {joint.name: 100 for joint in manifest.joints}).encode()
+    command = [sys.executable, "-m", "thenar.cli", "run", build_folder, "--glove", harness, "--sink", "jsonl:/dev/null"]
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(place)
+        systemd.settimeout(30.0)
+        with subprocess.Popen(command, env=os.environ | {"NOTIFY_SOCKET": place}) as process:
+            try:
+                assert systemd.recv(100) == b"READY=1"
+                systemd.settimeout(1.5)
+                with pytest.raises(TimeoutError):  # no glove yet
+                    systemd.recv(100)
+                systemd.settimeout(0.01)
+                reports = list[bytes]()
+                with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as glove:
+                    for _ in range(3000):
+                        glove.sendto(row, address)
+                        with suppress(TimeoutError):
+                            reports.append(systemd.recv(100))
+                        if len(reports) == 2:
+                            break
+                assert reports == [b"WATCHDOG=1"] * 2
+                systemd.settimeout(2.5)
+                with suppress(TimeoutError):
+                    systemd.recv(100)  # of what came last
+                with pytest.raises(TimeoutError):
+                    systemd.recv(100)
+            finally:
+                process.terminate()
+            assert process.wait(20.0) == 0
