@@ -1,0 +1,109 @@
+"""Which way leads to ROS: rclpy where it is there. A stand-in for it, since ROS cannot be installed by pip."""
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+from unittest.mock import MagicMock
+
+import pytest
+
+from thenar.drivers.errors import SettingError
+from thenar.runtime import ros as nodes
+from thenar.runtime.published import JointAngles, LiveGrasp, Preshape
+from thenar.runtime.sinks import open_sink
+from thenar.runtime.sources.ros import RosReader
+
+PACKAGES = ("std_msgs", "builtin_interfaces", "sensor_msgs", "trajectory_msgs")
+
+
+@pytest.fixture
+def rclpy(monkeypatch: pytest.MonkeyPatch) -> Iterator[MagicMock]:
+    """Return a package rclpy that notes what is called; messages are namespaces of their keywords."""
+    for name in ("rclpy", "rclpy.executors", "rclpy.qos", *PACKAGES, *(f"{name}.msg" for name in PACKAGES)):
+        monkeypatch.setitem(sys.modules, name, MagicMock())
+    for name in PACKAGES:
+        monkeypatch.setitem(sys.modules, f"{name}.msg", Messages(f"{name}.msg"))
+    monkeypatch.setattr(nodes, "find_spec", lambda name: name if name == "rclpy" else None)
+    monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
+    yield sys.modules["rclpy"]  # type: ignore[misc]
+    sys.modules.pop("thenar.runtime.ros_rclpy", None)
+
+
+class Messages(ModuleType):
+    def __getattr__(self, kind: str) -> Callable[..., Any]:
+        if kind.startswith("__"):
+            raise AttributeError(kind)
+        return lambda **fields: SimpleNamespace(kind=f"{self.__name__}.{kind}", **fields)
+
+
+def test_where_rclpy_is_there_it_publishes(
+    rclpy: MagicMock,
+    monkeypatch: pytest.MonkeyPatch,
+    make_grasp: Callable[..., LiveGrasp],
+    preshape: Preshape,
+    angles: JointAngles,
+) -> None:
+    monkeypatch.setitem(sys.modules, "thenar_msgs", MagicMock())
+    monkeypatch.setitem(sys.modules, "thenar_msgs.msg", Messages("thenar_msgs.msg"))
+    monkeypatch.setenv("ROS_DOMAIN_ID", "7")
+    sink = open_sink("ros:/lab")
+    node = rclpy.create_node.return_value
+    assert rclpy.init.call_args.kwargs["domain_id"] == 7
+    topics = [call.args[1] for call in node.create_publisher.call_args_list]
+    assert topics == [f"/lab/{topic}" for topic in ("grasp", "state", "preshape", "angles", "health")]
+    sink.publish(make_grasp(1, "cup"), preshape, angles)
+    sent = [call.args[0] for call in node.create_publisher.return_value.publish.call_args_list]
+    kinds = ["std_msgs.msg.String", "thenar_msgs.msg.Grasp"]
+    assert [one.kind for one in sent[:2]] == kinds
+    assert (sent[0].data, sent[1].grasp, sent[1].header.stamp.sec) == ("cup", "cup", 1_700_000_000)
+    assert (sink.report().sent, sink.report().lost) == (1, 0)
+    sink.close()
+    rclpy.shutdown.assert_called_once_with(context=rclpy.Context.return_value)
+
+
+@pytest.mark.parametrize("public", [False, True])
+def test_only_a_public_node_leaves_this_machine(
+    rclpy: MagicMock, monkeypatch: pytest.MonkeyPatch, public: bool
+) -> None:
+    seen = list[str | None]()
+    rclpy.init.side_effect = lambda **_: seen.append(nodes.os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE"))
+    monkeypatch.setenv("ROS_DISTRO", "jazzy")
+    nodes.open_node("ros:/lab", public=public).close()
+    assert seen == [None if public else "LOCALHOST"]
+    monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
+
+
+def test_messages_are_rows(rclpy: MagicMock) -> None:
+    reader, executor = RosReader("ros:/glove"), sys.modules["rclpy.executors"].SingleThreadedExecutor.return_value
+    reader.open()
+    take = rclpy.create_node.return_value.create_subscription.call_args.args[2]
+    stamp = SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0))
+    executor.spin_once.side_effect = lambda timeout_sec: take(
+        SimpleNamespace(name=["ring"], position=[0.5], header=stamp)
+    )
+    assert [(row.names, row.values) for row in (*reader.read(0.1), *reader.read(0.1))] == [(("ring",), (0.5,))] * 2
+    reader.close()
+
+
+def test_a_message_package_that_is_not_built_is_named(rclpy: MagicMock) -> None:
+    with pytest.raises(SettingError, match=rf"no package thenar_msgs: .* comes as {nodes.PACKAGE}: copy that into"):
+        open_sink("ros:/lab")
+    assert {str(path.relative_to(nodes.PACKAGE)) for path in nodes.PACKAGE.rglob("*") if path.is_file()} == {
+        *("package.xml", "CMakeLists.txt"),
+        str(Path("msg", "Grasp.msg")),
+    }
+
+
+@pytest.mark.parametrize("where", ["aarch64", "x86_64"])
+def test_without_either_a_sentence_names_the_way(monkeypatch: pytest.MonkeyPatch, where: str) -> None:
+    monkeypatch.setattr(nodes, "find_spec", lambda _name: None)
+    monkeypatch.setattr(nodes.platform, "machine", lambda: where)
+    for name in [name for name in sys.modules if name.partition(".")[0] == "cyclonedds"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.delitem(sys.modules, "thenar.runtime.ros_dds", raising=False)
+    monkeypatch.setitem(sys.modules, "cyclonedds", None)
+    said = "no wheel for aarch64: install ROS 2" if where == "aarch64" else r'pip install "thenar\[ros\]"'
+    with pytest.raises(SettingError, match=said):
+        open_sink("ros:/lab")
