@@ -4,7 +4,9 @@ Exit codes: 0 done, 1 a check failed (`verify`, `stability`), 2 a mistake that t
 143 SIGTERM, 129 SIGHUP.
 """
 
+import os
 import signal
+import socket
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -83,6 +85,14 @@ def ended_by_signals() -> Iterator[Event]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def notify(state: bytes) -> None:
+    """Tell systemd a state of this program, if that has started it."""
+    if place := os.environ.get("NOTIFY_SOCKET"):
+        with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
+            line.setblocking(False)
+            line.sendto(state, f"\0{place[1:]}" if place[0] == "@" else place)
 
 
 def main() -> None:

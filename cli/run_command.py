@@ -204,7 +204,7 @@ def _run_live(
 
 def _look_on(glove: "Glove", view: "LiveView | None", page: "LivePage | None", frames: int | None) -> None:
     """Let the glove run, and check its health once a second."""
-    from .service_command import notify
+    from . import notify
 
     said, health = dict[str, str](), None
     notify(b"READY=1")

@@ -1,13 +1,10 @@
 """`thenar service`: run a glove whenever the computer is on, by systemd."""
 
-import os
 import shlex
-import socket
 import stat
 import subprocess
 import sys
 from collections.abc import Iterable
-from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -43,8 +40,8 @@ def command(action: str, words: tuple[str, ...], root: Path, dry_run: bool) -> N
 
     \b
     Example:
+        thenar service install build/ --glove glove.toml --sink tcp:7777 --dry-run
         sudo /opt/thenar/bin/thenar service install build/ --glove glove.toml --sink mqtt:localhost/glove
-        journalctl -u thenar -f
         sudo /opt/thenar/bin/thenar service uninstall
     """
     if (action == "install") != bool(words):
@@ -103,11 +100,3 @@ def _run(lines: Iterable[str], root: Path, dry_run: bool) -> None:
         echo(f"$ {line}")
         if not dry_run and subprocess.run(shlex.split(line), check=False).returncode:
             raise click.ClickException(f"{line} has failed: see above")
-
-
-def notify(state: bytes) -> None:
-    """Tell systemd a state of this program, if that has started it."""
-    if place := os.environ.get("NOTIFY_SOCKET"):
-        with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
-            line.setblocking(False)
-            line.sendto(state, f"\0{place[1:]}" if place[0] == "@" else place)

@@ -1,20 +1,17 @@
-"""ROS 2: names, messages of grasps, and a node: by rclpy where ROS is installed, by Cyclone DDS otherwise.
+"""ROS 2: names, messages of grasps, and what its two kinds of node do: of rclpy, and of Cyclone DDS.
 
-A node writes and reads on this machine only, unless it is public. Both kinds of node have the same topics and types;
-`thenar_msgs` is a package of ROS beside this file, which who uses rclpy, or listens with ROS's tools, has to build.
+A node writes and reads on this machine only, unless it is public. Both kinds have the same topics and types.
+`thenar_msgs` is a package of ROS beside this file: who uses rclpy, or listens with ROS's tools, has to build it.
 """
 
 import os
-import platform
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from thenar.drivers.errors import SettingError
-from thenar.drivers.extras import optional
 
 from .published import JointAngles, LiveGrasp, Preshape
 
@@ -23,10 +20,6 @@ DEPTH, READ_DEPTH = 10, 256
 PACKAGE = Path(__file__).with_name("thenar_msgs")
 _MAX_DOMAIN = 232  # above it the ports of DDS would pass 65535
 _MAX_LENGTH = 200
-_NO_WHEEL = (
-    "cyclonedds has no wheel for aarch64: install ROS 2 (on Ubuntu 24.04: apt install ros-jazzy-ros-base), source its "
-    "setup.bash, and make the venv with --system-site-packages; or send grasps by mqtt: to a computer with ROS"
-)
 Kind = Callable[[str], Any]
 Read = Callable[[float], list[tuple[Any, Hashable]]]
 
@@ -53,22 +46,6 @@ class Node(ABC):
     @abstractmethod
     def close(self) -> None:
         """End the node; may be called twice."""
-
-
-def open_node(where: str, *, public: bool) -> Node:
-    """Return a node in the domain of ROS_DOMAIN_ID. Raises SettingError if neither rclpy nor Cyclone DDS is installed,
-    DeviceError if it cannot start.
-    """
-    number = domain()
-    if find_spec("rclpy") is not None:
-        from .ros_rclpy import RclpyNode
-
-        return RclpyNode(number, public=public)
-    if find_spec("cyclonedds") is None and platform.machine() == "aarch64":
-        raise SettingError(f"{where}: {_NO_WHEEL}")
-    with optional(SettingError, where):
-        from .ros_dds import DdsNode
-    return DdsNode(number, public=public)
 
 
 def namespace(name: str) -> str:

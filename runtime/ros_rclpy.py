@@ -5,10 +5,6 @@ from collections.abc import Callable, Hashable
 from importlib import import_module
 from typing import Any
 
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-
 from thenar.drivers.errors import SettingError
 
 from .ros import DEPTH, PACKAGE, READ_DEPTH, Node, Read
@@ -18,12 +14,16 @@ class RclpyNode(Node):
     """The node "thenar" of a separate context, in ROS's domain `number`. It does not know who sent a message."""
 
     def __init__(self, number: int, *, public: bool) -> None:
+        # With ROS comes a package that no extra installs.
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
         if not public:
             # Read by ROS when a context begins; Humble has another name for it.
             humble = os.environ.get("ROS_DISTRO") == "humble"
             name, here = ("ROS_LOCALHOST_ONLY", "1") if humble else ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
             os.environ.setdefault(name, here)
-        self._context = rclpy.Context()
+        self._rclpy, self._context = rclpy, rclpy.Context()
         rclpy.init(args=[], context=self._context, domain_id=number)
         self._node = rclpy.create_node("thenar", context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
@@ -42,12 +42,16 @@ class RclpyNode(Node):
 
     def writer(self, topic: str, kind: str, *, kept: bool = False) -> Callable[[Any], object]:
         """Return what publishes messages of this type."""
+        from rclpy.qos import DurabilityPolicy, QoSProfile
+
         durability = DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE
         profile = QoSProfile(depth=DEPTH, durability=durability)
         return self._node.create_publisher(self.kind(kind), topic, profile).publish  # type: ignore[no-any-return]
 
     def reader(self, topic: str, kind: str) -> Read:
         """Return what reads messages of this type."""
+        from rclpy.qos import QoSProfile, ReliabilityPolicy
+
         came, profile = list[Any](), QoSProfile(depth=READ_DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
         self._node.create_subscription(self.kind(kind), topic, came.append, profile)
 
@@ -63,4 +67,4 @@ class RclpyNode(Node):
         if self._context.ok():
             self._executor.shutdown()
             self._node.destroy_node()
-            rclpy.shutdown(context=self._context)
+            self._rclpy.shutdown(context=self._context)

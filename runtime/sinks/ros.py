@@ -20,6 +20,7 @@ from thenar.drivers.errors import DeviceError
 
 from .. import ros
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
+from ..sources.ros import open_node
 from .base import Sink, SinkError, SinkKind
 
 _RATE_HZ = 20
@@ -43,7 +44,7 @@ class RosTopics(Sink):
         """
         self.where = f"ros:{ros.namespace(name)}" + "?public" * public
         try:
-            self._node = ros.open_node(self.where, public=public)
+            self._node = open_node(self.where, public=public)
         except DeviceError as reason:
             raise SinkError(f"{self.where} cannot be opened {reason}") from None
         self._kind = self._node.kind

@@ -9,11 +9,14 @@ CYCLONEDDS_URI or `&public` allows them; ROS_DOMAIN_ID sets the domain. By Cyclo
 are left out; rclpy does not say who sent one.
 """
 
+import platform
 import re
 from collections.abc import Hashable, Iterator, Sequence
+from importlib.util import find_spec
 from typing import Any
 
 from thenar.drivers.errors import DeviceError, SettingError
+from thenar.drivers.extras import optional
 from thenar.drivers.lines import LineCounts, Row, RowReader, finite
 from thenar.drivers.names import shortened
 from thenar.drivers.senders import FirstSender
@@ -26,6 +29,26 @@ _JOINTS = "JointState"
 _TYPES = {_JOINTS: "sensor_msgs/JointState"}
 _TYPES |= {name: f"std_msgs/{name}" for name in ("UInt8MultiArray", "Float32MultiArray")}
 _PORT = re.compile(rf"ros:(/[^?]*)(?:\?(?:type=({'|'.join(_TYPES)})&?)?(public)?)?")
+_NO_WHEEL = (
+    "cyclonedds has no wheel for aarch64: install ROS 2 (on Ubuntu 24.04: apt install ros-jazzy-ros-base), source its "
+    "setup.bash, and make the venv with --system-site-packages; or send grasps by mqtt: to a computer with ROS"
+)
+
+
+def open_node(where: str, *, public: bool) -> ros.Node:
+    """Return a node in the domain of ROS_DOMAIN_ID. Raises SettingError if neither rclpy nor Cyclone DDS is installed,
+    DeviceError if it cannot start.
+    """
+    number = ros.domain()
+    if find_spec("rclpy") is not None:
+        from ..ros_rclpy import RclpyNode
+
+        return RclpyNode(number, public=public)
+    if find_spec("cyclonedds") is None and platform.machine() == "aarch64":
+        raise SettingError(f"{where}: {_NO_WHEEL}")
+    with optional(SettingError, where):
+        from ..ros_dds import DdsNode
+    return DdsNode(number, public=public)
 
 
 class RosReader(RowReader):
@@ -47,7 +70,7 @@ class RosReader(RowReader):
             raise SettingError(f"{shortened(repr(self._port))} names no topic: write {ways}")
         self._senders, name = FirstSender(), ros.namespace(found[1])
         try:
-            self._node = ros.open_node(self._port, public=bool(found[3]))
+            self._node = open_node(self._port, public=bool(found[3]))
             self._read = self._node.reader(name, _TYPES[found[2] or _JOINTS])
         except DeviceError as reason:
             raise DeviceError(f"{self._port} cannot be opened {reason}") from None

@@ -180,6 +180,8 @@ def test_the_extras_in_hints_are_those_of_the_project() -> None:
         "scikit-learn": "sklearn",
         "python-calamine": "python_calamine",
         "foxglove-sdk": "foxglove",
+        "paho-mqtt": "paho",
+        "python-osc": "pythonosc",
     }
     needed = {
         extra: {called.get(name, name) for name in (re.split("[>=<]", package)[0] for package in packages)}

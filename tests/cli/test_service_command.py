@@ -13,8 +13,7 @@ from shutil import which
 
 import pytest
 
-from thenar.cli import run
-from thenar.cli.service_command import notify
+from thenar.cli import notify, run
 from thenar.runtime import Build
 
 from ..conftest import lacking
@@ -90,7 +89,7 @@ def test_systemds_own_tools_find_no_fault(tmp_path: Path) -> None:
         ["systemd-analyze", "verify", tmp_path / UNIT], capture_output=True, text=True, check=False
     )
     assert (checked.returncode, checked.stderr) == (0, "")
-    users = ["systemd-sysusers", "--dry-run", tmp_path / "etc/sysusers.d/thenar.conf"]
+    users = ["systemd-sysusers", "--dry-run", str(tmp_path / "etc/sysusers.d/thenar.conf")]
     dry = subprocess.run(users, capture_output=True, text=True, check=True)
     assert "Creating user 'thenar'" in dry.stderr + dry.stdout
 
@@ -148,11 +147,12 @@ def test_a_live_run_reports_to_systemd_while_frames_come_and_no_longer(build_fol
     stream = f'port = "udp://127.0.0.1:{address[1]}"\nswitches = {json.dumps(switches)}\njoints = {{ {joints} }}\n'
     harness.write_text(f"[[stream]]\n{stream}")
     row = json.dumps(dict.fromkeys(switches, 0) | {joint.name: 100 for joint in manifest.joints}).encode()
-    command = [sys.executable, "-m", "thenar.cli", "run", build_folder, "--glove", harness, "--sink", "jsonl:/dev/null"]
+    command = [sys.executable, "-m", "thenar.cli", "run", str(build_folder), "--glove", str(harness)]
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
         systemd.bind(place)
         systemd.settimeout(30.0)
-        with subprocess.Popen(command, env=os.environ | {"NOTIFY_SOCKET": place}) as process:
+        environment = os.environ | {"NOTIFY_SOCKET": place}
+        with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) as process:
             try:
                 assert systemd.recv(100) == b"READY=1"
                 systemd.settimeout(1.5)

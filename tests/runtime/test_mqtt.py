@@ -164,7 +164,12 @@ def test_a_broker_that_takes_nothing_loses_lines_and_does_not_block(broker: Brok
     sink = open_sink(f"{broker.place}/hand")
     broker.process.send_signal(signal.SIGSTOP)
     wide = make_grasp(1, lost=("x" * 1_000_000,))
-    eventually(lambda: sink.publish(wide, None, None) is None and sink.report().lost > 0)
+
+    def loses() -> bool:
+        sink.publish(wide, None, None)
+        return sink.report().lost > 0
+
+    eventually(loses)
     assert sink.report().error == "the broker takes nothing"
     broker.end()
     sink.close()

@@ -87,7 +87,12 @@ def test_a_receiver_that_has_gone_is_reported(receiver: socket.socket, make_gras
     sink.publish(make_grasp(0), None, None)
     assert receiver.recv(65536).startswith(b"#bundle")
     receiver.close()
-    eventually(lambda: sink.publish(make_grasp(1), None, None) is None and sink.report().lost > 0)
+
+    def loses() -> bool:
+        sink.publish(make_grasp(1), None, None)
+        return sink.report().lost > 0
+
+    eventually(loses)
     assert sink.report().error == "Connection refused"
     sink.close()
 

@@ -1,5 +1,7 @@
 """Which way leads to ROS: rclpy where it is there. A stand-in for it, since ROS cannot be installed by pip."""
 
+import os
+import platform
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,9 +12,10 @@ from unittest.mock import MagicMock
 import pytest
 
 from thenar.drivers.errors import SettingError
-from thenar.runtime import ros as nodes
 from thenar.runtime.published import JointAngles, LiveGrasp, Preshape
+from thenar.runtime.ros import PACKAGE
 from thenar.runtime.sinks import open_sink
+from thenar.runtime.sources import ros as nodes
 from thenar.runtime.sources.ros import RosReader
 
 PACKAGES = ("std_msgs", "builtin_interfaces", "sensor_msgs", "trajectory_msgs")
@@ -68,7 +71,7 @@ def test_only_a_public_node_leaves_this_machine(
     rclpy: MagicMock, monkeypatch: pytest.MonkeyPatch, public: bool
 ) -> None:
     seen = list[str | None]()
-    rclpy.init.side_effect = lambda **_: seen.append(nodes.os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE"))
+    rclpy.init.side_effect = lambda **_: seen.append(os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE"))
     monkeypatch.setenv("ROS_DISTRO", "jazzy")
     nodes.open_node("ros:/lab", public=public).close()
     assert seen == [None if public else "LOCALHOST"]
@@ -88,9 +91,9 @@ def test_messages_are_rows(rclpy: MagicMock) -> None:
 
 
 def test_a_message_package_that_is_not_built_is_named(rclpy: MagicMock) -> None:
-    with pytest.raises(SettingError, match=rf"no package thenar_msgs: .* comes as {nodes.PACKAGE}: copy that into"):
+    with pytest.raises(SettingError, match=rf"no package thenar_msgs: .* comes as {PACKAGE}: copy that into"):
         open_sink("ros:/lab")
-    assert {str(path.relative_to(nodes.PACKAGE)) for path in nodes.PACKAGE.rglob("*") if path.is_file()} == {
+    assert {str(path.relative_to(PACKAGE)) for path in PACKAGE.rglob("*") if path.is_file()} == {
         *("package.xml", "CMakeLists.txt"),
         str(Path("msg", "Grasp.msg")),
     }
@@ -99,7 +102,7 @@ def test_a_message_package_that_is_not_built_is_named(rclpy: MagicMock) -> None:
 @pytest.mark.parametrize("where", ["aarch64", "x86_64"])
 def test_without_either_a_sentence_names_the_way(monkeypatch: pytest.MonkeyPatch, where: str) -> None:
     monkeypatch.setattr(nodes, "find_spec", lambda _name: None)
-    monkeypatch.setattr(nodes.platform, "machine", lambda: where)
+    monkeypatch.setattr(platform, "machine", lambda: where)
     for name in [name for name in sys.modules if name.partition(".")[0] == "cyclonedds"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.delitem(sys.modules, "thenar.runtime.ros_dds", raising=False)
