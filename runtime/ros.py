@@ -1,7 +1,7 @@
 """ROS 2: names, messages of grasps, and what its two kinds of node do: of rclpy, and of Cyclone DDS.
 
 A node writes and reads on this machine only, unless it is public. Both kinds have the same topics and types.
-`thenar_msgs` is a package of ROS beside this file: who uses rclpy, or listens with ROS's tools, has to build it.
+`thenar_msgs` is a package of ROS next to this file: who uses rclpy, or listens with ROS's tools, has to build it.
 """
 
 import os
@@ -33,14 +33,14 @@ class Node(ABC):
 
     @abstractmethod
     def writer(self, topic: str, kind: str, *, kept: bool = False) -> Callable[[Any], object]:
-        """Return what writes a message to a topic: reliably, the last 10 kept, and volatile unless the newest is `kept`
-        for late readers (transient local).
+        """Return a function that writes a message to a topic: reliably, with the last 10 kept, and volatile unless the
+        newest is `kept` for late readers (transient local).
         """
 
     @abstractmethod
     def reader(self, topic: str, kind: str) -> Read:
-        """Return what reads messages of a topic, from reliable and best-effort writers: until a time in seconds is over
-        it waits for some, and it returns them with who sent each, as far as that is known.
+        """Return a function that waits at most some seconds for messages of a topic, from reliable and best-effort
+        writers, and returns them with who sent each, as far as that is known.
         """
 
     @abstractmethod

@@ -154,7 +154,7 @@ class DdsNode(Node):
         return TYPES[name]
 
     def writer(self, topic: str, kind: str, *, kept: bool = False) -> Callable[[Any], object]:
-        """Return what writes messages of this type."""
+        """Return a function that writes messages of this type."""
         policies = [
             # Nobody may delay the writer: a message that does not fit is rejected at once.
             Policy.Reliability.Reliable(max_blocking_time=0),
@@ -166,7 +166,7 @@ class DdsNode(Node):
         return DataWriter(self._participant, self._topic(topic, kind), qos=_qos(kind, *policies)).write
 
     def reader(self, topic: str, kind: str) -> Read:
-        """Return what reads messages of this type."""
+        """Return a function that reads messages of this type."""
         policies = Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(READ_DEPTH)
         try:
             made = DataReader(self._participant, self._topic(topic, kind), qos=_qos(kind, *policies))

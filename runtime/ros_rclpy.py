@@ -41,7 +41,7 @@ class RclpyNode(Node):
             ) from None
 
     def writer(self, topic: str, kind: str, *, kept: bool = False) -> Callable[[Any], object]:
-        """Return what publishes messages of this type."""
+        """Return a function that publishes messages of this type."""
         from rclpy.qos import DurabilityPolicy, QoSProfile
 
         durability = DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE
@@ -49,7 +49,7 @@ class RclpyNode(Node):
         return self._node.create_publisher(self.kind(kind), topic, profile).publish  # type: ignore[no-any-return]
 
     def reader(self, topic: str, kind: str) -> Read:
-        """Return what reads messages of this type."""
+        """Return a function that reads messages of this type."""
         from rclpy.qos import QoSProfile, ReliabilityPolicy
 
         came, profile = list[Any](), QoSProfile(depth=READ_DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)

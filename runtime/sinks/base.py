@@ -61,7 +61,7 @@ class Sink(ABC):
     pace : PublishPace or None
         When it gets a result; None: it gets every frame's. `open_sink` sets it.
     where, sent, lost, error
-        Its part of a `SinkReport`, for a sink that does not make one of its own.
+        Its part of a `SinkReport`, for a sink without another `report`.
     """
 
     pace: "PublishPace | None" = None

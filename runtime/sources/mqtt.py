@@ -29,7 +29,7 @@ _MOST_WAITING = 256
 _PLACE = re.compile(r"mqtt:(?:\[([0-9A-Fa-f:.]+)\]|([^][:/]+))(?::([0-9]{1,5}))?/([^+#\0]+)")
 _USUAL_PORT = 1883
 _CONNECT_S = 2.0
-# A broker that is silent for half as long again is gone.
+# A broker that does not respond for this long is gone.
 _KEEP_ALIVE_S = 4
 
 
@@ -51,13 +51,13 @@ def connect(where: str, kind: type[ThenarError], prepare: Callable[["Client"], A
     with optional(SettingError, where):
         from paho.mqtt.client import Client
         from paho.mqtt.enums import CallbackAPIVersion
-    client, answered, refused = Client(CallbackAPIVersion.VERSION2), Event(), list[str]()
+    client, replied, refused = Client(CallbackAPIVersion.VERSION2), Event(), list[str]()
 
-    def answer(_client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+    def reply(_client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
         refused.extend([str(reason)] if reason.is_failure else [])
-        answered.set()
+        replied.set()
 
-    client.on_connect = answer
+    client.on_connect = reply
     client.connect_timeout = _CONNECT_S
     client.reconnect_delay_set(1, 1)
     if "MQTT_USERNAME" in os.environ:
@@ -69,9 +69,9 @@ def connect(where: str, kind: type[ThenarError], prepare: Callable[["Client"], A
         said = getattr(reason, "strerror", None) or str(reason)
         raise kind(f"{where} cannot be opened: {said}: does the broker run there?") from None
     client.loop_start()
-    if not answered.wait(_CONNECT_S) or refused:
+    if not replied.wait(_CONNECT_S) or refused:
         leave(client)
-        said = f"{refused[0]}: set MQTT_USERNAME and MQTT_PASSWORD" if refused else "the broker does not answer"
+        said = f"{refused[0]}: set MQTT_USERNAME and MQTT_PASSWORD" if refused else "the broker does not respond"
         raise kind(f"{where} cannot be opened: {said}")
     return client
 
