@@ -9,14 +9,13 @@ import sys
 from configparser import ConfigParser
 from contextlib import suppress
 from pathlib import Path
-from shutil import which
 
 import pytest
 
 from thenar.cli import notify, run
 from thenar.runtime import Build
 
-from ..conftest import lacking
+from ..conftest import tool
 
 Captured = pytest.CaptureFixture[str]
 UNIT = "etc/systemd/system/thenar.service"
@@ -28,6 +27,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "a b"
     (folder / "build").mkdir(parents=True)
     (folder / "glove.toml").touch()
+    folder.chmod(0o700)
     monkeypatch.chdir(folder)
     return folder
 
@@ -36,62 +36,53 @@ def files(root: Path) -> set[str]:
     return {str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()}
 
 
-def unit(root: Path) -> ConfigParser:
-    found = ConfigParser(interpolation=None)
-    found.optionxform = str  # type: ignore[assignment]
-    found.read(root / UNIT)
-    return found
+def service(root: Path, *words: str) -> int:
+    return run(["service", *words, "--root", str(root)])
 
 
-def install(root: Path, *words: str) -> int:
-    return run(["service", "install", "build", "--glove", "glove.toml", *words, "--root", str(root)])
+INSTALL = ("install", "build", "--glove", "glove.toml")
 
 
 def test_a_service_is_installed_shown_and_gone_again(tmp_path: Path, capsys: Captured) -> None:
     root = tmp_path / "root"
-    assert install(root, "--sink", "tcp:7777") == 0
+    assert service(root, *INSTALL, "--dry-run") == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "$ systemctl restart thenar"
+    assert not files(root)
+    assert service(root, *INSTALL) == 0
     assert files(root) == FILES
-    assert run(["service", "show", "--root", str(root)]) == 0
+    said = capsys.readouterr().err
+    assert "warning: the user thenar cannot reach build: /" in said
+    assert "is closed to others; move it to /opt/thenar" in said
+    assert service(root, "show") == 0
     shown = capsys.readouterr().out
     assert all(f"# {root / name}\n{(root / name).read_text()}" in shown for name in FILES)
-    assert run(["service", "uninstall", "--root", str(root), "--dry-run"]) == 0
+    assert service(root, "uninstall", "--dry-run") == 0
     assert "$ systemctl disable --now thenar" in capsys.readouterr().out
     assert files(root) == FILES
-    assert run(["service", "uninstall", "--root", str(root)]) == 0
+    assert service(root, "uninstall") == 0
     assert not files(root)
-    assert run(["service", "show", "--root", str(root)]) == 2
+    assert service(root, "show") == 2
     assert f"no service of thenar is installed in {root}" in capsys.readouterr().err
 
 
 def test_it_runs_in_this_folder_without_root_and_is_watched(tmp_path: Path, place: Path) -> None:
-    assert install(tmp_path) == 0
-    service = unit(tmp_path)["Service"]
-    assert service["WorkingDirectory"] == str(place)
-    assert (service["User"], service["Type"], service["Restart"]) == ("thenar", "notify", "always")
-    assert int(service["WatchdogSec"]) > 2  # a run reports once a second
-    assert shlex.split(service["ExecStart"])[1:] == ["-m", "thenar.cli", "run", "build", "--glove", "glove.toml"]
-
-
-def test_a_dry_run_writes_nothing_and_says_every_command(tmp_path: Path, capsys: Captured) -> None:
-    before = files(tmp_path)
-    assert install(tmp_path, "--dry-run") == 0
-    assert files(tmp_path) == before
-    printed = capsys.readouterr().out.splitlines()
-    assert [line for line in printed if line.startswith("$")][-1] == "$ systemctl restart thenar"
-    assert f"# {tmp_path / UNIT}" in printed
+    assert service(tmp_path, *INSTALL) == 0
+    unit = ConfigParser(interpolation=None)
+    unit.read(tmp_path / UNIT)
+    found = unit["Service"]
+    assert found["WorkingDirectory"] == str(place)
+    assert (found["User"], found["Type"], found["Restart"]) == ("thenar", "notify", "always")
+    assert int(found["WatchdogSec"]) > 2  # a run reports once a second
+    assert shlex.split(found["ExecStart"])[1:] == ["-m", "thenar.cli", "run", *INSTALL[1:]]
 
 
 def test_systemds_own_tools_find_no_fault(tmp_path: Path) -> None:
-    assert install(tmp_path, "--sink", 'jsonl:50 % of "$HOME"\n[Install]\\') == 0
-    if which("systemd-analyze") is None:
-        lacking("program systemd-analyze")
-    checked = subprocess.run(
-        ["systemd-analyze", "verify", tmp_path / UNIT], capture_output=True, text=True, check=False
-    )
+    assert service(tmp_path, *INSTALL, "--sink", 'jsonl:50 % of "$HOME"\n[Install]\\') == 0
+    command = [tool("systemd-analyze"), "verify", str(tmp_path / UNIT)]
+    checked = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (checked.returncode, checked.stderr) == (0, "")
-    users = ["systemd-sysusers", "--dry-run", str(tmp_path / "etc/sysusers.d/thenar.conf")]
-    dry = subprocess.run(users, capture_output=True, text=True, check=True)
-    assert "Creating user 'thenar'" in dry.stderr + dry.stdout
+    users = [tool("systemd-sysusers"), "--dry-run", str(tmp_path / "etc/sysusers.d/thenar.conf")]
+    subprocess.run(users, capture_output=True, check=True)
 
 
 @pytest.mark.parametrize(
@@ -99,41 +90,28 @@ def test_systemds_own_tools_find_no_fault(tmp_path: Path) -> None:
     [
         (("install",), "name the build and options of thenar run after install"),
         (("show", "build"), "name the build and options of thenar run after install"),
-        (("install", "build"), "a service runs on a glove: name its --glove"),
         (("install", "build", "--replay", "glove.toml"), "a service runs on a glove: name its --glove"),
         (("install", "other", "--glove", "glove.toml"), "'other' does not exist"),
-        (("install", "build", "--glove", "glove.toml", "--lead", "high"), "'--lead': 'high' is not a valid float"),
+        ((*INSTALL, "--lead", "high"), "'--lead': 'high' is not a valid float"),
     ],
 )
 def test_what_thenar_run_would_refuse_is_refused(
     tmp_path: Path, capsys: Captured, words: tuple[str, ...], said: str
 ) -> None:
-    assert run(["service", *words, "--root", str(tmp_path / "root")]) == 2
+    assert service(tmp_path / "root", *words) == 2
     assert said in capsys.readouterr().err
     assert not files(tmp_path / "root")
 
 
-def test_a_folder_that_is_closed_to_others_is_said(tmp_path: Path, place: Path, capsys: Captured) -> None:
-    place.chmod(0o700)
-    assert install(tmp_path) == 0
-    said = capsys.readouterr().err
-    assert "warning: the user thenar cannot reach build: /" in said
-    assert said.count("is closed to others; move it to /opt/thenar") >= 2
-
-
-@pytest.mark.parametrize("abstract", [False, True])
-def test_states_reach_the_socket_that_systemd_names(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, abstract: bool
-) -> None:
-    notify(b"READY=1")  # to nobody
-    name = f"\0{tmp_path}" if abstract else str(tmp_path / "notify")
+def test_a_state_reaches_an_abstract_socket_or_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    notify(b"READY=1")
+    monkeypatch.setenv("NOTIFY_SOCKET", f"@{tmp_path}")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
-        systemd.bind(name)
+        systemd.bind(f"\0{tmp_path}")
         systemd.settimeout(10.0)
-        monkeypatch.setenv("NOTIFY_SOCKET", name.replace("\0", "@"))
         notify(b"READY=1")
         assert systemd.recv(100) == b"READY=1"
-    notify(b"WATCHDOG=1")  # to nobody any more
+    notify(b"WATCHDOG=1")
 
 
 def test_a_live_run_reports_to_systemd_while_frames_come_and_no_longer(build_folder: Path, tmp_path: Path) -> None:
