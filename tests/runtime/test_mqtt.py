@@ -13,6 +13,7 @@ import pytest
 from msgspec.json import decode
 from msgspec.structs import replace
 
+from thenar.drivers.closing import Closing
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
@@ -76,7 +77,7 @@ def broker(tmp_path: Path) -> Iterator[Broker]:
     made.end()
 
 
-class Other:
+class Other(Closing):
     """Another client of the broker: what it gets of a topic comes out of a queue."""
 
     def __init__(self, broker: Broker, topic: str) -> None:
@@ -92,10 +93,7 @@ class Other:
         self.client.subscribe(topic)
         ready.get(timeout=WAIT_S)
 
-    def __enter__(self) -> "Other":
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         self.client.disconnect()
         self.client.loop_stop()
 
@@ -119,7 +117,6 @@ def test_lines_are_those_of_json_lines_and_joints_are_kept_for_late_readers(
         assert (topic, decode(payload, type=Line)) == ("lab/left/joints", HeaderLine(angles.names))
         sink.publish(make_grasp(2), None, angles)
         assert late.got.get(timeout=WAIT_S)[0] == "lab/left/grasp"
-    sink.close()
     sink.close()
     assert (sink.report().sent, sink.report().lost, sink.report().error) == (4, 0, "")
 

@@ -8,13 +8,12 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from thenar.runtime.published import LiveGrasp, Preshape
-from thenar.runtime.ros import PACKAGE, state, trajectory
+from thenar.runtime.ros import state, trajectory
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
-STORE.register(get_types_from_msg((PACKAGE / "msg" / "Grasp.msg").read_text("utf-8"), "thenar_msgs/msg/Grasp"))
+from .ros_types import STORE
+
 PUBLISHED = {
     *("std_msgs/String", "sensor_msgs/JointState", "trajectory_msgs/JointTrajectory", "thenar_msgs/Grasp"),
     *("std_msgs/UInt8MultiArray", "std_msgs/Float32MultiArray"),
