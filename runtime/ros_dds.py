@@ -87,10 +87,9 @@ _LOOPBACK = _FORM.format(
       <Peers><Peer address="localhost"/></Peers>
     </Discovery>"""
 )
-_DESCRIPTORS = Path("/proc/self/fd")
 
 
-def join(number: int, settings: str) -> tuple[Domain | None, DomainParticipant]:
+def join(number: int, settings: str) -> tuple[Domain | None, Any]:
     """Return the domain, if it is ours to end, and a participant in it."""
     try:
         ours = Domain(number, settings)
@@ -121,7 +120,7 @@ def _kept_to_loopback() -> Iterator[None]:
 def _sockets() -> dict[int, str]:
     """Return the sockets of this process: the socket of each descriptor."""
     found = {}
-    for link in _DESCRIPTORS.iterdir():
+    for link in Path("/proc/self/fd").iterdir():
         with suppress(OSError):  # closed meanwhile
             target = str(link.readlink())
             if target.startswith("socket:"):
@@ -136,7 +135,6 @@ class DdsNode(Node):
     """
 
     def __init__(self, number: int, *, public: bool) -> None:
-        self._participant: Any
         users = os.environ.get("CYCLONEDDS_URI", "")
         network = users or ("" if public else _LOOPBACK)
         try:
@@ -163,24 +161,21 @@ class DdsNode(Node):
             Policy.History.KeepLast(DEPTH),
             Policy.WriterDataLifecycle(autodispose=False),
         ]
-        return DataWriter(self._participant, self._topic(topic, kind), qos=_qos(kind, *policies)).write
+        with _failing(f"with {topic}"):
+            return DataWriter(self._participant, self._topic(topic, kind), qos=_qos(kind, *policies)).write
 
     def reader(self, topic: str, kind: str) -> Read:
         """Return a function that reads messages of this type."""
         policies = Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(READ_DEPTH)
-        try:
+        with _failing(f"with {topic}"):
             made = DataReader(self._participant, self._topic(topic, kind), qos=_qos(kind, *policies))
             waiting = WaitSet(self._participant)
             waiting.attach(ReadCondition(made, _ANY))
-        except DDSException as reason:
-            raise DeviceError(f"with {topic}: {reason}") from None
 
         def read(timeout_s: float) -> list[tuple[Any, Hashable]]:
-            try:
+            with _failing(f"reading {topic}"):
                 waiting.wait(timeout=max(1, round(timeout_s * 1e9)))
                 samples = made.take(N=READ_DEPTH)
-            except DDSException as reason:
-                raise DeviceError(str(reason)) from None
             # Others say that a writer has gone.
             return [(one, one.sample_info.publication_handle) for one in samples if one.sample_info.valid_data]
 
@@ -194,6 +189,15 @@ class DdsNode(Node):
         # Each entity ends with its last name; the domain, which ends all that is left in it, goes last.
         self._participant = None
         self._domain = None
+
+
+@contextmanager
+def _failing(what: str) -> Iterator[None]:
+    """Turn an error of Cyclone DDS into a DeviceError that says what has failed."""
+    try:
+        yield
+    except DDSException as reason:
+        raise DeviceError(f"{what}: {reason}") from None
 
 
 def _qos(kind: str, *policies: Any) -> Qos:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Hashable
 from importlib import import_module
 from typing import Any
 
-from thenar.drivers.errors import SettingError
+from thenar.drivers.errors import DeviceError, SettingError
 
 from .ros import DEPTH, PACKAGE, READ_DEPTH, Node, Read
 
@@ -24,8 +24,11 @@ class RclpyNode(Node):
             name, here = ("ROS_LOCALHOST_ONLY", "1") if humble else ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
             os.environ.setdefault(name, here)
         self._rclpy, self._context = rclpy, rclpy.Context()
-        rclpy.init(args=[], context=self._context, domain_id=number)
-        self._node = rclpy.create_node("thenar", context=self._context)
+        try:
+            rclpy.init(args=[], context=self._context, domain_id=number)
+            self._node = rclpy.create_node("thenar", context=self._context)
+        except Exception as reason:  # of many kinds
+            raise DeviceError(f"in domain {number}: {reason}") from None
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
 

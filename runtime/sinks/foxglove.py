@@ -144,13 +144,9 @@ class FoxgloveServer(Sink):
 
     def moment(self, moment: "Moment") -> None:
         """Publish the details with the grasp."""
-        for topic, details in (
-            ("/thenar/scores", _scores),
-            ("/thenar/switches", _switches),
-            ("/thenar/joints", _joints),
-        ):
+        for topic, made in (("/thenar/scores", _scores), ("/thenar/switches", _switches), ("/thenar/joints", _joints)):
             if self._build is not None and self._channels[topic].has_sinks():
-                self._log(topic, details(moment, self._build))
+                self._log(topic, made(moment, self._build))
 
     def health(self, report: HealthReport) -> None:
         """Publish the glove's health."""

@@ -8,15 +8,11 @@ A broker that goes away is connected to again; what comes meanwhile is lost.
 """
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
 from ..sources.mqtt import connect, leave, place_of
 from .base import Sink, SinkError, SinkKind, SinkPlace
 from .jsonl import encode, encode_header, encode_health
-
-if TYPE_CHECKING:
-    from paho.mqtt.client import Client
 
 _RATE_HZ = 20
 # How long a broker may take nothing before a line is lost, live and in a replay.
@@ -24,11 +20,12 @@ _LIVE_S, _REPLAY_S = 0.5, 10.0
 
 
 class MqttTopics(Sink):
-    """Publishes below a topic, through a connected client."""
+    """Publishes below the topic of mqtt:HOST:PORT/TOPIC. Raises SettingError and SinkError as `connect` does."""
 
-    def __init__(self, client: "Client", where: str, longest_s: float = _LIVE_S) -> None:
-        self.where, self._client, self._longest_s = where, client, longest_s
+    def __init__(self, where: str, longest_s: float = _LIVE_S) -> None:
+        self.where, self._longest_s = where, longest_s
         *_, self._topic = place_of(where)
+        self._client = connect(where, SinkError)
         self._joints: tuple[str, ...] = ()
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
@@ -54,8 +51,7 @@ class MqttTopics(Sink):
 
 
 def _open(where: SinkPlace) -> Sink:
-    place = f"mqtt:{where.place}"
-    return MqttTopics(connect(place, SinkError), place, _REPLAY_S if where.wait else _LIVE_S)
+    return MqttTopics(f"mqtt:{where.place}", _REPLAY_S if where.wait else _LIVE_S)
 
 
 MEMBER = SinkKind("mqtt", "HOST[:PORT]/TOPIC", "JSON lines to topics of an MQTT broker", _open, rate=_RATE_HZ, rank=7)

@@ -28,7 +28,7 @@ _PREFIX = re.compile(r"(?:/[^ #*,/?\[\]{}]+)+", re.ASCII)
 
 
 class OscMessages(Sink):
-    """Sends bundles to an address; a receiver that is not there is reported, as far as the system notices it."""
+    """Sends bundles to an address, whether or not anybody receives them."""
 
     def __init__(self, where: str, place: str) -> None:
         self.where = where
@@ -36,9 +36,8 @@ class OscMessages(Sink):
         self._prefix = f"/{prefix}" if slash else "/thenar"
         if not _PREFIX.fullmatch(self._prefix):
             raise SettingError(f"{where}: {self._prefix} is no OSC address: write it as /thenar")
-        family, address = resolve(host, where, "osc:127.0.0.1:9000")
+        family, self._address = resolve(host, where, "osc:127.0.0.1:9000")
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
-        self._socket.connect(address)
         self._shown: Preshape | None = None
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
@@ -67,7 +66,7 @@ class OscMessages(Sink):
             for value in values:
                 message.add_arg(value)
             bundle.add_content(message.build())
-        self._socket.send(bundle.build().dgram)
+        self._socket.sendto(bundle.build().dgram, self._address)
 
     def close(self) -> None:
         """Close the socket."""

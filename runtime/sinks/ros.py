@@ -44,28 +44,28 @@ class RosTopics(Sink):
         """
         self.where = f"ros:{ros.namespace(name)}" + "?public" * public
         try:
-            self._node = open_node(self.where, public=public)
+            self._node = node = open_node(self.where, public=public)
+            self._writers = {
+                topic: node.writer(f"{name}/{topic}", kind, kept=topic in _KEPT) for topic, kind in _TOPICS.items()
+            }
         except DeviceError as reason:
             raise SinkError(f"{self.where} cannot be opened {reason}") from None
-        self._kind = self._node.kind
-        self._writers = {
-            topic: self._node.writer(f"{name}/{topic}", kind, kept=topic in _KEPT) for topic, kind in _TOPICS.items()
-        }
         self._told: Preshape | None = None
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish everything, but the preshape only if it changed."""
-        messages = {"grasp": self._kind("std_msgs/String")(data=grasp.grasp), "state": ros.state(self._kind, grasp)}
+        kind = self._node.kind
+        messages = {"grasp": kind("std_msgs/String")(data=grasp.grasp), "state": ros.state(kind, grasp)}
         if angles is not None:
-            messages["angles"] = ros.joint_state(self._kind, grasp.unix_us, angles)
+            messages["angles"] = ros.joint_state(kind, grasp.unix_us, angles)
         if preshape is not None and preshape != self._told:
-            messages["preshape"] = ros.trajectory(self._kind, preshape)
+            messages["preshape"] = ros.trajectory(kind, preshape)
             self._told = preshape
         self.attempt(lambda: self._write(messages))
 
     def health(self, report: HealthReport) -> None:
         """Publish the glove's health."""
-        message = self._kind("std_msgs/String")(data=json.encode(report).decode())
+        message = self._node.kind("std_msgs/String")(data=json.encode(report).decode())
         self.attempt(lambda: self._write({"health": message}))
 
     def _write(self, messages: dict[str, Any]) -> None:

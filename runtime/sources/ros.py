@@ -26,8 +26,8 @@ from ..frames import now_us
 from .rows import row_kinds
 
 _JOINTS = "JointState"
-_TYPES = {_JOINTS: "sensor_msgs/JointState"}
-_TYPES |= {name: f"std_msgs/{name}" for name in ("UInt8MultiArray", "Float32MultiArray")}
+_ARRAYS = ("UInt8MultiArray", "Float32MultiArray")
+_TYPES = {_JOINTS: f"sensor_msgs/{_JOINTS}"} | {name: f"std_msgs/{name}" for name in _ARRAYS}
 _PORT = re.compile(rf"ros:(/[^?]*)(?:\?(?:type=({'|'.join(_TYPES)})&?)?(public)?)?")
 _NO_WHEEL = (
     "cyclonedds has no wheel for aarch64: install ROS 2 (on Ubuntu 24.04: apt install ros-jazzy-ros-base), source its "
