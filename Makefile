@@ -14,8 +14,9 @@ SCENE ?= crowd
 PEOPLE := $(if $(filter crowd,$(SCENE)),--subjects 4 --repetitions 6)
 
 PACKAGES := cli compiler drivers firmware_templates runtime simulator stability studio
+PYTHONS := 3.11 3.12 3.13 3.14
 
-.PHONY: help demo test test-slow test-all pythons mutants lint format types size bench soak fuzz docs dist check clean
+.PHONY: help demo test test-slow test-all pythons mutants lint format types size bench soak fuzz docs dist wheels check clean
 
 help:           ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -23,7 +24,7 @@ help:           ## list the targets
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --editable ".[compiler,stability,ros,lsl,ble,web,foxglove]" --group dev
+	$(BIN)/python -m pip install --quiet --editable ".[compiler,stability,ros,lsl,ble,mqtt,osc,web,foxglove]" --group dev
 	touch $@
 
 demo: $(VENV)/installed  ## recordings, rates, frontier, build, report, run: SCENE=crowd, or TABLE=examples/home_glove.csv
@@ -80,6 +81,18 @@ size: $(VENV)/installed  ## lines, tokens, classes and docstrings by room
 dist: $(VENV)/installed  ## the sdist and the wheel, in dist/, with their metadata checked
 	$(BIN)/python -m build
 	$(BIN)/twine check --strict dist/*
+
+# Fails if one has none. Its table is that of docs/how-to/raspberry-pi.md.
+wheels: $(VENV)/installed  ## the wheels of the base dependencies for aarch64 (a Raspberry Pi), from the network
+	@rm -rf $(OUT)/wheels && mkdir -p $(OUT)/wheels
+	@$(BIN)/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['dependencies'], sep='\n')" \
+	    > $(OUT)/wheels/base.txt
+	@printf '| Python | wheels for aarch64 |\n|---|---|\n'
+	@for python in $(PYTHONS); do \
+	    $(BIN)/python -m pip download --quiet --only-binary=:all: --python-version $$python \
+	        --platform manylinux2014_aarch64 --platform manylinux_2_28_aarch64 \
+	        --requirement $(OUT)/wheels/base.txt --dest $(OUT)/wheels/$$python || exit 1; \
+	    echo "| $$python | $$(ls $(OUT)/wheels/$$python | sed -E 's/^([^-]+)-([^-]+)-.*/\1 \2/' | paste -sd, | sed 's/,/, /g') |"; done
 
 format: $(VENV)/installed  ## let ruff fix what it can
 	$(BIN)/ruff check --fix .

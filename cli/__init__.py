@@ -4,7 +4,9 @@ Exit codes: 0 done, 1 a check failed (`verify`, `stability`), 2 a mistake that t
 143 SIGTERM, 129 SIGHUP.
 """
 
+import os
 import signal
+import socket
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -13,7 +15,7 @@ from threading import Event, Thread, current_thread, main_thread
 from types import FrameType
 
 # A shell reports a command ended by a signal as this plus the signal's number.
-_SIGNALLED = 128
+SIGNALLED = 128
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -29,7 +31,7 @@ def run(arguments: Sequence[str]) -> int:
             return run_group(arguments)
     except KeyboardInterrupt:
         sys.stderr.write("thenar: interrupted\n" if came[-1] == signal.SIGINT else "thenar: terminated\n")
-        return _SIGNALLED + came[-1]
+        return SIGNALLED + came[-1]
 
 
 @contextmanager
@@ -83,6 +85,14 @@ def ended_by_signals() -> Iterator[Event]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def notify(state: bytes) -> None:
+    """Tell systemd a state of this program, if that has started it."""
+    if place := os.environ.get("NOTIFY_SOCKET"):
+        with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
+            line.setblocking(False)
+            line.sendto(state, f"\0{place[1:]}" if place[0] == "@" else place)
 
 
 def main() -> None:

@@ -12,7 +12,7 @@ import msgspec
 
 from thenar.drivers.names import fault
 
-from . import ended_by_signals
+from . import SIGNALLED, ended_by_signals
 from .parameters import (
     Number,
     OutputFile,
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 _FRAME_US = 10_000
 _HARNESS, _CALIBRATION, _TAXELS = "glove.toml", "calibration.toml", "taxels.toml"
 _LONGEST_PATH = 4095  # of Linux
-# A shell reports a command ended by a signal as this plus the signal's number.
-_KILLED = 128
 
 
 @click.command("emulate", context_settings={"ignore_unknown_options": True})
@@ -130,7 +128,7 @@ def command(
             pass
     if child is not None:
         code = child.returncode
-        click.get_current_context().exit(code if code >= 0 else _KILLED - code)
+        click.get_current_context().exit(code if code >= 0 else SIGNALLED - code)
 
 
 def _check_folder(folder: Path) -> None:

@@ -9,7 +9,7 @@ import click
 
 from thenar.compiler.text import DASH, counted
 
-from .consoles import Table, Text
+from .consoles import Table
 from .options import (
     CHOOSING,
     LIMITS,
@@ -225,11 +225,12 @@ def _evaluate_people(
 
 def _print_wearers(study: "WearerStudy") -> None:
     numbers = ("mean", "worst")
-    grid = table(("", *numbers), numbers)
+    grid = table(("", *numbers), numbers, str(study.recipe))
     for row in study.rows:
         interval = "" if row.low is None or row.high is None else f" [{100 * row.low:.1f}, {100 * row.high:.1f}]"
         grid.add_row(row.title, f"{100 * row.mean:.1f}{interval}", f"{100 * min(row.people):.1f}")
-    _print_grid(str(study.recipe), grid)
+    out().print()
+    out().print(grid)
     people = counted(len(study.rows[0].people), "person", "people")
     out().print(f"{counted(study.trials, 'trial')} of {people}; accuracies in %, means over people with 95 % intervals")
 
@@ -240,12 +241,13 @@ def _print_streams(study: "StreamStudy") -> None:
     console = out()
     for inputs in dict.fromkeys(row.inputs for row in study.rows):
         for columns in (SHARES, (*TIMES, FALSE)):
-            grid = table(("", "", *columns), columns)
+            grid = table(("", "", *columns), columns, f"inputs: {inputs}; {study.recipe}")
             for row in study.rows:
                 if row.inputs == inputs:
                     cells = (_cell(row.values[name], 100 if name in SHARES else 1) for name in columns)
                     grid.add_row(row.method, row.what, *cells)
-            _print_grid(f"inputs: {inputs}; {study.recipe}", grid)
+            console.print()
+            console.print(grid)
     console.print(
         f"{counted(study.movements, 'movement')} of {counted(len(study.subjects), 'subject')}, {study.seconds:,.0f} s; "
         "each subject left out in turn; shares in %, means over subjects with 95 % intervals (Student). Nothing held "
@@ -260,15 +262,6 @@ def _cell(value: "SubjectMean", times: int) -> str:
     return f"{times * value.mean:.1f}" + (f" [{', '.join(ends)}]" if ends else "")
 
 
-def _print_grid(title: str, grid: Table, note: str = "") -> None:
-    console = out()
-    console.print()
-    console.print(Text(title, "bold"))
-    console.print(grid)
-    if note:
-        console.print(note)
-
-
 def _tables(run: "StudyRun", jobs: int) -> Iterator["RateTable"]:
     """Yield the tables; print each, laid out as in the paper, as soon as its fits are run."""
     from thenar.compiler.evaluation.folds import PROTOCOLS
@@ -281,7 +274,10 @@ def _tables(run: "StudyRun", jobs: int) -> Iterator["RateTable"]:
         with progress(f"evaluating {name[0]}") as report:
             (rated,) = run.tables([name], jobs, report)
         if not wants_json():
-            _print_grid(rated.title, _rates(rated), rated.note)
+            console.print()
+            console.print(_rates(rated))
+            if rated.note:
+                console.print(rated.note)
         yield rated
 
 
@@ -300,7 +296,7 @@ def _rates(rated: "RateTable") -> Table:
     averaged = ["all"] if len(rated.columns) > 1 else []
     paired = [f"against {row.paired.than}" for row in rated.rows if row.paired is not None][:1]
     numbers = ("switches", *rated.columns, *averaged, *paired)
-    grid = table(("", "", *numbers), numbers)
+    grid = table(("", "", *numbers), numbers, rated.title)
     for row in rated.rows:
         average = [both(row.rate, row.frames)] if averaged else []
         compared = [str(row.paired or "")] if paired else []

@@ -20,7 +20,7 @@ from .options import (
     trainer_option,
 )
 from .parameters import Number, OneOf, OutputFolder, existing_file, jobs_option, seed_range
-from .printing import echo, err, json_flag, out, progress, show, table
+from .printing import err, json_flag, out, progress, say, show, table
 
 if TYPE_CHECKING:
     from thenar.compiler.frontier.points import Frontier
@@ -144,7 +144,7 @@ def command(
             rate=rate,
             limits=limits,
             report=report,
-            rough=lambda early: echo(f"rough, from screening: {words.rough_of(early)}; drawn in {output}", err=True),
+            rough=lambda early: say(f"rough, from screening: {words.rough_of(early)}; drawn in {output}"),
             **asked,
         )
     show(found, _print, output)

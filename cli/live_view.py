@@ -1,13 +1,11 @@
 """The live terminal view of `thenar run`: the grasp, its confidence, and the state of the devices."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from threading import Event, Thread
-from typing import Self
+from time import monotonic
 
 from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, OutputTrouble, Quarantined
 
-from .consoles import Console, Live, Printed, Text, bar, grid
+from .consoles import Live, Printed, Text, bar, grid
 
 Devices = Callable[[], Sequence[DeviceHealth]]
 
@@ -16,49 +14,20 @@ _STYLES = {"ok": "bold green", "changing": "bold cyan", "degraded": "bold yellow
 _SHOWN = 6
 
 
-class LiveView:
-    """Draws the newest grasp ten times a second, in place.
+class LiveView(Live):
+    """Draws the newest grasp ten times a second, in place, on a console whose stream keeps nobody waiting."""
 
-    It draws in a separate thread: a terminal that is held (Ctrl-S), slow or closed delays nothing else.
-    """
+    _due_s = 0.0
 
-    def __init__(self, console: Console) -> None:
-        self._live = Live(console)
-        self._newest: tuple[LiveGrasp, Devices, HealthReport | None] | None = None
-        self._closing = Event()
-        self._thread = Thread(target=self._draw, name="thenar view", daemon=True)
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._closing.set()
-        self._thread.join()
-        with suppress(OSError):
-            self._live.__exit__()
-
-    def show(
-        self,
-        grasp: LiveGrasp,
-        devices: Devices,
-        health: HealthReport | None = None,
-    ) -> None:
-        """Draw this next, unless something newer arrives first; the devices are queried then."""
-        self._newest = grasp, devices, health
-
-    def _draw(self) -> None:
-        shown = None
-        # The thread also ends when the terminal closes.
-        with suppress(OSError):
-            while not self._closing.wait(_REDRAW_S):
-                newest = self._newest
-                if newest is not None and newest is not shown:
-                    grasp, devices, health = shown = newest
-                    wrong = list[Quarantined | OutputTrouble]()
-                    if health is not None:
-                        wrong += [*health.quarantined, *health.outputs]
-                    self._live.update(drawn(grasp, devices(), wrong))
+    def show(self, grasp: LiveGrasp, devices: Devices, health: HealthReport | None = None) -> None:
+        """Draw this if it is time; the devices are queried then."""
+        if monotonic() < self._due_s:
+            return
+        self._due_s = monotonic() + _REDRAW_S
+        wrong: tuple[Quarantined | OutputTrouble, ...] = ()
+        if health is not None:
+            wrong = (*health.quarantined, *health.outputs)
+        self.update(drawn(grasp, devices(), wrong))
 
 
 def drawn(

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from .parameters import WEB_ADDRESS, existing_file, existing_folder, web_token_option
-from .printing import say_page
+from .printing import say
 
 
 @click.command("monitor")
@@ -32,5 +32,5 @@ def command(recording: Path, build: Path, web: str, web_token: str | None) -> No
     from . import ended_by_signals
 
     with ended_by_signals() as stop, ReplayPage(recording, web, token=web_token, build=build) as page:
-        say_page(page.server.url)
+        say(f"thenar: the page is at {page.server.url}")
         page.run(stop)

@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Callable, Container, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from json import dumps
 from pathlib import Path
 from time import monotonic
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -22,7 +23,7 @@ _JSON = "thenar.json"
 _REDRAW_S = 0.1
 Found = TypeVar("Found")
 Rest = ParamSpec("Rest")
-# Left unescaped by JSON, but perhaps unsafe for a terminal or an encoding.
+# Left unescaped by msgspec, but perhaps unsafe for a terminal or an encoding.
 _DOUBTFUL = re.compile(r"[^\n -~]")
 
 json_flag = click.option(
@@ -40,29 +41,10 @@ def echo(text: str, *, err: bool = False) -> None:
     click.echo(shown(text), file=sys.stderr if err else sys.stdout)
 
 
-def json_shown(text: str, encoding: str) -> str:
-    """Return the JSON document `text`, with JSON escapes for characters without a glyph or outside `encoding`."""
-    return _DOUBTFUL.sub(lambda found: _in_json(found[0], encoding), text)
-
-
-def _in_json(letter: str, encoding: str) -> str:
-    with suppress(UnicodeEncodeError):
-        letter.encode(encoding)
-        if letter.isprintable():
-            return letter
-    units = letter.encode("utf-16-be", "surrogatepass")
-    return "".join(f"\\u{units[at]:02x}{units[at + 1]:02x}" for at in range(0, len(units), 2))
-
-
 def say(line: str) -> None:
     """Print a line on stderr, if that is still open: the terminal may have been closed."""
     with suppress(OSError):
         echo(line, err=True)
-
-
-def say_page(url: str) -> None:
-    """Print the address of the page."""
-    echo(f"thenar: the page is at {url}", err=True)
 
 
 def out() -> Console:
@@ -87,9 +69,9 @@ def wants_json() -> bool:
 
 
 def print_json(result: Any) -> None:
-    """Print `result` (msgspec struct, dataclass or builtin) as one indented JSON document on stdout."""
-    text = _json(result).decode()
-    click.echo(json_shown(text, getattr(sys.stdout, "encoding", None) or "utf-8"), file=sys.stdout)
+    """Print `result` (msgspec struct, dataclass or builtin) as one indented JSON document on stdout, in ASCII."""
+    text = _DOUBTFUL.sub(lambda found: dumps(found[0])[1:-1].replace("\x7f", "\\u007f"), _json(result).decode())
+    click.echo(text, file=sys.stdout)
 
 
 def show(

@@ -24,13 +24,17 @@ if TYPE_CHECKING:
     from thenar.runtime.sinks import SinkReport
 
 
-def selecting(build: "Build", preshape: str | None, **how: bool) -> "PreshapeSelector | None":
+# From row to row of a set, which has no times of frames.
+_PERIOD_US = 10_000
+
+
+def selecting(build: "Build", preshape: str | None, *, segments: bool) -> "PreshapeSelector | None":
     """Return the selector of preshapes, if one was requested."""
     if preshape is None:
         return None
     from thenar.runtime.preshape import preshape_selector
 
-    selector, lacking = preshape_selector(preshape, build, **how)
+    selector, lacking = preshape_selector(preshape, build, segments=segments)
     if lacking:
         err().print(f"thenar: {lacking}")
     return selector
@@ -67,7 +71,6 @@ def replay_set(
     sinks: Sequence[str],
     selector: "PreshapeSelector | None",
     frames: int | None,
-    period_us: int,
 ) -> None:
     """Classify every row of a set of grasps alone and send it to each sink, or as a JSON line to stdout if there is
     none; on stderr, print the accuracy, and whether the build was trained on these trials.
@@ -93,7 +96,7 @@ def replay_set(
         return msgspec.json.encode(shown if selector is None else shown | {"preshape": shape}) + b"\n"
 
     with _published(build, sinks, selector, line) as publish:
-        for grasp in replayed(build, grasp_set, period_us):
+        for grasp in replayed(build, grasp_set, _PERIOD_US):
             found.append(grasp.grasp)
             publish(grasp, None)
     rows = len(grasp_set)
@@ -155,18 +158,12 @@ def _published(
         click.get_current_context().exit(1)
 
 
-def nobody_listens(reports: Sequence["SinkReport"]) -> bool:
-    """Return whether every reader has gone for good (`| head`)."""
-    return bool(reports) and all(report.gone for report in reports)
-
-
 def say_what_was_lost(reports: Sequence["SinkReport"]) -> None:
     """Print on stderr what was not sent."""
     for report in reports:
         if report.lost or report.error:
             why = f": {report.error}" if report.error else ""
-            dropped = f", {report.dropped} readers dropped" if report.dropped else ""
-            say(f"{report.where}: {report.sent} frames sent, {report.lost} lost{dropped}{why}")
+            say(f"{report.where}: {report.sent} frames sent, {report.lost} lost{why}")
 
 
 def spoilt(reports: Sequence["SinkReport"]) -> bool:

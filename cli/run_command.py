@@ -15,8 +15,8 @@ from click.core import ParameterSource
 
 from .options import LazyOption
 from .parameters import Number, OutputFile, existing_file, existing_folder, overwrite_flag, web_options
-from .printing import of_device, out, say, say_page
-from .replaying import nobody_listens, replay_recording, replay_set, say_what_was_lost, selecting, spoilt
+from .printing import of_device, out, say
+from .replaying import replay_recording, replay_set, say_what_was_lost, selecting, spoilt
 
 if TYPE_CHECKING:
     from thenar.runtime import Build, Glove
@@ -50,21 +50,9 @@ def _sinks_help() -> str:
 @click.option(
     "--replay", metavar="FILE", type=existing_file, help="Recorded frames: a .grasps set, or the .mcap of a live run."
 )
-@click.option(
-    "--period-us",
-    type=click.IntRange(1),
-    default=10_000,
-    show_default=True,
-    help="Time between two rows of a .grasps set.",
-)
 @click.option("--sink", "sinks", metavar="SINK", multiple=True, cls=LazyOption, describe=_sinks_help)
 @click.option(
     "--preshape", metavar="NAME", help="Preshapes to send with grasps: barrett_bh8, parallel_gripper or a .toml file."
-)
-@click.option(
-    "--change-while-held",
-    is_flag=True,
-    help="Let the preshape change while something is held, not only after nothing was held.",
 )
 @click.option(
     "--record", metavar="FILE.mcap", type=OutputFile(".mcap"), help="Record the raw frames and the predictions."
@@ -76,11 +64,6 @@ def _sinks_help() -> str:
 @click.option("--lead", type=Number(0), help="Lead in score units that a new grasp type needs.")
 @click.option("--dwell-ms", type=Number(0, 10_000), help="Time for which a new grasp type must keep the lead.")
 @click.option("--max-lost", type=Number(0, 1), help="Share of the build's weight that may be missing.")
-@click.option(
-    "--grace-ms",
-    type=Number(0, 10_000),
-    help="Maximum age of a late CyberGlove record.  [default: four periods, at least 60]",
-)
 @click.option("--no-quarantine", is_flag=True, help="Use switches even if they are stuck or chatter.")
 @click.option(
     "--lag-ms", type=Number(0, 10_000), help="Time after which the state of a segment is final.  [default: 150]"
@@ -89,10 +72,8 @@ def command(
     build: Path,
     glove: Path | None,
     replay: Path | None,
-    period_us: int,
     sinks: tuple[str, ...],
     preshape: str | None,
-    change_while_held: bool,
     record: Path | None,
     web: str | None,
     web_token: str | None,
@@ -119,7 +100,7 @@ def command(
         raise click.UsageError("name either a glove to run on (--glove) or recorded frames (--replay)")
     from thenar.runtime import Build
 
-    _refuse_idle(glove, replay)
+    _refuse_idle(replay)
     loaded = Build.load(build)
     policy = _policy(deciding)
     if replay is None:
@@ -127,7 +108,6 @@ def command(
             raise click.UsageError("stdout is closed: name a --sink to send grasps to")
         viewed = sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
         asked: dict[str, Any] = {"preshapes": preshape, "record": record, "status": status}
-        asked |= {"change_while_held": change_while_held}
         asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy}
         page_of = None
         if web is not None:
@@ -136,29 +116,25 @@ def command(
             page_of = partial(LivePage, folder=build, address=web, token=web_token)
         _run_live(loaded, glove, viewed, page_of, frames, **asked)
     elif replay.suffix == ".mcap":
-        selector = selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
+        selector = selecting(loaded, preshape, segments=True)
         replay_recording(loaded, replay, sinks, selector, frames, policy)
     else:
-        replay_set(loaded, replay, sinks, selecting(loaded, preshape, segments=False), frames, period_us)
+        replay_set(loaded, replay, sinks, selecting(loaded, preshape, segments=False), frames)
 
 
 _LIVE = ("record", "web", "web_token", "status")
-_POLICY = ("lead", "dwell_ms", "max_lost", "grace_ms", "no_quarantine", "lag_ms")
+_POLICY = ("lead", "dwell_ms", "max_lost", "no_quarantine", "lag_ms")
 
 
-def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
+def _refuse_idle(replay: Path | None) -> None:
     """Raise UsageError for an option that would have no effect."""
-    if click.get_current_context().params["preshape"] is None:
-        _refuse("without --preshape", "change_while_held")
     if click.get_current_context().params["web"] is None:
         _refuse("without --web", "web_token")
-    if glove is not None:
-        _refuse("on a glove", "period_us")
-    elif replay is not None and replay.suffix == ".mcap":
-        _refuse("for a recording, which has the times of its frames", "period_us", *_LIVE)
-    else:
+    if replay is not None and replay.suffix == ".mcap":
+        _refuse("for a recording", *_LIVE)
+    elif replay is not None:
         alone = "for a set of grasps, each row of which is classified alone"
-        _refuse(alone, "change_while_held", *_LIVE, *_POLICY)
+        _refuse(alone, *_LIVE, *_POLICY)
 
 
 def _refuse(where: str, *names: str) -> None:
@@ -206,7 +182,7 @@ def _run_live(
                 say(f"thenar: {lacking}")
             page = None if page_of is None else stack.enter_context(page_of(glove))
             if page is not None:
-                say_page(page.server.url)
+                say(f"thenar: the page is at {page.server.url}")
             stack.enter_context(glove)
             view = None
             if viewed:
@@ -228,15 +204,21 @@ def _run_live(
 
 def _look_on(glove: "Glove", view: "LiveView | None", page: "LivePage | None", frames: int | None) -> None:
     """Let the glove run, and check its health once a second."""
+    from . import notify
+
     said, health = dict[str, str](), None
+    notify(b"READY=1")
     for moment in islice(glove, frames):
         if page is not None:
             page.show(moment)
         if glove.health is not health and glove.health is not None:
             health = glove.health
+            if health.switch_hz or health.glove_hz:
+                notify(b"WATCHDOG=1")
             if view is None:
                 _say_news(glove, health, said)
-                if glove.recorder is None and page is None and nobody_listens(glove.reports()):
+                gone = [report.gone for report in glove.reports()]
+                if glove.recorder is None and page is None and gone and all(gone):  # by `| head`
                     return
         if view is not None:
             view.show(moment.grasp, glove.devices, health)

@@ -1,4 +1,4 @@
-"""`thenar simulate`: a scene in, a set of grasps out, with the cost of each simulation step."""
+"""`thenar simulate`: a scene in, a set of grasps out."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -7,7 +7,6 @@ import click
 
 from thenar.compiler.text import counted
 
-from .consoles import Table
 from .parameters import OutputFile, jobs_option, keep_apart, overwrite_flag, seed_range
 from .printing import echo, json_flag, out, progress, show, table, warning
 
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from thenar.simulator.scenes.scene import Rest
 
 _SHOWN = 10  # unsettled repetitions that are listed individually
-_OWN = "dim"  # style of the scene-independent steps
 
 
 @click.command("simulate")
@@ -101,7 +99,7 @@ def command(
 
 
 def _print_report(report: "SimulationReport", path: Path, size: str) -> None:
-    """Print the grasps by type and the cost of each step, and warn of grasps that did not settle."""
+    """Print the grasps by type, and warn of grasps that did not settle."""
     console = out()
     fresh = f"after repetition {report.done}, " if report.done else ""
     console.print(
@@ -109,11 +107,12 @@ def _print_report(report: "SimulationReport", path: Path, size: str) -> None:
         f"{counted(len(report.subjects), 'subject')}, {counted(report.repetitions, 'grasp')} in {report.seconds:.1f} s"
     )
     console.print()
-    grasps = _table(
-        "Grasps, simulated",
-        *("grasp type", "grasps", "frames", "switches ON", "from - to", "distinct patterns", "no contact", "unsettled"),
+    columns = (
+        *("grasps", "frames", "switches ON", "from - to", "distinct patterns", "no contact", "unsettled"),
         *("N between switches", "largest residual N", "N mm"),
     )
+    grasps = table(("grasp type", *columns), columns, "Grasps, simulated")
+    grasps.columns[0].no_wrap = True
     for grasp in report.grasps:
         counts = (grasp.patterns, grasp.no_contact, grasp.unsettled)
         grasps.add_row(
@@ -124,17 +123,6 @@ def _print_report(report: "SimulationReport", path: Path, size: str) -> None:
     console.print(grasps)
     if report.lost_frames:
         console.print(f"{report.lost_frames} frames were lost; the frame received before is used in their place")
-    console.print()
-    columns = ("step", "whose", "calls", "grasps", "draws", "seconds", "us a grasp", "share")
-    costs = _table("Cost of every effect (own: a step that every scene has)", *columns)
-    for step in report.steps:
-        counts = (step.calls, step.grasps, step.draws)
-        times = (f"{step.seconds:.3f}", f"{step.us_a_grasp:.1f}", f"{step.share:.1%}")
-        costs.add_row(step.name, _whose(step.own), *map(str, counts), *times, style=_OWN if step.own else "")
-    draws, us = sum(step.draws for step in report.steps), sum(step.us_a_grasp for step in report.steps)
-    total = sum(step.seconds for step in report.steps)
-    costs.add_row("all", "", "", "", str(draws), f"{total:.3f}", f"{us:.1f}", "")
-    console.print(costs)
     if report.unsettled:
         what = "kept as requested" if report.kept_unsettled else "left out of the set (--keep-unsettled keeps them)"
         warning(f"{len(report.unsettled)} of {report.repetitions} grasps did not settle, and are {what}:")
@@ -143,14 +131,3 @@ def _print_report(report: "SimulationReport", path: Path, size: str) -> None:
             echo(f"  {place}: {one.why}", err=True)
         if len(report.unsettled) > _SHOWN:
             echo(f"  and {len(report.unsettled) - _SHOWN} more: --json lists them all", err=True)
-
-
-def _table(title: str, *columns: str) -> Table:
-    """Return a table whose first column is a name and never truncated."""
-    made = table(columns, columns[1:], title)
-    made.columns[0].no_wrap = True
-    return made
-
-
-def _whose(own: bool) -> str:
-    return "own" if own else "effect"

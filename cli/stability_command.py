@@ -28,10 +28,9 @@ def _names() -> Iterable[str]:
 @click.command("stability")
 @click.argument("cases", nargs=-1, metavar="[CASE]...", type=OneOf("case", _names))
 @click.option("--full", is_flag=True, help="Try more and harder inputs, such as 10,000 rounds of boosting: minutes.")
-@click.option("--list", "listing", is_flag=True, help="Only list the cases, and what could go wrong in each.")
 @jobs_option("Worker processes. The result does not depend on it.")
 @json_flag
-def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int) -> int:
+def command(cases: tuple[str, ...], full: bool, jobs: int) -> int:
     """Run the hard cases: what could go wrong numerically, the truth each is compared with, and the worst error.
 
     Without a CASE, run all of them. The truth is recomputed with 60 digits, independently of the product, or is a fact
@@ -45,14 +44,6 @@ def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int) -> int
         thenar stability separable weights
     """
     cases = tuple(name for name in _names() if not cases or name in cases)
-    if listing:
-        if full:
-            raise click.UsageError("--list only lists: leave out --full")
-        from thenar.stability.report import CASES
-
-        shown = [{"name": name, "title": CASES[name].title, "danger": CASES[name].danger} for name in cases]
-        show(shown, _print_list)
-        return 0
     for name in _NEEDED:
         if find_spec(name) is None:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
@@ -66,11 +57,6 @@ def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int) -> int
     result = Report(full, found, weka, all(case.holds for case in found))
     show(result, _print)
     return 0 if result.holds else 1
-
-
-def _print_list(cases: list[dict[str, str]]) -> None:
-    shown = table(("case", "subject", "what could go wrong"), rows=(tuple(case.values()) for case in cases))
-    out().print(shown)
 
 
 def _print(report: "Report") -> None:

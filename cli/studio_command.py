@@ -7,7 +7,7 @@ import click
 
 from .options import hand_of, layout_option, prices_of, prices_option
 from .parameters import WEB_ADDRESS, OutputFolder, existing_file, jobs_option, web_token_option
-from .printing import say_page
+from .printing import say
 
 
 @click.command("studio")
@@ -49,5 +49,5 @@ def command(
     hand, priced = hand_of(layout).fitted(grasp_set.element_names), prices_of(grasp_set, prices)
     choices: dict[str, Any] = {"hand": hand, "prices": priced, "output": output, "jobs": jobs}
     with ended_by_signals() as stop, ChoosePage(grasp_set, grasps.name, web, token=web_token, **choices) as page:
-        say_page(page.server.url)
+        say(f"thenar: the page is at {page.server.url}")
         page.run(stop)

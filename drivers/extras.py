@@ -15,6 +15,8 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "ros": ("cyclonedds",),
     "lsl": ("pylsl",),
     "ble": ("bleak",),
+    "mqtt": ("paho",),
+    "osc": ("pythonosc",),
     "web": ("aiohttp",),
     "foxglove": ("foxglove",),
 }

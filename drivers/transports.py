@@ -32,6 +32,7 @@ _TIMESPEC = struct.Struct("@ll")
 # Labels of a host's name are not empty, and at most 63 characters long: getaddrinfo raises UnicodeError for others.
 _HOST = r"[A-Za-z0-9_-]{1,63}(?:\.[A-Za-z0-9_-]{1,63})*\.?"
 _NET = re.compile(rf"(tcp|udp)://(\[[0-9A-Fa-f:.%]+\]|{_HOST}):(\d{{1,5}})/?")
+OTHER_PORTS = ("lsl:", "ros:", "mqtt:", "osc:")  # of rows that other readers open
 _WAYS = (
     "lines come from a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, udp://HOST:PORT, ble://NAME "
     "or - (standard input)"
@@ -39,8 +40,8 @@ _WAYS = (
 
 
 def line_port_fault(port: str) -> str:
-    """Return why `port` cannot deliver lines, or ""; streams of LSL and topics of ROS are other readers'."""
-    if port == "-" or port.startswith(("lsl:", "ros:")):
+    """Return why `port` cannot deliver lines, or ""; OTHER_PORTS are other readers'."""
+    if port == "-" or port.startswith(OTHER_PORTS):
         return ""
     if port.startswith(("tcp:", "udp:")):
         found = _NET.fullmatch(port)

@@ -1,8 +1,10 @@
 """What is installed: every package, under one name, and a runtime that needs the base dependencies only."""
 
 import importlib.metadata as metadata
+import json
 import re
 import shutil
+import socket
 import subprocess
 import sys
 import sysconfig
@@ -11,8 +13,14 @@ import tomllib
 import venv
 import zipfile
 from pathlib import Path
+from threading import Event, Thread
 
+import numpy as np
 import pytest
+
+from thenar.compiler import compile_build
+
+from .sets import grasp_set_of
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -205,3 +213,56 @@ def test_an_installed_wheel_imports_compiles_and_replays(distributions: Path, tm
         done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
     assert "2304 frames" in done.stderr
+
+
+# Lines of the page that need a Raspberry Pi, its network or root.
+OF_THE_PI = (
+    "make dist",
+    "scp ",
+    "ssh ",
+    "sudo raspi-config",
+    "sudo apt",
+    "sudo python3",
+    "sudo cp",
+    "cd ",
+    "journalctl ",
+)
+
+
+@pytest.mark.slow
+def test_the_commands_for_a_raspberry_pi_run_with_the_base_dependencies(board: Path, tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "how-to" / "raspberry-pi.md").read_text(encoding="utf-8")
+    assert len(re.sub(r"\||-{2,}", " ", page).split()) <= 450
+    labels = np.arange(30) % 3
+    grasps = grasp_set_of(["cup", "pen", "rod"], labels, switches=[[n == 0, n == 1] for n in labels])
+    compile_build(grasps, tmp_path / "build", rounds=5, folds=0)
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "thenar").write_text(f'#!/bin/sh\nexec {board} -I -m thenar.cli "$@"\n')
+    (tmp_path / "bin" / "thenar").chmod(0o755)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as glove:
+        glove.bind(("127.0.0.1", 0))
+        port = glove.getsockname()[1]
+    names, done = json.dumps(grasps.switch_names), Event()
+    row = json.dumps(dict.fromkeys(grasps.switch_names, 1)).encode()
+    (tmp_path / "glove.toml").write_text(f'[[stream]]\nport = "udp://127.0.0.1:{port}"\nswitches = {names}\n')
+
+    def send() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            while not done.wait(0.02):
+                sender.sendto(row, ("127.0.0.1", port))
+
+    sending = Thread(target=send)
+    sending.start()
+    try:
+        lines = [line for block in re.findall("```sh\n(.*?)```", page, re.DOTALL) for line in block.splitlines()]
+        commands = [line for line in lines if not line.startswith(OF_THE_PI) and "pip install" not in line]
+        assert len(commands) == 5
+        for line in commands:
+            below = f" --root {tmp_path / 'root'}" * ("service" in line)
+            run = ["sh", "-c", line.removeprefix("sudo ") + below]
+            ended = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+            assert ended.returncode == 0, (line, ended.stdout, ended.stderr)
+    finally:
+        done.set()
+        sending.join()
+    assert "@" not in (tmp_path / "root" / "etc" / "systemd" / "system" / "thenar.service").read_text()

@@ -3,7 +3,7 @@
 import socket
 
 from thenar.drivers.errors import SettingError
-from thenar.runtime.sinks import Sink, SinkKind, SinkPlace, SinkReport
+from thenar.runtime.sinks import Sink, SinkKind, SinkPlace
 from thenar.runtime.sinks.jsonl import encode
 
 
@@ -12,21 +12,13 @@ class Datagrams(Sink):
 
     def __init__(self, where, address):
         """Send to `address`, a host and a port; messages call the sink `where`."""
-        self.where, self.address, self.sent, self.lost = where, address, 0, 0
+        self.where, self.address = where, address
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setblocking(False)
 
     def publish(self, grasp, preshape, angles):
         """Send what was recognised, the preshape and the glove's angles, None where there are none."""
-        try:
-            self.socket.sendto(encode(grasp, preshape, angles), self.address)
-            self.sent += 1
-        except OSError:
-            self.lost += 1
-
-    def report(self):
-        """Say how this sink is doing; how many read cannot be known."""
-        return SinkReport(self.where, None, self.sent, self.lost)
+        self.attempt(lambda: self.socket.sendto(encode(grasp, preshape, angles), self.address))
 
     def close(self):
         """Close the socket."""

@@ -14,7 +14,7 @@ from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.frames import FrameParser, guess_frame
 from thenar.drivers.lines import UNITS_US, Row, RowReader
 from thenar.drivers.readers import LineReader
-from thenar.drivers.transports import is_serial
+from thenar.drivers.transports import OTHER_PORTS, is_serial
 
 from ..frames import now_us
 from ..harness.wiring import Range, StreamWiring
@@ -71,7 +71,7 @@ def reader_of(wiring: StreamWiring) -> RowReader:
     for kind in SOURCES.values():
         if isinstance(kind, RowKind) and kind.reader is not None and kind.takes(port):
             return kind.reader(wiring)
-    raise SettingError(f"{shortened(repr(port))} is not a port for rows{nearest(port, ['lsl:', 'ros:'])}")
+    raise SettingError(f"{shortened(repr(port))} is not a port for rows{nearest(port, OTHER_PORTS)}")
 
 
 def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str] = ()) -> Proposal:

@@ -4,6 +4,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from functools import partial
+from threading import current_thread, main_thread
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -39,7 +40,6 @@ class SinkReport(msgspec.Struct, frozen=True):
     lost      lines not sent: a reader was slow or gone, or the system refused
     error     the last error, or nothing
     gone      whether its only reader has gone for good
-    dropped   number of readers dropped because they took nothing
     """
 
     where: str
@@ -48,7 +48,6 @@ class SinkReport(msgspec.Struct, frozen=True):
     lost: int
     error: str = ""
     gone: bool = False
-    dropped: int = 0
 
 
 class Sink(ABC):
@@ -61,9 +60,13 @@ class Sink(ABC):
     ----------
     pace : PublishPace or None
         When it gets a result; None: it gets every frame's. `open_sink` sets it.
+    where, sent, lost, error
+        Its part of a `SinkReport`, for a sink without another `report`.
     """
 
     pace: "PublishPace | None" = None
+    where = error = ""
+    sent = lost = 0
 
     def begin(self, build: "Build") -> None:  # noqa: B027
         """Take the build that recognises, before the first frame."""
@@ -81,9 +84,22 @@ class Sink(ABC):
     def health(self, report: HealthReport) -> None:  # noqa: B027
         """Send the glove's health, about once a second."""
 
+    def attempt(self, send: Callable[[], object]) -> None:
+        """Call `send`, and count what it sends; as lost if it raises."""
+        try:
+            send()
+            self.sent += 1
+        except Exception as reason:  # packages raise many kinds for what cannot be sent
+            self.lost += 1
+            self.error = getattr(reason, "strerror", None) or str(reason)
+
     def report(self) -> SinkReport:
         """Return the state of the sink itself."""
-        return SinkReport(type(self).__name__, None, 0, 0)
+        return SinkReport(self.where or type(self).__name__, self.readers(), self.sent, self.lost, self.error)
+
+    def readers(self) -> int | None:
+        """Return the number of current readers; None if unknown."""
+        return None
 
     def close(self) -> None:  # noqa: B027
         """Release everything; may be called twice."""
@@ -217,7 +233,7 @@ class _Receiver:
         name = f"{type(sink).__module__}.{type(sink).__qualname__}"
         self.sink, self._fault, self._lost = sink, "", 0
         self._thread = WriterThread(name, _MOST_WAITING) if live else None
-        self._said = self._nothing = SinkReport(name, None, 0, 0)
+        self._nothing = SinkReport(name, None, 0, 0)
 
     @property
     def fault_message(self) -> str:
@@ -227,8 +243,11 @@ class _Receiver:
 
     @property
     def report(self) -> SinkReport:
-        """The last report that the sink has made, with what it never took: one that hangs loses, which is no error."""
-        said = self._nothing if self._fault else self._said
+        """The sink's report, with what it never took: one that hangs loses, which is no error."""
+        made = [self._nothing]
+        if not self._fault:
+            self._carried_out(lambda sink: made.append(sink.report()))
+        said = made[-1]
         lost = said.lost + self._lost + (0 if self._thread is None else self._thread.dropped)
         return replace(said, lost=lost, error=self._fault or said.error)
 
@@ -238,42 +257,23 @@ class _Receiver:
         else:
             self._thread.put(partial(self._try, send), longest_us)
 
-    def look(self) -> None:
-        """Let the sink make a report."""
-        if self._thread is None:
-            self._look()
-        elif not self._thread.hangs:
-            self._thread.put(self._look)
-
     def close(self) -> None:
         """Close the sink, also if it is left out; one that hangs is left to its thread."""
         if self._thread is None:
-            self._close()
+            self._carried_out(lambda sink: sink.close())
         else:
-            self._thread.close(self._close)
+            self._thread.close(lambda: self._carried_out(lambda sink: sink.close()))
 
     def _try(self, send: Callable[[Sink], None]) -> None:
         if self._fault or not self._carried_out(send):
             self._lost += 1
-
-    def _look(self) -> None:
-        def report(sink: Sink) -> None:
-            self._said = sink.report()
-
-        if not self._fault:
-            self._carried_out(report)
-
-    def _close(self) -> None:
-        self._carried_out(lambda sink: sink.close())
-        self._look()
 
     def _carried_out(self, call: Callable[[Sink], None]) -> bool:
         """Return whether the sink did its part; one that raises is left out from then on."""
         try:
             call(self.sink)
         except BaseException as reason:
-            # On the caller's thread it is the user's Ctrl-C.
-            if self._thread is None and isinstance(reason, KeyboardInterrupt):
+            if isinstance(reason, KeyboardInterrupt) and current_thread() is main_thread():  # the user's Ctrl-C
                 raise
             self._fault = f"{type(reason).__name__}: {reason}"
             from logging import getLogger  # for bugs only
@@ -297,8 +297,6 @@ class Fanout:
     def begin(self, build: "Build") -> None:
         """Pass the build to all sinks."""
         self._all(lambda sink: sink.begin(build))
-        for receiver in self._receivers:
-            receiver.look()
 
     def publish(
         self,
@@ -332,9 +330,7 @@ class Fanout:
         )
 
     def reports(self) -> tuple[SinkReport, ...]:
-        """Return the states of all sinks, in order; if live, those after the call before this one."""
-        for receiver in self._receivers:
-            receiver.look()
+        """Return the states of all sinks, in order."""
         return tuple(receiver.report for receiver in self._receivers)
 
     def close(self) -> None:

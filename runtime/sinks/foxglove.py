@@ -4,7 +4,7 @@
     /thenar/scores    score and probability of every grasp type, with `grasp`
     /thenar/switches  names of the switches that are closed or lost, with `grasp`
     /thenar/joints    angles of calibrated joints in rad, and the codes that are scored, with `grasp`
-    /thenar/preshape  the preshape, on change, and once a second with a grasp
+    /thenar/preshape  the preshape, with `grasp`
     /thenar/health    once a second, if requested: the glove's health
 
 A grasp comes on change and 50 times a second, unless the sink's options set another pace. A message has the time of its
@@ -16,7 +16,6 @@ Foxglove's schemas have no null, no alternatives and no references: None is left
 """
 
 import re
-from collections import Counter
 from math import exp
 from typing import TYPE_CHECKING, Any
 
@@ -24,8 +23,9 @@ import msgspec
 
 from thenar.drivers.extras import optional
 
+from ..frames import SwitchFrame
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
-from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+from .base import Sink, SinkError, SinkKind, SinkPlace
 from .sockets import check_readers, resolve
 
 if TYPE_CHECKING:
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from ..live.recogniser import Moment
 
 _RATE_HZ = 50
-_REPEAT_US = 1_000_000
 # Messages queued for one reader, over all topics: about two seconds.
 BACKLOG = 512
 
@@ -108,108 +107,65 @@ class FoxgloveServer(Sink):
     def __init__(self, host: str = "127.0.0.1", port: int = 8765, *, where: str = "") -> None:
         # The SDK is an extra.
         import foxglove
-        from foxglove.websocket import ServerListener
 
-        self._where = where or f"foxglove:{host}:{port}"
+        self.where = where or f"foxglove:{host}:{port}"
         # Channels end when it is garbage-collected.
         self._context = context = foxglove.Context()
         self._channels = {
             topic: foxglove.Channel(topic, schema=schema, message_encoding="json", context=context)
             for topic, schema in schemas().items()
         }
-        self._subscribed = Counter[int]()
         try:
             self._server = foxglove.start_server(
                 name="thenar",
                 host=host,
                 port=port,
                 context=context,
-                server_listener=_listener(ServerListener, self._subscribed),
                 message_backlog_size=BACKLOG,
             )
         except (RuntimeError, OSError) as reason:
             said = re.sub(r" \(os error [0-9]+\)", "", str(reason).removeprefix("FoxgloveError: "))
             hint = ": another process serves that port; use another" if "in use" in said else ""
-            raise SinkError(f"{self._where} cannot be opened: {said}{hint}") from None
+            raise SinkError(f"{self.where} cannot be opened: {said}{hint}") from None
         self.port: int = self._server.port
-        self._closed = False
-        self._repeated_us = self._unix_us = self._time_us = 0
-        # By topic: late readers get them within a second.
-        self._kept: dict[str, msgspec.Struct] = {}
+        self._unix_us = self._time_us = 0
         self._build: Build | None = None
-        self._sent = self._lost = 0
-        self._error = ""
 
     def begin(self, build: "Build") -> None:
         """Take the names of switches, joints and grasp types."""
         self._build = build
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Publish the grasp, and the kept messages."""
+        """Publish the grasp and the preshape."""
         self._time_us, self._unix_us = grasp.time_us, grasp.unix_us
         self._log("/thenar/grasp", grasp)
-        if preshape is not None and preshape is not self._kept.get("/thenar/preshape"):
-            self._keep("/thenar/preshape", preshape)
-        if not 0 <= grasp.time_us - self._repeated_us < _REPEAT_US:
-            self._repeated_us = grasp.time_us
-            for topic, content in self._kept.items():
-                self._log(topic, content)
+        if preshape is not None:
+            self._log("/thenar/preshape", preshape)
 
     def moment(self, moment: "Moment") -> None:
         """Publish the details with the grasp."""
-        if self._build is not None and self._subscribed:
-            self._log("/thenar/scores", _scores(moment, self._build))
-            if moment.switches is not None:
-                self._log("/thenar/switches", _switches(moment, self._build))
-            self._log("/thenar/joints", _joints(moment, self._build))
+        for topic, made in (("/thenar/scores", _scores), ("/thenar/switches", _switches), ("/thenar/joints", _joints)):
+            if self._build is not None and self._channels[topic].has_sinks():
+                self._log(topic, made(moment, self._build))
 
     def health(self, report: HealthReport) -> None:
         """Publish the glove's health."""
         self._log("/thenar/health", report, report.time_us - self._time_us)
 
-    def _keep(self, topic: str, content: msgspec.Struct) -> None:
-        self._kept[topic] = content
-        self._log(topic, content)
-
     def _log(self, topic: str, content: msgspec.Struct | dict[str, Any], later_us: int = 0) -> None:
-        """Pass a message to the server if its topic has readers, stamped `later_us` after the newest frame."""
-        channel = self._channels[topic]
-        if self._closed or not channel.has_sinks():
-            return
-        try:
-            channel.log(encode(content), log_time=1000 * max(0, self._unix_us + later_us))
-            self._sent += 1
-        except Exception as reason:  # of the SDK's own kinds
-            self._lost += 1
-            self._error = str(reason)
+        """Pass a message to the server if its topic has readers, stamped `later_us` after the newest frame.
 
-    def report(self) -> SinkReport:
-        """Return the state of this sink; the server does not report the messages that it drops for slow readers."""
-        readers = 0 if self._closed else len(self._subscribed)
-        return SinkReport(self._where, readers, self._sent, self._lost, self._error)
+        The server does not report the messages that it drops for slow readers.
+        """
+        channel, log_time = self._channels[topic], 1000 * max(0, self._unix_us + later_us)
+        if channel.has_sinks():
+            self.attempt(lambda: channel.log(encode(content), log_time=log_time))
 
     def close(self) -> None:
         """Stop the server and its connections."""
-        if not self._closed:
-            self._closed = True
-            self._server.stop()
-            for channel in self._channels.values():
-                channel.close()
-
-
-def _listener(base: type[Any], subscribed: Counter[int]) -> Any:
-    """Return a listener that counts each reader's topics."""
-
-    class Listener(base):  # type: ignore[misc]
-        def on_subscribe(self, client: Any, channel: Any) -> None:
-            subscribed[client.id] += 1
-
-        def on_unsubscribe(self, client: Any, channel: Any) -> None:
-            subscribed[client.id] -= 1
-            if not subscribed[client.id]:
-                del subscribed[client.id]
-
-    return Listener()
+        self._server.stop()
+        for channel in self._channels.values():
+            channel.close()
 
 
 def _scores(moment: "Moment", build: "Build") -> dict[str, Any]:
@@ -223,8 +179,7 @@ def _scores(moment: "Moment", build: "Build") -> dict[str, Any]:
 
 
 def _switches(moment: "Moment", build: "Build") -> dict[str, Any]:
-    frame = moment.switches
-    assert frame is not None
+    frame = moment.switches or SwitchFrame(0, 0)
     names = [switch.name for switch in build.manifest.switches]
 
     def named(mask: int) -> tuple[str, ...]:

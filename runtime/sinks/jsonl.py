@@ -12,7 +12,7 @@ import stat
 import sys
 from contextlib import suppress
 from io import UnsupportedOperation
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import msgspec
 from msgspec import json, structs
@@ -46,20 +46,16 @@ Line = HeaderLine | GraspLine | HealthLine
 # While nothing changes, in a live run.
 _RATE_HZ = 10
 _encode = json.Encoder().encode
-_GRASP, _PRESHAPE, _ANGLES = b'{"kind":"grasp",', b',"preshape":', b',"angles":'
 
 
 def encode(grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> bytes:
-    """Return a frame's line, including its newline. UTF-8, no newline inside.
-
-    The bytes equal those of a `GraspLine`, without making one.
-    """
+    """Return a frame's line, including its newline. UTF-8, no newline inside."""
     grasp = structs.replace(
         grasp, probability=round(grasp.probability, 4), segment_probability=round(grasp.segment_probability, 4)
     )
-    positions = None if angles is None else [round(position, 4) for position in angles.positions_rad]
-    parts = (_GRASP, _encode(grasp)[1:-1], _PRESHAPE, _encode(preshape), _ANGLES, _encode(positions), b"}\n")
-    return b"".join(parts)
+    positions = None if angles is None else tuple(round(position, 4) for position in angles.positions_rad)
+    values: list[Any] = [*structs.astuple(grasp), preshape, positions]
+    return _encode(GraspLine(*values)) + b"\n"
 
 
 def encode_header(angles: JointAngles) -> bytes:
@@ -84,9 +80,8 @@ class JsonLines(Sink):
         self._file = file
         self._rest = b""
         self._owned = owned
-        self._where = where
-        self._sent = self._lost = 0
-        self._error, self._gone = "", False
+        self.where = where
+        self._gone = False
         self._joints: tuple[str, ...] = ()
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
@@ -108,13 +103,13 @@ class JsonLines(Sink):
                 left = left[self._write(left) :]
             self._rest, sent = b"", not self._gone
         except (OSError, ValueError) as reason:  # ValueError: somebody closed the file
-            self._error = getattr(reason, "strerror", None) or str(reason)
+            self.error = getattr(reason, "strerror", None) or str(reason)
             self._gone = isinstance(reason, BrokenPipeError)
             torn = len(line) - len(left)
             self._rest = left[: max(-torn, 0)] if torn <= 0 or self._takes_back(torn) else left
         if line:
-            self._sent += sent
-            self._lost += not sent
+            self.sent += sent
+            self.lost += not sent
 
     def _write(self, data: bytes) -> int:
         try:
@@ -139,7 +134,7 @@ class JsonLines(Sink):
 
     def report(self) -> SinkReport:
         """Return how this sink is doing."""
-        return SinkReport(self._where, None, self._sent, self._lost, self._error, gone=self._gone)
+        return structs.replace(super().report(), gone=self._gone)
 
     def close(self) -> None:
         """Finish the line that was begun, if the reader allows, and close the file if it was opened here."""

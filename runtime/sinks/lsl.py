@@ -15,21 +15,22 @@ from thenar.drivers.lsl import load_pylsl
 from thenar.drivers.names import fault
 
 from ..published import JointAngles, LiveGrasp, Preshape
-from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+from .base import Sink, SinkError, SinkKind
 
 
 class LslStreams(Sink):
     """Publishes streams under a name. Raises SettingError for an invalid name, SinkError if LSL refuses."""
 
     def __init__(self, name: str, *, stamped: bool = True) -> None:
-        self._lsl, self._name, self._stamped = load_pylsl(f"lsl:{name}"), name, stamped
+        self.where, self._name, self._stamped = f"lsl:{name}", name, stamped
+        self._lsl = load_pylsl(self.where)
         if reason := fault(name):
             raise SettingError(f"lsl:{name!r} is not a valid stream name: it {reason}")
         self._grasps = self._outlet(name, "Markers", ("grasp",), "string", 0.0)
         self._angles: Any = None
         self._joints: tuple[str, ...] = ()
         self._measured: JointAngles | None = None
-        self._shown, self._sent, self._closed = "", 0, False
+        self._shown, self._closed = "", False
 
     def _outlet(self, name: str, kind: str, labels: tuple[str, ...], form: str, rate_hz: float) -> Any:
         lsl = self._lsl
@@ -48,7 +49,7 @@ class LslStreams(Sink):
         if grasp.grasp != self._shown:
             self._shown = grasp.grasp
             self._grasps.push_sample([grasp.grasp], stamp)
-            self._sent += 1
+            self.sent += 1
         if angles is not None and angles is not self._measured:
             self._measured = angles
             if self._angles is None:
@@ -57,17 +58,15 @@ class LslStreams(Sink):
             if angles.names == self._joints:
                 self._angles.push_sample(list(angles.positions_rad), stamp)
 
-    def report(self) -> SinkReport:
-        """Return the state of this sink."""
-        return SinkReport(f"lsl:{self._name}", None, self._sent, 0)
-
     def close(self) -> None:
         """End the streams."""
         self._closed, self._grasps, self._angles = True, None, None
 
 
-def _open(where: SinkPlace) -> Sink:
-    return LslStreams(where.place, stamped=not where.wait)
-
-
-MEMBER = SinkKind("lsl", "NAME", "grasp types and joints as streams of the Lab Streaming Layer", _open, rank=5)
+MEMBER = SinkKind(
+    "lsl",
+    "NAME",
+    "grasp types and joints as streams of the Lab Streaming Layer",
+    lambda where: LslStreams(where.place, stamped=not where.wait),
+    rank=5,
+)

@@ -1,120 +1,91 @@
-"""ROS 2 topics without a ROS installation, through Eclipse Cyclone DDS (extra `ros`).
+"""Topics of ROS 2, by rclpy where ROS is installed, by Eclipse Cyclone DDS otherwise (extra `ros`).
 
     NAMESPACE/grasp     std_msgs/String                  the grasp type, "unknown" and "none" included
-    NAMESPACE/segment   diagnostic_msgs/DiagnosticArray  the same with its stamp, probability, state, segment and health
+    NAMESPACE/state     thenar_msgs/Grasp                the same with its stamp, probability, state, segment and health
     NAMESPACE/preshape  trajectory_msgs/JointTrajectory  when it changes
     NAMESPACE/angles    sensor_msgs/JointState           the glove's calibrated joints, in rad
     NAMESPACE/health    std_msgs/String                  once a second, if requested: the glove's health, as JSON
 
-Grasp, segment and angles are published on change and 20 times a second, unless the sink's options set another pace.
-Reliable, with the last 10 kept, which serves reliable and best-effort readers alike. Grasp, segment and preshape
-are transient local: late readers get the newest at once. Nodes of this machine can read, others if CYCLONEDDS_URI or
-`?public` allows them; ROS_DOMAIN_ID sets the domain, as for a ROS 2 node.
+Grasp, state and angles are published on change and 20 times a second, unless the sink's options set another pace.
+Reliable, with the last 10 kept, which serves reliable and best-effort readers alike. Grasp, state and preshape
+are transient local: late readers get the newest at once. Nodes of this machine can read, others if `?public` or the
+settings of ROS or Cyclone DDS (CYCLONEDDS_URI) allow them; ROS_DOMAIN_ID sets the domain, as for any node.
 """
 
-from collections.abc import Callable
+from typing import Any
 
 from msgspec import json
 
-from thenar.drivers.extras import optional
+from thenar.drivers.errors import DeviceError
 
+from .. import ros
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
-from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+from ..sources.ros import open_node
+from .base import Sink, SinkError, SinkKind
 
 _RATE_HZ = 20
+_TOPICS = {
+    "grasp": "std_msgs/String",
+    "state": "thenar_msgs/Grasp",
+    "preshape": "trajectory_msgs/JointTrajectory",
+    "angles": "sensor_msgs/JointState",
+    "health": "std_msgs/String",
+}
+_KEPT = ("grasp", "state", "preshape")
 
 
 class RosTopics(Sink):
-    """Publishes under a namespace of ROS. Messages that DDS refuses are counted as lost in the report."""
+    """Publishes under a namespace of ROS. Messages that ROS refuses are counted as lost in the report."""
 
     def __init__(self, name: str = "/thenar", *, public: bool = False) -> None:
-        """Publish under `name` to this machine, or to all networks that Cyclone DDS finds if `public`.
+        """Publish under `name` to this machine, or also to others if `public`.
 
-        Raise SettingError for an invalid name or domain, SinkError if DDS does not start.
+        Raise SettingError for an invalid name or domain, SinkError if ROS does not start.
         """
-        # Cyclone DDS, which these import, is an extra.
-        from cyclonedds.core import DDSException
-
-        from .. import ros
-
-        self._where = f"ros:{ros.namespace(name)}" + "?public" * public
-        self._name, self._ros = name, ros
-        number = ros.domain()
+        self.where = f"ros:{ros.namespace(name)}" + "?public" * public
         try:
-            self._domain, participant = ros.join(number, public=public)
-            self._grasp = ros.writer(participant, f"{name}/grasp", ros.String, kept=True)
-            self._segment = ros.writer(participant, f"{name}/segment", ros.DiagnosticArray, kept=True)
-            self._preshape = ros.writer(participant, f"{name}/preshape", ros.JointTrajectory, kept=True)
-            self._angles = ros.writer(participant, f"{name}/angles", ros.JointState)
-            self._health = ros.writer(participant, f"{name}/health", ros.String)
-        except DDSException as reason:
-            raise SinkError(
-                f"{self._where} cannot be opened in domain {number}: {reason} "
-                "Check CYCLONEDDS_URI, and the network interfaces that it names."
-            ) from None
-        except OSError as reason:
-            raise SinkError(
-                f"{self._where} cannot be limited to this machine: {reason.strerror}. That takes Linux 5.7 or newer; "
-                f"ros:{name}?public lets other machines read"
-            ) from None
-        self._closed = False
+            self._node = node = open_node(self.where, public=public)
+            self._writers = {
+                topic: node.writer(f"{name}/{topic}", kind, kept=topic in _KEPT) for topic, kind in _TOPICS.items()
+            }
+        except DeviceError as reason:
+            raise SinkError(f"{self.where} cannot be opened {reason}") from None
         self._told: Preshape | None = None
-        self._sent = self._lost = 0
-        self._error = ""
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish everything, but the preshape only if it changed."""
-        self._try(lambda: self._write(grasp, preshape, angles))
+        kind = self._node.kind
+        messages = {"grasp": kind("std_msgs/String")(data=grasp.grasp), "state": ros.state(kind, grasp)}
+        if angles is not None:
+            messages["angles"] = ros.joint_state(kind, grasp.unix_us, angles)
+        if preshape is not None and preshape != self._told:
+            messages["preshape"] = ros.trajectory(kind, preshape)
+            self._told = preshape
+        self.attempt(lambda: self._write(messages))
 
     def health(self, report: HealthReport) -> None:
         """Publish the glove's health."""
-        self._try(lambda: self._health.write(self._ros.String(json.encode(report).decode())))
+        message = self._node.kind("std_msgs/String")(data=json.encode(report).decode())
+        self.attempt(lambda: self._write({"health": message}))
 
-    def _try(self, write: Callable[[], None]) -> None:
-        if self._closed:
-            self._lost += 1
-            return
-        try:
-            write()
-            self._sent += 1
-        except Exception as reason:  # Cyclone's Python side raises many kinds for what it cannot serialise
-            self._lost += 1
-            self._error = str(reason)
-
-    def _write(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        ros = self._ros
-        self._grasp.write(ros.String(grasp.grasp))
-        self._segment.write(ros.segment(self._name, grasp))
-        if angles is not None:
-            self._angles.write(ros.joint_state(grasp.unix_us, angles))
-        if preshape is not None and preshape != self._told:
-            self._preshape.write(ros.trajectory(preshape))
-            self._told = preshape
-
-    def report(self) -> SinkReport:
-        """Return the state of this sink; its readers are those of the grasp type."""
-        readers = 0 if self._closed else self._grasp.get_publication_matched_status().current_count
-        return SinkReport(self._where, readers, self._sent, self._lost, self._error)
+    def _write(self, messages: dict[str, Any]) -> None:
+        if not self._writers:
+            raise DeviceError("the node has ended")
+        for topic, message in messages.items():
+            self._writers[topic](message)
 
     def close(self) -> None:
         """Leave the domain."""
-        if not self._closed:
-            self._closed = True
-            # Each entity ends with its last name; the domain, which ends all that is left in it, goes last.
-            del self._grasp, self._segment, self._preshape, self._angles, self._health
-            del self._domain
-
-
-def _open(where: SinkPlace) -> Sink:
-    with optional(SinkError, f"ros:{where.place}"):
-        return RosTopics(where.place, public="public" in where.options)
+        # What a topic is written by ends with its last name, before its node.
+        self._writers.clear()
+        self._node.close()
 
 
 MEMBER = SinkKind(
     "ros",
     "/NAMESPACE",
     "topics of ROS 2 on this machine; with public also for others",
-    _open,
+    lambda where: RosTopics(where.place, public="public" in where.options),
     ("public",),
     _RATE_HZ,
     rank=4,

@@ -10,46 +10,34 @@ Places are limited. A reader that takes nothing for five seconds is dropped.
 import errno
 import ipaddress
 import re
-import select
 import socket
-from collections.abc import Callable
 from contextlib import suppress
-from time import monotonic
-from typing import Any
 
 from thenar.drivers.errors import SettingError
 
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
-from .base import Sink, SinkError, SinkKind, SinkReport
+from .base import Sink, SinkError, SinkKind
 from .jsonl import encode, encode_header, encode_health
 
 _BACKLOG = 16
 MAX_READERS = 32
-# Per remote machine, so that none can take every place.
-MAX_OF_ONE = 8
 # A reader that takes no byte for this long hangs.
 HANGING_S = 5.0
 # About fifty lines; the kernel doubles it for its own bookkeeping.
 SEND_BUFFER = 16384
 # Readers accepted per frame, so that many at once do not delay it.
 _KNOCKS = 16
-_HERE = frozenset({"127.0.0.1", "::1"})
 
 
 class SocketLines(Sink):
     """Serves the readers of a listening socket, which it takes over."""
 
-    def __init__(self, listener: socket.socket, where: str, clock: Callable[[], float] = monotonic) -> None:
-        """Serve `listener`; `clock` gives seconds."""
+    def __init__(self, listener: socket.socket, where: str) -> None:
         listener.setblocking(False)
         self._listener = listener
-        self._listener_poll = select.poll()
-        self._listener_poll.register(listener, select.POLLIN)
-        self._where = where
-        self._clock = clock
-        self._readers: list[_Reader] = []
-        self._sent = self._lost = self._dropped = 0
-        self._error = ""
+        self.where = where
+        self._clients: list[_Reader] = []
+        self._dropped = 0
         self._joints: tuple[str, ...] = ()
         self._header = b""
 
@@ -65,129 +53,96 @@ class SocketLines(Sink):
         if angles is not None and angles.names != self._joints:
             self._joints, self._header = angles.names, encode_header(angles)
             self._send_all(self._header)
-        if self._readers:
+        if self._clients:
             self._send_all(encode(grasp, preshape, angles))
 
     def health(self, report: HealthReport) -> None:
         """Accept new readers, and send every reader the report's line."""
         self._accept_clients()
-        if self._readers:
+        if self._clients:
             self._send_all(encode_health(report))
 
     def _accept_clients(self) -> None:
-        if self._listener.fileno() < 0 or not self._listener_poll.poll(0):
+        if self._listener.fileno() < 0:
             return
         try:
             with suppress(BlockingIOError):
                 for _ in range(_KNOCKS):
-                    self._add_client(*self._listener.accept())
+                    self._add_client(self._listener.accept()[0])
         except OSError as reason:  # gone before it was accepted, or no descriptors left
-            self._error = reason.strerror or str(reason)
+            self.error = reason.strerror or str(reason)
 
-    def _add_client(self, reader: socket.socket, peer: Any) -> None:
-        host = _host(peer)
-        if self._has_room(host):
-            self._readers.append(_Reader(reader, host))
-            if self._header:
-                self._send(self._readers[-1], self._header, self._clock())
-        else:
+    def _add_client(self, reader: socket.socket) -> None:
+        if len(self._clients) >= MAX_READERS:
+            self.error = f"more than {MAX_READERS} readers: the newest were rejected"
             reader.close()
-
-    def _has_room(self, host: str) -> bool:
-        """Return whether one more reader of `host` has a place."""
-        if host and sum(reader.host == host for reader in self._readers) >= MAX_OF_ONE:
-            full = f"more than {MAX_OF_ONE} readers on {host}"
-        elif len(self._readers) >= MAX_READERS:
-            full = f"more than {MAX_READERS} readers"
-        else:
-            return True
-        self._error = f"{full}: the newest were rejected"
-        return False
+            return
+        self._clients.append(_Reader(reader))
+        if self._header:
+            self._send(self._clients[-1], self._header)
 
     def _send_all(self, line: bytes) -> None:
-        now_s = self._clock()
-        for reader in tuple(self._readers):
-            sent = self._send(reader, line, now_s)
-            self._sent += sent
-            self._lost += not sent
+        for reader in tuple(self._clients):
+            sent = self._send(reader, line)
+            self.sent += sent
+            self.lost += not sent
 
-    def _send(self, reader: "_Reader", line: bytes, now_s: float) -> bool:
+    def _send(self, reader: "_Reader", line: bytes) -> bool:
         try:
-            sent = reader.send(line, now_s)
-        except OSError:
-            self._readers.remove(reader)
+            return reader.send(line)
+        except OSError as reason:
+            self._clients.remove(reader)
             reader.close()
+            if reason.errno == errno.ETIMEDOUT:
+                self._dropped += 1
+                self.error = f"readers dropped that took nothing for {HANGING_S:g} s: {self._dropped}"
             return False
-        if reader.hangs(now_s):
-            self._readers.remove(reader)
-            reader.close()
-            self._dropped += 1
-            self._error = f"a reader that took nothing for {HANGING_S:g} s was dropped"
-        return sent
 
-    def report(self) -> SinkReport:
-        """Return the state of this sink."""
-        return SinkReport(self._where, len(self._readers), self._sent, self._lost, self._error, dropped=self._dropped)
+    def readers(self) -> int:
+        """Return the number of readers."""
+        return len(self._clients)
 
     def close(self) -> None:
         """Close the socket and every reader's."""
         if self._listener.fileno() < 0:
             return
         self._listener.close()
-        for reader in self._readers:
+        for reader in self._clients:
             reader.close()
-        self._readers.clear()
+        self._clients.clear()
 
 
 class _Reader:
-    """A reader of the lines, and the `host` it is on, "" for this one; the rest of one line may wait for it here."""
+    """A reader of the lines; the rest of one line may wait for it here."""
 
-    __slots__ = ("_rest", "_socket", "_stalled_s", "host")
+    __slots__ = ("_rest", "_socket")
 
-    def __init__(self, reader: socket.socket, host: str) -> None:
+    def __init__(self, reader: socket.socket) -> None:
         reader.setblocking(False)
         reader.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self.host = host
+        # The system ends the connection if it takes nothing of what waits for it.
+        reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1000 * HANGING_S))
         self._socket, self._rest = reader, b""
-        self._stalled_s: float | None = None
 
-    def send(self, line: bytes, now_s: float) -> bool:
+    def send(self, line: bytes) -> bool:
         """Send `line` if there is room for it; return whether it was begun. Raises OSError if the reader is gone."""
         left = self._rest + line
         took = 0
         with suppress(BlockingIOError):
             while took < len(left):
                 took += self._socket.send(left[took:])
-        if took:
-            self._stalled_s = None
-        elif self._stalled_s is None:
-            self._stalled_s = now_s
         sent = took > len(self._rest)
         # Of a line of which nothing was sent, nothing is kept: it is lost, and the next one starts afresh.
         self._rest = left[took:] if sent else self._rest[took:]
         return sent
-
-    def hangs(self, now_s: float) -> bool:
-        """Return whether lines were offered for the whole limit without a byte taken."""
-        return self._stalled_s is not None and now_s - self._stalled_s >= HANGING_S
 
     def close(self) -> None:
         """Close the connection."""
         self._socket.close()
 
 
-def _host(peer: Any) -> str:
-    """Return the key of a reader's machine: its address, for IPv6 its 64-bit network; "" for this machine."""
-    address = ipaddress.ip_address(peer[0].partition("%")[0])
-    mapped = getattr(address, "ipv4_mapped", None)
-    address = address if mapped is None else mapped
-    if str(address) in _HERE:
-        return ""
-    return str(address if address.version == 4 else ipaddress.ip_network((address, 64), strict=False))
-
-
-def open_tcp(place: str, *, public: bool = False, clock: Callable[[], float] = monotonic) -> SocketLines:
+def open_tcp(place: str, *, public: bool = False) -> SocketLines:
     """Return a sink on a TCP port: "127.0.0.1:7777", "localhost:7777", "[::1]:7777" or, on 127.0.0.1, "7777".
 
     Anyone who can connect can read, so only addresses of this machine are accepted unless `public`. Port 0 means any
@@ -196,7 +151,7 @@ def open_tcp(place: str, *, public: bool = False, clock: Callable[[], float] = m
     where = f"tcp:{place}" + "?public" * public
     family, address = resolve(place, where, "tcp:127.0.0.1:7777")
     check_readers(address, f"tcp:{place}", public=public)
-    return SocketLines(_listener(family, address, where), where, clock)
+    return SocketLines(_listener(family, address, where), where)
 
 
 def check_readers(address: tuple[str, int], where: str, *, public: bool) -> None:

@@ -1,13 +1,14 @@
 """Lines or binary frames of a board or a program, over serial, TCP, UDP, Bluetooth or stdin."""
 
 from thenar.drivers.readers import LineReader
+from thenar.drivers.transports import OTHER_PORTS
 
 from .rows import row_kinds
 
 MEMBER = row_kinds(
     "line",
     "Lines or frames of numbers over serial, TCP, UDP, Bluetooth or stdin: [[stream]].",
-    lambda port: not port.startswith(("lsl:", "ros:")),
+    lambda port: not port.startswith(OTHER_PORTS),
     lambda wiring: LineReader(wiring.port, wiring.baud, len(wiring.columns), wiring.frame),
     3,
 )

@@ -1,15 +1,18 @@
-"""Topics of ROS 2 as rows, through Eclipse Cyclone DDS (extra `ros`), without a ROS installation.
+"""Topics of ROS 2 as rows, by rclpy where ROS is installed, by Eclipse Cyclone DDS otherwise (extra `ros`).
 
     ros:/TOPIC                         sensor_msgs/JointState: columns are the names of the joints, by their positions
     ros:/TOPIC?type=UInt8MultiArray    std_msgs: columns in the order of `columns`
     ros:/TOPIC?type=Float32MultiArray  the same
 
 A JointState's stamp is the sender's clock, unless it is zero. Nodes of this machine are received, others if
-CYCLONEDDS_URI or `&public` allows them; ROS_DOMAIN_ID sets the domain. Messages of a second publisher are left out.
+CYCLONEDDS_URI or `&public` allows them; ROS_DOMAIN_ID sets the domain. By Cyclone DDS, messages of a second publisher
+are left out; rclpy does not say who sent one.
 """
 
+import platform
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
+from importlib.util import find_spec
 from typing import Any
 
 from thenar.drivers.errors import DeviceError, SettingError
@@ -18,13 +21,34 @@ from thenar.drivers.lines import LineCounts, Row, RowReader, finite
 from thenar.drivers.names import shortened
 from thenar.drivers.senders import FirstSender
 
+from .. import ros
 from ..frames import now_us
 from .rows import row_kinds
 
-_TYPES = ("JointState", "UInt8MultiArray", "Float32MultiArray")
+_JOINTS = "JointState"
+_ARRAYS = ("UInt8MultiArray", "Float32MultiArray")
+_TYPES = {_JOINTS: f"sensor_msgs/{_JOINTS}"} | {name: f"std_msgs/{name}" for name in _ARRAYS}
 _PORT = re.compile(rf"ros:(/[^?]*)(?:\?(?:type=({'|'.join(_TYPES)})&?)?(public)?)?")
-_MOST = 256
-_ANY = 0xFFFFFFFF  # samples, views and instances of all states
+_NO_WHEEL = (
+    "cyclonedds has no wheel for aarch64: install ROS 2 (on Ubuntu 24.04: apt install ros-jazzy-ros-base), source its "
+    "setup.bash, and make the venv with --system-site-packages; or send grasps by mqtt: to a computer with ROS"
+)
+
+
+def open_node(where: str, *, public: bool) -> ros.Node:
+    """Return a node in the domain of ROS_DOMAIN_ID. Raises SettingError if neither rclpy nor Cyclone DDS is installed,
+    DeviceError if it cannot start.
+    """
+    number = ros.domain()
+    if find_spec("rclpy") is not None:
+        from ..ros_rclpy import RclpyNode
+
+        return RclpyNode(number, public=public)
+    if find_spec("cyclonedds") is None and platform.machine() == "aarch64":
+        raise SettingError(f"{where}: {_NO_WHEEL}")
+    with optional(SettingError, where):
+        from ..ros_dds import DdsNode
+    return DdsNode(number, public=public)
 
 
 class RosReader(RowReader):
@@ -33,10 +57,9 @@ class RosReader(RowReader):
     def __init__(self, port: str) -> None:
         self._port, self._counts = port, LineCounts()
         found = _PORT.fullmatch(port)
-        self.kind = "joint" if found and (found[2] or _TYPES[0]) == _TYPES[0] else ""
-        self._reader: Any = None
-        self._waiting: Any = None
-        self._domain: Any = None
+        self.kind = "joint" if found and (found[2] or _JOINTS) == _JOINTS else ""
+        self._node: ros.Node | None = None
+        self._read: ros.Read = lambda _timeout_s: []
         self._senders = FirstSender()
 
     def open(self) -> None:
@@ -45,36 +68,26 @@ class RosReader(RowReader):
         if found is None:
             ways = f"ros:/TOPIC, optionally followed by ?type= one of {', '.join(_TYPES)}, or ?public"
             raise SettingError(f"{shortened(repr(self._port))} names no topic: write {ways}")
-        with optional(SettingError, self._port):
-            from cyclonedds.core import DDSException, ReadCondition, WaitSet
-
-            from .. import ros
-        self._senders = FirstSender()
-        number, name = ros.domain(), ros.namespace(found[1])
+        self._senders, name = FirstSender(), ros.namespace(found[1])
         try:
-            self._domain, participant = ros.join(number, public=bool(found[3]))
-            self._reader = ros.reader(participant, name, getattr(ros, found[2] or _TYPES[0]))
-            self._waiting = WaitSet(participant)
-            self._waiting.attach(ReadCondition(self._reader, _ANY))
-        except (DDSException, OSError) as reason:
-            raise DeviceError(f"{self._port} cannot be opened in domain {number}: {reason}") from None
+            self._node = open_node(self._port, public=bool(found[3]))
+            self._read = self._node.reader(name, _TYPES[found[2] or _JOINTS])
+        except DeviceError as reason:
+            raise DeviceError(f"{self._port} cannot be opened {reason}") from None
 
     def read(self, timeout_s: float) -> Sequence[Row]:
         """Return the rows of the messages that arrived."""
-        from cyclonedds.core import DDSException
-
         try:
-            self._waiting.wait(timeout=max(1, round(timeout_s * 1e9)))
-            return list(self._rows(self._reader.take(N=_MOST)))
-        except DDSException as reason:
+            return list(self._rows(self._read(timeout_s)))
+        except DeviceError as reason:
             raise DeviceError(f"{self._port}: {reason}") from None
 
-    def _rows(self, samples: Sequence[Any]) -> Iterator[Row]:
-        valid = [sample for sample in samples if sample.sample_info.valid_data]  # others say that a writer has gone
-        senders, time_us = [sample.sample_info.publication_handle for sample in valid], now_us()
-        if self._senders.current in senders:  # it was not silent, wherever its messages are among those that waited
+    def _rows(self, messages: Sequence[tuple[Any, Hashable]]) -> Iterator[Row]:
+        time_us = now_us()
+        # It was not silent, wherever its messages are among those that waited.
+        if any(sender == self._senders.current for _, sender in messages):
             self._senders.admits(self._senders.current, time_us)
-        for sample, sender in zip(valid, senders, strict=True):
+        for sample, sender in messages:
             if not self._senders.admits(sender, time_us):
                 self._counts.foreign += 1
                 continue
@@ -101,8 +114,9 @@ class RosReader(RowReader):
 
     def close(self) -> None:
         """Leave the domain."""
-        self._reader = self._waiting = None
-        self._domain = None
+        if self._node is not None:
+            self._node.close()
+            self._node = None
 
 
 MEMBER = row_kinds(

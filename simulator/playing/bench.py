@@ -122,7 +122,7 @@ class Bench(Closing):
         return line
 
     def _stream(self, number: int, wiring: StreamWiring, stack: ExitStack) -> tuple[LineSender, str]:
-        """Return the sender of a stream's rows, and its port; LSL and ROS streams are also sent as lines."""
+        """Return the sender of a stream's rows, and its port; those of other readers are also sent as lines."""
         if not is_serial(wiring.port):
             way = lines_like(wiring.port)
             stack.callback(way.close)

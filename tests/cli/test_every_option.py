@@ -52,6 +52,7 @@ LINES: dict[str, tuple[str, str]] = {
     "wear": ("build", "--glove glove.toml -o new"),
     "emulate": ("set.grasps", "--glove glove.toml --dir new --period-ms 1"),
     "doctor": ("glove.toml", ""),
+    "service": ("install build", "--glove glove.toml --root new"),
     "stability": ("elementary", "--jobs 1"),
 }
 NUMBERS = ("nan", "inf", "-inf", "-1", "0", "1" + 30 * "0")

@@ -180,6 +180,8 @@ def test_the_extras_in_hints_are_those_of_the_project() -> None:
         "scikit-learn": "sklearn",
         "python-calamine": "python_calamine",
         "foxglove-sdk": "foxglove",
+        "paho-mqtt": "paho",
+        "python-osc": "pythonosc",
     }
     needed = {
         extra: {called.get(name, name) for name in (re.split("[>=<]", package)[0] for package in packages)}
@@ -257,7 +259,7 @@ def test_ports_on_the_command_line_obey_the_rules_of_files(tmp_path: Path) -> No
     assert victim.read_text() == "kept"
 
 
-@pytest.mark.parametrize("line", ["stability --list", "stability --list --json", "--help"])
+@pytest.mark.parametrize("line", ["simulate --list", "simulate --list --json", "--help"])
 def test_a_command_ends_silently_when_the_reader_of_its_output_has_gone(line: str) -> None:
     command = [sys.executable, "-m", "thenar.cli", *line.split()]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:

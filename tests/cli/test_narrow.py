@@ -34,7 +34,7 @@ def place(small_set: GraspSet, build_folder: Path, tmp_path: Path, monkeypatch: 
         "compile set.grasps -o new --rounds 3 --folds 2 --no-report --glove glove.toml",
         "spec build",
         "doctor glove.toml",
-        "stability --list",
+        "simulate --list",
         pytest.param("stability elementary --jobs 1", marks=pytest.mark.slow),
         pytest.param(
             "frontier set.grasps -o new --methods elimination --rounds 3 --repeats 1 --finalists 1",

@@ -33,17 +33,10 @@ def test_a_shipped_scene_becomes_a_set_and_says_that_it_is_simulated(tmp_path: P
     assert "Grasps, simulated" in printed
 
 
-def test_the_summary_has_a_row_for_every_grasp_type_and_every_step(tmp_path: Path, capsys: Captured) -> None:
+def test_the_summary_has_a_row_for_every_grasp_type(tmp_path: Path, capsys: Captured) -> None:
     assert run(["simulate", "quick", *SMALL, "-o", str(tmp_path / "set.grasps")]) == 0
     rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in capsys.readouterr().out.splitlines()]
-    grasps, steps = ([row for row in rows if len(row) == count] for count in (11, 8))
-    assert [row[:2] for row in grasps] == [[name, "2"] for name in load_types()]
-    assert [row[:2] for row in steps if row[1] == "effect"] == [
-        [name, "effect"]
-        for name in ("hand.style", "hand.posture", "hand.object_pose", "hand.grip", "switch.threshold", "joint.noise")
-    ]
-    assert ["contact.quasistatic", "own"] in [row[:2] for row in steps]
-    assert steps[-1][0] == "all"
+    assert [row[:2] for row in rows if len(row) == 11] == [[name, "2"] for name in load_types()]
 
 
 def load_types() -> tuple[str, ...]:

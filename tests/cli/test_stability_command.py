@@ -11,7 +11,6 @@ from thenar.cli import run
 from thenar.stability import cases
 from thenar.stability import report as catalogue
 from thenar.stability.finding import Case
-from thenar.stability.report import CASES
 
 from .conftest import thenar
 
@@ -53,20 +52,10 @@ def here(folder: Path, capsys: pytest.CaptureFixture[str]) -> Thenar:
     return run_here
 
 
-def test_the_list_names_every_case_with_what_could_go_wrong() -> None:
-    listed = json.loads(thenar("stability", "--list", "--json").stdout)
-    assert tuple(case["name"] for case in listed) == tuple(CASES)
-    assert all(case["title"] and case["danger"] for case in listed)
-
-
 def test_a_case_of_another_name_is_refused_with_the_nearest() -> None:
     done = thenar("stability", "seperable")
     assert done.returncode == 2
     assert "there is no case 'seperable' (did you mean 'separable'" in done.stderr
-
-
-def test_listing_runs_nothing() -> None:
-    assert "--list only lists" in thenar("stability", "--list", "--full").stderr
 
 
 def test_cases_that_hold_exit_with_0_and_print_error_bound_and_verdict(here: Thenar) -> None:

@@ -126,7 +126,7 @@ def ros() -> ModuleType:
     """Return the messages of ROS, if Cyclone DDS is installed."""
     if find_spec("cyclonedds") is None:
         (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)("cyclonedds is missing")
-    return import_module("thenar.runtime.ros")
+    return import_module("thenar.runtime.ros_dds")
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""A process that listens to ROS 2 topics, and knows their types from ROS's .msg files, not from thenar.
+"""A process that listens to ROS 2 topics, and knows their types from ROS, not from thenar.
 
 Run as `python ros_listener.py NAMESPACE KIND DOMAIN`: one JSON line a sample, and one a writer that is found. Of KIND
 "kept" it asks for what was published before it came.
@@ -6,102 +6,26 @@ Run as `python ros_listener.py NAMESPACE KIND DOMAIN`: one JSON line a sample, a
 
 import json
 import sys
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict
+from importlib import import_module
+from typing import Any
 
 from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
 from cyclonedds.core import ReadCondition, WaitSet
 from cyclonedds.domain import DomainParticipant
-from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import byte, float64, int32, uint32
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence as sequence  # noqa: N813
-else:
-    from cyclonedds.idl.types import sequence
-
-KEPT = ("grasp", "segment", "preshape")
+kind_of = import_module("ros_types").kind_of
+KEPT = ("grasp", "state", "preshape")
 ANY = 0xFFFFFFFF  # samples, views and instances of all states
-
-
-@dataclass
-class BuiltinInterfacesTime(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
-    sec: int32
-    nanosec: uint32
-
-
-@dataclass
-class BuiltinInterfacesDuration(IdlStruct, typename="builtin_interfaces::msg::dds_::Duration_"):
-    sec: int32
-    nanosec: uint32
-
-
-@dataclass
-class StdMsgsHeader(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
-    stamp: BuiltinInterfacesTime
-    frame_id: str
-
-
-@dataclass
-class StdMsgsString(IdlStruct, typename="std_msgs::msg::dds_::String_"):
-    data: str
-
-
-@dataclass
-class SensorMsgsJointState(IdlStruct, typename="sensor_msgs::msg::dds_::JointState_"):
-    header: StdMsgsHeader
-    name: sequence[str]
-    position: sequence[float64]
-    velocity: sequence[float64]
-    effort: sequence[float64]
-
-
-@dataclass
-class TrajectoryMsgsJointTrajectoryPoint(IdlStruct, typename="trajectory_msgs::msg::dds_::JointTrajectoryPoint_"):
-    positions: sequence[float64]
-    velocities: sequence[float64]
-    accelerations: sequence[float64]
-    effort: sequence[float64]
-    time_from_start: BuiltinInterfacesDuration
-
-
-@dataclass
-class TrajectoryMsgsJointTrajectory(IdlStruct, typename="trajectory_msgs::msg::dds_::JointTrajectory_"):
-    header: StdMsgsHeader
-    joint_names: sequence[str]
-    points: sequence[TrajectoryMsgsJointTrajectoryPoint]
-
-
-@dataclass
-class DiagnosticMsgsKeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
-    key: str
-    value: str
-
-
-@dataclass
-class DiagnosticMsgsDiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
-    level: byte
-    name: str
-    message: str
-    hardware_id: str
-    values: sequence[DiagnosticMsgsKeyValue]
-
-
-@dataclass
-class DiagnosticMsgsDiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
-    header: StdMsgsHeader
-    status: sequence[DiagnosticMsgsDiagnosticStatus]
-
-
 TYPES: dict[str, Any] = {
-    "grasp": StdMsgsString,
-    "segment": DiagnosticMsgsDiagnosticArray,
-    "preshape": TrajectoryMsgsJointTrajectory,
-    "angles": SensorMsgsJointState,
-    "health": StdMsgsString,
+    "grasp": kind_of("std_msgs/String"),
+    "state": kind_of("thenar_msgs/Grasp"),
+    "preshape": kind_of("trajectory_msgs/JointTrajectory"),
+    "angles": kind_of("sensor_msgs/JointState"),
+    "health": kind_of("std_msgs/String"),
 }
 
 

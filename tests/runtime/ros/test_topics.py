@@ -131,11 +131,9 @@ def test_every_topic_is_read_back_as_it_was_published(
 
     stamped = {"stamp": {"sec": 1_700_000_000, "nanosec": 123_456_000}, "frame_id": ""}
     assert listener.hear("topic", "grasp", publish)["message"] == {"data": "PoS"}
-    segment = listener.hear("topic", "segment", publish)["message"]
-    assert segment["header"] == stamped
-    (status,) = segment["status"]
-    assert {pair["key"]: pair["value"] for pair in status.pop("values")}["probability"] == "0.937500"
-    assert status == {"level": 0, "name": sink.report().where[4:], "message": "PoS", "hardware_id": ""}
+    state = listener.hear("topic", "state", publish)["message"]
+    assert state["header"] == stamped
+    assert (state["grasp"], state["probability"], state["health"], state["lost"]) == ("PoS", 0.9375, "ok", [])
     assert listener.hear("topic", "angles", publish)["message"] == {
         "header": stamped,
         "name": list(angles.names),
@@ -143,7 +141,6 @@ def test_every_topic_is_read_back_as_it_was_published(
         "velocity": [],
         "effort": [],
     }
-    assert sink.report().readers == 1
     assert sink.report().lost == 0
 
 
@@ -172,7 +169,7 @@ def test_a_preshape_is_read_back_as_a_trajectory(
     ("topic", "kind", "durability"),
     [
         ("grasp", "std_msgs::msg::dds_::String_", "TransientLocal"),
-        ("segment", "diagnostic_msgs::msg::dds_::DiagnosticArray_", "TransientLocal"),
+        ("state", "thenar_msgs::msg::dds_::Grasp_", "TransientLocal"),
         ("preshape", "trajectory_msgs::msg::dds_::JointTrajectory_", "TransientLocal"),
         ("angles", "sensor_msgs::msg::dds_::JointState_", "Volatile"),
         ("health", "std_msgs::msg::dds_::String_", "Volatile"),
@@ -183,7 +180,7 @@ def test_writers_are_found_under_ros_2s_names_with_its_qos(
 ) -> None:
     found = listen().hear("found", f"rt{name}/{topic}")
     assert found["type"] == kind
-    assert found["user_data"] == f"typehash={ros.TYPE_HASHES[kind]};"
+    assert found["user_data"] == f"typehash=RIHS01_{ros.TYPE_HASHES[kind.replace('::msg::dds_::', '/').rstrip('_')]};"
     assert found["reliability"] == "Policy.Reliability.Reliable"
     assert found["durability"] == f"Policy.Durability.{durability}"
 
@@ -229,25 +226,24 @@ def test_a_node_that_comes_late_has_the_newest_at_once(
     for number in (1, 2):
         sink.publish(replace(make_grasp(number), segment=number), preshape, None)
     late = listen("kept")
-    heard: dict[str, list[Message]] = {"grasp": [], "segment": [], "preshape": []}
+    heard: dict[str, list[Message]] = {"grasp": [], "state": [], "preshape": []}
     while not all(heard.values()):
         said = late.said.get(timeout=20)
         heard.get(said.get("topic", ""), []).append(said)
-    (segment,) = heard["segment"]
-    assert {"key": "segment", "value": "2"} in segment["message"]["status"][0]["values"]
+    (state,) = heard["state"]
+    assert state["message"]["segment"] == 2
     assert len(heard["preshape"]) == 1
 
 
 def test_every_change_is_heard(sink: Sink, listen: Listen, again: MakeGrasp) -> None:
     listener = listen()
-    listener.hear("topic", "segment", lambda: sink.publish(again(), None, None))
+    listener.hear("topic", "state", lambda: sink.publish(again(), None, None))
     now = again()
     for number in range(1, 9):
         sink.publish(replace(now, segment=number), None, None)
     heard = [0]
     while heard[-1] < 8:
-        said = listener.hear("topic", "segment")
-        heard.append(next(int(p["value"]) for p in said["message"]["status"][0]["values"] if p["key"] == "segment"))
+        heard.append(listener.hear("topic", "state")["message"]["segment"])
     assert heard[heard.index(1) :] == list(range(1, 9))
 
 

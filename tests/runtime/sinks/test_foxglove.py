@@ -77,10 +77,12 @@ def listen(sink: Any) -> Iterator[Callable[..., Client]]:
     with ExitStack() as stack:
 
         def made(topics: list[str] | None = None) -> Client:
-            before, protocol = sink._subscribed.total(), Subprotocol("foxglove.sdk.v1")
+            protocol = Subprotocol("foxglove.sdk.v1")
             connection = connect(f"ws://127.0.0.1:{sink.port}", subprotocols=[protocol], close_timeout=0.1)
             client = Client(stack.enter_context(connection), topics)
-            eventually(lambda: sink._subscribed.total() == before + len(client.topics))
+            # The server answers in order.
+            assert connection.ping().wait(LONG_S)
+            eventually(lambda: all(sink._channels[topic].has_sinks() for topic in client.topics))
             return client
 
         yield made
@@ -187,16 +189,15 @@ def test_moments_come_as_they_were_published_with_their_times(
         assert came["/thenar/joints"]["angles"] == [
             {"name": name, "position_rad": at} for name, at in zip(angles.names, angles.positions_rad, strict=True)
         ]
-    assert (sink.report().sent, sink.report().lost, sink.report().readers) == (80, 0, 1)
+    assert (sink.report().sent, sink.report().lost) == (80, 0)
 
 
-def test_late_readers_get_the_preshape_within_a_second(
+def test_a_preshape_comes_with_the_grasp_and_health_behind_its_frame(
     sink: Any, listen: Callable[..., Client], make_grasp: MakeGrasp, preshape: Preshape, health: HealthReport
 ) -> None:
-    topics = ["/thenar/preshape", "/thenar/health"]
-    first = listen(topics)
+    first = listen(["/thenar/preshape", "/thenar/health"])
     sink.publish(make_grasp(0), preshape, None)
-    sink.publish(make_grasp(1), preshape, None)
+    sink.publish(make_grasp(1), None, None)
     report = replace(health, time_us=make_grasp(1).time_us + 5)
     sink.health(report)
     kept = "/thenar/preshape", fields(preshape)
@@ -204,11 +205,6 @@ def test_late_readers_get_the_preshape_within_a_second(
     assert [(topic, content) for topic, _, content in came] == [kept, ("/thenar/health", fields(report))]
     stamps = make_grasp(0).unix_us, make_grasp(1).unix_us + 5
     assert [time_ns for _, time_ns, _ in came] == [1000 * unix_us for unix_us in stamps]
-    second = listen(topics)
-    for number in range(2, 102):
-        sink.publish(make_grasp(number), preshape, None)
-    topic, _, content = second.next()
-    assert (topic, content) == kept
 
 
 def test_a_reader_that_reads_nothing_holds_nobody_up_and_no_memory(
@@ -246,7 +242,6 @@ def test_the_end_closes_connections_and_frees_the_port(sink: Any, listen: Callab
     sink.close()
     with pytest.raises(ConnectionClosed):
         client.next()
-    assert sink.report().readers == 0
     again = open_sink(f"foxglove:127.0.0.1:{sink.port}")
     again.close()
 

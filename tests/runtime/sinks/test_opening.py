@@ -29,7 +29,7 @@ def test_every_kind_is_opened_by_its_name(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "where", ["", "jsonl", "jsonl:", "mqtt:broker", "ros", "ros:thenar", "ros:/a//b", "ros:/2nd", "ros:?public"]
+    "where", ["", "jsonl", "jsonl:", "amqp:broker", "ros", "ros:thenar", "ros:/a//b", "ros:/2nd", "ros:?public"]
 )
 def test_a_name_that_means_nothing_is_told_how_to_write_it(where: str) -> None:
     with pytest.raises(SettingError, match=r"jsonl:FILE|ros:/thenar"):

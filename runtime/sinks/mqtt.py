@@ -1,0 +1,57 @@
+"""Topics of an MQTT broker (extra `mqtt`): the JSON lines of `jsonl`, each sent at most once (quality of service 0).
+
+    TOPIC/grasp   the line of a grasp
+    TOPIC/joints  the header that names the joints of its angles; retained, so that late readers have it, too
+    TOPIC/health  once a second, if requested: the glove's health
+
+A broker that goes away is connected to again; what comes meanwhile is lost.
+"""
+
+from functools import partial
+
+from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
+from ..sources.mqtt import connect, leave, place_of
+from .base import Sink, SinkError, SinkKind, SinkPlace
+from .jsonl import encode, encode_header, encode_health
+
+_RATE_HZ = 20
+# How long a broker may take nothing before a line is lost, live and in a replay.
+_LIVE_S, _REPLAY_S = 0.5, 10.0
+
+
+class MqttTopics(Sink):
+    """Publishes below the topic of mqtt:HOST:PORT/TOPIC. Raises SettingError and SinkError as `connect` does."""
+
+    def __init__(self, where: str, longest_s: float = _LIVE_S) -> None:
+        self.where, self._longest_s = where, longest_s
+        *_, self._topic = place_of(where)
+        self._client = connect(where, SinkError)
+        self._joints: tuple[str, ...] = ()
+
+    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
+        """Publish the line, after a header if the joints are others than before."""
+        if angles is not None and angles.names != self._joints:
+            self._joints = angles.names
+            self.attempt(partial(self._send, "joints", encode_header(angles), retain=True))
+        self.attempt(partial(self._send, "grasp", encode(grasp, preshape, angles)))
+
+    def health(self, report: HealthReport) -> None:
+        """Publish the report's line."""
+        self.attempt(partial(self._send, "health", encode_health(report)))
+
+    def _send(self, topic: str, line: bytes, *, retain: bool = False) -> None:
+        sent = self._client.publish(f"{self._topic}/{topic}", line.rstrip(), retain=retain)
+        sent.wait_for_publish(self._longest_s)
+        if not sent.is_published():
+            raise TimeoutError("the broker takes nothing")
+
+    def close(self) -> None:
+        """Leave the broker, once all is sent."""
+        leave(self._client)
+
+
+def _open(where: SinkPlace) -> Sink:
+    return MqttTopics(f"mqtt:{where.place}", _REPLAY_S if where.wait else _LIVE_S)
+
+
+MEMBER = SinkKind("mqtt", "HOST[:PORT]/TOPIC", "JSON lines to topics of an MQTT broker", _open, rate=_RATE_HZ, rank=7)
