@@ -187,7 +187,7 @@ def test_the_studio_answers_until_a_signal_ends_it(start: Callable[..., Command]
         assert (answer["sensors"], answer["of"]) == ([0, 7], "within subject")
         assert answer["command"] == "thenar compile set.grasps -o build --sensors 2 --have s0,j1"
         ask(live, do="train", sensors=[0])
-        assert "no folder is known for a build: start the studio with" in told(live, "refused")["why"]
+        assert "no folder is known for a build: start thenar studio with -o" in told(live, "refused")["why"]
     assert studio.end() == 0
 
 
