@@ -17,7 +17,7 @@ from thenar.runtime.model.quantise import as_deployed, balance, quantise
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Line
-from thenar.runtime.scores import LANE_OFFSET, LiveScores, Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 
 from .conftest import UNIT, exact_scores, lost_in_parts
 
@@ -219,11 +219,10 @@ def test_a_missing_joint_adds_its_mean_and_gives_pairs_code_0(seed: int) -> None
         left = np.array(scorer.biased_scores_without(bits[row], codes[row], np.zeros(3, bool), lost)) - LANE_OFFSET
         assert (left == meant).all()
         assert np.abs(left).max() <= integers.bound
-    live, every = LiveScores(scorer), np.ones(JOINTS, bool)
-    for held in (None, tuple(codes[0].tolist()), None):
-        live.joints(held)
+    every = np.ones(JOINTS, bool)
+    for held in (None, tuple(codes[0].tolist())):
         none = scorer.biased_scores_without([False] * 3, codes[0], [False] * 3, every if held is None else ~every)
-        assert live.biased_scores(0) == none
+        assert scorer.state_scores(0, 0, held) == none
 
 
 @settings(deadline=None, max_examples=25)
