@@ -310,7 +310,7 @@ class _Limits:
         ranges = self.ranges.copy()
         tables = self._tables
         steps = [int(steps[-1]) + 1 for steps in map(tables.steps_of, range(tables.n_joints)) if len(steps)]
-        if max([0, *steps, *(slope.high for slope in tables.slopes)]) <= 255:
+        if max([0, *steps, *(slope.high for slope in tables.lines)]) <= 255:
             # No code above 254 is distinguished, and boards that send bytes send 255 for all codes above it.
             ranges[:, :, 0] = np.minimum(ranges[:, :, 0], 255)
             ranges[:, :, 1][ranges[:, :, 1] >= 255] = HIGHEST_CODE

@@ -82,7 +82,7 @@ class Library:
             "softmax": Softmax(tables.scale),
             "columns": _remark(f"The entries of a row: {', '.join(map(comment, names.grasps))}."),
             "rows": [*_row_lines(layout.start[None], layout, "START"), *_section_lines(names, layout)],
-            "slopes": _row_lines([line.row.astype(int) for line in tables.slopes], layout, "SLOPES"),
+            "slopes": _row_lines([line.row.astype(int) for line in tables.lines], layout, "SLOPES"),
             "straight": straight(layout),
             "grasp_enum": _enumerators(f"{prefix}_GRASP", names.grasps, names.grasps),
             "switch_enum": _enumerators(f"{prefix}_SWITCH", switches, switches),

@@ -4,7 +4,7 @@
               + sum over slopes l of distance_l * row_l[k] + sum over grids g of joints rows_g[bin_a, bin_b, k]
 
 where bin_a is the number of thresholds of joint a below its code, and distance_l is the distance of its joint's code
-from the middle of a range (`Slope`). Distances and their rows are int8, everything else is int16, and no partial sum,
+from the middle of a range (`Line`). Distances and their rows are int8, everything else is int16, and no partial sum,
 in any order, leaves int16: `IntegerTables` checks this when made, so a table that could overflow cannot be loaded.
 
 The payload of `tables.bin`, inside the envelope of `sealed.py`, all little-endian (K classes, s switches, j joints):
@@ -52,7 +52,7 @@ from .terms.base import HIGHEST_CODE
 from .terms.bins import Bins
 from .terms.bit import Bit
 from .terms.grid import Grid
-from .terms.line import Slope
+from .terms.line import Line
 
 KIND = b"THNRTABL"
 PLAIN, SLOPED, PAIRED = 1, 2, 3  # formats
@@ -80,7 +80,7 @@ Steps = NDArray[np.int64]
 class IntegerTables(Additive):
     """Score tables in int16. Raises BuildError if terms disagree or a sum could leave -32767..32767.
 
-    bias (K,); terms: a `Bit` for each switch, `Bins` for each joint, and a `Slope` for some joints, or a `Grid` for
+    bias (K,); terms: a `Bit` for each switch, `Bins` for each joint, and a `Line` for some joints, or a `Grid` for
     some pairs of joints, each joint in one at most, in the order of the (first) joints. switch_means (s, K) and
     joint_means (j, K) replace missing inputs; scale in steps per unit of score.
 
@@ -105,7 +105,7 @@ class IntegerTables(Additive):
         switch_means: Rows,
         joint_means: Rows,
         scale: float,
-        further: Sequence[Slope | Grid] = (),
+        further: Sequence[Line | Grid] = (),
         grid: int = 1,
     ) -> Self:
         """Return tables of the rows of switches (s, K), of thresholds (T_a,) and rows (T_a + 1, K) of each joint, and
@@ -128,11 +128,6 @@ class IntegerTables(Additive):
         if self.bound > LIMIT:
             raise BuildError(f"a sum could reach {self.bound}, beyond {LIMIT}: these tables could overflow")
 
-    @cached_property
-    def slopes(self) -> tuple[Slope, ...]:
-        """The terms in proportion to a code."""
-        return tuple(term for term in self.terms if isinstance(term, Slope))
-
     @property
     def bound(self) -> int:
         """The largest absolute value of any partial sum, in any order, with any inputs or missing ones."""
@@ -150,9 +145,9 @@ class IntegerTables(Additive):
         rows = [self.bias, self.switch_means, self.joint_means, *(end for term in self.core_terms for end in term.ends)]
         return not any(each[..., -1].any() for each in rows)
 
-    def of_joint(self, joint: int) -> tuple[Bins | Slope, ...]:
+    def of_joint(self, joint: int) -> tuple[Bins | Line, ...]:
         """Return the terms of a joint alone: its bins, and its slope if it has one."""
-        return (self.bins[joint], *(slope for slope in self.slopes if slope.joint == joint))
+        return (self.bins[joint], *(slope for slope in self.lines if slope.joint == joint))
 
     def turning_codes(self, joint: int, steps: Steps) -> Steps:
         """Return codes at which a joint's contribution is greatest and least between the codes `steps`, after which its
@@ -237,9 +232,11 @@ def _check_shapes(tables: IntegerTables) -> None:
         ("joint_means", tables.joint_means, np.int16, (j, K)),
         *((f"switch_rows[{bit.switch}]", bit.row, np.int16, (K,)) for bit in tables.bits),
         *((f"joint_rows[{a.joint}]", a.rows, np.int16, (len(a.thresholds) + 1, K)) for a in tables.bins),
-        *((f"the row of the slope of joint {slope.joint}", slope.row, np.int8, (K,)) for slope in tables.slopes),
+        *((f"the row of the slope of joint {slope.joint}", slope.row, np.int8, (K,)) for slope in tables.lines),
     ]
     _check_further(tables)
+    if any(line.gain is None for line in tables.lines):
+        raise BuildError("the tables have a line of scores: quantise them first")
     for grid in tables.grids:
         bins = (len(grid.thresholds[0]) + 1, len(grid.thresholds[1]) + 1, K)
         expected.append((f"the rows of the grid of joints {grid.joints}", grid.rows, np.int16, bins))
@@ -250,16 +247,16 @@ def _check_shapes(tables: IntegerTables) -> None:
 
 def _check_further(tables: IntegerTables) -> None:
     j = tables.n_joints
-    if any(not isinstance(term, Bit | Bins | Slope | Grid) for term in tables.terms):
+    if any(not isinstance(term, Bit | Bins | Line | Grid) for term in tables.terms):
         raise BuildError("the tables have terms that no board reads: collapse them first")
     numbers = [term.inputs[0] for term in (*tables.bits, *tables.bins)]
     if numbers != [*range(tables.n_switches), *range(j)]:
         raise BuildError("the terms of switches and joints are not in order")
-    joints = [slope.joint for slope in tables.slopes]
+    joints = [slope.joint for slope in tables.lines]
     if joints != sorted(set(joints)) or any(not 0 <= joint < j for joint in joints):
         raise BuildError(f"slopes of joints {joints}: they must rise, each below {j}")
     joints = [joint for grid in tables.grids for joint in grid.joints]
-    if tables.slopes and joints:
+    if tables.lines and joints:
         raise BuildError("slopes and grids: tables have one of both")
     if len(set(joints)) < len(joints) or any(not 0 <= a < b < j for a, b in (grid.joints for grid in tables.grids)):
         raise BuildError(f"grids of joints {joints}: each is below {j}, and in one grid at most")
@@ -274,7 +271,7 @@ def _check_further(tables: IntegerTables) -> None:
 
 
 def _check_grid(tables: IntegerTables) -> None:
-    if tables.grid not in ((1, COARSE) if tables.slopes else (1,)):
+    if tables.grid not in ((1, COARSE) if tables.lines else (1,)):
         raise BuildError(f"rows on a grid of {tables.grid} steps: it is 1, or {COARSE} in tables with slopes")
     rows = [tables.switch_rows, *(rows for rows in tables.joint_rows if len(rows) > 1)]
     if tables.grid == COARSE and not (tables.relative and all(not (each % COARSE).any() for each in rows)):
@@ -313,13 +310,13 @@ def tables_to_bytes(tables: IntegerTables) -> bytes:
     parts = [header, counts, *(r.astype("<i2").tobytes() for r in rows)]
     parts += [t.astype("<u2").tobytes() for t in tables.thresholds]
     parts += [r.astype("<i2").tobytes() for r in tables.joint_rows]
-    parts += [_GRID.pack(tables.grid)] if tables.slopes else []
-    parts += [_SLOPE.pack(slope.joint, slope.low, slope.high, slope.gain) for slope in tables.slopes]
-    parts += [slope.row.astype("<i1").tobytes() for slope in tables.slopes]
+    parts += [_GRID.pack(tables.grid)] if tables.lines else []
+    parts += [_SLOPE.pack(slope.joint, slope.low, slope.high, slope.gain) for slope in tables.lines]
+    parts += [slope.row.astype("<i1").tobytes() for slope in tables.lines]
     parts += [_PAIR.pack(*grid.joints, *map(len, grid.thresholds)) for grid in tables.grids]
     parts += [each.astype("<u2").tobytes() for grid in tables.grids for each in grid.thresholds]
     parts += [grid.rows.astype("<i2").tobytes() for grid in tables.grids]
-    data = seal(KIND, SLOPED if tables.slopes else PAIRED if tables.grids else PLAIN, b"".join(parts))
+    data = seal(KIND, SLOPED if tables.lines else PAIRED if tables.grids else PLAIN, b"".join(parts))
     if len(data) > MAX_BYTES:
         raise BuildError(f"the tables need {len(data)} bytes, a build has at most {MAX_BYTES}: keep fewer inputs")
     return data
@@ -364,7 +361,7 @@ def _parse(payload: bytes, version: int) -> IntegerTables:
     words = np.frombuffer(payload, "<u2", sum(sizes), _COUNTS.size + 2 * j).astype(np.uint16)
     bias, switches, means, joint_means, *joints = np.split(words, np.cumsum(sizes)[:-1])
     rows = [block.view(np.int16).reshape(-1, K) for block in (switches, means, joint_means, *joints[j:])]
-    further: tuple[Slope | Grid, ...] = ()
+    further: tuple[Line | Grid, ...] = ()
     if version == SLOPED:
         further = _parse_slopes(payload[own + _GRID.size :], n, K)
     elif pairs:
@@ -395,7 +392,7 @@ def _parse_grids(data: bytes, pairs: Sequence[tuple[int, ...]], K: int) -> tuple
     )
 
 
-def _parse_slopes(data: bytes, n: int, K: int) -> tuple[Slope, ...]:
+def _parse_slopes(data: bytes, n: int, K: int) -> tuple[Line, ...]:
     rows = np.frombuffer(data, "<i1", offset=n * _SLOPE.size).astype(np.int8).reshape(n, K)
     ends = _SLOPE.iter_unpack(data[: n * _SLOPE.size])
-    return tuple(Slope(joint, low, high, gain, row) for (joint, low, high, gain), row in zip(ends, rows, strict=True))
+    return tuple(Line(joint, low, high, row, gain) for (joint, low, high, gain), row in zip(ends, rows, strict=True))

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from .integers import COARSE, FINEST_SCALE, IntegerTables
 from .tables import ScoreTables, winners
-from .terms.base import Floats, ScoreTerm, StepTerm, rounded
+from .terms.base import CoreTerm, Floats, rounded
 from .terms.line import LARGEST_SLOPE, WIDEST, Line
 
 # The most consecutive switches that firmware looks up together in tables of narrow entries. Every group of this many
@@ -63,18 +63,14 @@ def as_deployed(tables: ScoreTables, grid: int) -> ScoreTables:
     """Return the tables before rounding to a `grid`: scores relative to the last class if rows are on one."""
     if grid == 1:
         return tables
-    return ScoreTables(tables.bias - tables.bias[-1:], tuple(term.relative() for term in _score_terms(tables)))
-
-
-def _score_terms(tables: ScoreTables) -> list[ScoreTerm]:
-    return [term for term in tables.core_terms if isinstance(term, ScoreTerm)]
+    return ScoreTables(tables.bias - tables.bias[-1:], tuple(term.relative() for term in tables.core_terms))
 
 
 def _centred(tables: ScoreTables, scale: float) -> ScoreTables:
     """Return the tables with what lines add at the zeros of their slopes in the rows of bins."""
     rows = list(tables.joint_rows)
     for line in tables.lines:
-        rows[line.joint] = rows[line.joint] + line.row * line.slope(scale).offset
+        rows[line.joint] = rows[line.joint] + line.offset(scale)
     return tables.changed(joint_rows=rows) if tables.lines else tables
 
 
@@ -126,7 +122,7 @@ def least_disruptive_scale(
 
 def rounding_error(tables: ScoreTables, scale: float, grid: int = 1) -> float:
     """Return the most steps by which rounding can move a score: half a step for the bias, and that of each term."""
-    return sum((term.rounding_error(scale, grid) for term in _score_terms(tables)), 0.5)
+    return sum((term.rounding_error(scale, grid) for term in tables.core_terms), 0.5)
 
 
 def reach(tables: ScoreTables, scale: float, *, whole: bool = True, grid: int = 1) -> float:
@@ -150,7 +146,7 @@ class _Extremes:
     """The largest and smallest contributions of bias and terms, at any scale: rounding keeps them extreme."""
 
     def __init__(self, tables: ScoreTables, grid: int) -> None:
-        fixed = [term for term in _score_terms(tables) if not isinstance(term, Line)]
+        fixed = [term for term in tables.core_terms if not isinstance(term, Line)]
         ends = [(tables.bias, tables.bias), *(term.ends for term in fixed)]
         self._n_switches, self._lines = tables.n_switches, tables.lines
         self._upper, self._lower = (np.stack(rows) for rows in zip(*ends, strict=True))
@@ -166,7 +162,7 @@ class _Extremes:
         if self._lines:
             upper, lower = upper.copy(), lower.copy()
             for line in self._lines:
-                offset = line.row * line.slope(scale).offset
+                offset = line.offset(scale)
                 upper[self._first + line.joint] += offset
                 lower[self._first + line.joint] += offset
         upper, lower = upper * scale, lower * scale
@@ -202,9 +198,9 @@ def _leads(scores: Floats) -> Floats:
     return leads
 
 
-def _whole(tables: ScoreTables, scale: float, grid: int) -> list[StepTerm]:
+def _whole(tables: ScoreTables, scale: float, grid: int) -> list[CoreTerm]:
     """Return the terms in whole steps."""
-    return [term.whole(scale, grid) for term in _score_terms(_centred(tables, scale))]
+    return [term.whole(scale, grid) for term in _centred(tables, scale).core_terms]
 
 
 def _whole_bias(tables: ScoreTables, scale: float, grid: int, means: Floats) -> Floats:

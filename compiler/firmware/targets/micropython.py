@@ -52,7 +52,7 @@ class MicroPython(Target):
             "rows": _coded(rows),
             "steps": _coded(steps),
             "places": accumulate(map(len, steps), initial=0),
-            "slopes": [(s.joint, s.low, s.high, s.gain, s.zero, tuple(s.row.tolist())) for s in tables.slopes],
+            "slopes": [(s.joint, s.low, s.high, s.gain, s.zero, tuple(s.row.tolist())) for s in tables.lines],
             "pairs": [(*grid.joints, tables.n_joints + 2 * n) for n, grid in enumerate(tables.grids)],
             "powers": POWERS,
             "sensors": library.sensors,

@@ -42,7 +42,7 @@ def built(grasp_set: GraspSet, tmp_path_factory: pytest.TempPathFactory, request
     build = tmp_path_factory.mktemp("built") / "build"
     made = compile_build(grasp_set, build, trainer=trainer, folds=0, refuse=0, **given)
     assert made.manifest.fit.trainer == trainer
-    assert bool(made.tables.slopes) == (trainer in ("discriminant", "linear"))
+    assert bool(made.tables.lines) == (trainer in ("discriminant", "linear"))
     return made.folder
 
 
@@ -56,7 +56,7 @@ def _silence(folder: Path, joints: int) -> None:
     """Make the first joints say nothing, and seal everything again, as a faulty compiler would."""
     tables = tables_from_bytes((folder / "tables.bin").read_bytes())
     rows = tuple(rows * (number >= joints) for number, rows in enumerate(tables.joint_rows))
-    slopes = tuple(slope for slope in tables.slopes if slope.joint >= joints)
+    slopes = tuple(slope for slope in tables.lines if slope.joint >= joints)
     whole = tuple(row.astype(np.int16) for row in rows)
     silent = tables.changed(joint_rows=whole, joint_means=0 * tables.joint_means, further=slopes)
     _seal(folder, silent)
@@ -104,7 +104,7 @@ def test_a_fault_that_no_recorded_row_shows_does_not_hold(folder: Path, grasp_se
     # A bin above all codes that were recorded.
     tables = tables_from_bytes((folder / "tables.bin").read_bytes())
     assert grasp_set.codes.max() < 300
-    fault = np.array([-30 - 400 * bool(tables.slopes), 0, 0, 0], np.int16)
+    fault = np.array([-30 - 400 * bool(tables.lines), 0, 0, 0], np.int16)
     rows = np.vstack([tables.joint_rows[0], tables.joint_rows[0][-1:] + fault])
     thresholds = (np.append(tables.thresholds[0], np.uint16(300)), *tables.thresholds[1:])
     _seal(folder, tables.changed(thresholds=thresholds, joint_rows=(rows, *tables.joint_rows[1:])))

@@ -136,7 +136,7 @@ def test_the_runtime_sums_as_arrays_do_without_lost_inputs(seed: int) -> None:
             mine = integers.joint_rows[joint][np.searchsorted(integers.thresholds[joint], codes[row, joint])].astype(
                 int
             )
-            slopes = (slope for slope in integers.slopes if slope.joint == joint)
+            slopes = (slope for slope in integers.lines if slope.joint == joint)
             mine = mine + sum(slope.of(codes[row : row + 1, joint])[0] for slope in slopes)
             left += mine - integers.joint_means[joint]
         assert (left == scores[row]).all()
@@ -156,7 +156,7 @@ def test_no_partial_sum_of_any_code_leaves_the_bound(seed: int, entry_bits: int)
         for joint, mean in enumerate(integers.joint_means.astype(int)):
             each = np.maximum(sign * integers.joint_rows[joint].astype(int), 0)
             each = each[np.searchsorted(integers.thresholds[joint], codes)]
-            for slope in integers.slopes:
+            for slope in integers.lines:
                 each = each + np.maximum(sign * slope.of(codes), 0) * (slope.joint == joint)
             reached += np.maximum(each.max(axis=0), sign * mean)
         assert reached.max() <= integers.bound
@@ -193,7 +193,7 @@ def test_a_line_of_few_codes_and_much_weight_takes_a_gain() -> None:
     tables = ScoreTables.of(np.zeros(2), np.zeros((0, 2)), (no,), (np.zeros((1, 2)),), (Line(0, 10, 14, row),))
     bits, codes = np.zeros((5, 0), bool), np.arange(10, 15, dtype=np.uint16)[:, np.newaxis]
     integers = quantise(tables, bits, codes)
-    (slope,) = integers.slopes
+    (slope,) = integers.lines
     assert slope.most == 4 << slope.gain > 127
     scores = integers.scores(bits, codes)
     assert (np.diff(scores, axis=0) == np.diff(scores, axis=0)[0]).all()
