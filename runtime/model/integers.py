@@ -40,7 +40,8 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from math import prod
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -284,20 +285,9 @@ def _check_stored_scale(scale: float) -> None:
         raise BuildError(f"the scale is {scale!r}, in a file it must be at least 2^-64 steps per unit")
 
 
-def payload_bytes(
-    n_classes: int,
-    n_switches: int,
-    thresholds: Sequence[int],
-    n_slopes: int = 0,
-    grids: Sequence[tuple[int, int]] = (),
-) -> int:
-    """Return the payload length of tables with `n_classes` and `n_switches`; `thresholds` of each joint, and of both
-    joints of `grids`.
-    """
-    rows = 1 + 2 * n_switches + sum(2 + count for count in thresholds) + sum((a + 1) * (b + 1) for a, b in grids)
-    words = len(thresholds) + sum(thresholds) + sum(a + b for a, b in grids) + n_classes * rows
-    slopes = _GRID.size + n_slopes * (_SLOPE.size + n_classes) if n_slopes else 0
-    return _COUNTS.size + 2 * words + slopes + len(grids) * _PAIR.size
+def least_bytes(n_classes: int, n_switches: int, n_joints: int) -> int:
+    """Return the payload length of tables of this size whose joints have no thresholds."""
+    return _COUNTS.size + 2 * (n_joints + n_classes * (1 + 2 * n_switches + 2 * n_joints))
 
 
 def tables_to_bytes(tables: IntegerTables) -> bytes:
@@ -338,61 +328,38 @@ def tables_from_bytes(data: bytes, what: str = "tables.bin") -> IntegerTables:
 
 
 def _parse(payload: bytes, version: int) -> IntegerTables:
-    if len(payload) < _COUNTS.size:
-        raise BuildError(f"{len(payload)} bytes of content, the counts alone have {_COUNTS.size}")
-    K, s, j, n, scale = _COUNTS.unpack_from(payload)
+    at = 0
+
+    def take(kind: str, *shape: int) -> NDArray[Any]:
+        """Return the next numbers, of a type of numpy's, in this shape."""
+        nonlocal at
+        begin, at = at, at + prod(shape) * np.dtype(kind).itemsize
+        if at > len(payload):
+            raise BuildError(f"{len(payload)} bytes of content, its counts call for {at} or more")
+        found = np.frombuffer(payload[begin:at], kind).reshape(shape)
+        return found.astype(found.dtype.newbyteorder("="))
+
+    K, s, j, n = take("<u2", 4).tolist()
+    scale: float = take("<f8", 1).item()
     _check_counts(K, s, j)
     _check_stored_scale(scale)
     if (n > 0) != (version in (SLOPED, PAIRED)):
         raise BuildError(f"{n} slopes or grids in format {version}: the two bytes at offset 6 are wrong")
-    if len(payload) < _COUNTS.size + 2 * j:
-        raise BuildError(f"{len(payload)} bytes of content are too few for {j} joints")
-    counts = np.frombuffer(payload, "<u2", j, _COUNTS.size).tolist()
-    sizes = [K, s * K, s * K, j * K, *counts, *((T + 1) * K for T in counts)]
-    own = payload_bytes(K, s, counts)
-    pairs = (
-        list(_PAIR.iter_unpack(payload[own : own + n * _PAIR.size]))
-        if version == PAIRED and len(payload) >= own + n * _PAIR.size
-        else []
-    )
-    expected = payload_bytes(K, s, counts, n if version == SLOPED else 0, [(one, other) for _, _, one, other in pairs])
-    if len(payload) != expected or len(pairs) != (n if version == PAIRED else 0):
-        raise BuildError(f"{len(payload)} bytes of content, its counts call for {expected}")
-    words = np.frombuffer(payload, "<u2", sum(sizes), _COUNTS.size + 2 * j).astype(np.uint16)
-    bias, switches, means, joint_means, *joints = np.split(words, np.cumsum(sizes)[:-1])
-    rows = [block.view(np.int16).reshape(-1, K) for block in (switches, means, joint_means, *joints[j:])]
-    further: tuple[Line | Grid, ...] = ()
+    counts = take("<u2", j).tolist()
+    bias, switch_rows, switch_means, joint_means = (take("<i2", *shape) for shape in ((K,), (s, K), (s, K), (j, K)))
+    thresholds = [take("<u2", count) for count in counts]
+    joint_rows = [take("<i2", count + 1, K) for count in counts]
+    grid, further = 1, list[Line | Grid]()
     if version == SLOPED:
-        further = _parse_slopes(payload[own + _GRID.size :], n, K)
-    elif pairs:
-        further = _parse_grids(payload[own + n * _PAIR.size :], pairs, K)
-    return IntegerTables.of(
-        bias=bias.view(np.int16),
-        switch_rows=rows[0],
-        thresholds=joints[:j],
-        joint_rows=rows[3:],
-        switch_means=rows[1],
-        joint_means=rows[2],
-        scale=scale,
-        further=further,
-        grid=_GRID.unpack_from(payload, own)[0] if version == SLOPED else 1,
-    )
-
-
-def _parse_grids(data: bytes, pairs: Sequence[tuple[int, ...]], K: int) -> tuple[Grid, ...]:
-    words = np.frombuffer(data, "<u2").astype(np.uint16)
-    sizes = [count for pair in pairs for count in pair[2:]] + [
-        (one + 1) * (other + 1) * K for _, _, one, other in pairs
-    ]
-    parts = np.split(words, np.cumsum(sizes)[:-1])
-    steps, rows = parts[: 2 * len(pairs)], parts[2 * len(pairs) :]
-    return tuple(
-        Grid((a, b), (steps[2 * at], steps[2 * at + 1]), rows[at].view(np.int16).reshape(one + 1, other + 1, K))
-        for at, (a, b, one, other) in enumerate(pairs)
-    )
-
-
-def _parse_slopes(data: bytes, n: int, K: int) -> tuple[Line, ...]:
-    rows = np.frombuffer(data, "<i1", offset=n * _SLOPE.size).astype(np.int8).reshape(n, K)
-    ends = _SLOPE.iter_unpack(data[: n * _SLOPE.size])
-    return tuple(Line(joint, low, high, row, gain) for (joint, low, high, gain), row in zip(ends, rows, strict=True))
+        grid = take("<u2", 1).item()
+        ends = [(*take("<u2", 3).tolist(), take("<i2", 1).item()) for _ in range(n)]
+        rows = take("<i1", n, K)
+        further += (Line(joint, low, high, row, gain) for (joint, low, high, gain), row in zip(ends, rows, strict=True))
+    elif version == PAIRED:
+        pairs = take("<u2", n, 4).tolist()
+        steps = [(take("<u2", one), take("<u2", other)) for _, _, one, other in pairs]
+        for (a, b, one, other), both in zip(pairs, steps, strict=True):
+            further.append(Grid((a, b), both, take("<i2", one + 1, other + 1, K)))
+    if at < len(payload):
+        raise BuildError(f"{len(payload)} bytes of content, its counts call for {at}")
+    return IntegerTables.of(bias, switch_rows, thresholds, joint_rows, switch_means, joint_means, scale, further, grid)
