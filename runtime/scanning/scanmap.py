@@ -1,8 +1,7 @@
 """The scan map: the transactions that read the kept switches, in order; `scan.json` of a build.
 
-It refers to chips by their place in the harness that it was made for, whose fingerprint it holds. Its bytes are
-canonical: fields in the order of the structs below, indented by two, one newline at the end. `build.json` holds their
-SHA-256.
+It refers to chips by their place in a harness. Its bytes are canonical: fields in the order of the structs below,
+indented by two, one newline at the end. `build.json` holds their SHA-256.
 """
 
 from typing import Annotated
@@ -57,7 +56,6 @@ class ScanMap(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     """The reading plan of a glove, with its ports in reading order, and the used part of every stream."""
 
     schema: int
-    harness: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
     ports: tuple[Port, ...]
     streams: tuple[StreamRead, ...] = ()
 

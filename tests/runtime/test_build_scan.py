@@ -6,12 +6,15 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from thenar.compiler.glove.propose import propose_harness
 from thenar.runtime.build import MANIFEST_NAME, SCAN_NAME, Build
 from thenar.runtime.errors import BuildError
+from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
-from thenar.runtime.scanning.scanmap import SCHEMA, Port, ScanMap, scanmap_to_bytes
+from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.scanmap import SCHEMA, Port, ScanMap, StreamRead, scanmap_to_bytes
 
-SCAN = ScanMap(SCHEMA, "0" * 64, (Port(0, 0, "AB", tuple((bit, bit) for bit in range(9)), False),), ())
+SCAN = ScanMap(SCHEMA, (Port(0, 0, "AB", tuple((bit, bit) for bit in range(9)), False),), ())
 
 
 def add(folder: Path, scan: ScanMap) -> Path:
@@ -40,7 +43,7 @@ def test_a_map_that_is_not_there_is_named(folder: Path) -> None:
 
 
 def test_a_map_of_another_build_is_refused(folder: Path) -> None:
-    add(folder, SCAN).write_bytes(scanmap_to_bytes(replace(SCAN, harness="1" * 64)))
+    add(folder, SCAN).write_bytes(scanmap_to_bytes(replace(SCAN, streams=(StreamRead((), ()),))))
     with pytest.raises(BuildError, match=r"scan\.json is not the one that build\.json describes"):
         Build.load(folder)
 
@@ -49,3 +52,11 @@ def test_a_map_of_other_switches_is_refused_even_if_vouched_for(folder: Path) ->
     add(folder, replace(SCAN, ports=(Port(0, 0, "A", ((0, 0),), False),)))
     with pytest.raises(BuildError, match="does not read each of the 9 kept switches once"):
         Build.load(folder)
+
+
+def test_a_run_plans_its_own_map_for_the_wiring_that_it_is_given(folder: Path) -> None:
+    add(folder, SCAN)
+    build = Build.load(folder)
+    names = [switch.name for switch in build.manifest.switches]
+    harness = propose_harness(names[::-1])
+    assert LiveSystem.of(build, harness).scan == plan_scan(names, harness) != build.scan

@@ -23,7 +23,6 @@ from thenar.runtime.build import SCAN_NAME
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_from_bytes, tables_to_bytes
-from thenar.runtime.scanning.plan import check_harness
 from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 
 from ...conftest import calls
@@ -207,4 +206,3 @@ def test_the_build_holds_a_map_of_the_harness_and_says_its_checksum(
     assert files[SCAN_NAME] == scanmap_to_bytes(report.scan)
     build = Build.load(tmp_path / "build")
     assert build.scan == report.scan
-    check_harness(report.scan, harness, [switch.name for switch in build.manifest.switches])

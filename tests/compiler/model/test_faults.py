@@ -119,7 +119,6 @@ def test_the_worst_fault_of_each_kind_names_its_inputs() -> None:
     bits, codes = random.random((40, 3)) < 0.5, random.integers(0, 32, (40, 1)).astype(np.uint16)
     scan = ScanMap(
         1,
-        "0" * 64,
         (Port(0, 1, "GPIOA", ((0, 2),), False), Port(0, 1, "GPIOB", ((0, 0),), False)),
         (StreamRead(((4, 1),), ()),),
     )
