@@ -24,16 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .integers import COARSE, FINEST_SCALE, IntegerTables
-from .tables import ScoreTables, winners
+from .tables import ScoreTables
 from .terms.base import CoreTerm, Floats, rounded
 from .terms.line import LARGEST_SLOPE, WIDEST, Line
 
 # The most consecutive switches that firmware looks up together in tables of narrow entries. Every group of this many
 # consecutive switches keeps the span, so smaller groups do as well.
 GROUP_SIZE = 5
-
-# Scales that `least_disruptive_scale` tries, evenly spaced down to four fifths of the finest.
-TRIED, _TRIED_OF_ALL = 32, 160
 
 
 def balance(tables: ScoreTables) -> ScoreTables:
@@ -94,30 +91,6 @@ def finest_scale(tables: ScoreTables, limit: float, widest: int, grid: int = 1) 
         else:
             too_fine = middle
     return fits
-
-
-def least_disruptive_scale(
-    tables: ScoreTables, finest: float, bits: NDArray[np.bool_], codes: NDArray[np.uint16], grid: int = 1
-) -> float:
-    """Return, of `finest` and slightly coarser scales, the one at which the fewest rows change class.
-
-    The rows are bits (n, s) and codes (n, j); ties go to the finest scale. With coarse steps, whether a common frame
-    changes its class depends on luck rather than on the scale. The bounds on rounding hold at every scale.
-    """
-    scales = finest * (1 - np.arange(TRIED) / _TRIED_OF_ALL)
-    scores = tables.scores(bits, codes)
-    most = max(rounding_error(tables, scale, grid) for scale in scales[[0, -1]].tolist())
-    near = _leads(scores) * scales[-1] <= 2 * most + 1  # no scale can change the other rows: see above
-    right, means = winners(scores[near]), bits.sum(axis=0) / len(bits)
-    closed, asked, changed = bits[near].astype(np.float64), codes[near], []
-    for scale in scales.tolist():
-        whole = ScoreTables(_whole_bias(tables, scale, grid, means), tuple(_whole(tables, scale, grid)))
-        # Sums of integers are exact in any order, so a matrix product may add them up.
-        added = closed @ whole.switch_rows
-        for term in (*whole.bins, *whole.further):
-            added += term.of(*whole.values(term, bits, asked))
-        changed.append(np.count_nonzero((whole.bias + added).argmax(axis=1) != right))
-    return float(scales[int(np.argmin(changed))])
 
 
 def rounding_error(tables: ScoreTables, scale: float, grid: int = 1) -> float:
@@ -191,13 +164,6 @@ class _Extremes:
         return float(np.vstack([groups, others]).max(initial=0.0))
 
 
-def _leads(scores: Floats) -> Floats:
-    """Return the lead (n,) of the best over the second best score in each row of (n, K)."""
-    second, best = np.partition(scores, -2, axis=1)[:, -2:].T
-    leads: Floats = best - second
-    return leads
-
-
 def _whole(tables: ScoreTables, scale: float, grid: int) -> list[CoreTerm]:
     """Return the terms in whole steps."""
     return [term.whole(scale, grid) for term in _centred(tables, scale).core_terms]
@@ -225,16 +191,14 @@ def quantise(
 
     bits (n, s) and codes (n, j) are the training rows; their mean contributions replace missing inputs. No lookup (a
     joint, or up to GROUP_SIZE consecutive switches) spans more than 2^entry_bits - 1 steps in any class. With 16 bits
-    this is no restriction, since sums of 16 bits span no more, and the scale is the finest; with fewer it is the
-    kindest. With lines, entries of fewer than 16 bits are multiples of 256 instead.
+    this is no restriction, since sums of 16 bits span no more. With lines, entries of fewer than 16 bits are multiples
+    of 256 instead.
     """
     grid, means = COARSE if tables.lines and entry_bits < 16 else 1, bits.sum(axis=0) / len(bits)
     balanced = balance(as_deployed(tables, grid))
     limit, room = 2 ** (width - 1) - 1, 0.0
     while True:
         scale = finest_scale(balanced, limit - room, 2**entry_bits - 1, grid)
-        if entry_bits < 16:
-            scale = least_disruptive_scale(balanced, scale, bits, codes, grid)
         bias = _whole_bias(balanced, scale, grid, means)
         beyond = reach(ScoreTables(bias / scale, balanced.terms), scale, grid=grid) - limit
         if grid == 1 or beyond <= 0:
