@@ -17,13 +17,12 @@ from thenar.compiler.artifact.ensemble import ensemble_from_bytes
 from thenar.compiler.artifact.verify import Verification, verify
 from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.model.collapse import collapse
+from thenar.compiler.scan_file import SCAN_NAME, load_scan, scanmap_to_bytes
 from thenar.compiler.trainers.base import Training
 from thenar.runtime import Build, BuildError
-from thenar.runtime.build import SCAN_NAME
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_from_bytes, tables_to_bytes
-from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 
 from ...conftest import calls
 from ..conftest import make_set
@@ -205,4 +204,4 @@ def test_the_build_holds_a_map_of_the_harness_and_says_its_checksum(
     assert report.scan is not None
     assert files[SCAN_NAME] == scanmap_to_bytes(report.scan)
     build = Build.load(tmp_path / "build")
-    assert build.scan == report.scan
+    assert load_scan(tmp_path / "build", build.manifest) == report.scan

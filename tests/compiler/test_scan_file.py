@@ -6,17 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.compiler.scan_file import MAX_BYTES, scanmap_from_bytes, scanmap_to_bytes
 from thenar.runtime.errors import BuildError
-from thenar.runtime.scanning.scanmap import (
-    MAX_BYTES,
-    SCHEMA,
-    Port,
-    ScanMap,
-    StreamRead,
-    check_switches,
-    scanmap_from_bytes,
-    scanmap_to_bytes,
-)
+from thenar.runtime.scanning.scanmap import SCHEMA, Port, ScanMap, StreamRead
 
 SCAN = ScanMap(
     SCHEMA,
@@ -79,13 +71,6 @@ def test_what_is_no_map_is_refused_by_name(data: bytes, reason: str) -> None:
 def test_a_map_that_reads_a_thing_twice_is_refused(scan: ScanMap) -> None:
     with pytest.raises(BuildError, match="twice: compile the build again"):
         scanmap_from_bytes(scanmap_to_bytes(scan))
-
-
-@pytest.mark.parametrize("switches", [4, 6])
-def test_a_map_of_other_switches_than_the_builds_is_refused(switches: int) -> None:
-    check_switches(SCAN, 5)
-    with pytest.raises(BuildError, match=f"does not read each of the {switches} kept switches once"):
-        check_switches(SCAN, switches)
 
 
 @given(position=st.integers(0, len(scanmap_to_bytes(SCAN)) - 1), value=st.integers(0, 255))
