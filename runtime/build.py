@@ -165,7 +165,7 @@ class Build:
             biased_scores = self._all_scores(biased_scores, closed, values, gone, mask)
         second, best = sorted(biased_scores)[-2:]
         winner = biased_scores.index(best)
-        probability = softmax(biased_scores, winner, self.tables.scale)
+        probability = softmax(biased_scores, self.tables.scale)[winner]
         return Recognition(self.classes[winner], probability, best - second, degraded)
 
 

@@ -240,20 +240,16 @@ def refused(
     return np.asarray((scores.max(axis=1) < least) | (count < fewest) | (count > most) | (outside > rejection.outside))
 
 
-def softmax(scores: Sequence[int], number: int, scale: float) -> float:
-    """Return the softmax of `scores` (K,), in steps of 1 / `scale`, for class `number`; it cannot overflow.
+def softmax(scores: Sequence[int], scale: float) -> list[float]:
+    """Return the softmax of `scores` (K,), in steps of 1 / `scale`; it cannot overflow.
 
     It is calculated only to be published: no decision depends on it.
     """
-    return math.exp((scores[number] - max(scores)) / scale) / odds(scores, scale)
-
-
-def odds(scores: Sequence[int], scale: float) -> float:
-    """Return the sum of all classes' odds relative to the best one."""
     best, total = max(scores), 0.0
-    for score in scores:
-        total += math.exp((score - best) / scale)
-    return total
+    odds = [math.exp((score - best) / scale) for score in scores]
+    for share in odds:
+        total += share
+    return [share / total for share in odds]
 
 
 def _packed(rows: NDArray[np.int16], offsets: int) -> list[int]:

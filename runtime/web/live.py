@@ -3,7 +3,6 @@
 In the loop of the run a moment costs a reference or two; its text is made on the server's thread, if a page is open.
 """
 
-import math
 from collections import deque
 from collections.abc import Sequence
 from functools import partial
@@ -21,6 +20,7 @@ from ..harness.wiring import Harness
 from ..live.recogniser import Moment
 from ..manifest import Manifest
 from ..published import HealthReport, LiveGrasp
+from ..scores import softmax
 from ..taxels import calibration_of
 from .server import Server, message
 
@@ -147,13 +147,9 @@ class FrameText:
         return tuple(round(joint.value(code), 2) for joint, code in zip(self._joints, codes, strict=True))
 
     def _probabilities(self, scores: Sequence[int], refused: bool) -> tuple[float, ...]:
-        best = max(scores)
         if self._none_leads is not None:
-            scores = (*scores, best + self._none_leads[refused])
-            best = max(scores)
-        powers = [math.exp((score - best) / self._scale) for score in scores]
-        total = sum(powers)
-        return tuple(round(power / total, 4) for power in powers)
+            scores = (*scores, max(scores) + self._none_leads[refused])
+        return tuple(round(share, 4) for share in softmax(scores, self._scale))
 
     def _pressed(self, codes: Sequence[int | None]) -> dict[str, float]:
         return {
