@@ -109,23 +109,20 @@ class Reader:
             yield Oddity("records passed over", skipped, message)
 
     def _read(self) -> Iterator[Entry]:
+        """Yield the entries of the data section; later sections repeat known content."""
         for record in self._records:
             try:
-                yield from self._taken(record)
+                if record.opcode == Opcode.FOOTER:
+                    self._end_summary(record)
+                elif not self._in_data:
+                    self._count(record)
+                elif record.opcode == Opcode.DATA_END:
+                    self._end_data(record)
+                else:
+                    self.tail.size, self.tail.crc = record.end, record.after
+                    yield from self._decoded(record)
             except FormatError as wrong:
                 raise FormatError(f"{self.path.name}: the record at byte {record.offset} {wrong}") from None
-
-    def _taken(self, record: RawRecord) -> Iterator[Entry]:
-        """Yield the entries of a record of the data section; later sections repeat known content."""
-        if record.opcode == Opcode.FOOTER:
-            self._end_summary(record)
-        elif not self._in_data:
-            self._count(record)
-        elif record.opcode == Opcode.DATA_END:
-            self._end_data(record)
-        else:
-            self.tail.size, self.tail.crc = record.end, record.after
-            yield from self._decoded(record)
 
     def _decoded(self, record: RawRecord) -> Iterator[Entry]:
         """Yield the record's entries. Raises FormatError, whose text continues "the record at byte 17 "."""

@@ -13,7 +13,7 @@ import msgspec
 from thenar.drivers.closing import Closing
 
 from ..build import Build
-from ..frames import Mask, now_us
+from ..frames import now_us
 from ..glove import Glove
 from ..hand import load_hand
 from ..harness.wiring import Harness
@@ -127,24 +127,22 @@ class FrameText:
 
     def __call__(self, moment: Moment) -> bytes:
         """Return the text."""
-        frame, codes = moment.switches, moment.codes
+        frame, codes, shut = moment.switches, moment.codes, ""
+        if self._switches:
+            shut = f"{0 if frame is None else frame.closed:0{self._switches}b}"[::-1]
         more = {
             "preshape": moment.preshape,
             "angles": moment.angles,
             "late_us": now_us() - moment.grasp.time_us,
-            "closed": self._bits(0 if frame is None else frame.closed),
-            "joints": None if codes is None else self._values(codes),
+            "closed": shut,
+            "joints": None
+            if codes is None
+            else [round(joint.value(code), 2) for joint, code in zip(self._joints, codes, strict=True)],
             "probabilities": self._probabilities(moment.scores, moment.refused) if moment.scores else None,
             "taxels": {} if frame is None or frame.taxels is None else self._pressed(frame.taxels),
         }
         # Both are objects of JSON: their fields follow the topic.
         return _FRAME + _encode(moment.grasp)[1:-1] + b"," + _encode(more)[1:]
-
-    def _bits(self, mask: Mask) -> str:
-        return f"{mask:0{self._switches}b}"[::-1] if self._switches else ""
-
-    def _values(self, codes: Sequence[int]) -> tuple[float, ...]:
-        return tuple(round(joint.value(code), 2) for joint, code in zip(self._joints, codes, strict=True))
 
     def _probabilities(self, scores: Sequence[int], refused: bool) -> tuple[float, ...]:
         if self._none_leads is not None:
