@@ -194,7 +194,7 @@ def test_a_line_of_few_codes_and_much_weight_takes_a_gain() -> None:
     bits, codes = np.zeros((5, 0), bool), np.arange(10, 15, dtype=np.uint16)[:, np.newaxis]
     integers = quantise(tables, bits, codes)
     (slope,) = integers.lines
-    assert slope.most == 4 << slope.gain > 127
+    assert slope.most == 4 << slope.shift > 127
     scores = integers.scores(bits, codes)
     assert (np.diff(scores, axis=0) == np.diff(scores, axis=0)[0]).all()
     assert scores[:, 0].tolist() == (-scores[:, 1]).tolist()
