@@ -19,7 +19,6 @@ from .model.integers import IntegerTables, tables_from_bytes
 from .published import NONE
 from .scores import LANE_OFFSET, Rejector, Scorer, none_leads, softmax
 from .sealed import sha256
-from .softmax import Softmax
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -31,9 +30,8 @@ class Recognition(Struct, frozen=True):
     """The prediction for a frame, and its confidence.
 
     probability is the published softmax of the scores of all classes, including nothing held if the build may refuse a
-    frame; a board's probability, in integers and of the grasp types only, is that of `Build.softmax`. margin is the
-    lead over the second best in integer steps; degraded says that a switch or a joint was missing and its mean
-    contribution was added instead.
+    frame; a board's probability is in integers, and of the grasp types only. margin is the lead over the second best in
+    integer steps; degraded says that a switch or a joint was missing and its mean contribution was added instead.
     """
 
     grasp: str
@@ -47,9 +45,9 @@ class Build:
 
     A frame is `bits` (s,), the kept switches in the order of `manifest.switches`, and `codes` (j,), the joints in the
     order of `manifest.joints`. Of equal scores the first grasp type wins. `scorer` is shared by all users of the
-    scores, and `softmax` converts scores to a board's probabilities, in 65535ths. `none` is the class of frames in
-    which nothing is held, None if no training row showed that; then `rejector` decides which frames are refused, None
-    if none is, and `none_leads` holds the leads of none for a frame that is not refused and for one that is.
+    scores. `none` is the class of frames in which nothing is held, None if no training row showed that; then `rejector`
+    decides which frames are refused, None if none is, and `none_leads` holds the leads of none for a frame that is not
+    refused and for one that is.
     """
 
     __slots__ = (
@@ -60,7 +58,6 @@ class Build:
         "none_leads",
         "rejector",
         "scorer",
-        "softmax",
         "tables",
     )
 
@@ -77,7 +74,6 @@ class Build:
         self.tables = tables
         self.grasps, self.classes = manifest.grasps, manifest.classes
         self.scorer = Scorer(tables)
-        self.softmax = Softmax(tables.scale)
         self.none = len(self.grasps) - 1 if self.grasps[-1] == NONE else None
         refusal = manifest.rejection
         self.rejector = None if refusal is None else Rejector(refusal)

@@ -10,11 +10,11 @@ from textwrap import wrap
 from thenar.firmware_templates.rendering import file_text, render
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.softmax import Softmax
 
 from . import FirmwareError
 from .layout import Layout, Rows
 from .sensors import Sensors, codes_files, sensors_of
+from .softmax import Softmax
 from .straight import straight
 from .words import answers_of, check_name, comment, identifiers, inputs_in_words, joint_in_words, none_of, string
 

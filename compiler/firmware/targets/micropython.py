@@ -34,9 +34,9 @@ class MicroPython(Target):
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text: the Python module alone, which is the source for `run` too."""
         from thenar.runtime.code_line import FARTHEST, FRACTION
-        from thenar.runtime.softmax import POWERS, Softmax
 
         from ..classifier import lag_of
+        from ..softmax import POWERS, Softmax
         from ..words import inputs_in_words, none_of
 
         tables, names = library.layout.tables, library.names

@@ -15,6 +15,7 @@ from thenar.compiler.firmware.classifier import LAG_US, Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import Predictions, Probes, lost_inputs
 from thenar.compiler.firmware.sensors import Sensor, sensors_of
+from thenar.compiler.firmware.softmax import Softmax
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
@@ -24,7 +25,6 @@ from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Line
 from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.softmax import Softmax
 
 from ....conftest import tool
 from ....tables import code_of, describe, grid_code
