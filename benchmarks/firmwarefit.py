@@ -31,7 +31,7 @@ from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.firmware.targets.base import Formula
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.model.integers import COARSE, IntegerTables
-from thenar.runtime.model.terms.line import Slope
+from thenar.runtime.model.terms.line import Line
 
 FITTED = ("avr328p", "cortex-m0plus", "cortex-m4", "rv32imac")
 FRAMES = 200
@@ -74,7 +74,7 @@ def drawn(seed: int) -> IntegerTables:
     gain = int(random.integers(-4, 4))
     span = 240 >> gain if gain > 0 else 240 << -gain
     slopes = tuple(
-        Slope(joint, 3, 3 + span, gain, (random.integers(-9, 10, classes) * last).astype(np.int8))
+        Line(joint, 3, 3 + span, (random.integers(-9, 10, classes) * last).astype(np.int8), gain)
         for joint in range(joints - lines, joints)
     )
     return IntegerTables.of(

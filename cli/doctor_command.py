@@ -61,7 +61,7 @@ def command(
     from thenar.runtime.build import Build
     from thenar.runtime.harness.loading import load_harness
     from thenar.runtime.live.checkup import check_up
-    from thenar.runtime.live.system import LiveSystem
+    from thenar.runtime.scanning.plan import plan_scan
     from thenar.runtime.scanning.ports import whole_scan
 
     harness = load_harness(glove)
@@ -73,7 +73,7 @@ def command(
     else:
         switches = [switch.name for switch in loaded.manifest.switches]
         joints = [joint.name for joint in loaded.manifest.joints]
-        looks = list(check_up(harness, LiveSystem.map_of(loaded, harness), switches, joints))
+        looks = list(check_up(harness, plan_scan(switches, harness), switches, joints))
     found = list(_calibration(harness, loaded))
     with progress("looking") as report:
         for number, look in enumerate(looks):

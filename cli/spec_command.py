@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from thenar.compiler.glove.spec import SpecSummary
-    from thenar.runtime.build import Build
     from thenar.runtime.harness.wiring import Harness
 
 _FOLDER = "spec"
@@ -52,6 +51,7 @@ def command(
     from thenar.compiler.glove.files import check_output, expectations, files_of, write_spec
     from thenar.compiler.glove.prices import load_prices
     from thenar.compiler.glove.spec import glove_spec
+    from thenar.compiler.scan_file import load_scan
     from thenar.runtime.build import Build
 
     loaded = Build.load(build)
@@ -61,7 +61,8 @@ def command(
     hand = fitted_hand(layout, sensors, hand_length)
     every = [*sensors, *(joint.name for joint in loaded.manifest.joints)]
     parts = {} if prices is None else load_prices(prices, every)
-    spec = glove_spec(loaded.manifest, loaded.scan, _harness(build, loaded, glove), hand, parts)
+    scan = load_scan(build, loaded.manifest)
+    spec = glove_spec(loaded.manifest, scan, _harness(build, scan is not None, glove), hand, parts)
     written = None
     if output is not None:
         files = files_of(spec)
@@ -70,14 +71,14 @@ def command(
     show(spec.summary, lambda summary: _print(summary, expectations(spec), written))
 
 
-def _harness(folder: Path, loaded: "Build", glove: Path | None) -> "Harness | None":
-    """Return the named wiring, or the one in the build; None for a new one."""
+def _harness(folder: Path, wired: bool, glove: Path | None) -> "Harness | None":
+    """Return the named wiring, or the one in a build that was compiled for one; None for a new one."""
     from thenar.runtime.harness.loading import load_harness
 
     if glove is not None:
         return load_harness(glove)
     own = folder / _FOLDER / _WIRING
-    return load_harness(own) if loaded.scan is not None and own.is_file() else None
+    return load_harness(own) if wired and own.is_file() else None
 
 
 def _print(spec: "SpecSummary", expected: "Iterable[str]", written: str | None) -> None:

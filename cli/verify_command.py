@@ -86,10 +86,7 @@ def _print(found: "Verification") -> None:
         f"allowed {worst.bound:.3f} ({frame})"
     )
     _print_margin(f"{worst.safe_margin:.3f} steps, which covers the worst frames", worst)
-    echo(
-        "largest possible sum, with or without missing inputs: "
-        f"{worst.reach} for {worst.reaching}, allowed {worst.limit}"
-    )
+    echo(f"largest possible sum, with or without missing inputs: {worst.reach}, allowed {worst.limit}")
     whose = {0: "trials not trained on", found.trials: "trials trained on"}.get(
         found.trained_on, f"{found.trained_on} of {trials} trained on"
     )

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.manifest import Fitting, Rejection
-from thenar.runtime.model.integers import LIMIT, MAX_BYTES, MAX_JOINTS, MAX_SWITCHES, IntegerTables, payload_bytes
+from thenar.runtime.model.integers import LIMIT, MAX_BYTES, MAX_JOINTS, MAX_SWITCHES, IntegerTables, least_bytes
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.published import NONE
@@ -252,7 +252,7 @@ def check_inputs(n_classes: int, elements: int, joints: int, raises: type[Thenar
         raise raises(f"{elements} switches, a build has at most {MAX_SWITCHES}: keep fewer")
     if joints > MAX_JOINTS:
         raise raises(f"{joints} joints, a build has at most {MAX_JOINTS}: import fewer, or use switches alone")
-    least = payload_bytes(n_classes, elements, [0] * joints)
+    least = least_bytes(n_classes, elements, joints)
     if least > MAX_BYTES:
         raise raises(
             f"tables of {n_classes} grasp types, {elements} switches and {joints} joints need {least} bytes at least, "
@@ -310,7 +310,7 @@ class _Limits:
         ranges = self.ranges.copy()
         tables = self._tables
         steps = [int(steps[-1]) + 1 for steps in map(tables.steps_of, range(tables.n_joints)) if len(steps)]
-        if max([0, *steps, *(slope.high for slope in tables.slopes)]) <= 255:
+        if max([0, *steps, *(slope.high for slope in tables.lines)]) <= 255:
             # No code above 254 is distinguished, and boards that send bytes send 255 for all codes above it.
             ranges[:, :, 0] = np.minimum(ranges[:, :, 0], 255)
             ranges[:, :, 1][ranges[:, :, 1] >= 255] = HIGHEST_CODE

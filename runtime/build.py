@@ -1,4 +1,4 @@
-"""A loaded build folder: `build.json` describes the tables, `tables.bin` holds them, `scan.json` the reading order."""
+"""A loaded build folder: `build.json` describes the tables, `tables.bin` holds them."""
 
 from collections.abc import Sequence
 from os import PathLike
@@ -17,25 +17,21 @@ from .manifest_file import manifest_from_bytes
 from .model import integers as tables_file
 from .model.integers import IntegerTables, tables_from_bytes
 from .published import NONE
-from .scanning import scanmap as scan_file
-from .scanning.scanmap import ScanMap, check_switches, scanmap_from_bytes
 from .scores import LANE_OFFSET, Rejector, Scorer, none_leads, softmax
 from .sealed import sha256
-from .softmax import Softmax
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME = "build.json", "tables.bin", "ensemble.bin", "scan.json"
+MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME = "build.json", "tables.bin", "ensemble.bin"
 
 
 class Recognition(Struct, frozen=True):
     """The prediction for a frame, and its confidence.
 
     probability is the published softmax of the scores of all classes, including nothing held if the build may refuse a
-    frame; a board's probability, in integers and of the grasp types only, is that of `Build.softmax`. margin is the
-    lead over the second best in integer steps; degraded says that a switch or a joint was missing and its mean
-    contribution was added instead.
+    frame; a board's probability is in integers, and of the grasp types only. margin is the lead over the second best in
+    integer steps; degraded says that a switch or a joint was missing and its mean contribution was added instead.
     """
 
     grasp: str
@@ -48,11 +44,10 @@ class Build:
     """A recogniser for single frames, integer arithmetic only.
 
     A frame is `bits` (s,), the kept switches in the order of `manifest.switches`, and `codes` (j,), the joints in the
-    order of `manifest.joints`. Of equal scores the first grasp type wins. `scan` is the scan map of the kept switches,
-    None if the build was compiled for no harness. `scorer` is shared by all users of the scores, and `softmax` converts
-    scores to a board's probabilities, in 65535ths. `none` is the class of frames in which nothing is held, None if no
-    training row showed that; then `rejector` decides which frames are refused, None if none is, and `none_leads` holds
-    the leads of none for a frame that is not refused and for one that is.
+    order of `manifest.joints`. Of equal scores the first grasp type wins. `scorer` is shared by all users of the
+    scores. `none` is the class of frames in which nothing is held, None if no training row showed that; then `rejector`
+    decides which frames are refused, None if none is, and `none_leads` holds the leads of none for a frame that is not
+    refused and for one that is.
     """
 
     __slots__ = (
@@ -62,13 +57,11 @@ class Build:
         "none",
         "none_leads",
         "rejector",
-        "scan",
         "scorer",
-        "softmax",
         "tables",
     )
 
-    def __init__(self, manifest: Manifest, tables: IntegerTables, scan: ScanMap | None = None) -> None:
+    def __init__(self, manifest: Manifest, tables: IntegerTables) -> None:
         """Combine the parts of a build. Raises BuildError if they describe different builds."""
         named = len(manifest.grasps), len(manifest.switches), len(manifest.joints)
         held = tables.n_classes, tables.n_switches, tables.n_joints
@@ -77,14 +70,10 @@ class Build:
                 f"{MANIFEST_NAME} names {named[0]} grasp types, {named[1]} switches and {named[2]} joints, but "
                 f"{TABLES_NAME} holds {held[0]}, {held[1]} and {held[2]}: compile the build again"
             )
-        if scan is not None:
-            check_switches(scan, tables.n_switches)
         self.manifest = manifest
         self.tables = tables
-        self.scan = scan
         self.grasps, self.classes = manifest.grasps, manifest.classes
         self.scorer = Scorer(tables)
-        self.softmax = Softmax(tables.scale)
         self.none = len(self.grasps) - 1 if self.grasps[-1] == NONE else None
         refusal = manifest.rejection
         self.rejector = None if refusal is None else Rejector(refusal)
@@ -110,7 +99,7 @@ class Build:
                 f"{where / MANIFEST_NAME} has a scale of {proved[0]!r} and a bound of {proved[1]}, but {TABLES_NAME} "
                 f"has {tables.scale!r} and {tables.bound}: compile the build again"
             )
-        return cls(manifest, tables, _load_scan(where, manifest))
+        return cls(manifest, tables)
 
     def scores(self, bits: ArrayLike, codes: ArrayLike) -> NDArray[np.int64]:
         """Return the scores of one frame, (K,) in steps of 1 / `tables.scale`. Raises FrameError."""
@@ -172,7 +161,7 @@ class Build:
             biased_scores = self._all_scores(biased_scores, closed, values, gone, mask)
         second, best = sorted(biased_scores)[-2:]
         winner = biased_scores.index(best)
-        probability = softmax(biased_scores, winner, self.tables.scale)
+        probability = softmax(biased_scores, self.tables.scale)[winner]
         return Recognition(self.classes[winner], probability, best - second, degraded)
 
 
@@ -180,13 +169,6 @@ def load_manifest(folder: "Path") -> Manifest:
     """Return the content of the `build.json` in `folder`. Raises BuildError."""
     path = folder / MANIFEST_NAME
     return manifest_from_bytes(read_member(path, manifest_file.MAX_BYTES), str(path))
-
-
-def _load_scan(folder: "Path", manifest: Manifest) -> ScanMap | None:
-    if manifest.scan_sha256 is None:
-        return None
-    path = folder / SCAN_NAME
-    return scanmap_from_bytes(read_member(path, scan_file.MAX_BYTES, manifest.scan_sha256), str(path))
 
 
 def read_member(path: "Path", largest: int, checksum: str | None = None) -> bytes:

@@ -261,7 +261,8 @@ class GloveHealth:
 
     def __init__(self, quarantine: Quarantine) -> None:
         self._quarantine = quarantine
-        self._switches, self._glove = FrameRate(), FrameRate()
+        # Times of frames.
+        self._switches, self._glove = deque[int](maxlen=_MOST_FRAMES), deque[int](maxlen=_MOST_FRAMES)
         self._published = Counter[str]()
 
     def update(self, grasp: LiveGrasp, switches: SwitchFrame | None, glove_us: int | None = None) -> None:
@@ -269,10 +270,10 @@ class GloveHealth:
         before counts once.
         """
         self._published[grasp.health] += 1
-        if switches is not None:
-            self._switches.frame(switches.time_us)
-        if glove_us is not None:
-            self._glove.frame(glove_us)
+        switches_us = None if switches is None else switches.time_us
+        for times_us, time_us in ((self._switches, switches_us), (self._glove, glove_us)):
+            if time_us is not None and (not times_us or time_us > times_us[-1]):
+                times_us.append(time_us)
 
     def report(
         self,
@@ -285,8 +286,8 @@ class GloveHealth:
         published = self._published
         return HealthReport(
             time_us=now_us,
-            switch_hz=self._switches.hz(now_us),
-            glove_hz=self._glove.hz(now_us),
+            switch_hz=_rate_hz(self._switches, now_us),
+            glove_hz=_rate_hz(self._glove, now_us),
             frames=published.total(),
             changing=published["changing"],
             degraded=published["degraded"],
@@ -298,19 +299,8 @@ class GloveHealth:
         )
 
 
-class FrameRate:
-    """The number of frames in the last second."""
-
-    def __init__(self) -> None:
-        self._times_us = deque[int](maxlen=_MOST_FRAMES)
-
-    def frame(self, time_us: int) -> None:
-        """Count a frame, unless it is no newer than the last one."""
-        if not self._times_us or time_us > self._times_us[-1]:
-            self._times_us.append(time_us)
-
-    def hz(self, now_us: int) -> float:
-        """Return the rate."""
-        while self._times_us and self._times_us[0] <= now_us - _REPORT_US:
-            self._times_us.popleft()
-        return float(len(self._times_us))
+def _rate_hz(times_us: deque[int], now_us: int) -> float:
+    """Return how many of these times are of the last second; older ones are dropped."""
+    while times_us and times_us[0] <= now_us - _REPORT_US:
+        times_us.popleft()
+    return float(len(times_us))

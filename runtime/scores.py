@@ -125,6 +125,22 @@ class Scorer:
         total += self.joint_sum(joints, sum(lost << joint for joint, lost in enumerate(lost_codes)))
         return self.unpack(total.to_bytes(self.size, "little"))
 
+    def state_scores(
+        self, closed: Mask, lost: Mask, codes: Sequence[int] | None, lost_joints: Mask = 0
+    ) -> tuple[int, ...]:
+        """Return `biased_scores_without` of a state: of masks of switches and joints, and of all codes, None if all are
+        lost. Bits of `closed` that are lost are ignored. Raises FrameError.
+        """
+        if (closed | lost) >> len(self.switch_rows):
+            raise FrameError(f"a switch beyond the {len(self.switch_rows)} of the build is closed or lost")
+        if codes is not None and len(codes) != len(self.thresholds):
+            raise FrameError(f"a frame has {len(codes)} codes, but the build has {len(self.thresholds)} joints")
+        total = self.start + _sum(closed & ~lost, self.row_sums)
+        if lost:
+            total += _sum(lost, self.mean_sums)
+        total += self.joints_lost if codes is None else self.joint_sum(codes, lost_joints)
+        return self.unpack(total.to_bytes(self.size, "little"))
+
     def _codes(self, codes: ArrayLike) -> list[int]:
         array = np.asarray(codes)
         expected = len(self.thresholds)
@@ -149,60 +165,6 @@ class _RowsByCode(dict[int, int]):
             self.clear()
         row = self[code] = self._rows[bisect_left(self._thresholds, code)]
         return row
-
-
-class LiveScores:
-    """The scores of live frames, updated incrementally: the same numbers as a whole frame's sum.
-
-    Three sums of packed rows, each recalculated when its inputs change; at first every switch is open and every joint
-    lost. A switch adds its row while it is closed, its mean row while it is lost; a joint adds the row of its code's
-    bin, its mean row while it is lost. So `biased_scores` are exactly `Scorer.biased_scores_without` of the same state.
-    """
-
-    __slots__ = ("_closed", "_codes", "_joints", "_lost", "_lost_joints", "_newest", "_scorer", "_silent", "_there")
-
-    def __init__(self, scorer: Scorer) -> None:
-        self._scorer = scorer
-        self._there: Mask = 0
-        self._lost: Mask = 0
-        self._closed, self._silent = scorer.start, 0
-        self._codes: tuple[int, ...] | None = None
-        self._lost_joints: Mask = 0
-        self._joints = scorer.joints_lost
-        self._newest: tuple[int, ...] | None = None
-
-    def joints(self, codes: Sequence[int] | None, lost: Mask = 0) -> None:
-        """Take the codes of all joints, and which are lost; None: all are. Raises FrameError."""
-        taken = None if codes is None else tuple(codes)
-        if taken == self._codes and lost == self._lost_joints:
-            return
-        scorer = self._scorer
-        if taken is None:
-            self._joints = scorer.joints_lost
-        elif len(taken) != len(scorer.thresholds):
-            raise FrameError(f"a frame has {len(taken)} codes, but the build has {len(scorer.thresholds)} joints")
-        else:
-            self._joints = scorer.joint_sum(taken, lost)
-        self._codes, self._lost_joints, self._newest = taken, lost, None
-
-    def biased_scores(self, closed: Mask, lost: Mask = 0) -> tuple[int, ...]:
-        """Return the K scores, each 2^15 too high, for a state of all switches; bits of `closed` that are lost are
-        ignored. While nothing changes, they are the same object. Raises FrameError.
-        """
-        scorer = self._scorer
-        if (closed | lost) >> len(scorer.switch_rows):
-            raise FrameError(f"a switch beyond the {len(scorer.switch_rows)} of the build is closed or lost")
-        there = closed & ~lost
-        if there != self._there:
-            self._closed = scorer.start + _sum(there, scorer.row_sums)
-            self._there, self._newest = there, None
-        if lost != self._lost:
-            self._silent = _sum(lost, scorer.mean_sums)
-            self._lost, self._newest = lost, None
-        if self._newest is None:
-            total = self._closed + self._silent + self._joints
-            self._newest = scorer.unpack(total.to_bytes(scorer.size, "little"))
-        return self._newest
 
 
 def none_leads(rejection: Rejection, scale: float) -> tuple[int, int]:
@@ -278,20 +240,16 @@ def refused(
     return np.asarray((scores.max(axis=1) < least) | (count < fewest) | (count > most) | (outside > rejection.outside))
 
 
-def softmax(scores: Sequence[int], number: int, scale: float) -> float:
-    """Return the softmax of `scores` (K,), in steps of 1 / `scale`, for class `number`; it cannot overflow.
+def softmax(scores: Sequence[int], scale: float) -> list[float]:
+    """Return the softmax of `scores` (K,), in steps of 1 / `scale`; it cannot overflow.
 
     It is calculated only to be published: no decision depends on it.
     """
-    return math.exp((scores[number] - max(scores)) / scale) / odds(scores, scale)
-
-
-def odds(scores: Sequence[int], scale: float) -> float:
-    """Return the sum of all classes' odds relative to the best one."""
     best, total = max(scores), 0.0
-    for score in scores:
-        total += math.exp((score - best) / scale)
-    return total
+    odds = [math.exp((score - best) / scale) for score in scores]
+    for share in odds:
+        total += share
+    return [share / total for share in odds]
 
 
 def _packed(rows: NDArray[np.int16], offsets: int) -> list[int]:

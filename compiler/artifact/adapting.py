@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
-from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build, read_member
+from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME, Build, read_member
 from thenar.runtime.hand import HAND_NAME
 from thenar.runtime.manifest import Adapted, Manifest, Of, Recognised, Rejection, Switch, Wearing
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
@@ -27,6 +27,7 @@ from ..recogniser import predicted_classes
 from ..recordings.graspset import GraspSet, Joint
 from ..recordings.taxonomy import ANY, own
 from ..samples import Samples, check_types, decided, select_inputs
+from ..scan_file import SCAN_NAME
 from ..wearer import STRENGTH, Adaptation, AdaptationError
 from .compile import check_target, closed_shares, origin_of, proof_of, publish, sha256
 from .documents import SPEC_FOLDER

@@ -11,7 +11,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
+from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
 from thenar.runtime.hand import HAND_NAME, hand_from_bytes, hand_to_bytes
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.system import unread_joints
@@ -20,7 +20,6 @@ from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Recipe, TableBits, changed
 from thenar.runtime.scanning.plan import plan_scan
-from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
@@ -36,6 +35,7 @@ from ..publication import check_folder, publish_folder, sweep
 from ..recogniser import Recogniser, predicted_classes
 from ..recordings.graspset import GraspSet, Joint
 from ..samples import Samples
+from ..scan_file import SCAN_NAME, scanmap_to_bytes
 from ..trainers.base import SHARED, Report, Training
 from ..wearer import STRENGTH
 from . import CompileError

@@ -18,6 +18,7 @@ from ..model.faults import count_faults, groups_of, worst_faults
 from ..recogniser import predicted_classes
 from ..recordings.graspset import GraspSet
 from ..samples import decided, select_inputs
+from ..scan_file import load_scan
 from ..trainers.base import Model, Report
 from ..trainers.stumps import Stumps
 from . import CompileError
@@ -240,7 +241,8 @@ def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Report | No
     build = _build_for(folder, grasp_set)
     manifest = build.manifest
     bits, codes = select_inputs(grasp_set, manifest)
-    groups = groups_of(build.scan, [switch.source for switch in manifest.switches], build.tables.n_joints)
+    scan, sources = load_scan(Path(folder), manifest), [switch.source for switch in manifest.switches]
+    groups = groups_of(scan, sources, build.tables.n_joints)
     labels = _labels(np.array(build.grasps), grasp_set)
     counts = count_faults(build.tables, bits, codes, labels, grasp_set.trial_ids, tuple(groups.values()), progress)
     names = [*(each.name for each in manifest.switches), *(each.name for each in manifest.joints)]

@@ -23,6 +23,7 @@ from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Li
 from ..firmware.costs import PartFit, fit_for, smallest_fit
 from ..firmware.generate import LARGEST
 from ..firmware.probes import Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames, states_of
+from ..firmware.softmax import Softmax
 from ..firmware.targets import TARGETS
 from ..firmware.targets import kinds as every_kind
 from ..recordings.graspset import GraspSet
@@ -176,7 +177,7 @@ class FirmwareTrial:
         """
         scores = self._scores_without if missing else self._scores
         best, second = np.sort(scores, axis=1)[:, :-3:-1].T
-        softmax = self._build.softmax
+        softmax = Softmax(self._build.tables.scale)
         shares = [softmax.probabilities(own)[n % len(own)] for n, own in enumerate(scores.tolist())]
         states = []
         if found.states is not None:

@@ -10,11 +10,11 @@ from textwrap import wrap
 from thenar.firmware_templates.rendering import file_text, render
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.softmax import Softmax
 
 from . import FirmwareError
 from .layout import Layout, Rows
 from .sensors import Sensors, codes_files, sensors_of
+from .softmax import Softmax
 from .straight import straight
 from .words import answers_of, check_name, comment, identifiers, inputs_in_words, joint_in_words, none_of, string
 
@@ -82,7 +82,7 @@ class Library:
             "softmax": Softmax(tables.scale),
             "columns": _remark(f"The entries of a row: {', '.join(map(comment, names.grasps))}."),
             "rows": [*_row_lines(layout.start[None], layout, "START"), *_section_lines(names, layout)],
-            "slopes": _row_lines([line.row.astype(int) for line in tables.slopes], layout, "SLOPES"),
+            "slopes": _row_lines([line.row.astype(int) for line in tables.lines], layout, "SLOPES"),
             "straight": straight(layout),
             "grasp_enum": _enumerators(f"{prefix}_GRASP", names.grasps, names.grasps),
             "switch_enum": _enumerators(f"{prefix}_SWITCH", switches, switches),

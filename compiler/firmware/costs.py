@@ -65,7 +65,7 @@ def table_bytes(layout: Layout, *, avr: bool) -> int:
     tables, means = layout.tables, 2 * layout.means.size
     if avr and (function := straight(layout)) is not None:
         return means + 2 * len(function.instructions) - CORE_SUM
-    bins, lines = len(layout.binned), len(tables.slopes)
+    bins, lines = len(layout.binned), len(tables.lines)
     slopes = lines * layout.row_pairs * (2 if avr else 4)
     terms = 8 * (bins + lines) + 18 * len(tables.grids)
     return 4 * layout.row_pairs * layout.n_rows + slopes + terms + 2 * len(layout.thresholds) + means
@@ -92,9 +92,9 @@ def terms(layout: Layout, *, avr: bool) -> dict[str, int]:
         "bytes": -(-tables.n_switches // 8),
         "groups": len(layout.groups),
         "rows": layout.found * blocks,
-        "lines": len(tables.slopes) * blocks,
-        "distances": len(tables.slopes),
-        "shifts": sum(abs(line.gain) for line in tables.slopes),
+        "lines": len(tables.lines) * blocks,
+        "distances": len(tables.lines),
+        "shifts": sum(abs(line.shift) for line in tables.lines),
         "bins": len(layout.bins),
         "halves": sum(len(bins.thresholds).bit_length() for bins in layout.bins),
     }

@@ -104,7 +104,7 @@ class Layout:
         tables = self.tables
         constant = [rows[0] for steps, rows in zip(tables.thresholds, tables.joint_rows, strict=True) if not len(steps)]
         start: Rows = tables.bias.astype(np.int64) + sum(constant, np.zeros(tables.n_classes, np.int64))
-        return start - sum((line.zero * line.row.astype(np.int64) for line in tables.slopes), np.zeros_like(start))
+        return start - sum((line.zero * line.row.astype(np.int64) for line in tables.lines), np.zeros_like(start))
 
     @property
     def sections(self) -> tuple[tuple[str, tuple[int, ...], Rows], ...]:
@@ -144,7 +144,7 @@ class Layout:
         joints = [
             mean - rows[0] for mean, rows in zip(tables.joint_means.astype(np.int64), tables.joint_rows, strict=True)
         ]
-        for line in tables.slopes:
+        for line in tables.lines:
             joints[line.joint] = joints[line.joint] - line.of(np.zeros(1, np.uint16))[0]
         return np.vstack([tables.switch_means.astype(np.int64), *joints])
 
@@ -165,7 +165,7 @@ class Layout:
     def memory(self) -> int:
         """The words of 16 bits that a hand needs: inputs, scores, found rows, distances, which inputs are missing."""
         tables = self.tables
-        small = len(tables.slopes) + -(-(tables.n_switches + tables.n_joints) // 8)
+        small = len(tables.lines) + -(-(tables.n_switches + tables.n_joints) // 8)
         return self.frame_size // 2 + 2 * self.row_pairs + self.found + -(-small // 2)
 
 

@@ -197,7 +197,7 @@ def turns(tables: IntegerTables, joint: int) -> NDArray[np.uint16]:
     """
     thresholds, top = tables.steps_of(joint), _top(tables)
     codes = np.concatenate([[0, top], thresholds, thresholds + 1])
-    for slope in (slope for slope in tables.slopes if slope.joint == joint):
+    for slope in (slope for slope in tables.lines if slope.joint == joint):
         between = np.linspace(slope.low, slope.high, _BETWEEN).astype(np.int64)
         codes = np.concatenate([codes, between, [abs(slope.low - 1), slope.low + 1, slope.high - 1, slope.high + 1]])
     codes = np.unique(codes)
@@ -206,7 +206,7 @@ def turns(tables: IntegerTables, joint: int) -> NDArray[np.uint16]:
 
 def _top(tables: IntegerTables) -> int:
     steps = [int(steps[-1]) for term in (*tables.bins, *tables.grids) for steps in term.steps if len(steps)]
-    return _WORD if max([0, *steps, *(slope.high - 1 for slope in tables.slopes)]) >= _BYTE else _BYTE
+    return _WORD if max([0, *steps, *(slope.high - 1 for slope in tables.lines)]) >= _BYTE else _BYTE
 
 
 DRAWN = 16  # frames in addition to the two extreme ones

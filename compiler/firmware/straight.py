@@ -11,7 +11,7 @@ from textwrap import wrap
 
 import numpy as np
 
-from thenar.runtime.model.terms.line import Slope
+from thenar.runtime.model.terms.line import Line
 
 from .layout import Layout
 
@@ -58,7 +58,7 @@ def straight(layout: Layout) -> Straight | None:
     tables = layout.tables
     if layout.binned or tables.grids:
         return None
-    adds = np.any([layout.start, *(slope.row for slope in tables.slopes), *tables.switch_rows], axis=0)
+    adds = np.any([layout.start, *(slope.row for slope in tables.lines), *tables.switch_rows], axis=0)
     types, zeros = np.flatnonzero(adds).tolist(), np.flatnonzero(~adds).tolist()
     sums = {2 + at for at in range(min(len(types), _TYPES))}
     saved = sorted(_KEPT & (sums | {14 + low for low in sums} | {15, 29}))
@@ -83,7 +83,7 @@ class _Writer:
         tables = self._layout.tables
         for types in passes:
             yield "what no input changes", tuple(_start(self._layout.start[list(types)].tolist()))
-            for slope in tables.slopes:
+            for slope in tables.lines:
                 if products := _products(slope.row[list(types)].tolist()):
                     yield f"joint {slope.joint}", (*self._distance(slope), *products)
             for first in range(0, tables.n_switches, 8):
@@ -109,7 +109,7 @@ class _Writer:
         pairs = zip(registers, at, strict=True)
         return code + [f"ldd {register}, {z}" if how == "ldd" else f"std {z}, {register}" for register, z in pairs]
 
-    def _distance(self, slope: Slope) -> list[str]:
+    def _distance(self, slope: Line) -> list[str]:
         """Return instructions that put the distance of a joint's code from the lowest one into r15."""
         span = slope.high - slope.low
         code = self._word("ldd", ("r15", "r0"), self._codes + 2 * slope.joint)
@@ -118,8 +118,8 @@ class _Writer:
         code += ["brcc 1f", "clr r15", "clr r0", "1:"]
         code += [f"ldi r29, {span >> 8}", "mov r1, r29"] if span > 255 else []
         code += [f"ldi r29, {span & 255}", "cp r29, r15", "cpc r1, r0", "brcc 1f", "mov r15, r29"]
-        code += ["mov r0, r1", "1:"] if slope.gain < 0 else ["1:"]
-        return code + ["lsl r15"] * slope.gain + ["lsr r0", "ror r15"] * -slope.gain
+        code += ["mov r0, r1", "1:"] if slope.shift < 0 else ["1:"]
+        return code + ["lsl r15"] * slope.shift + ["lsr r0", "ror r15"] * -slope.shift
 
 
 def _start(row: Sequence[int]) -> list[str]:

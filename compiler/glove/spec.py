@@ -11,8 +11,7 @@ from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.system import own_joints
 from thenar.runtime.manifest import Detected, Faults, Manifest, Recognised, Switch
 from thenar.runtime.names import list_names
-from thenar.runtime.scanning.plan import check_harness, unwired
-from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.scanning.plan import plan_scan, unwired
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us
 
@@ -134,13 +133,13 @@ def glove_spec(
     scan is the build's scan map, if it has one; hand, the hand that has positions for its switches; parts, the part of
     a price list for each of its sensors, by name: all of them, or none. Raises BuildError
     if the build keeps no switch, or has a scan map but no harness is given; HarnessError if the harness lacks a kept
-    switch, or does not match the scan map.
+    switch.
     """
     if not manifest.switches:
         raise BuildError("the build keeps no switch, so there is no glove to build: compile it with ``inputs`` both")
     wired = _harness(manifest, scan, harness)
     kept_names = [switch.name for switch in manifest.switches]
-    read = whole_scan(wired, kept_names) if scan is None else scan
+    read = plan_scan(kept_names, wired)
     names = elements_of(wired, kept_names)
     known = hand if hand is not None and hand.knows(names) else None
     soldered = as_soldered(wired)
@@ -182,8 +181,6 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) 
         if scan is not None:
             raise BuildError("the build was compiled for a specific wiring: name its glove.toml with ``glove``")
         return propose_harness(names, cyberglove=propose_cyberglove([joint.name for joint in manifest.joints]))
-    if scan is not None:
-        check_harness(scan, harness, names)
     if missing := unwired(harness, names):
         raise HarnessError(
             f"harness {harness.name!r} has no pin or column for {list_names(missing)}, which the build keeps: "

@@ -8,7 +8,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from thenar.runtime.model.integers import LIMIT, IntegerTables
-from thenar.runtime.model.proof import Rounding, furthest
+from thenar.runtime.model.proof import Rounding
 from thenar.runtime.model.quantise import as_deployed, rounding_error
 from thenar.runtime.model.tables import TIE, ScoreTables, winners
 from thenar.runtime.scores import LANE_OFFSET, Scorer
@@ -61,7 +61,7 @@ class WorstCase(Struct, frozen=True, kw_only=True):
 
     In the frame `closed` (names of kept switches) and `codes`, `leader` loses most of its lead over `competitor`.
     A margin above safe_margin keeps its grasp type: true of `covered` rows, of which `covered_changed` change all the
-    same. `reach` is the furthest that a sum gets from zero, in any order, whole or with inputs missing: for `reaching`.
+    same. No sum gets further than `reach` from zero, in any order, whole or with inputs missing.
     """
 
     leader: str
@@ -73,7 +73,6 @@ class WorstCase(Struct, frozen=True, kw_only=True):
     safe_margin: float
     covered: int
     covered_changed: int
-    reaching: str
     reach: int
     limit: int = LIMIT
 
@@ -91,8 +90,7 @@ def worst_case(
     They were made from `model`; `grasps` and `switches` are the names of its classes and kept switches.
     """
     rounding = Rounding(as_deployed(collapse(model, integers.n_switches), integers.grid), integers)
-    frame, furthest_sum = rounding.worst_of_all(), furthest(integers)
-    safe = float(rounding.safe_margin())
+    frame, safe = rounding.worst_of_all(), float(rounding.safe_margin())
     # Scores that the ensemble treats as tied are decided by the number of the class.
     covered = comparison.margins > max(safe, TIE * integers.scale) + 2 * comparison.slack
     return WorstCase(
@@ -105,8 +103,7 @@ def worst_case(
         safe_margin=safe,
         covered=int(np.count_nonzero(covered)),
         covered_changed=int(np.count_nonzero(covered[comparison.changed])),
-        reaching=grasps[furthest_sum.grasp],
-        reach=furthest_sum.total,
+        reach=integers.bound,
     )
 
 

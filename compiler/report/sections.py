@@ -165,7 +165,7 @@ def guarantee_table(content: ReportContent) -> PlainTable | None:
         ("Ensemble vs. float tables, units of score", float_difference, float_bound),
         ("Float tables vs. integers, steps", f"{found.integer_difference:.3f}", f"{integer_bound:.3f}"),
         ("Largest loss of a lead, steps, all frames", f"{worst.loss:.3f}", f"{worst.bound:.3f}"),
-        ("Largest magnitude of a sum, steps", f"{abs(worst.reach):,}", f"{most:,}"),
+        ("Largest magnitude of a sum, steps", f"{worst.reach:,}", f"{most:,}"),
     )
     caption = f"Differences and their bounds ({recipe(content.manifest)})"
     return PlainTable(caption, ("What", "Found", "Bound"), rows)

@@ -3,13 +3,11 @@
 The structs are the tables of `glove.toml`, field by field; a loaded harness is known to be valid.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import msgspec
 from msgspec import Meta, Struct, field
 
-from ..sealed import sha256
 from ..taxels import TaxelSettings
 
 if TYPE_CHECKING:
@@ -316,30 +314,3 @@ class Harness(_Table, frozen=True):
     def line_of(self, bus: int) -> BusWiring | SpiWiring:
         """Return a bus, or an SPI device, by the numbering of scan maps."""
         return self.buses[bus] if bus < len(self.buses) else self.spi[bus - len(self.buses)]
-
-    @property
-    def fingerprint(self) -> str:
-        """SHA-256, in hex, of the place of each switch: of chips, pins and columns in order.
-
-        It does not cover ports, device files and clocks: a map of the switches stays valid when they change.
-        """
-        return sha256(msgspec.json.encode(list(self._where()))).hex()
-
-    def _where(self) -> Iterator[object]:
-        for bus in self.buses:
-            yield [
-                (chip.kind, chip.address, chip.mux, chip.closed, list(chip.numbered_pins.items())) for chip in bus.chips
-            ]
-        if self.spi:
-            yield [(chip.kind, list(chip.numbered_pins.items())) for chip in self.spi]
-        if self.streams:
-            yield [
-                (
-                    each.switches,
-                    each.threshold,
-                    sorted(each.thresholds.items()),
-                    each.closed,
-                    *map(list, (each.taxels.items(), each.joints.items())),
-                )
-                for each in self.streams
-            ]

@@ -1,10 +1,8 @@
 """The decision, frame after frame: the leader of one frame, hysteresis and dwell."""
 
-import math
-
 from msgspec import Struct
 
-from ..scores import odds
+from ..scores import softmax
 
 
 class Ranking:
@@ -12,12 +10,12 @@ class Ranking:
     the last class.
     """
 
-    __slots__ = ("_margin", "_odds", "biased_scores", "candidate")
+    __slots__ = ("_margin", "_shares", "biased_scores", "candidate")
 
     def __init__(self, biased_scores: tuple[int, ...]) -> None:
         self.biased_scores = biased_scores
         self.candidate = biased_scores.index(max(biased_scores))
-        self._odds, self._margin = (0.0, 0.0), -1
+        self._margin, self._shares = -1, (0.0, list[float]())
 
     @property
     def margin(self) -> int:
@@ -37,10 +35,9 @@ class Ranking:
 
     def probability(self, number: int, scale: float) -> float:
         """Return the softmax of class `number`, at `scale` steps per unit."""
-        of, total = self._odds
-        if of != scale:
-            self._odds = scale, (total := odds(self.biased_scores, scale))
-        return math.exp(-self.lead(number) / scale) / total
+        if self._shares[0] != scale:
+            self._shares = scale, softmax(self.biased_scores, scale)
+        return self._shares[1][number]
 
     def with_none_class(self, lead: int) -> "Ranking":
         """Return the same with none, the last class, `lead` steps above the best, or below it if that is negative."""

@@ -18,8 +18,8 @@ two observations each; so h is ln(2 * switches * 2 * GRASPS).
 A hand that never closes a switch looks like a switch that never closes. So a switch is called stuck open only after it
 was seen to close: the share of grasps of this run in which it closed when expected multiplies the build's share.
 
-A fault makes other inputs look wrong. So of several sums that reach h together only the largest counts; then the last
-grasps are weighed again without its switch.
+A fault makes other inputs look wrong. So of several sums that reach h together only the largest counts; from the next
+grasp on, its switch is lost.
 
 **A grasp** is one observation, however many frames it lasts: contacts that have not changed by half for SETTLED_US. A
 switch that cannot be read for a while keeps its last state: an outage begins no grasp. The frame with the fewest
@@ -33,12 +33,10 @@ last change.
 """
 
 import math
-from collections import deque
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from ..build import Build
@@ -52,7 +50,7 @@ GRASPS = 1_000
 # Evidence is counted in sixteenths of a nat.
 _NAT = 16
 _SLIPS, _LEAST, _LEAST_ALONE = 1 / 32, 1 / 20, 1 / 100
-# Observations that are weighed again without a switch that was found to be stuck.
+# Sets of lost inputs for which the choice of switches to leave out is kept.
 _KEPT = 64
 # A switch begins with one grasp in which it closed as expected and one in which it did not (Laplace's rule).
 _DOUBT = 255
@@ -98,7 +96,6 @@ class StuckTest:
         self.sums = np.zeros((2, len(switches)), np.int64)
         self.stuck: dict[int, int] = {}
         self._due, self._seen = np.zeros(len(switches), np.int64), np.zeros(len(switches), np.int64)
-        self._last: deque[_Grasp] = deque(maxlen=_KEPT)
 
     def weigh(self, biased_scores: Sequence[int], closed: Mask, read: Mask, lost: Mask) -> None:
         """Take a grasp: the scores of a frame, the switches closed and read, and those scored as lost."""
@@ -108,7 +105,6 @@ class StuckTest:
         self.sums = np.maximum(self.sums + self._evidence(grasp, shares, held), 0)
         due = np.where(grasp.read & held, 255 - shares[1], 0)
         self._due, self._seen = self._due + due, self._seen + due * grasp.closed
-        self._last.append(grasp)
         self._judge()
 
     def _judge(self) -> None:
@@ -116,25 +112,12 @@ class StuckTest:
             if not self.sums[kind, switch]:
                 del self.stuck[switch]
                 self.sums[:, switch] = 0
-        self.sums[:, list(self.stuck)] = np.minimum(self.sums[:, list(self.stuck)], self.limit)
-        while (fresh := np.where(self._known(), -1, self.sums)).max(initial=-1) >= self.limit:
-            kind, switch = divmod(int(fresh.argmax()), len(self._rows))
-            self.stuck[switch] = kind
-            self._weigh_again(switch)
-
-    def _weigh_again(self, switch: int) -> None:
-        """Recalculate the sums of switches that are not stuck, from the last grasps, without this one."""
-        sums = np.zeros_like(self.sums)
-        for number, grasp in enumerate(self._last):
-            grasp = self._last[number] = grasp.without(switch, self._rows, self._means)
-            evidence = self._evidence(grasp, self._shares_of(grasp), self._held(grasp))
-            sums = np.maximum(sums + evidence, 0)
-        self.sums = np.where(self._known(), np.minimum(self.sums, self.limit), sums)
-
-    def _known(self) -> Flags:
         known = np.zeros(len(self._rows), bool)
         known[list(self.stuck)] = True
-        return known
+        self.sums = np.where(known, np.minimum(self.sums, self.limit), self.sums)
+        if (fresh := np.where(known, -1, self.sums)).max(initial=-1) >= self.limit:
+            kind, switch = divmod(int(fresh.argmax()), len(self._rows))
+            self.stuck[switch] = kind
 
     def _shares_of(self, grasp: "_Grasp") -> Ints:
         """Return the share of grasps, in 255ths (2, s), in which by training a switch is closed, and open, given the
@@ -173,16 +156,6 @@ class _Grasp(Struct, frozen=True):
     closed: Flags
     read: Flags
     lost: Flags
-
-    def without(self, switch: int, rows: Ints, means: Ints) -> "_Grasp":
-        """Return the same grasp with a switch scored as lost."""
-        if self.lost[switch]:
-            return self
-        lost = self.lost.copy()
-        lost[switch] = True
-        return replace(
-            self, biased_scores=self.biased_scores + means[switch] - rows[switch] * self.closed[switch], lost=lost
-        )
 
 
 class Chattering:

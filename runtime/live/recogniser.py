@@ -12,7 +12,6 @@ from ..frames import PERIODS, GloveFrame, Mask, Newest, SwitchFrame
 from ..model.integers import IntegerTables
 from ..policy import Policy
 from ..published import UNKNOWN, Health, JointAngles, LiveGrasp, Preshape
-from ..scores import LiveScores
 from ..segmenting.decoder import LiveSegments, Segment
 from .decision import Decision, Ranking
 from .quarantine import Quarantine
@@ -75,9 +74,9 @@ class LiveRecognizer:
         self._switches = Newest[SwitchFrame]()
         grace_us = self._policy.grace_of(glove_period_us or 0)
         self._joints = Joints(build.manifest.joints, sensor_names, calibration, glove_period_us, grace_us)
-        self._scores = LiveScores(build.scorer)
-        self._scored: tuple[Sequence[int] | None, Mask] = None, 0
-        self._scored_last: tuple[int, ...] | None = None
+        self._scorer = build.scorer
+        # Closed and lost switches, codes, and lost joints: a hand at rest is scored and ranked once.
+        self._state: tuple[Mask, Mask, Sequence[int] | None, Mask] | None = None
         self._missing = MissingInputs(build, self._policy.max_lost)
         self.quarantine = Quarantine(build, self._missing.may_be_lost, active=self._policy.quarantine)
         self._all_joints = (1 << tables.n_joints) - 1
@@ -107,16 +106,12 @@ class LiveRecognizer:
         joints_lost = self._all_joints if codes is None else 0
         frame = self._trusted(read, joints_lost)
         lost_joints = self._joints.lost if codes else 0
-        if codes is not self._scored[0] or lost_joints != self._scored[1]:
-            self._scores.joints(codes, lost_joints)
-            self._scored = codes, lost_joints
         closed, lost = (0, self._all_switches) if frame is None else (frame.closed & ~frame.lost, frame.lost)
-        biased_scores = self._scores.biased_scores(closed, lost)
-        if biased_scores is not self._scored_last:
-            # A hand at rest is ranked once.
-            self._scored_last = biased_scores
-            self._ranking, self._refused = self._ranked(biased_scores, closed, lost, codes, lost_joints)
-        standing, refused = self._ranking, self._refused
+        if (state := (closed, lost, codes, lost_joints)) != self._state:
+            self._biased_scores = self._scorer.state_scores(*state)
+            self._ranking, self._refused = self._ranked(self._biased_scores, *state)
+            self._state = state
+        biased_scores, standing, refused = self._biased_scores, self._ranking, self._refused
         missing, too_much = self._missing.of(lost, lost_joints | joints_lost)
         if read is not None:
             self.quarantine.look(read, biased_scores, lost)

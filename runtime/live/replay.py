@@ -16,6 +16,7 @@ from ..policy import Policy
 from ..published import LiveGrasp
 from ..recording.reader import Entry, Reader
 from ..recording.session import Session
+from ..scanning.plan import plan_scan
 from ..taxels import Taxels, count_limit
 from .recogniser import LiveRecognizer, Moment
 from .system import LiveSystem
@@ -185,7 +186,7 @@ class _Inputs:
 
 def _system(build: Build, session: Session, name: str, policy: Policy | None) -> LiveSystem:
     harness = parse_harness(session.harness, name)
-    scan = LiveSystem.map_of(build, harness)
+    scan = plan_scan([switch.name for switch in build.manifest.switches], harness)
     system = LiveSystem(
         build, harness, scan, session.sensors, session.calibration, policy or session.policy or Policy()
     )

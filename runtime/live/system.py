@@ -44,7 +44,7 @@ def own_joints(joints: Sequence[str]) -> str:
 
 
 class LiveSystem(Struct, frozen=True, eq=False):
-    """The running system: `scan` is the build's own map, or one that was planned for the harness now."""
+    """The running system: `scan` is the map of the build's inputs in the harness."""
 
     build: Build
     harness: Harness
@@ -61,21 +61,13 @@ class LiveSystem(Struct, frozen=True, eq=False):
         """
         from pathlib import Path
 
+        from ..scanning.plan import plan_scan  # it needs the chips
+
         calibration = None if harness.calibration is None else load_calibration(Path(harness.calibration))
         # A user's own source sends the codes of the build's joints, in order.
         names = harness.sensor_names or tuple(joint.name for joint in build.manifest.joints)
-        return cls(build, harness, cls.map_of(build, harness), names, calibration, policy or Policy())
-
-    @staticmethod
-    def map_of(build: Build, harness: Harness) -> ScanMap:
-        """Return the build's own scan map, or one that is planned now. Raises HarnessError if the two do not fit."""
-        from ..scanning.plan import check_harness, plan_scan  # it needs the chips, a replay of frames does not
-
-        names = [switch.name for switch in build.manifest.switches]
-        if build.scan is not None:
-            check_harness(build.scan, harness, names)
-            return build.scan
-        return plan_scan(names, harness)
+        scan = plan_scan([switch.name for switch in build.manifest.switches], harness)
+        return cls(build, harness, scan, names, calibration, policy or Policy())
 
     @property
     def switch_names(self) -> tuple[str, ...]:

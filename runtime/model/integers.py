@@ -4,7 +4,7 @@
               + sum over slopes l of distance_l * row_l[k] + sum over grids g of joints rows_g[bin_a, bin_b, k]
 
 where bin_a is the number of thresholds of joint a below its code, and distance_l is the distance of its joint's code
-from the middle of a range (`Slope`). Distances and their rows are int8, everything else is int16, and no partial sum,
+from the middle of a range (`Line`). Distances and their rows are int8, everything else is int16, and no partial sum,
 in any order, leaves int16: `IntegerTables` checks this when made, so a table that could overflow cannot be loaded.
 
 The payload of `tables.bin`, inside the envelope of `sealed.py`, all little-endian (K classes, s switches, j joints):
@@ -40,7 +40,8 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from math import prod
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +53,7 @@ from .terms.base import HIGHEST_CODE
 from .terms.bins import Bins
 from .terms.bit import Bit
 from .terms.grid import Grid
-from .terms.line import Slope
+from .terms.line import Line
 
 KIND = b"THNRTABL"
 PLAIN, SLOPED, PAIRED = 1, 2, 3  # formats
@@ -80,7 +81,7 @@ Steps = NDArray[np.int64]
 class IntegerTables(Additive):
     """Score tables in int16. Raises BuildError if terms disagree or a sum could leave -32767..32767.
 
-    bias (K,); terms: a `Bit` for each switch, `Bins` for each joint, and a `Slope` for some joints, or a `Grid` for
+    bias (K,); terms: a `Bit` for each switch, `Bins` for each joint, and a `Line` for some joints, or a `Grid` for
     some pairs of joints, each joint in one at most, in the order of the (first) joints. switch_means (s, K) and
     joint_means (j, K) replace missing inputs; scale in steps per unit of score.
 
@@ -105,7 +106,7 @@ class IntegerTables(Additive):
         switch_means: Rows,
         joint_means: Rows,
         scale: float,
-        further: Sequence[Slope | Grid] = (),
+        further: Sequence[Line | Grid] = (),
         grid: int = 1,
     ) -> Self:
         """Return tables of the rows of switches (s, K), of thresholds (T_a,) and rows (T_a + 1, K) of each joint, and
@@ -128,11 +129,6 @@ class IntegerTables(Additive):
         if self.bound > LIMIT:
             raise BuildError(f"a sum could reach {self.bound}, beyond {LIMIT}: these tables could overflow")
 
-    @cached_property
-    def slopes(self) -> tuple[Slope, ...]:
-        """The terms in proportion to a code."""
-        return tuple(term for term in self.terms if isinstance(term, Slope))
-
     @property
     def bound(self) -> int:
         """The largest absolute value of any partial sum, in any order, with any inputs or missing ones."""
@@ -150,9 +146,9 @@ class IntegerTables(Additive):
         rows = [self.bias, self.switch_means, self.joint_means, *(end for term in self.core_terms for end in term.ends)]
         return not any(each[..., -1].any() for each in rows)
 
-    def of_joint(self, joint: int) -> tuple[Bins | Slope, ...]:
+    def of_joint(self, joint: int) -> tuple[Bins | Line, ...]:
         """Return the terms of a joint alone: its bins, and its slope if it has one."""
-        return (self.bins[joint], *(slope for slope in self.slopes if slope.joint == joint))
+        return (self.bins[joint], *(slope for slope in self.lines if slope.joint == joint))
 
     def turning_codes(self, joint: int, steps: Steps) -> Steps:
         """Return codes at which a joint's contribution is greatest and least between the codes `steps`, after which its
@@ -237,9 +233,11 @@ def _check_shapes(tables: IntegerTables) -> None:
         ("joint_means", tables.joint_means, np.int16, (j, K)),
         *((f"switch_rows[{bit.switch}]", bit.row, np.int16, (K,)) for bit in tables.bits),
         *((f"joint_rows[{a.joint}]", a.rows, np.int16, (len(a.thresholds) + 1, K)) for a in tables.bins),
-        *((f"the row of the slope of joint {slope.joint}", slope.row, np.int8, (K,)) for slope in tables.slopes),
+        *((f"the row of the slope of joint {slope.joint}", slope.row, np.int8, (K,)) for slope in tables.lines),
     ]
     _check_further(tables)
+    if any(line.gain is None for line in tables.lines):
+        raise BuildError("the tables have a line of scores: quantise them first")
     for grid in tables.grids:
         bins = (len(grid.thresholds[0]) + 1, len(grid.thresholds[1]) + 1, K)
         expected.append((f"the rows of the grid of joints {grid.joints}", grid.rows, np.int16, bins))
@@ -250,16 +248,16 @@ def _check_shapes(tables: IntegerTables) -> None:
 
 def _check_further(tables: IntegerTables) -> None:
     j = tables.n_joints
-    if any(not isinstance(term, Bit | Bins | Slope | Grid) for term in tables.terms):
+    if any(not isinstance(term, Bit | Bins | Line | Grid) for term in tables.terms):
         raise BuildError("the tables have terms that no board reads: collapse them first")
     numbers = [term.inputs[0] for term in (*tables.bits, *tables.bins)]
     if numbers != [*range(tables.n_switches), *range(j)]:
         raise BuildError("the terms of switches and joints are not in order")
-    joints = [slope.joint for slope in tables.slopes]
+    joints = [slope.joint for slope in tables.lines]
     if joints != sorted(set(joints)) or any(not 0 <= joint < j for joint in joints):
         raise BuildError(f"slopes of joints {joints}: they must rise, each below {j}")
     joints = [joint for grid in tables.grids for joint in grid.joints]
-    if tables.slopes and joints:
+    if tables.lines and joints:
         raise BuildError("slopes and grids: tables have one of both")
     if len(set(joints)) < len(joints) or any(not 0 <= a < b < j for a, b in (grid.joints for grid in tables.grids)):
         raise BuildError(f"grids of joints {joints}: each is below {j}, and in one grid at most")
@@ -274,7 +272,7 @@ def _check_further(tables: IntegerTables) -> None:
 
 
 def _check_grid(tables: IntegerTables) -> None:
-    if tables.grid not in ((1, COARSE) if tables.slopes else (1,)):
+    if tables.grid not in ((1, COARSE) if tables.lines else (1,)):
         raise BuildError(f"rows on a grid of {tables.grid} steps: it is 1, or {COARSE} in tables with slopes")
     rows = [tables.switch_rows, *(rows for rows in tables.joint_rows if len(rows) > 1)]
     if tables.grid == COARSE and not (tables.relative and all(not (each % COARSE).any() for each in rows)):
@@ -287,20 +285,9 @@ def _check_stored_scale(scale: float) -> None:
         raise BuildError(f"the scale is {scale!r}, in a file it must be at least 2^-64 steps per unit")
 
 
-def payload_bytes(
-    n_classes: int,
-    n_switches: int,
-    thresholds: Sequence[int],
-    n_slopes: int = 0,
-    grids: Sequence[tuple[int, int]] = (),
-) -> int:
-    """Return the payload length of tables with `n_classes` and `n_switches`; `thresholds` of each joint, and of both
-    joints of `grids`.
-    """
-    rows = 1 + 2 * n_switches + sum(2 + count for count in thresholds) + sum((a + 1) * (b + 1) for a, b in grids)
-    words = len(thresholds) + sum(thresholds) + sum(a + b for a, b in grids) + n_classes * rows
-    slopes = _GRID.size + n_slopes * (_SLOPE.size + n_classes) if n_slopes else 0
-    return _COUNTS.size + 2 * words + slopes + len(grids) * _PAIR.size
+def least_bytes(n_classes: int, n_switches: int, n_joints: int) -> int:
+    """Return the payload length of tables of this size whose joints have no thresholds."""
+    return _COUNTS.size + 2 * (n_joints + n_classes * (1 + 2 * n_switches + 2 * n_joints))
 
 
 def tables_to_bytes(tables: IntegerTables) -> bytes:
@@ -313,13 +300,13 @@ def tables_to_bytes(tables: IntegerTables) -> bytes:
     parts = [header, counts, *(r.astype("<i2").tobytes() for r in rows)]
     parts += [t.astype("<u2").tobytes() for t in tables.thresholds]
     parts += [r.astype("<i2").tobytes() for r in tables.joint_rows]
-    parts += [_GRID.pack(tables.grid)] if tables.slopes else []
-    parts += [_SLOPE.pack(slope.joint, slope.low, slope.high, slope.gain) for slope in tables.slopes]
-    parts += [slope.row.astype("<i1").tobytes() for slope in tables.slopes]
+    parts += [_GRID.pack(tables.grid)] if tables.lines else []
+    parts += [_SLOPE.pack(slope.joint, slope.low, slope.high, slope.gain) for slope in tables.lines]
+    parts += [slope.row.astype("<i1").tobytes() for slope in tables.lines]
     parts += [_PAIR.pack(*grid.joints, *map(len, grid.thresholds)) for grid in tables.grids]
     parts += [each.astype("<u2").tobytes() for grid in tables.grids for each in grid.thresholds]
     parts += [grid.rows.astype("<i2").tobytes() for grid in tables.grids]
-    data = seal(KIND, SLOPED if tables.slopes else PAIRED if tables.grids else PLAIN, b"".join(parts))
+    data = seal(KIND, SLOPED if tables.lines else PAIRED if tables.grids else PLAIN, b"".join(parts))
     if len(data) > MAX_BYTES:
         raise BuildError(f"the tables need {len(data)} bytes, a build has at most {MAX_BYTES}: keep fewer inputs")
     return data
@@ -341,61 +328,38 @@ def tables_from_bytes(data: bytes, what: str = "tables.bin") -> IntegerTables:
 
 
 def _parse(payload: bytes, version: int) -> IntegerTables:
-    if len(payload) < _COUNTS.size:
-        raise BuildError(f"{len(payload)} bytes of content, the counts alone have {_COUNTS.size}")
-    K, s, j, n, scale = _COUNTS.unpack_from(payload)
+    at = 0
+
+    def take(kind: str, *shape: int) -> NDArray[Any]:
+        """Return the next numbers, of a type of numpy's, in this shape."""
+        nonlocal at
+        begin, at = at, at + prod(shape) * np.dtype(kind).itemsize
+        if at > len(payload):
+            raise BuildError(f"{len(payload)} bytes of content, its counts call for {at} or more")
+        found = np.frombuffer(payload[begin:at], kind).reshape(shape)
+        return found.astype(found.dtype.newbyteorder("="))
+
+    K, s, j, n = take("<u2", 4).tolist()
+    scale: float = take("<f8", 1).item()
     _check_counts(K, s, j)
     _check_stored_scale(scale)
     if (n > 0) != (version in (SLOPED, PAIRED)):
         raise BuildError(f"{n} slopes or grids in format {version}: the two bytes at offset 6 are wrong")
-    if len(payload) < _COUNTS.size + 2 * j:
-        raise BuildError(f"{len(payload)} bytes of content are too few for {j} joints")
-    counts = np.frombuffer(payload, "<u2", j, _COUNTS.size).tolist()
-    sizes = [K, s * K, s * K, j * K, *counts, *((T + 1) * K for T in counts)]
-    own = payload_bytes(K, s, counts)
-    pairs = (
-        list(_PAIR.iter_unpack(payload[own : own + n * _PAIR.size]))
-        if version == PAIRED and len(payload) >= own + n * _PAIR.size
-        else []
-    )
-    expected = payload_bytes(K, s, counts, n if version == SLOPED else 0, [(one, other) for _, _, one, other in pairs])
-    if len(payload) != expected or len(pairs) != (n if version == PAIRED else 0):
-        raise BuildError(f"{len(payload)} bytes of content, its counts call for {expected}")
-    words = np.frombuffer(payload, "<u2", sum(sizes), _COUNTS.size + 2 * j).astype(np.uint16)
-    bias, switches, means, joint_means, *joints = np.split(words, np.cumsum(sizes)[:-1])
-    rows = [block.view(np.int16).reshape(-1, K) for block in (switches, means, joint_means, *joints[j:])]
-    further: tuple[Slope | Grid, ...] = ()
+    counts = take("<u2", j).tolist()
+    bias, switch_rows, switch_means, joint_means = (take("<i2", *shape) for shape in ((K,), (s, K), (s, K), (j, K)))
+    thresholds = [take("<u2", count) for count in counts]
+    joint_rows = [take("<i2", count + 1, K) for count in counts]
+    grid, further = 1, list[Line | Grid]()
     if version == SLOPED:
-        further = _parse_slopes(payload[own + _GRID.size :], n, K)
-    elif pairs:
-        further = _parse_grids(payload[own + n * _PAIR.size :], pairs, K)
-    return IntegerTables.of(
-        bias=bias.view(np.int16),
-        switch_rows=rows[0],
-        thresholds=joints[:j],
-        joint_rows=rows[3:],
-        switch_means=rows[1],
-        joint_means=rows[2],
-        scale=scale,
-        further=further,
-        grid=_GRID.unpack_from(payload, own)[0] if version == SLOPED else 1,
-    )
-
-
-def _parse_grids(data: bytes, pairs: Sequence[tuple[int, ...]], K: int) -> tuple[Grid, ...]:
-    words = np.frombuffer(data, "<u2").astype(np.uint16)
-    sizes = [count for pair in pairs for count in pair[2:]] + [
-        (one + 1) * (other + 1) * K for _, _, one, other in pairs
-    ]
-    parts = np.split(words, np.cumsum(sizes)[:-1])
-    steps, rows = parts[: 2 * len(pairs)], parts[2 * len(pairs) :]
-    return tuple(
-        Grid((a, b), (steps[2 * at], steps[2 * at + 1]), rows[at].view(np.int16).reshape(one + 1, other + 1, K))
-        for at, (a, b, one, other) in enumerate(pairs)
-    )
-
-
-def _parse_slopes(data: bytes, n: int, K: int) -> tuple[Slope, ...]:
-    rows = np.frombuffer(data, "<i1", offset=n * _SLOPE.size).astype(np.int8).reshape(n, K)
-    ends = _SLOPE.iter_unpack(data[: n * _SLOPE.size])
-    return tuple(Slope(joint, low, high, gain, row) for (joint, low, high, gain), row in zip(ends, rows, strict=True))
+        grid = take("<u2", 1).item()
+        ends = [(*take("<u2", 3).tolist(), take("<i2", 1).item()) for _ in range(n)]
+        rows = take("<i1", n, K)
+        further += (Line(joint, low, high, row, gain) for (joint, low, high, gain), row in zip(ends, rows, strict=True))
+    elif version == PAIRED:
+        pairs = take("<u2", n, 4).tolist()
+        steps = [(take("<u2", one), take("<u2", other)) for _, _, one, other in pairs]
+        for (a, b, one, other), both in zip(pairs, steps, strict=True):
+            further.append(Grid((a, b), both, take("<i2", one + 1, other + 1, K)))
+    if at < len(payload):
+        raise BuildError(f"{len(payload)} bytes of content, its counts call for {at}")
+    return IntegerTables.of(bias, switch_rows, thresholds, joint_rows, switch_means, joint_means, scale, further, grid)

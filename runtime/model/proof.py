@@ -1,4 +1,4 @@
-"""What integers can do at worst, over all possible frames rather than a sample of them: their rounding, their sums.
+"""How much rounding can change a score at worst, over all possible frames rather than a sample of them.
 
 Rounding takes from the lead of class k over class l a sum over bias and inputs,
 
@@ -16,7 +16,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from .integers import LOST, IntegerTables
+from .integers import IntegerTables
 from .tables import ScoreTables
 from .terms.base import HIGHEST_CODE, CoreTerm, Floats
 from .terms.bit import Bit
@@ -183,75 +183,3 @@ def _errors(choices: Sequence[_Choice], scale: float) -> tuple[list[Exact], int]
 def _whole(mantissas: Floats, powers: NDArray[np.int32], lowest: int) -> Exact:
     whole: Exact = np.ldexp(mantissas, 53).astype(np.int64).astype(object) << (powers - 53 - lowest).astype(object)
     return whole
-
-
-OPEN, CLOSED = 0, 1
-_SIGNS = 1, -1
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Furthest:
-    """A frame, perhaps with inputs missing, whose rows reach the largest partial sum when added in this `order`.
-
-    The first `n_terms` rows bring class `grasp` to the partial sum `total`; the others lead back. order (n,) numbers
-    the terms: 0 the bias, then switches, then joints, then slopes or grids, n in all. bits (s,) and codes (j,) come
-    with the masks of missing inputs that the runtime takes; `terms` (n, K) are the rows themselves, by number.
-    """
-
-    grasp: int
-    total: int
-    n_terms: int
-    order: NDArray[np.intp]
-    terms: NDArray[np.int16]
-    bits: NDArray[np.bool_]
-    codes: NDArray[np.uint16]
-    lost_switches: NDArray[np.bool_]
-    lost_joints: NDArray[np.bool_]
-
-
-def furthest(tables: IntegerTables, *, missing: bool = True) -> Furthest:
-    """Return the sum that reaches `tables.bound`; without `missing`, the largest over frames that are read completely.
-
-    A bin that no code can reach, above a threshold of 65535, counts for the bound but for no frame; `collapse` never
-    makes one.
-    """
-    choices = list(_states(tables, missing))
-    onwards = [[np.maximum(sign * terms, 0).sum(axis=0) for _, terms in choices] for sign in _SIGNS]
-    reached = np.stack([sum(onward.max(axis=0) for onward in each) for each in onwards])
-    way, grasp = map(int, np.unravel_index(reached.argmax(), reached.shape))
-    sign = _SIGNS[way]
-    picked = [int(np.argmax(onward[:, grasp])) for onward in onwards[way]]
-    chosen = [(values[pick], terms[:, pick]) for (values, terms), pick in zip(choices, picked, strict=True)]
-    first = 1 + tables.n_switches
-    switches, joints = np.array([value for value, _ in chosen[1:first]]), np.zeros(tables.n_joints, np.int64)
-    single, further = [term[0] for _, term in chosen[:first]], []
-    of_joints = np.zeros((tables.n_joints, tables.n_classes), np.int64)
-    for unit, (codes, term) in zip(tables.units, chosen[first:], strict=True):
-        joints[list(unit)], of_joints[list(unit)] = codes, term[: len(unit)]
-        further += list(term[len(unit) :])
-    terms = np.stack([*single, *of_joints, *further])
-    onward = sign * terms[:, grasp] > 0
-    order = np.concatenate([np.flatnonzero(onward), np.flatnonzero(~onward)])
-    return Furthest(
-        grasp=grasp,
-        total=int(terms[onward, grasp].sum()),
-        n_terms=int(np.count_nonzero(onward)),
-        order=order,
-        terms=terms.astype(np.int16),
-        bits=switches == CLOSED,
-        codes=np.maximum(joints, 0).astype(np.uint16),
-        lost_switches=switches == LOST,
-        lost_joints=joints == LOST,
-    )
-
-
-def _states(tables: IntegerTables, missing: bool) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Yield, for bias, switches and units of joints, the choices, (c,) or (c, joints), and their terms, (t, c, K)."""
-    last = slice(None if missing else -1)
-    yield np.zeros(1, np.int64), tables.bias[np.newaxis, np.newaxis].astype(np.int64)
-    for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True):
-        yield np.array([OPEN, CLOSED, LOST])[last], np.stack([0 * row, row, mean])[np.newaxis, last].astype(np.int64)
-    for unit in tables.units:
-        codes, terms = tables.states(unit)
-        there = (codes <= HIGHEST_CODE).all(axis=1) & (missing | (codes != LOST).all(axis=1))
-        yield codes[there], terms[:, there]

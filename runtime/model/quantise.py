@@ -24,16 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .integers import COARSE, FINEST_SCALE, IntegerTables
-from .tables import ScoreTables, winners
-from .terms.base import Floats, ScoreTerm, StepTerm, rounded
+from .tables import ScoreTables
+from .terms.base import CoreTerm, Floats, rounded
 from .terms.line import LARGEST_SLOPE, WIDEST, Line
 
 # The most consecutive switches that firmware looks up together in tables of narrow entries. Every group of this many
 # consecutive switches keeps the span, so smaller groups do as well.
 GROUP_SIZE = 5
-
-# Scales that `least_disruptive_scale` tries, evenly spaced down to four fifths of the finest.
-TRIED, _TRIED_OF_ALL = 32, 160
 
 
 def balance(tables: ScoreTables) -> ScoreTables:
@@ -63,18 +60,14 @@ def as_deployed(tables: ScoreTables, grid: int) -> ScoreTables:
     """Return the tables before rounding to a `grid`: scores relative to the last class if rows are on one."""
     if grid == 1:
         return tables
-    return ScoreTables(tables.bias - tables.bias[-1:], tuple(term.relative() for term in _score_terms(tables)))
-
-
-def _score_terms(tables: ScoreTables) -> list[ScoreTerm]:
-    return [term for term in tables.core_terms if isinstance(term, ScoreTerm)]
+    return ScoreTables(tables.bias - tables.bias[-1:], tuple(term.relative() for term in tables.core_terms))
 
 
 def _centred(tables: ScoreTables, scale: float) -> ScoreTables:
     """Return the tables with what lines add at the zeros of their slopes in the rows of bins."""
     rows = list(tables.joint_rows)
     for line in tables.lines:
-        rows[line.joint] = rows[line.joint] + line.row * line.slope(scale).offset
+        rows[line.joint] = rows[line.joint] + line.offset(scale)
     return tables.changed(joint_rows=rows) if tables.lines else tables
 
 
@@ -100,33 +93,9 @@ def finest_scale(tables: ScoreTables, limit: float, widest: int, grid: int = 1) 
     return fits
 
 
-def least_disruptive_scale(
-    tables: ScoreTables, finest: float, bits: NDArray[np.bool_], codes: NDArray[np.uint16], grid: int = 1
-) -> float:
-    """Return, of `finest` and slightly coarser scales, the one at which the fewest rows change class.
-
-    The rows are bits (n, s) and codes (n, j); ties go to the finest scale. With coarse steps, whether a common frame
-    changes its class depends on luck rather than on the scale. The bounds on rounding hold at every scale.
-    """
-    scales = finest * (1 - np.arange(TRIED) / _TRIED_OF_ALL)
-    scores = tables.scores(bits, codes)
-    most = max(rounding_error(tables, scale, grid) for scale in scales[[0, -1]].tolist())
-    near = _leads(scores) * scales[-1] <= 2 * most + 1  # no scale can change the other rows: see above
-    right, means = winners(scores[near]), bits.sum(axis=0) / len(bits)
-    closed, asked, changed = bits[near].astype(np.float64), codes[near], []
-    for scale in scales.tolist():
-        whole = ScoreTables(_whole_bias(tables, scale, grid, means), tuple(_whole(tables, scale, grid)))
-        # Sums of integers are exact in any order, so a matrix product may add them up.
-        added = closed @ whole.switch_rows
-        for term in (*whole.bins, *whole.further):
-            added += term.of(*whole.values(term, bits, asked))
-        changed.append(np.count_nonzero((whole.bias + added).argmax(axis=1) != right))
-    return float(scales[int(np.argmin(changed))])
-
-
 def rounding_error(tables: ScoreTables, scale: float, grid: int = 1) -> float:
     """Return the most steps by which rounding can move a score: half a step for the bias, and that of each term."""
-    return sum((term.rounding_error(scale, grid) for term in _score_terms(tables)), 0.5)
+    return sum((term.rounding_error(scale, grid) for term in tables.core_terms), 0.5)
 
 
 def reach(tables: ScoreTables, scale: float, *, whole: bool = True, grid: int = 1) -> float:
@@ -150,7 +119,7 @@ class _Extremes:
     """The largest and smallest contributions of bias and terms, at any scale: rounding keeps them extreme."""
 
     def __init__(self, tables: ScoreTables, grid: int) -> None:
-        fixed = [term for term in _score_terms(tables) if not isinstance(term, Line)]
+        fixed = [term for term in tables.core_terms if not isinstance(term, Line)]
         ends = [(tables.bias, tables.bias), *(term.ends for term in fixed)]
         self._n_switches, self._lines = tables.n_switches, tables.lines
         self._upper, self._lower = (np.stack(rows) for rows in zip(*ends, strict=True))
@@ -166,7 +135,7 @@ class _Extremes:
         if self._lines:
             upper, lower = upper.copy(), lower.copy()
             for line in self._lines:
-                offset = line.row * line.slope(scale).offset
+                offset = line.offset(scale)
                 upper[self._first + line.joint] += offset
                 lower[self._first + line.joint] += offset
         upper, lower = upper * scale, lower * scale
@@ -195,16 +164,9 @@ class _Extremes:
         return float(np.vstack([groups, others]).max(initial=0.0))
 
 
-def _leads(scores: Floats) -> Floats:
-    """Return the lead (n,) of the best over the second best score in each row of (n, K)."""
-    second, best = np.partition(scores, -2, axis=1)[:, -2:].T
-    leads: Floats = best - second
-    return leads
-
-
-def _whole(tables: ScoreTables, scale: float, grid: int) -> list[StepTerm]:
+def _whole(tables: ScoreTables, scale: float, grid: int) -> list[CoreTerm]:
     """Return the terms in whole steps."""
-    return [term.whole(scale, grid) for term in _score_terms(_centred(tables, scale))]
+    return [term.whole(scale, grid) for term in _centred(tables, scale).core_terms]
 
 
 def _whole_bias(tables: ScoreTables, scale: float, grid: int, means: Floats) -> Floats:
@@ -229,16 +191,14 @@ def quantise(
 
     bits (n, s) and codes (n, j) are the training rows; their mean contributions replace missing inputs. No lookup (a
     joint, or up to GROUP_SIZE consecutive switches) spans more than 2^entry_bits - 1 steps in any class. With 16 bits
-    this is no restriction, since sums of 16 bits span no more, and the scale is the finest; with fewer it is the
-    kindest. With lines, entries of fewer than 16 bits are multiples of 256 instead.
+    this is no restriction, since sums of 16 bits span no more. With lines, entries of fewer than 16 bits are multiples
+    of 256 instead.
     """
     grid, means = COARSE if tables.lines and entry_bits < 16 else 1, bits.sum(axis=0) / len(bits)
     balanced = balance(as_deployed(tables, grid))
     limit, room = 2 ** (width - 1) - 1, 0.0
     while True:
         scale = finest_scale(balanced, limit - room, 2**entry_bits - 1, grid)
-        if entry_bits < 16:
-            scale = least_disruptive_scale(balanced, scale, bits, codes, grid)
         bias = _whole_bias(balanced, scale, grid, means)
         beyond = reach(ScoreTables(bias / scale, balanced.terms), scale, grid=grid) - limit
         if grid == 1 or beyond <= 0:

@@ -76,6 +76,11 @@ class Additive(ABC):
         """The terms of two joints together."""
         return tuple(term for term in self.terms if isinstance(term, Grid))
 
+    @cached_property
+    def lines(self) -> tuple[Line, ...]:
+        """The terms in proportion to a code."""
+        return tuple(term for term in self.terms if isinstance(term, Line))
+
     @property
     def n_switches(self) -> int:
         """Number of kept switches, s."""
@@ -172,11 +177,6 @@ class ScoreTables(Additive):
         of further terms.
         """
         return cls(bias, (*terms_of(switch_rows, thresholds, joint_rows), *further))
-
-    @cached_property
-    def lines(self) -> tuple[Line, ...]:
-        """The terms in proportion to a code."""
-        return tuple(term for term in self.terms if isinstance(term, Line))
 
     @property
     def magnitude(self) -> float:

@@ -201,7 +201,12 @@ class CollectionGuide:
         FrameError.
         """
         for frame in arrived:
-            self._record(frame)
+            if self.stage != "paused":
+                self._recorder.frame(frame)
+            if isinstance(frame, SwitchFrame):
+                self._switches = frame
+            else:
+                self._glove = frame
         self.lost = self._lost(now_us, disconnected)
         if self.stage not in ("countdown", "moving") or now_us < self._zero_us:
             return
@@ -269,14 +274,6 @@ class CollectionGuide:
     def _become(self, stage: Stage) -> None:
         self.stage = stage
         self.step += 1
-
-    def _record(self, frame: SwitchFrame | GloveFrame) -> None:
-        if self.stage != "paused":
-            self._recorder.frame(frame)
-        if isinstance(frame, SwitchFrame):
-            self._switches = frame
-        else:
-            self._glove = frame
 
     def _capture(self, now_us: int) -> None:
         self.problem = self._lack(now_us, FRESH_US)

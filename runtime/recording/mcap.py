@@ -171,12 +171,8 @@ class RecordStream:
                 raise FormatError(f"{path.name} does not begin like an MCAP file: it is another kind of file, or empty")
 
     def __iter__(self) -> Iterator[RawRecord]:
-        return self.since(len(MAGIC))
-
-    def since(self, offset: int) -> Iterator[RawRecord]:
-        """Iterate from `offset` on, where a record is known to begin."""
         with open_file(self._path, FormatError) as file:
-            file.seek(offset)
+            file.seek(len(MAGIC))
             while (record := self._next(file)) is not None:
                 yield record
                 if record.opcode == Opcode.FOOTER:

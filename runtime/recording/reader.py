@@ -1,11 +1,5 @@
-"""Read a recording back: sessions, frames, predictions and labels in the order in which they were written.
+"""Read a recording back: sessions, frames, predictions and labels in the order in which they were written."""
 
-A recording is neither chunked nor indexed, because it must survive the death of its writer. So, to be read from
-anywhere, it is scanned once (`Index`), most of its messages undecoded.
-"""
-
-from array import array
-from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from struct import Struct, pack
@@ -35,168 +29,6 @@ _LEAST, _LARGEST = -(2**63), 2**63 - 1
 _REASON = 200
 # The most records of a file that are no messages: a recording has a few dozen.
 OTHER_RECORDS = 100_000
-
-
-class EntryDecoder:
-    """Decodes the records of a data section one by one.
-
-    session  the session of the next messages; None before the first
-    ours     whether the file says that thenar wrote it
-    foreign  whether another program has numbered or added something
-    skipped  the number of records, or parts of them, that were skipped; first_skipped, the first few with their places
-    """
-
-    def __init__(self, tail: Tail) -> None:
-        """Messages and sessions are counted in `tail`."""
-        self.session: Session | None = None
-        self.ours = self.foreign = False
-        self.skipped = 0
-        self.first_skipped: list[str] = []
-        self._tail = tail
-        self._schemas: dict[int, str] = {}
-        self._channels: dict[int, int | None] = {}
-        self._others = 0
-        self._codes: tuple[int | None, tuple[int | None, ...]] = None, ()
-
-    def channel(self, content: bytes) -> int | None:
-        """Return our channel of a message; None for a foreign or truncated one."""
-        return self._channels.get(int.from_bytes(content[:2], "little")) if len(content) >= _MESSAGE.size else None
-
-    def entries(self, record: RawRecord) -> Iterator[Entry]:
-        """Yield the record's entries. Raises FormatError, whose text continues "the record at byte 17 "."""
-        self.count(record)
-        content = record.content
-        if record.opcode == Opcode.CHUNK:
-            raise FormatError(
-                "is a chunk, which thenar's recordings do not have: another program packed them; read the original, or "
-                "save other programs' data as CSV"
-            )
-        if content is None:
-            self.foreign = True
-            self._skip(kind_of(record.opcode), record.offset)
-        elif record.opcode == Opcode.MESSAGE:
-            entry = self._message(content)
-            if entry is not None:
-                yield entry
-        else:
-            yield from self._described(record, content)
-
-    def _skip(self, what: str, offset: int) -> None:
-        self.skipped += 1
-        if len(self.first_skipped) < SHOWN:
-            self.first_skipped.append(f"{what} at byte {offset}")
-
-    def count(self, record: RawRecord) -> None:
-        """Count a record that holds no measurements. Raises FormatError if there are too many to read in seconds."""
-        self._others += record.opcode != Opcode.MESSAGE
-        if self._others > OTHER_RECORDS:
-            raise FormatError(
-                f"is one of more than {OTHER_RECORDS} that hold no measurements, the most that are read: the file is "
-                "damaged, or not a recording of thenar"
-            )
-
-    def _described(self, record: RawRecord, content: bytes) -> Iterator[Session]:
-        """Take a record that describes others."""
-        if record.opcode == Opcode.HEADER:
-            _, library = self._parsed(Opcode.HEADER, record, content)
-            self.ours = library.startswith(layout.WRITER)
-        elif record.opcode == Opcode.METADATA:
-            yield from self._sessions(record, *self._parsed(Opcode.METADATA, record, content))
-        elif record.opcode == Opcode.CHANNEL:
-            self._name(*self._parsed(Opcode.CHANNEL, record, content))
-        elif record.opcode == Opcode.SCHEMA:
-            number, name, *_ = self._parsed(Opcode.SCHEMA, record, content)
-            self._schemas[number] = name
-
-    def _parsed(self, opcode: Opcode, record: RawRecord, content: bytes) -> list[Any]:
-        """Return the fields of a record. Raises FormatError."""
-        found, rest = parsed(opcode, content)
-        if rest:
-            # MCAP lets later versions add fields. This version of the record has none.
-            self.foreign = True
-            self._skip(f"{rest} bytes more than a {kind_of(opcode)} has", record.end - rest)
-        return found
-
-    def _message(self, content: bytes) -> Entry | None:
-        if len(content) < _MESSAGE.size:
-            raise FormatError("is a truncated message")
-        number, _, logged_ns, published_ns = _MESSAGE.unpack_from(content)
-        if number not in self._channels:
-            raise FormatError(f"is a message of channel {number}, which the file does not name")
-        channel, session = self._channels[number], self.session
-        if channel is None:
-            return None
-        if session is None:
-            raise FormatError("is a message before any session of thenar")
-        self._tail.add_message(channel, logged_ns)
-        data = content[_MESSAGE.size :]
-        time_us = (published_ns - session.clock_ns) // 1000
-        if channel == layout.TAXELS:
-            self._codes = time_us, layout.taxel_codes(layout.decode_bytes(data), len(session.taxels))
-            return None
-        if channel == layout.SWITCHES:
-            frame = layout.switch_frame(time_us, layout.decode_bytes(data), len(session.switches), len(session.sensors))
-            coded_us, codes = self._codes
-            return frame if coded_us != time_us else msgspec.structs.replace(frame, taxels=codes)
-        if channel == layout.GLOVE:
-            return layout.glove_frame(time_us, layout.decode_bytes(data), len(session.sensors))
-        return _from_json(channel, layout.decode_text(data))
-
-    def _sessions(self, record: RawRecord, name: str, texts: dict[str, str]) -> Iterator[Session]:
-        if name != METADATA:
-            self.foreign = True
-            self._skip(f"metadata {shortened(repr(name))}", record.offset)
-            return
-        before, session = self.session, from_metadata(texts)
-        if before is not None and _wired(before) != _wired(session):
-            raise FormatError(
-                "begins a session of another glove than the one before: its switches, taxels or sensors differ"
-            )
-        self.session, self._codes = session, (None, ())
-        self._tail.add_session(record.end - record.offset)
-        yield self.session
-
-    def _name(self, number: int, schema: int, topic: str, encoding: str, _metadata: dict[str, str]) -> None:
-        for ours, (known, name) in layout.CHANNELS.items():
-            if topic == known:
-                found = self._schemas.get(schema, "nothing")
-                if (found, encoding) != (name, "cdr"):
-                    found = shortened(f"{encoding} of {found}")
-                    raise FormatError(f"says that {topic} holds {found}, not cdr of {name}")
-                self._channels[number] = ours
-                self.foreign |= number != ours
-                return
-        self.foreign = True
-        self._channels.setdefault(number, None)
-
-
-def _wired(session: Session) -> tuple[tuple[str, ...], ...]:
-    return session.switches, session.taxels, session.sensors
-
-
-def parsed(opcode: Opcode, content: bytes) -> tuple[list[Any], int]:
-    """Return the fields of a record, and the number of bytes left. Raises FormatError."""
-    try:
-        return decode(opcode, content)
-    except ValueError as wrong:
-        raise FormatError(f"is not a valid {kind_of(opcode)}: {shortened(str(wrong))}") from None
-
-
-def _from_json(channel: int, text: bytes) -> LiveGrasp | Label | None:
-    decoder = _DECODERS.get(channel)
-    if decoder is None:
-        return None
-    try:
-        entry = decoder(text)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
-        raise FormatError(f"cannot be read: {shortened(str(wrong), _REASON)}") from None
-    for name in entry.__struct_fields__:
-        value = getattr(entry, name)
-        if isinstance(value, int) and not _LEAST <= value <= _LARGEST:
-            raise FormatError(f"cannot be read: its {name!r} has more than 64 bits")
-    return entry
-
-
 # All of a footer except its checksum, which covers the rest.
 _CHECKED_FOOTER = 16
 # Maximum memory for a recording beyond its own size, in bytes.
@@ -232,12 +64,23 @@ class Reader:
         self._wrong: list[str] = []
         self._in_data = True
         self._records = RecordStream(path)
-        self._decoder = EntryDecoder(self.tail)
+        self._session: Session | None = None
+        self._ours = self.foreign = False
+        # Records, or parts of them, that were passed over: their number, and the first few with their places.
+        self._skipped, self._first_skipped = 0, list[str]()
+        self._schemas: dict[int, str] = {}
+        self._channels: dict[int, int | None] = {}
+        self._others = 0
+        self._codes: tuple[int | None, tuple[int | None, ...]] = None, ()
         self._entries = self._read()
-        first = next(self._entries, None)
-        if not isinstance(first, Session):
+        if not isinstance(next(self._entries, None), Session):
             raise FormatError(f"{path.name} holds no session of thenar: cut at its beginning, or from another program")
-        self.session = first
+
+    @property
+    def session(self) -> Session:
+        """The session of the next entries."""
+        assert self._session is not None
+        return self._session
 
     @property
     def end(self) -> End | None:
@@ -249,57 +92,154 @@ class Reader:
         """Whether some byte is known to have changed since it was written."""
         return bool(self._wrong)
 
-    @property
-    def foreign(self) -> bool:
-        """Whether another program has added something."""
-        return self._decoder.foreign
-
     def __iter__(self) -> Iterator[Entry]:
         yield self.session
-        for entry in self._entries:
-            if isinstance(entry, Session):
-                self.session = entry
-            yield entry
+        yield from self._entries
 
     def faults(self) -> Iterator[Oddity]:
         """Yield the faults of the file, once its end is reached."""
-        name, end, skipped = self.path.name, self.end, self._decoder.skipped
+        name, end, skipped = self.path.name, self.end, self._skipped
         if end is not None and (end.whole < end.size or not (end.closed or self._in_data)):
-            yield Oddity("cut recordings", 1, _cut_message(name, end))
+            message = f"{name} is whole up to byte {end.whole} of {end.size}, the rest was left out: {end.reason}"
+            yield Oddity("cut recordings", 1, message)
         if self._wrong:
             yield Oddity("altered recordings", 1, f"{name} is altered: {'; '.join(self._wrong)}")
         if skipped:
-            message = f"{name} holds records that thenar skips: {list_names(self._decoder.first_skipped, skipped)}"
+            message = f"{name} holds records that thenar skips: {list_names(self._first_skipped, skipped)}"
             yield Oddity("records passed over", skipped, message)
 
     def _read(self) -> Iterator[Entry]:
+        """Yield the entries of the data section; later sections repeat known content."""
         for record in self._records:
             try:
-                yield from self._taken(record)
+                if record.opcode == Opcode.FOOTER:
+                    self._end_summary(record)
+                elif not self._in_data:
+                    self._count(record)
+                elif record.opcode == Opcode.DATA_END:
+                    self._end_data(record)
+                else:
+                    self.tail.size, self.tail.crc = record.end, record.after
+                    yield from self._decoded(record)
             except FormatError as wrong:
                 raise FormatError(f"{self.path.name}: the record at byte {record.offset} {wrong}") from None
 
-    def _taken(self, record: RawRecord) -> Iterator[Entry]:
-        """Yield the entries of a record of the data section; later sections repeat known content."""
-        if record.opcode == Opcode.FOOTER:
-            self._end_summary(record)
-        elif not self._in_data:
-            self._decoder.count(record)
-        elif record.opcode == Opcode.DATA_END:
-            self._end_data(record)
+    def _decoded(self, record: RawRecord) -> Iterator[Entry]:
+        """Yield the record's entries. Raises FormatError, whose text continues "the record at byte 17 "."""
+        self._count(record)
+        content = record.content
+        if record.opcode == Opcode.CHUNK:
+            raise FormatError(
+                "is a chunk, which thenar's recordings do not have: another program packed them; read the original, or "
+                "save other programs' data as CSV"
+            )
+        if content is None:
+            self.foreign = True
+            self._skip(kind_of(record.opcode), record.offset)
+        elif record.opcode == Opcode.MESSAGE:
+            entry = self._message(content)
+            if entry is not None:
+                yield entry
         else:
-            self.tail.size, self.tail.crc = record.end, record.after
-            yield from self._decoder.entries(record)
+            yield from self._described(record, content)
+
+    def _skip(self, what: str, offset: int) -> None:
+        self._skipped += 1
+        if len(self._first_skipped) < SHOWN:
+            self._first_skipped.append(f"{what} at byte {offset}")
+
+    def _count(self, record: RawRecord) -> None:
+        """Count a record that holds no measurements. Raises FormatError if there are too many to read in seconds."""
+        self._others += record.opcode != Opcode.MESSAGE
+        if self._others > OTHER_RECORDS:
+            raise FormatError(
+                f"is one of more than {OTHER_RECORDS} that hold no measurements, the most that are read: the file is "
+                "damaged, or not a recording of thenar"
+            )
+
+    def _described(self, record: RawRecord, content: bytes) -> Iterator[Session]:
+        """Take a record that describes others."""
+        if record.opcode == Opcode.HEADER:
+            _, library = self._parsed(Opcode.HEADER, record, content)
+            self._ours = library.startswith(layout.WRITER)
+        elif record.opcode == Opcode.METADATA:
+            yield from self._sessions(record, *self._parsed(Opcode.METADATA, record, content))
+        elif record.opcode == Opcode.CHANNEL:
+            self._name(*self._parsed(Opcode.CHANNEL, record, content))
+        elif record.opcode == Opcode.SCHEMA:
+            number, name, *_ = self._parsed(Opcode.SCHEMA, record, content)
+            self._schemas[number] = name
+
+    def _parsed(self, opcode: Opcode, record: RawRecord, content: bytes) -> list[Any]:
+        """Return the fields of a record. Raises FormatError."""
+        found, rest = _fields(opcode, content)
+        if rest:
+            # MCAP lets later versions add fields. This version of the record has none.
+            self.foreign = True
+            self._skip(f"{rest} bytes more than a {kind_of(opcode)} has", record.end - rest)
+        return found
+
+    def _message(self, content: bytes) -> Entry | None:
+        if len(content) < _MESSAGE.size:
+            raise FormatError("is a truncated message")
+        number, _, logged_ns, published_ns = _MESSAGE.unpack_from(content)
+        if number not in self._channels:
+            raise FormatError(f"is a message of channel {number}, which the file does not name")
+        channel, session = self._channels[number], self._session
+        if channel is None:
+            return None
+        if session is None:
+            raise FormatError("is a message before any session of thenar")
+        self.tail.add_message(channel, logged_ns)
+        data = content[_MESSAGE.size :]
+        time_us = (published_ns - session.clock_ns) // 1000
+        if channel == layout.TAXELS:
+            self._codes = time_us, layout.taxel_codes(layout.decode_bytes(data), len(session.taxels))
+            return None
+        if channel == layout.SWITCHES:
+            frame = layout.switch_frame(time_us, layout.decode_bytes(data), len(session.switches), len(session.sensors))
+            coded_us, codes = self._codes
+            return frame if coded_us != time_us else msgspec.structs.replace(frame, taxels=codes)
+        if channel == layout.GLOVE:
+            return layout.glove_frame(time_us, layout.decode_bytes(data), len(session.sensors))
+        return _from_json(channel, layout.decode_text(data))
+
+    def _sessions(self, record: RawRecord, name: str, texts: dict[str, str]) -> Iterator[Session]:
+        if name != METADATA:
+            self.foreign = True
+            self._skip(f"metadata {shortened(repr(name))}", record.offset)
+            return
+        before, session = self._session, from_metadata(texts)
+        if before is not None and _wired(before) != _wired(session):
+            raise FormatError(
+                "begins a session of another glove than the one before: its switches, taxels or sensors differ"
+            )
+        self._session, self._codes = session, (None, ())
+        self.tail.add_session(record.end - record.offset)
+        yield session
+
+    def _name(self, number: int, schema: int, topic: str, encoding: str, _metadata: dict[str, str]) -> None:
+        for ours, (known, name) in layout.CHANNELS.items():
+            if topic == known:
+                found = self._schemas.get(schema, "nothing")
+                if (found, encoding) != (name, "cdr"):
+                    found = shortened(f"{encoding} of {found}")
+                    raise FormatError(f"says that {topic} holds {found}, not cdr of {name}")
+                self._channels[number] = ours
+                self.foreign |= number != ours
+                return
+        self.foreign = True
+        self._channels.setdefault(number, None)
 
     def _end_data(self, record: RawRecord) -> None:
         self._in_data = False
         self._records.begin_section()
-        (crc,), rest = parsed(Opcode.DATA_END, record.content or b"")
+        (crc,), rest = _fields(Opcode.DATA_END, record.content or b"")
         self._check("its data", crc, record.before, rest)
 
     def _end_summary(self, record: RawRecord) -> None:
         content = record.content or b""
-        (_, _, crc), rest = parsed(Opcode.FOOTER, content)
+        (_, _, crc), rest = _fields(Opcode.FOOTER, content)
         checked = pack("<BQ", record.opcode, len(content)) + content[:_CHECKED_FOOTER]
         self._check("its summary", crc, crc32(checked, record.before), rest)
         if self._in_data:
@@ -307,10 +247,37 @@ class Reader:
 
     def _check(self, what: str, said: int, found: int, rest: int) -> None:
         """Note a checksum of `what` that does not match. In files of other programs 0 means none."""
-        if said != found and (said or self._decoder.ours):
+        if said != found and (said or self._ours):
             self._wrong.append(f"the checksum of {what} does not match")
         if rest:
             self._wrong.append(f"{rest} bytes follow the checksum of {what}")
+
+
+def _wired(session: Session) -> tuple[tuple[str, ...], ...]:
+    return session.switches, session.taxels, session.sensors
+
+
+def _fields(opcode: Opcode, content: bytes) -> tuple[list[Any], int]:
+    """Return the fields of a record, and the number of bytes left. Raises FormatError."""
+    try:
+        return decode(opcode, content)
+    except ValueError as wrong:
+        raise FormatError(f"is not a valid {kind_of(opcode)}: {shortened(str(wrong))}") from None
+
+
+def _from_json(channel: int, text: bytes) -> LiveGrasp | Label | None:
+    decoder = _DECODERS.get(channel)
+    if decoder is None:
+        return None
+    try:
+        entry = decoder(text)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
+        raise FormatError(f"cannot be read: {shortened(str(wrong), _REASON)}") from None
+    for name in entry.__struct_fields__:
+        value = getattr(entry, name)
+        if isinstance(value, int) and not _LEAST <= value <= _LARGEST:
+            raise FormatError(f"cannot be read: its {name!r} has more than 64 bits")
+    return entry
 
 
 def check_made(what: str, made: int, size: int) -> None:
@@ -322,116 +289,3 @@ def check_made(what: str, made: int, size: int) -> None:
         raise FormatError(
             f"{what} would take {made >> 20} MiB, more than {size} bytes can have recorded: it is damaged"
         )
-
-
-def _cut_message(name: str, end: End) -> str:
-    return f"{name} is whole up to byte {end.whole} of {end.size}, the rest was left out: {end.reason}"
-
-
-# Distance from one recorded position to the next.
-_STEP_NS = 200_000_000
-_LOG_NS = slice(6, 14)
-_MANY = {layout.SWITCHES, layout.GLOVE, layout.GRASP, layout.TAXELS, layout.RECOGNITION}
-
-
-class Index:
-    """The positions of a recording's moments, so that it can be read from anywhere: 16 bytes for a fifth of a second.
-
-    The scanned part can be read at once, during the scan. A truncated or damaged file can be read up to the fault.
-
-    session   the first one
-    first_us, last_us   the span scanned so far, in microseconds since 1970; None before the first message
-    scanned, size       number of bytes scanned, and in total
-    fault     why nothing more can be read; "" if there is no fault
-    """
-
-    def __init__(self, path: Path) -> None:
-        """Raise FormatError if `path` is not a recording of thenar, OSError as it comes."""
-        self.path, self.session = path, Reader(path).session
-        self._head, self._sessions = list[RawRecord](), list[tuple[int, RawRecord]]()
-        self._times, self._offsets = array("q"), array("q")
-        self.first_us: int | None = None
-        self.last_us: int | None = None
-        self.scanned, self.size, self.fault = 0, path.stat().st_size, ""
-
-    def scan(self, every_us: int = 0) -> Iterator[tuple[int, Entry]]:
-        """Yield entries with their moments in microseconds since 1970, and record their positions.
-
-        One prediction per `every_us` is decoded, and no frame; with 0 all are.
-        """
-        decoder, due_ns, in_data = EntryDecoder(Tail()), 0, True
-        stream = RecordStream(self.path)
-        self.size = stream.size
-        try:
-            for record in stream:
-                # The rest repeats known content, but shows whether the file is whole.
-                in_data = in_data and record.opcode != Opcode.DATA_END
-                if not in_data:
-                    continue
-                logged_ns = self._note(record)
-                channel = decoder.channel(record.content or b"") if record.opcode == Opcode.MESSAGE else None
-                if every_us and channel in _MANY:
-                    if channel != layout.RECOGNITION or logged_ns < due_ns:
-                        self.scanned = record.end
-                        continue
-                    due_ns = logged_ns + 1000 * every_us
-                for entry in _entries(decoder, record):
-                    if isinstance(entry, Session):
-                        self._sessions.append((record.offset, record))
-                    yield _unix_us(entry, decoder), entry
-                if not self._sessions:
-                    self._head.append(record)
-                self.scanned = record.end
-        except FormatError as wrong:
-            self.fault = f"{self.path.name}: {wrong}"
-            return
-        end = stream.end
-        if end is not None and not end.closed:
-            self.fault = _cut_message(self.path.name, end)
-        self.scanned = self.size
-
-    def since(self, unix_us: int) -> Iterator[tuple[int, Entry]]:
-        """Yield all entries from a fifth of a second or more before a moment on, preceded by their session, up to the
-        end of the part scanned when this is called; from the first one on if the moment is before all.
-        """
-        at = max(bisect_right(self._times, 1000 * unix_us - _STEP_NS) - 1, 0)
-        if not len(self._offsets):
-            return
-        offset, until = self._offsets[at], self.scanned
-        decoder = EntryDecoder(Tail())
-        for record in self._head:
-            list(_entries(decoder, record))
-        (session,) = [record for place, record in self._sessions if place <= offset][-1:]
-        for entry in _entries(decoder, session):
-            yield _unix_us(entry, decoder), entry
-        for record in RecordStream(self.path).since(offset):
-            if record.offset >= until or record.opcode == Opcode.DATA_END:
-                return
-            for entry in _entries(decoder, record):
-                yield _unix_us(entry, decoder), entry
-
-    def _note(self, record: RawRecord) -> int:
-        """Record the position of a message, if the newest is far enough back; return its time."""
-        if record.opcode != Opcode.MESSAGE or record.content is None or not self._sessions:
-            return 0
-        logged_ns = min(int.from_bytes(record.content[_LOG_NS], "little"), 2**62)
-        if self.first_us is None:
-            self.first_us = logged_ns // 1000
-        self.last_us = max(self.last_us or 0, logged_ns // 1000)
-        if not self._times or logged_ns >= self._times[-1] + _STEP_NS:
-            self._times.append(logged_ns)
-            self._offsets.append(record.offset)
-        return logged_ns
-
-
-def _entries(decoder: EntryDecoder, record: RawRecord) -> Iterator[Entry]:
-    try:
-        yield from decoder.entries(record)
-    except FormatError as wrong:
-        raise FormatError(f"the record at byte {record.offset} {wrong}, and nothing behind it is read") from None
-
-
-def _unix_us(entry: Entry, decoder: EntryDecoder) -> int:
-    """Return the time of an entry, in microseconds since 1970."""
-    clock_us = decoder.session.clock_ns // 1000 if decoder.session is not None else 0
-    return clock_us if isinstance(entry, Session) else clock_us + entry.time_us

@@ -96,7 +96,7 @@ def whole_scan(harness: Harness, switch_names: Sequence[str], *, every_taxel: bo
     )
     if every_taxel:
         levels = {taxel: levels.get(taxel, ()) for taxel in harness.taxel_names}
-    return ScanMap(SCHEMA, harness.fingerprint, ports_of(harness, numbers, levels), streams)
+    return ScanMap(SCHEMA, ports_of(harness, numbers, levels), streams)
 
 
 def _places(names: Sequence[str], numbers: Mapping[str, int]) -> tuple[Pair, ...]:

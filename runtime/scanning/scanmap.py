@@ -1,20 +1,13 @@
-"""The scan map: the transactions that read the kept switches, in order; `scan.json` of a build.
+"""The scan map: the transactions that read the kept switches, in order.
 
-It refers to chips by their place in the harness that it was made for, whose fingerprint it holds. Its bytes are
-canonical: fields in the order of the structs below, indented by two, one newline at the end. `build.json` holds their
-SHA-256.
+It refers to chips by their place in a harness.
 """
 
 from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from ..errors import BuildError
-from ..json_document import decode_document, encode_document
-from ..names import fault, shortened
-
 SCHEMA = 1
-MAX_BYTES = 4 << 20
 
 Number = Annotated[int, Meta(ge=0, le=65535)]
 # A bit of a reply, or a place among a stream's switches, and the number of its switch in the build.
@@ -57,7 +50,6 @@ class ScanMap(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     """The reading plan of a glove, with its ports in reading order, and the used part of every stream."""
 
     schema: int
-    harness: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
     ports: tuple[Port, ...]
     streams: tuple[StreamRead, ...] = ()
 
@@ -66,47 +58,3 @@ class ScanMap(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
         """The numbers of the build's switches that are read: from the ports, then the streams."""
         streams = (pair[-1] for stream in self.streams for pair in (*stream.switches, *stream.levels))
         return (*(switch for port in self.ports for switch in port.elements), *streams)
-
-
-def scanmap_to_bytes(scan: ScanMap) -> bytes:
-    """Return the content of `scan.json`."""
-    return encode_document(scan)
-
-
-def scanmap_from_bytes(data: bytes, what: str = "scan.json") -> ScanMap:
-    """Return the scan map of a `scan.json`, whose name in messages is `what`.
-
-    Raises BuildError if it is oversized, no such document, of another schema, not canonical, or reads an input twice.
-    """
-    scan = decode_document(data, ScanMap, what, "a scan map", MAX_BYTES, SCHEMA)
-    if data != scanmap_to_bytes(scan):
-        raise BuildError(f"{what} is altered: these are not the bytes that thenar writes; compile the build again")
-    _check_once(scan, what)
-    return scan
-
-
-def check_switches(scan: ScanMap, switches: int) -> None:
-    """Raise BuildError unless `scan` reads each of a build's `switches` once, and nothing else."""
-    if sorted(scan.switches) != list(range(switches)):
-        raise BuildError(f"scan.json does not read each of the {switches} kept switches once: compile the build again")
-
-
-def _check_once(scan: ScanMap, what: str) -> None:
-    for port in scan.ports:
-        if reason := fault(port.reading):
-            raise BuildError(f"{what}: the reading {shortened(repr(port.reading))} {reason}: compile the build again")
-        if bool(port.switches) == bool(port.levels):
-            raise BuildError(f"{what} has a port without switches, or with levels too: compile the build again")
-    readings = [(port.bus, port.chip, port.reading) for port in scan.ports]
-    if len(set(readings)) < len(readings):
-        raise BuildError(f"{what} reads a port twice: compile the build again")
-    sources = [pairs for port in scan.ports for pairs in (port.switches, port.levels)]
-    sources += [stream.switches for stream in scan.streams]
-    measured = [stream.levels for stream in scan.streams]
-    levels = [[(taxel, code) for taxel, code, _ in each] for each in measured]
-    for numbers in (scan.switches, *([bit for bit, _ in pairs] for pairs in sources), *levels):
-        if len(set(numbers)) < len(numbers):
-            raise BuildError(f"{what} reads a bit or a switch twice: compile the build again")
-    for ascending in (*(port.levels for port in scan.ports), *measured):
-        if list(ascending) != sorted(ascending):
-            raise BuildError(f"{what} has levels out of order: compile the build again")

@@ -5,7 +5,7 @@ standard gives by speed: 4.7, 1.3 and 0.5 us up to 100 kHz, 400 kHz and above.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from math import fsum
 
 from msgspec import Struct
@@ -23,29 +23,13 @@ _FREE_US = ((100_000, 4.7), (400_000, 1.3))
 _FREE_FASTEST_US = 0.5
 
 
-class ChipTime(Struct, frozen=True):
-    """The time of one chip of a scan alone: harness.chip_of(bus, chip), by name; its readings; the number of kept
-    switches, levels included, that they show; microseconds with conversions, without selections.
-    """
-
-    bus: int
-    chip: int
-    device: str
-    place: str
-    readings: tuple[str, ...]
-    switches: int
-    us: float
-
-
 class ScanTime(Struct, frozen=True):
-    """The time of a whole scan: chip by chip in the order of their first reading, selections, and in total.
+    """The time of a whole scan in microseconds, and the writes to muxes in it.
 
     full_us is a scan of all switches and taxels that are wired to chips, kept or not, for comparison.
     """
 
-    chips: tuple[ChipTime, ...]
     selects: int
-    select_us: float
     us: float
     full_us: float
 
@@ -90,16 +74,16 @@ def reading_of(port: Port, harness: Harness) -> Reading:
 
 def scan_us(scan: ScanMap, harness: Harness) -> ScanTime:
     """Return the time of a scan of the map with all ports."""
-    chips = tuple(_chip_times(scan.ports, harness))
-    chosen = _selected_us(scan.ports, harness)
     everything = whole_scan(harness, harness.switches, every_taxel=True).ports
-    us, full_us = (_whole_us(ports, harness) for ports in (scan.ports, everything))
-    return ScanTime(chips, len(chosen), fsum(chosen), us, full_us)
+    us, full_us = (_reading_us(ports, harness) for ports in (scan.ports, everything))
+    return ScanTime(len(selections(scan.ports, harness)), us, full_us)
 
 
-def _whole_us(ports: Sequence[Port], harness: Harness) -> float:
+def _reading_us(ports: Sequence[Port], harness: Harness) -> float:
     """Return the time to read these ports. fsum: in another order, the same to the last bit."""
-    return fsum((*_selected_us(ports, harness), *(time.us for time in _chip_times(ports, harness))))
+    chosen = (select_us(harness.buses[bus].clock_hz) for bus, *_ in selections(ports, harness))
+    reads = (port_us(reading_of(port, harness), harness.line_of(port.bus).clock_hz) for port in ports)
+    return fsum((*chosen, *reads))
 
 
 def selections(ports: Iterable[Port], harness: Harness) -> tuple[tuple[int, ...], ...]:
@@ -134,24 +118,3 @@ _ROW_BYTES, _READING_BYTES = len("$row,65535,4294967295,*00\r\n"), len(",65535")
 def row_us(switches: int, readings: int, baud: int) -> float:
     """Return the time of a board's row on a serial line, in microseconds."""
     return sending_us(_ROW_BYTES + -(-switches // 4) + readings * _READING_BYTES, baud)
-
-
-def _selected_us(ports: Iterable[Port], harness: Harness) -> list[float]:
-    return [select_us(harness.buses[bus].clock_hz) for bus, *_ in selections(ports, harness)]
-
-
-def _chip_times(ports: Iterable[Port], harness: Harness) -> Iterator[ChipTime]:
-    by_chip: dict[tuple[int, int], list[Port]] = {}
-    for port in ports:
-        by_chip.setdefault((port.bus, port.chip), []).append(port)
-    for (bus, chip), group in by_chip.items():
-        line = harness.line_of(bus)
-        yield ChipTime(
-            bus=bus,
-            chip=chip,
-            device=line.device,
-            place=harness.chip_of(bus, chip).place,
-            readings=tuple(port.reading for port in group),
-            switches=sum(len(port.elements) for port in group),
-            us=sum(port_us(reading_of(port, harness), line.clock_hz) for port in group),
-        )

@@ -69,9 +69,9 @@ class _Sources(msgspec.Struct):
 
 
 class _Paths:
-    """The cheapest paths to the newest tick, and the origins of the last `depth` ticks; None: of all."""
+    """The cheapest paths to the newest tick, and the origins of the last `depth` ticks."""
 
-    def __init__(self, model: SegmentModel, depth: int | None) -> None:
+    def __init__(self, model: SegmentModel, depth: int) -> None:
         K = model.n_types
         self._none, self.tick = K, -1
         self._enter, self._direct, self._leave = model.enter, model.direct, model.leave
@@ -332,7 +332,7 @@ def emissions(scores: ArrayLike, model: SegmentModel, refused: ArrayLike | None 
 def decode(model: SegmentModel, emissions: ArrayLike) -> NDArray[np.intp]:
     """Return the states (T,) of the cheapest segmentation of a whole stream, of the emissions (T, K + 1)."""
     costs = np.asarray(emissions, np.int64).reshape(-1, model.n_types + 1)
-    paths = _Paths(model, None)
+    decoder = Decoder(model, len(costs))
     for row in costs.tolist():
-        paths.step(row)
-    return np.array(paths.states(len(costs)), np.intp)
+        decoder.take(row)
+    return np.array(decoder.finish(), np.intp)

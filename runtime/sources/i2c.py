@@ -68,7 +68,7 @@ class PortScanner(Source):
         ]
         self.owned: Mask = sum(port.targets for port in self._ports)
         self.taxels = tuple(port.taxels for port in self._ports if isinstance(port, PortLevels))
-        self._wire_us = scan_us(ScanMap(SCHEMA, harness.fingerprint, tuple(ports)), harness).us
+        self._wire_us = scan_us(ScanMap(SCHEMA, tuple(ports)), harness).us
         self._everything = len(harness.taxel_names)
         self._pace, self._held_up = Pace(wiring.rate_hz), 0
 

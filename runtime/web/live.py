@@ -3,7 +3,6 @@
 In the loop of the run a moment costs a reference or two; its text is made on the server's thread, if a page is open.
 """
 
-import math
 from collections import deque
 from collections.abc import Sequence
 from functools import partial
@@ -14,13 +13,14 @@ import msgspec
 from thenar.drivers.closing import Closing
 
 from ..build import Build
-from ..frames import Mask, now_us
+from ..frames import now_us
 from ..glove import Glove
 from ..hand import load_hand
 from ..harness.wiring import Harness
 from ..live.recogniser import Moment
 from ..manifest import Manifest
 from ..published import HealthReport, LiveGrasp
+from ..scores import softmax
 from ..taxels import calibration_of
 from .server import Server, message
 
@@ -108,74 +108,46 @@ def build_message(folder: Path, manifest: Manifest, name: str, **shows: bool) ->
     return message("build", known, name=name, **{"preshapes": False, "replay": False} | shows)
 
 
-class Detail(msgspec.Struct, frozen=True):
-    """A moment.
+class FrameText:
+    """Makes the text of a moment of a run of `build`: the fields of its grasp, preshape and angles as in sinks, and
 
+    late_us        its age now
     closed         a character per kept switch, in the build's order: "1" closed, "0" open
     joints         the value of each joint of the build, in its unit; None while they are lost
     probabilities  of every class of the build, in order; None while too little can be read
-    """
-
-    closed: str
-    joints: tuple[float, ...] | None
-    probabilities: tuple[float, ...] | None
-
-
-class Details:
-    """Makes the details of the moments of a run of `build`."""
-
-    def __init__(self, build: Build) -> None:
-        self._switches, self._scale = build.tables.n_switches, build.tables.scale
-        self._none_leads = None if build.rejector is None else build.none_leads
-        self._joints = build.manifest.joints
-
-    def __call__(self, moment: Moment) -> Detail:
-        """Return the details of a moment."""
-        frame = moment.switches
-        return Detail(
-            closed=self._bits(0 if frame is None else frame.closed),
-            joints=None if moment.codes is None else self._values(moment.codes),
-            probabilities=self._probabilities(moment.scores, moment.refused) if moment.scores else None,
-        )
-
-    def _bits(self, mask: Mask) -> str:
-        return f"{mask:0{self._switches}b}"[::-1] if self._switches else ""
-
-    def _values(self, codes: Sequence[int]) -> tuple[float, ...]:
-        return tuple(round(joint.value(code), 2) for joint, code in zip(self._joints, codes, strict=True))
-
-    def _probabilities(self, scores: Sequence[int], refused: bool) -> tuple[float, ...]:
-        best = max(scores)
-        if self._none_leads is not None:
-            scores = (*scores, best + self._none_leads[refused])
-            best = max(scores)
-        powers = [math.exp((score - best) / self._scale) for score in scores]
-        total = sum(powers)
-        return tuple(round(power / total, 4) for power in powers)
-
-
-class FrameText:
-    """Makes the text of a moment: the fields of its grasp, preshape and angles as in sinks, those of `Detail`,
-    `late_us`: its age now, and `taxels`: by name, how far each read and calibrated taxel is pressed, from 0 at rest to
-    1 at its press.
+    taxels         by name, how far each read and calibrated taxel is pressed, from 0 at rest to 1 at its press
     """
 
     def __init__(self, build: Build, harness: Harness) -> None:
-        self._details = Details(build)
+        self._switches, self._scale = build.tables.n_switches, build.tables.scale
+        self._none_leads = None if build.rejector is None else build.none_leads
+        self._joints = build.manifest.joints
         calibration = calibration_of(harness.taxel_settings)
         self._taxels = [None if calibration is None else calibration.line(name) for name in harness.taxel_names]
 
     def __call__(self, moment: Moment) -> bytes:
         """Return the text."""
-        frame = moment.switches
+        frame, codes, shut = moment.switches, moment.codes, ""
+        if self._switches:
+            shut = f"{0 if frame is None else frame.closed:0{self._switches}b}"[::-1]
         more = {
             "preshape": moment.preshape,
             "angles": moment.angles,
             "late_us": now_us() - moment.grasp.time_us,
+            "closed": shut,
+            "joints": None
+            if codes is None
+            else [round(joint.value(code), 2) for joint, code in zip(self._joints, codes, strict=True)],
+            "probabilities": self._probabilities(moment.scores, moment.refused) if moment.scores else None,
             "taxels": {} if frame is None or frame.taxels is None else self._pressed(frame.taxels),
         }
-        parts = map(_inside, (moment.grasp, self._details(moment), more))
-        return _FRAME + b",".join(parts) + b"}"
+        # Both are objects of JSON: their fields follow the topic.
+        return _FRAME + _encode(moment.grasp)[1:-1] + b"," + _encode(more)[1:]
+
+    def _probabilities(self, scores: Sequence[int], refused: bool) -> tuple[float, ...]:
+        if self._none_leads is not None:
+            scores = (*scores, max(scores) + self._none_leads[refused])
+        return tuple(round(share, 4) for share in softmax(scores, self._scale))
 
     def _pressed(self, codes: Sequence[int | None]) -> dict[str, float]:
         return {
@@ -183,7 +155,3 @@ class FrameText:
             for code, line in zip(codes, self._taxels, strict=True)
             if code is not None and line is not None
         }
-
-
-def _inside(fields: object) -> bytes:
-    return _encode(fields)[1:-1]

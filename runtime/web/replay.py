@@ -1,13 +1,16 @@
 """The page of a recording: the glove's readings and the prediction at any moment, next to the labels.
 
-The file is scanned while the page is open; the scanned part can be shown at once. All pages show the same moment.
+The recording is recognised once, while the page is open, and the messages of its moments are kept in a temporary file.
+The part that was read can be shown at once. All pages show the same moment.
 """
 
-from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+import os
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping
 from itertools import islice
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from tempfile import TemporaryFile
 from threading import Event, Thread
 from time import monotonic
 from typing import Any
@@ -21,17 +24,16 @@ from ..build import Build
 from ..hand import load_hand
 from ..harness.loading import parse_harness
 from ..harness.wiring import Harness
+from ..live.recogniser import Moment
 from ..live.replay import Stepper, periods_us
 from ..published import LiveGrasp
-from ..recording.reader import Index
+from ..recording.reader import Entry, Reader
 from ..recording.session import Label, Session
 from .live import PAST_US, Change, FrameText, build_message, change_of
 from .server import Server, message
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
-# Recognition starts this long before the moment that is shown, so that it has settled.
-LEAD_US = 1_500_000
-# Predictions of a run are sampled at this interval; this many changes are kept.
+# Moments are kept at this interval, and this many changes of the prediction.
 _SAMPLE_US, _MOST_CHANGES = 20_000, 100_000
 _FRAME_S, _IDLE_S, _TOLD_S = 0.02, 0.2, 0.5
 _PERIODS_OF = 20_000
@@ -122,21 +124,28 @@ class ReplayPage(Closing):
     """
 
     def __init__(self, path: Path, address: str, *, token: str | None, build: Path) -> None:
-        self._index, self._overview = Index(path), Overview()
-        self._build = Build.load(build)
-        self._own = self._index.session.build == self._build.manifest.checksum
-        self._walk = _Walk(self._index, self._build)
+        self._reader, self._size, self._overview = Reader(path), path.stat().st_size, Overview()
+        self._build = loaded = Build.load(build)
+        session = self._reader.session
+        self._stepper = Stepper(loaded, path.name, periods_us(islice(Reader(path), _PERIODS_OF)))
+        self._stepper.take(session)
+        harness = parse_harness(session.harness, path.name) if session.harness else Harness(name="")
+        self._text = FrameText(loaded, harness)
+        # What was read so far: its span, and of each kept moment its time and where its text ends.
+        self._first_us: int | None = None
+        self._last_us = 0
+        self._times, self._ends = list[int](), [0]
         self._asked = SimpleQueue[Mapping[str, object]]()
         self._faults = list[str]()
-        self._at_us, self._playing, self._speed, self._sought = 0, False, 1.0, True
-        manifest = self._build.manifest
-        hand = message("hand", load_hand(build, manifest))
-        self._first = build_message(build, manifest, path.name, replay=True), hand
+        self._at_us, self._playing, self._speed, self._sought, self._shown = 0, False, 1.0, True, -1
+        hand = message("hand", load_hand(build, loaded.manifest))
+        self._first = build_message(build, loaded.manifest, path.name, replay=True), hand
         self._scanned = Event()
         self._told = 0.0
         self._stop = Event()
         self._thread = Thread(target=self._scan, name="thenar scan", daemon=True)
         self.server = Server("live", address, token=token, on_message=self._take, hello=lambda: self._first)
+        self._kept = TemporaryFile(buffering=0)  # noqa: SIM115
 
     def run(self, stop: Event) -> None:
         """Show the recording, as pages request it, until `stop` is set."""
@@ -155,33 +164,51 @@ class ReplayPage(Closing):
         if self._thread.is_alive():
             self._thread.join()
         self.server.close()
+        self._kept.close()
 
     def _scan(self) -> None:
-        """Scan the whole recording for its overview."""
+        """Recognise the whole recording: fill the overview, and keep what the page shows."""
+        name, newest = self._reader.path.name, None
         try:
-            for unix_us, entry in self._predicted():
-                self._overview.take(unix_us, entry)
+            for entry in self._reader:
+                newest = self._recognised(entry) or newest
                 if self._stop.is_set():
                     return
+            if newest is not None and newest.grasp.time_us > self._times[-1]:
+                self._keep(newest)
         except ThenarError as wrong:
             self._faults.append(str(wrong))
         except OSError as wrong:
-            self._faults.append(f"{self._index.path.name} cannot be read: {wrong.strerror}")
-        if self._index.fault:
-            self._faults.append(self._index.fault)
+            self._faults.append(f"{name} is shown up to here: {wrong.strerror}")
+        self._faults += [fault.message for fault in self._reader.faults()]
         self._scanned.set()
 
-    def _predicted(self) -> Iterator[tuple[int, object]]:
-        """Yield labels and predictions; those of the build if the recording is not its own."""
-        if self._own:
-            for unix_us, entry in self._index.scan(_SAMPLE_US):
-                clock_us = unix_us - entry.time_us if isinstance(entry, LiveGrasp) else 0
-                yield unix_us, _dated(entry, clock_us) if isinstance(entry, LiveGrasp) else entry
-            return
-        stepper = Stepper(self._build, self._index.path.name, self._walk.periods)
-        for unix_us, entry in self._index.scan():
-            moment = stepper.take(entry)
-            yield unix_us, entry if moment is None else _dated(moment.grasp, unix_us - moment.grasp.time_us)
+    def _recognised(self, entry: Entry) -> Moment | None:
+        """Take an entry; return its moment, if it has one, with times since 1970."""
+        moment, session = self._stepper.take(entry), self._reader.session
+        clock_us = session.clock_ns // 1000
+        if isinstance(entry, Session):
+            self._overview.take(clock_us, entry)
+            return None
+        unix_us = clock_us + entry.time_us
+        self._first_us = unix_us if self._first_us is None else self._first_us
+        self._last_us = max(self._last_us, unix_us)
+        if moment is None:
+            self._overview.take(unix_us, entry)
+            return None
+        own = session.build == self._build.manifest.checksum
+        moment.grasp = _dated(entry if own and isinstance(entry, LiveGrasp) else moment.grasp, clock_us)
+        self._overview.take(unix_us, moment.grasp)
+        if not self._times or unix_us >= self._times[-1] + _SAMPLE_US:
+            self._keep(moment)
+        return moment
+
+    def _keep(self, moment: Moment) -> None:
+        """Keep the message of a moment. The page's thread reads it once its time is in the list."""
+        text = self._text(moment)
+        self._kept.write(text)
+        self._ends.append(self._ends[-1] + len(text))
+        self._times.append(moment.grasp.time_us)
 
     def _take(self, asked: Mapping[str, object]) -> None:
         do, value = asked["do"], asked.get("value")
@@ -210,8 +237,8 @@ class ReplayPage(Closing):
             return
 
     def _advance(self, passed_s: float) -> None:
-        first, last = self._index.first_us, self._index.last_us
-        if first is None or last is None:
+        first, last = self._first_us, self._last_us
+        if first is None:
             return
         if self._playing and self._at_us >= last and self._scanned.is_set() and not self._sought:
             self._playing = False
@@ -220,19 +247,19 @@ class ReplayPage(Closing):
         self._at_us = min(max(self._at_us, first), last)
 
     def _show(self) -> None:
-        first, last = self._index.first_us, self._index.last_us
-        if first is None or last is None:
+        first, last = self._first_us, self._last_us
+        if first is None:
             if self._scanned.is_set():
                 self._tell(0, 0)
             return
         if self._sought:
             self.server.publish("past", self._overview.past(self._at_us))
-        try:
-            if self._walk.to(self._at_us):
-                self.server.publish("frame", self._walk.text())
-        except (ThenarError, OSError) as wrong:
-            if str(wrong) not in self._faults:
-                self._faults.append(str(wrong))
+        # Before the first prediction, the first one is shown.
+        shown = max(bisect_right(self._times, self._at_us) - 1, 0)
+        if self._times and shown != self._shown:
+            begin, end = self._ends[shown : shown + 2]
+            self.server.publish("frame", os.pread(self._kept.fileno(), end - begin, begin))
+            self._shown = shown
         self._sought = False
         self._tell(first, last)
 
@@ -246,7 +273,7 @@ class ReplayPage(Closing):
             "last_us": last_us,
             "playing": self._playing,
             "speed": self._speed,
-            "share": 1.0 if self._scanned.is_set() else self._index.scanned / max(self._index.size, 1),
+            "share": 1.0 if self._scanned.is_set() else self._reader.tail.size / max(self._size, 1),
             "truth": self._overview.truth_at(self._at_us),
             "faults": self._faults[:8],
         }
@@ -255,56 +282,6 @@ class ReplayPage(Closing):
         if self._told < float("inf") and now - self._told >= _TOLD_S:
             self._told = float("inf") if self._scanned.is_set() else now
             self.server.publish("overview", self._overview.text())
-
-
-class _Walk:
-    """Moves through a recording to any moment, and holds the state there."""
-
-    def __init__(self, index: Index, build: Build) -> None:
-        self._index, self._build, name = index, build, index.path.name
-        self.periods = periods_us(entry for _, entry in islice(Index(index.path).scan(), _PERIODS_OF))
-        self._stepper = Stepper(build, name, self.periods)
-        self._stepper.take(index.session)
-        harness = parse_harness(index.session.harness, name) if index.session.harness else Harness(name="")
-        self._text = FrameText(build, harness)
-        self._entries: Iterator[tuple[int, object]] = iter(())
-        self._next: tuple[int, Any] | None = None
-        self._at_us = -1
-        self._shown: Any = None
-        self._moment: Any = None
-
-    def to(self, unix_us: int) -> bool:
-        """Go to a moment; return whether there is something new to show."""
-        if not self._at_us <= unix_us <= self._at_us + 2 * LEAD_US:
-            self._entries = self._index.since(unix_us - LEAD_US)
-            self._stepper = Stepper(self._build, self._index.path.name, self.periods)
-            self._next = self._moment = None
-        self._at_us = unix_us
-        while True:
-            if self._next is None:
-                self._next = next(self._entries, None)
-            # Before the first prediction, the first one is shown.
-            if self._next is None or self._next[0] > unix_us + LEAD_US * (self._moment is None):
-                break
-            self._take(*self._next)
-            self._next = None
-        newest = self._moment
-        changed, self._shown = newest is not None and newest is not self._shown, newest
-        if self._next is None:
-            self._at_us = -1  # the part that is scanned later starts afresh
-        return changed
-
-    def text(self) -> bytes:
-        """Return the message of the newest moment."""
-        return self._text(self._moment)
-
-    def _take(self, unix_us: int, entry: Any) -> None:
-        moment, session = self._stepper.take(entry), self._stepper.session
-        if moment is not None and session is not None:
-            own = session.build == self._build.manifest.checksum
-            grasp = entry if own and isinstance(entry, LiveGrasp) else moment.grasp
-            moment.grasp = _dated(grasp, unix_us - grasp.time_us)
-            self._moment = moment
 
 
 def _dated(grasp: LiveGrasp, clock_us: int) -> LiveGrasp:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.build import Build
-from thenar.runtime.model.proof import furthest
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.scores import LANE_OFFSET
 
@@ -32,15 +31,18 @@ class Lost(NamedTuple):
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Lose every subset of joints and of ports, of 8 and of 16 switches, in recorded and in the furthest frames."""
+    """Lose every subset of joints and of ports, of 8 and of 16 switches, in recorded frames and in two extreme ones."""
     if full:
         small = small_build(small_set(8, rows=150, switches=48, joints=4, types=5, noise=0.15), rounds=40)
     else:
         small = small_build(small_set(8, rows=100, switches=32, joints=2, types=4, noise=0.1), rounds=20)
     recorded = 24 if full else 8
-    hard = [furthest(small.build.tables, missing=missing) for missing in (True, False)]
-    bits = np.vstack([small.bits[:recorded], *(frame.bits for frame in hard)])
-    codes = np.vstack([small.codes[:recorded], *(frame.codes for frame in hard)])
+    tables = small.build.tables
+    # The frames in which the first type's score is largest and least.
+    first, joints = tables.switch_rows[:, 0], [tables.choices(joint) for joint in range(tables.n_joints)]
+    bits = np.vstack([small.bits[:recorded], first > 0, first < 0])
+    extreme = [[at[of(rows[:, 0])] for at, rows in joints] for of in (np.argmax, np.argmin)]
+    codes = np.vstack([small.codes[:recorded], extreme]).astype(np.uint16)
     cases = [case for width in (8, 16) for case in every_loss(small.build, width, bits, codes)]
     yield _fitted(small)
     yield _sums(small, cases)

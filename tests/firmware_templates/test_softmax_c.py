@@ -9,9 +9,9 @@ import pytest
 
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout
+from thenar.compiler.firmware.softmax import Softmax
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.model.integers import IntegerTables
-from thenar.runtime.softmax import Softmax
 
 SharedLibrary = Callable[..., ctypes.CDLL]
 

@@ -26,8 +26,9 @@ from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.kept import kept_names
 from thenar.compiler.placement.placement import place
 from thenar.compiler.report.frontier import frontier_view
+from thenar.compiler.scan_file import SCAN_NAME, load_scan
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build
+from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME, Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.hand import HAND_NAME, load_hand
 from thenar.runtime.live.system import LiveSystem
@@ -96,8 +97,7 @@ def _live(build: Build, _folder: Path) -> None:
     glove = GloveFrame(0, bytes(range(100, 118)), None)
     frame = SwitchFrame(0, closed=5, lost=2)
     system.recognizer().step(0, 0, frame, glove)
-    if build.scan is not None:
-        scan_us(build.scan, harness())
+    scan_us(system.scan, harness())
     system.sources()
 
 
@@ -105,8 +105,8 @@ def _verified(_build: Build, folder: Path) -> None:
     verify(folder, grasp_set())
 
 
-def _spec(build: Build, _folder: Path) -> None:
-    spec_files(build.manifest, build.scan, harness())
+def _spec(build: Build, folder: Path) -> None:
+    spec_files(build.manifest, load_scan(folder, build.manifest), harness())
 
 
 def _firmware(build: Build, _folder: Path) -> None:

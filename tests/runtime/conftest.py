@@ -17,7 +17,7 @@ from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME, Build
 from thenar.runtime.manifest import Calibration, Manifest
 from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
-from thenar.runtime.model.terms.line import Slope
+from thenar.runtime.model.terms.line import Line
 from thenar.runtime.published import Count, DeviceHealth, HealthReport, JointAngles, LiveGrasp, Preshape, Quarantined
 
 from ..tables import describe as _describe
@@ -49,10 +49,10 @@ def _make_tables(
     )
 
 
-def _slope(random: np.random.Generator, joint: int, classes: int) -> Slope:
+def _slope(random: np.random.Generator, joint: int, classes: int) -> Line:
     low, gain = int(random.integers(0, 200)), int(random.integers(-2, 3))
     high = low + int(random.integers(8, 254 / 2**gain))
-    return Slope(joint, low, high, gain, random.integers(-9, 10, classes).astype(np.int8))
+    return Line(joint, low, high, random.integers(-9, 10, classes).astype(np.int8), gain)
 
 
 def eventually(condition: Callable[[], bool]) -> None:

@@ -23,7 +23,7 @@ from thenar.runtime.model.integers import (
     tables_from_bytes,
     tables_to_bytes,
 )
-from thenar.runtime.model.terms.line import Slope
+from thenar.runtime.model.terms.line import Line
 from thenar.runtime.sealed import HEADER, seal
 
 MakeTables = Callable[..., IntegerTables]
@@ -68,7 +68,7 @@ def test_the_bytes_are_as_documented() -> None:
 
 def test_the_bytes_of_slopes_are_as_documented() -> None:
     none, row = np.zeros((0, 2), np.int16), np.zeros((1, 2), np.int16)
-    slope = Slope(0, 258, 300, -1, np.array([7, -8], np.int8))
+    slope = Line(0, 258, 300, np.array([7, -8], np.int8), -1)
     tables = IntegerTables.of(row[0], none, (np.array([], np.uint16),), (row,), none, row, 1.0, (slope,))
     counts = bytes.fromhex("0200 0000 0100 0100 000000000000f03f 0000")
     assert bytes(_payload(tables)) == counts + bytes(12) + bytes.fromhex("0100 0000 0201 2c01 ffff 07f8")
@@ -81,21 +81,24 @@ def test_the_bytes_of_slopes_are_as_documented() -> None:
     "ends", [(9, 9, 0), (9, 8, 0), (0, 65536, -9), (0, 65535, -8), (0, 255, 0), (0, 20, 4), (0, 20, -5), (0, 20, -17)]
 )
 def test_a_slope_that_fits_no_byte_is_refused(ends: tuple[int, int, int]) -> None:
+    low, high, gain = ends
     with pytest.raises(BuildError, match="does not fit a byte"):
-        Slope(0, *ends, np.zeros(2, np.int8))
+        Line(0, low, high, np.zeros(2, np.int8), gain)
 
 
 def test_slopes_of_other_joints_or_shapes_are_refused(make_tables: MakeTables) -> None:
     tables = make_tables(slopes=2)
     for joints in ((1, 0), (0, 0), (0, 3)):
         with pytest.raises(BuildError, match="they must rise"):
-            tables.changed(further=tuple(replace(tables.slopes[0], joint=joint) for joint in joints))
+            tables.changed(further=tuple(replace(tables.lines[0], joint=joint) for joint in joints))
+    with pytest.raises(BuildError, match="a line of scores"):
+        tables.changed(further=(replace(tables.lines[0], gain=None),))
     with pytest.raises(BuildError, match="row of the slope"):
-        tables.changed(further=(replace(tables.slopes[0], row=np.zeros(4, np.int8)),))
+        tables.changed(further=(replace(tables.lines[0], row=np.zeros(4, np.int8)),))
 
 
 def test_a_slope_that_could_overflow_is_refused(make_tables: MakeTables) -> None:
-    slopes = (Slope(0, 0, 254, 0, np.full(5, 127, np.int8)),)
+    slopes = (Line(0, 0, 254, np.full(5, 127, np.int8), 0),)
     assert make_tables().changed(further=slopes).bound > 127 * 127
     two = (*slopes, replace(slopes[0], joint=1), replace(slopes[0], joint=2))
     with pytest.raises(BuildError, match="could overflow"):
@@ -110,7 +113,7 @@ def test_no_partial_sum_of_any_frame_leaves_the_bound(make_tables: MakeTables, s
         terms.append(data.draw(st.sampled_from([row, mean, 0 * row])))
     for rows, mean in zip(tables.joint_rows, tables.joint_means, strict=True):
         terms.append(data.draw(st.sampled_from([*rows, mean])))
-    for slope in tables.slopes:
+    for slope in tables.lines:
         lost = (terms[1 + tables.n_switches + slope.joint] == tables.joint_means[slope.joint]).all()
         terms.append(0 * tables.bias if lost else slope.of(np.array([data.draw(st.integers(0, 500))]))[0])
     order = data.draw(st.permutations(terms))
@@ -205,7 +208,7 @@ def test_any_sealed_content_is_read_or_refused_without_much_memory(payload: byte
 @given(size=sizes, data=st.data())
 def test_mutated_content_is_read_or_refused(make_tables: MakeTables, size: Size, data: st.DataObject) -> None:
     made = make_tables(**size)
-    payload, version = _payload(made), SLOPED if made.slopes else PLAIN
+    payload, version = _payload(made), SLOPED if made.lines else PLAIN
     for _ in range(data.draw(st.integers(1, 4))):
         payload[data.draw(st.integers(0, len(payload) - 1))] = data.draw(st.integers(0, 255))
     try:

@@ -154,7 +154,7 @@ def test_a_scan_map_is_turned_into_counts() -> None:
     switches = [Switch(0, "s", 0.0), Switch(1, "pad>60", 0.0, Threshold(60, 0.5, NEWTONS))]
     port = Port(0, 0, "CH3", (), True, ((60, 1),))
     ports = (port, Port(0, 1, "A", ((0, 0),), False))
-    scan = ScanMap(1, "0" * 64, ports, (StreamRead((), ((3, 60, 1),)),))
+    scan = ScanMap(1, ports, (StreamRead((), ((3, 60, 1),)),))
     counted = in_counts(scan, switches, TaxelCalibration(unit="N", taxels=(TaxelLine("pad", 100, 900, 2.0),)))
     # Above 0.5 N by half a code of 0.01 N, of 400 counts a newton.
     assert counted.ports[0].levels == ((302, 1),)

@@ -34,9 +34,9 @@ class MicroPython(Target):
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text: the Python module alone, which is the source for `run` too."""
         from thenar.runtime.code_line import FARTHEST, FRACTION
-        from thenar.runtime.softmax import POWERS, Softmax
 
         from ..classifier import lag_of
+        from ..softmax import POWERS, Softmax
         from ..words import inputs_in_words, none_of
 
         tables, names = library.layout.tables, library.names
@@ -52,7 +52,7 @@ class MicroPython(Target):
             "rows": _coded(rows),
             "steps": _coded(steps),
             "places": accumulate(map(len, steps), initial=0),
-            "slopes": [(s.joint, s.low, s.high, s.gain, s.zero, tuple(s.row.tolist())) for s in tables.slopes],
+            "slopes": [(s.joint, s.low, s.high, s.gain, s.zero, tuple(s.row.tolist())) for s in tables.lines],
             "pairs": [(*grid.joints, tables.n_joints + 2 * n) for n, grid in enumerate(tables.grids)],
             "powers": POWERS,
             "sensors": library.sensors,

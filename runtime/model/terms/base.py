@@ -56,7 +56,7 @@ class Term(ABC):
 
 
 class CoreTerm(Term):
-    """A term of one of the four kinds that boards read.
+    """A term of one of the four kinds that boards read: its rows are scores, or whole steps in integer tables.
 
     Attributes
     ----------
@@ -103,38 +103,26 @@ class CoreTerm(Term):
         """
         return ends[:0]
 
-
-class ScoreTerm(CoreTerm):
-    """A core term of a model: its rows are scores."""
-
-    __slots__ = ()
-
     @abstractmethod
     def relative(self) -> Self:
         """Return the term of scores relative to the last class."""
 
     @abstractmethod
-    def whole(self, scale: float, grid: int) -> "StepTerm":
-        """Return the term in whole steps, `scale` a unit of score; rows of switches and bins are multiples of `grid`.
-        They are doubles still.
+    def whole(self, scale: float, grid: int) -> Self:
+        """Return the term of scores in whole steps, `scale` a unit of score; rows of switches and bins are multiples of
+        `grid`. They are doubles still.
         """
 
     @abstractmethod
     def rounding_error(self, scale: float, grid: int) -> float:
         """Return the most steps by which `whole` moves the contribution."""
 
-
-class StepTerm(CoreTerm):
-    """A core term of integer tables: its rows are whole steps."""
-
-    __slots__ = ()
-
     @abstractmethod
     def integers(self) -> Self:
-        """Return the term with its rows as integers."""
+        """Return the term of whole steps with its rows as integers."""
 
 
-class Tabulated(ScoreTerm, StepTerm):
+class Tabulated(CoreTerm):
     """A term that adds one of its rows (..., K); rows on a grid are multiples of it."""
 
     __slots__ = ()

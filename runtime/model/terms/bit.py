@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .base import Ends, Rows, ScoreTerm, StepTerm, less_last, rounded
+from .base import CoreTerm, Ends, Rows, less_last, rounded
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bit(ScoreTerm, StepTerm):
+class Bit(CoreTerm):
     """The contribution of a closed switch: row (K,)."""
 
     name = "bit"

@@ -51,12 +51,11 @@ export function cell(kind, text) {
   return made;
 }
 
-/** Fill a list, changing only the entries that differ; `style` gets each entry and its number. */
-export function list(element, texts, style = () => {}) {
+/** Fill a list, changing only the entries that differ. */
+export function list(element, texts) {
   while (element.children.length > texts.length) element.lastChild.remove();
   texts.forEach((text, at) => {
     const item = element.children[at] ?? element.appendChild(document.createElement("li"));
-    style(item, at);
     say(item, text);
   });
 }

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from thenar.compiler.firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, random_frames
+from thenar.compiler.firmware.softmax import Softmax
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.scores import LANE_OFFSET
-from thenar.runtime.softmax import Softmax
 
 from ...conftest import tool
 from ...tables import describe

@@ -20,7 +20,7 @@ from thenar.compiler.firmware.tools import STRICT, call, workshop
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.model.integers import COARSE, IntegerTables
 from thenar.runtime.model.terms.grid import Grid
-from thenar.runtime.model.terms.line import Slope
+from thenar.runtime.model.terms.line import Line
 
 from ...conftest import tool
 from .conftest import make_tables, probed, same_as_python
@@ -102,11 +102,11 @@ def made(
     )
 
 
-def _line(random: np.random.Generator, joint: int, last: np.ndarray, top: int, share: int) -> Slope:
+def _line(random: np.random.Generator, joint: int, last: np.ndarray, top: int, share: int) -> Line:
     span = int(random.choice([1, 5, 100, min(top, 254), min(top, 3000)]))
     low = int(random.choice([0, top - span]))
     gain = next(gain for gain in range(7, -17, -1) if (span << gain if gain > 0 else span >> -gain) <= 254)
-    return Slope(joint, low, low + span, gain, (random.integers(-128, 128, len(last)) // share * last).astype(np.int8))
+    return Line(joint, low, low + span, (random.integers(-128, 128, len(last)) // share * last).astype(np.int8), gain)
 
 
 def _pair(random: np.random.Generator, joints: tuple[int, int], classes: int, top: int) -> Grid:

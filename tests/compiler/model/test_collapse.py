@@ -156,4 +156,4 @@ def test_a_term_of_another_kind_becomes_the_terms_of_its_core(seed: int) -> None
     assert np.abs(tables.scores(bits, codes) - model.scores(bits, codes)).max() <= 1e-12 * model.magnitude
     with pytest.raises(ValueError, match="collapse them first"):
         quantise(model, bits, codes)
-    assert quantise(tables, bits, codes).slopes
+    assert quantise(tables, bits, codes).lines

@@ -12,7 +12,7 @@ from thenar.compiler.model import faults
 from thenar.compiler.model.faults import count_faults, groups_of, worst_faults
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.terms.grid import Grid
-from thenar.runtime.model.terms.line import Slope
+from thenar.runtime.model.terms.line import Line
 from thenar.runtime.scanning.scanmap import Port, ScanMap, StreamRead
 from thenar.runtime.scores import Scorer
 
@@ -30,7 +30,7 @@ def tables_of(
     thresholds = tuple(steps() for _ in range(joints))
     both = steps(), steps()
     joined = Grid((0, joints - 1), both, rows(len(both[0]) + 1, len(both[1]) + 1, classes))
-    line = Slope(0, 5, 15, 0, rows(classes).astype(np.int8))
+    line = Line(0, 5, 15, rows(classes).astype(np.int8), 0)
     return IntegerTables.of(
         bias=rows(classes),
         switch_rows=rows(switches, classes),
@@ -119,7 +119,6 @@ def test_the_worst_fault_of_each_kind_names_its_inputs() -> None:
     bits, codes = random.random((40, 3)) < 0.5, random.integers(0, 32, (40, 1)).astype(np.uint16)
     scan = ScanMap(
         1,
-        "0" * 64,
         (Port(0, 1, "GPIOA", ((0, 2),), False), Port(0, 1, "GPIOB", ((0, 0),), False)),
         (StreamRead(((4, 1),), ()),),
     )

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from thenar.compiler.model.compare import compare, worst_case
 from thenar.runtime.errors import BuildError
 from thenar.runtime.model.integers import LIMIT, IntegerTables, tables_from_bytes, tables_to_bytes
-from thenar.runtime.model.proof import Rounding, furthest
+from thenar.runtime.model.proof import Rounding
 from thenar.runtime.model.quantise import as_deployed, balance, quantise
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Line
-from thenar.runtime.scores import LANE_OFFSET, LiveScores, Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 
 from .conftest import UNIT, exact_scores, lost_in_parts
 
@@ -136,7 +136,7 @@ def test_the_runtime_sums_as_arrays_do_without_lost_inputs(seed: int) -> None:
             mine = integers.joint_rows[joint][np.searchsorted(integers.thresholds[joint], codes[row, joint])].astype(
                 int
             )
-            slopes = (slope for slope in integers.slopes if slope.joint == joint)
+            slopes = (slope for slope in integers.lines if slope.joint == joint)
             mine = mine + sum(slope.of(codes[row : row + 1, joint])[0] for slope in slopes)
             left += mine - integers.joint_means[joint]
         assert (left == scores[row]).all()
@@ -156,7 +156,7 @@ def test_no_partial_sum_of_any_code_leaves_the_bound(seed: int, entry_bits: int)
         for joint, mean in enumerate(integers.joint_means.astype(int)):
             each = np.maximum(sign * integers.joint_rows[joint].astype(int), 0)
             each = each[np.searchsorted(integers.thresholds[joint], codes)]
-            for slope in integers.slopes:
+            for slope in integers.lines:
                 each = each + np.maximum(sign * slope.of(codes), 0) * (slope.joint == joint)
             reached += np.maximum(each.max(axis=0), sign * mean)
         assert reached.max() <= integers.bound
@@ -193,8 +193,8 @@ def test_a_line_of_few_codes_and_much_weight_takes_a_gain() -> None:
     tables = ScoreTables.of(np.zeros(2), np.zeros((0, 2)), (no,), (np.zeros((1, 2)),), (Line(0, 10, 14, row),))
     bits, codes = np.zeros((5, 0), bool), np.arange(10, 15, dtype=np.uint16)[:, np.newaxis]
     integers = quantise(tables, bits, codes)
-    (slope,) = integers.slopes
-    assert slope.most == 4 << slope.gain > 127
+    (slope,) = integers.lines
+    assert slope.most == 4 << slope.shift > 127
     scores = integers.scores(bits, codes)
     assert (np.diff(scores, axis=0) == np.diff(scores, axis=0)[0]).all()
     assert scores[:, 0].tolist() == (-scores[:, 1]).tolist()
@@ -219,11 +219,10 @@ def test_a_missing_joint_adds_its_mean_and_gives_pairs_code_0(seed: int) -> None
         left = np.array(scorer.biased_scores_without(bits[row], codes[row], np.zeros(3, bool), lost)) - LANE_OFFSET
         assert (left == meant).all()
         assert np.abs(left).max() <= integers.bound
-    live, every = LiveScores(scorer), np.ones(JOINTS, bool)
-    for held in (None, tuple(codes[0].tolist()), None):
-        live.joints(held)
+    every = np.ones(JOINTS, bool)
+    for held in (None, tuple(codes[0].tolist())):
         none = scorer.biased_scores_without([False] * 3, codes[0], [False] * 3, every if held is None else ~every)
-        assert live.biased_scores(0) == none
+        assert scorer.state_scores(0, 0, held) == none
 
 
 @settings(deadline=None, max_examples=25)
@@ -245,10 +244,6 @@ def test_the_bound_is_what_the_worst_of_all_frames_reaches(seed: int, entry_bits
             terms = np.stack([integers.bias, switch, *own]).astype(int)
             reached = max(reached, int(np.maximum(terms, 0).sum(0).max()), int(np.maximum(-terms, 0).sum(0).max()))
     assert integers.bound == reached
-    found = furthest(integers, missing=False)
-    whole = found.terms.astype(int).sum(axis=0)
-    assert (whole == integers.scores(found.bits[np.newaxis], found.codes[np.newaxis])[0]).all()
-    assert found.terms[found.order][: found.n_terms].astype(int).sum(axis=0)[found.grasp] == found.total
 
 
 def _whole(*pairs: Grid) -> IntegerTables:

@@ -12,15 +12,13 @@ from thenar.runtime.model.integers import FINEST_SCALE, IntegerTables, tables_to
 from thenar.runtime.model.proof import Rounding
 from thenar.runtime.model.quantise import (
     GROUP_SIZE,
-    TRIED,
     balance,
     finest_scale,
-    least_disruptive_scale,
     quantise,
     reach,
     span,
 )
-from thenar.runtime.model.tables import ScoreTables, winners
+from thenar.runtime.model.tables import ScoreTables
 
 from .conftest import make_rows, make_stumps
 
@@ -76,29 +74,6 @@ def test_the_next_finer_scale_would_not_do(seed: int, shape: tuple[int, int], en
     assert reach(tables, scale) <= 32767
     assert span(tables, scale) <= 2**entry_bits - 1
     assert reach(tables, finer) > 32767 or span(tables, finer) > 2**entry_bits - 1 or finer >= FINEST_SCALE
-
-
-@given(seed=seeds, shape=shapes)
-def test_coarse_steps_are_those_that_change_the_fewest_rows(seed: int, shape: tuple[int, int]) -> None:
-    switches, joints = shape
-    stumps = make_stumps(seed, switches=switches, joints=joints)
-    rows = make_rows(seed, n=60, switches=switches, joints=joints)
-    unbalanced = collapse(stumps, switches)
-    tables = balance(unbalanced)
-    finest = finest_scale(tables, 32767, 31)
-
-    bins = [np.searchsorted(*pair) for pair in zip(tables.thresholds, rows[1].T, strict=True)]
-    right = winners(stumps.scores(np.hstack(rows)))
-
-    def changed(scale: float) -> int:
-        steps = [np.rint(tables.switch_rows * scale), *(np.rint(joint * scale) for joint in tables.joint_rows)]
-        scores = np.rint(tables.bias * scale) + rows[0].astype(float) @ steps[0]
-        scores += sum((joint[bin_] for joint, bin_ in zip(steps[1:], bins, strict=True)), np.zeros_like(scores))
-        return int(np.count_nonzero(scores.argmax(axis=1) != right))
-
-    counts = [changed(finest * (1 - i / 160)) for i in range(TRIED)]
-    assert least_disruptive_scale(tables, finest, *rows) == finest * (1 - counts.index(min(counts)) / 160)
-    assert quantise(unbalanced, *rows, entry_bits=5).scale == least_disruptive_scale(tables, finest, *rows)
 
 
 @given(seed=seeds)

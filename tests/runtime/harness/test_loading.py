@@ -2,7 +2,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
 
 from thenar.drivers.errors import ThenarError
 from thenar.drivers.i2c import chips
@@ -265,33 +264,3 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
 def test_a_harness_error_is_one_of_ours_and_a_value_error() -> None:
     assert issubclass(HarnessError, ThenarError)
     assert issubclass(HarnessError, ValueError)
-
-
-def test_the_fingerprint_is_of_what_hangs_where_and_of_nothing_else(load: Load, full_text: str) -> None:
-    harness = load(full_text)
-    (bus,) = harness.buses
-    (stream,) = harness.streams
-    elsewhere = replace(
-        harness,
-        name="other",
-        cyberglove=None,
-        streams=(replace(stream, port="/dev/ttyACM7", baud=9600, board=None),),
-        buses=(replace(bus, device="/dev/i2c-3", clock_hz=100_000),),
-        debounce=Debounce(enabled=False),
-    )
-    assert elsewhere.fingerprint == harness.fingerprint
-    chip = bus.chips[0]
-    others = [
-        replace(chip, address=0x21),
-        replace(chip, closed="high"),
-        replace(chip, mux=MuxChannel(address=0x70, channel=0)),
-        replace(chip, pins={"GPA0": "s001", "GPB4": "s014"}),
-        replace(chip, pins={"GPA0": "s014", "GPB3": "s001"}),
-    ]
-    changed = [replace(harness, buses=(replace(bus, chips=(other, *bus.chips[1:])),)) for other in others]
-    changed.append(replace(harness, streams=(replace(stream, switches=("s102", "s100")),)))
-    prints = {harness.fingerprint, *(other.fingerprint for other in changed)}
-    assert len(prints) == 1 + len(changed)
-    reordered = replace(chip, pins={"GPB3": "s014", "GPA0": "s001"})
-    same = replace(harness, buses=(replace(bus, chips=(reordered, *bus.chips[1:])),))
-    assert same.fingerprint == harness.fingerprint

@@ -3,17 +3,16 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from thenar.compiler.glove.propose import propose_board, propose_harness
 from thenar.compiler.placement.ports import WireTimes
+from thenar.compiler.scan_file import scanmap_from_bytes, scanmap_to_bytes
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, SpiWiring, StreamWiring
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.scanning.plan import check_harness, plan_scan
+from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.scanmap import check_switches, scanmap_from_bytes, scanmap_to_bytes
 from thenar.runtime.scanning.timing import scan_us
 
 START, READ, WAIT = 38 / 0.4 + 1.3, 48 / 0.4 + 1.3, 1317.0  # of an ADS1115 at 400 kHz
@@ -46,8 +45,7 @@ names = st.one_of(
 @given(kept=st.lists(names, unique=True, max_size=25))
 def test_a_taxels_levels_share_one_conversion(kept: list[str]) -> None:
     scan = plan_scan(kept, MIXED)
-    check_switches(scan, len(kept))
-    check_harness(scan, MIXED, kept)
+    assert sorted(scan.switches) == [*range(len(kept))]
     assert scanmap_from_bytes(scanmap_to_bytes(scan)) == scan
     taxels = {name.split(">")[0] for name in kept if name[0] == "t"}
     measured = [port for port in scan.ports if port.levels]
@@ -77,42 +75,9 @@ def test_a_wired_switch_named_like_a_level_is_a_switch() -> None:
     assert [(port.switches, port.levels) for port in scan.ports] == [(((0, 0),), ()), ((), ((8, 1),))]
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"levels": ((8, 0),)},
-        {"levels": ((7, 1),)},
-        {"levels": ((7, 0), (9, 1))},
-        {"reading": "AIN1"},
-        {"reading": "A"},
-        {"bus": 1},
-        {"chip": 1},
-        {"closed_high": False},
-    ],
-)
-def test_a_conversion_that_the_wiring_does_not_have_is_refused(change: dict[str, object]) -> None:
-    harness = glove(ads1115(0, "t0", "t1"))
-    scan = plan_scan(["t0>7"], harness)
-    with pytest.raises(HarnessError, match="reads other pins or columns than harness 'x'"):
-        check_harness(replace(scan, ports=(replace(scan.ports[0], **change),)), harness, ["t0>7"])
-
-
 def test_taxels_that_are_wired_to_nothing_are_named() -> None:
     with pytest.raises(HarnessError, match="'x' has no pin or column for t9>7, t1, which the build keeps"):
         plan_scan(["t0>7", "t9>7", "t1"], glove(ads1115(0, "t0")))
-
-
-def test_what_hangs_where_is_in_the_fingerprint() -> None:
-    others = [
-        MIXED,
-        replace(MIXED, spi=()),
-        replace(MIXED, spi=(replace(MIXED.spi[0], kind="mcp3008"),)),
-        replace(MIXED, spi=(replace(MIXED.spi[0], pins={"CH1": "t4", "CH5": "t5"}),)),
-        replace(MIXED, streams=(replace(MIXED.streams[0], taxels={"t6": (0, 1023)}),)),
-    ]
-    assert len({other.fingerprint for other in others}) == len(others)
-    moved = replace(MIXED, spi=(replace(MIXED.spi[0], device="/dev/spidev1.1", hz=500_000),))
-    assert moved.fingerprint == MIXED.fingerprint
 
 
 # Times.
@@ -122,7 +87,6 @@ def test_one_converter_alone_waits_for_each_conversion() -> None:
     harness = glove(ads1115(0, "t0", "t1", "t2"))
     time = scan_us(whole_scan(harness, ["t0>1", "t1>1", "t2>1"]), harness)
     assert time.us == pytest.approx(3 * (START + WAIT + READ))
-    assert time.chips[0].us == pytest.approx(time.us)
 
 
 def test_converters_and_expanders_are_read_one_after_the_other() -> None:
@@ -133,7 +97,8 @@ def test_converters_and_expanders_are_read_one_after_the_other() -> None:
     kept = [*(f"{taxel}{number}>1" for number in range(4) for taxel in "ab"), "s0"]
     scan = whole_scan(harness, kept)
     time, times = scan_us(scan, harness), WireTimes(scan.ports, harness)
-    assert time.us == pytest.approx(8 * (START + WAIT + READ) + time.chips[-1].us)
+    alone = scan_us(whole_scan(harness, ["s0"]), harness)
+    assert time.us == pytest.approx(8 * (START + WAIT + READ) + alone.us)
     assert sum(times.after(0, port) for port in range(len(scan.ports))) == pytest.approx(1000 * time.us, abs=10)
 
 

@@ -46,18 +46,13 @@ def test_eight_chips_take_what_the_sum_says(eight_chips: EightChips) -> None:
     assert time.us == pytest.approx(8 * (120.0 + 1.3))
     assert time.us == time.full_us
     assert time.share == 1.0
-    assert [chip.switches for chip in time.chips] == [14] * 8
-    assert (time.selects, time.select_us) == (0, 0.0)
+    assert time.selects == 0
 
 
 def test_a_few_kept_switches_take_their_share_of_all_that_are_wired(eight_chips: EightChips) -> None:
     harness = eight_chips()
     time = scan_us(whole_scan(harness, ["s0", "s1", "s20", "s27"]), harness)
-    first, second = time.chips
-    assert (first.place, first.device, first.readings) == ("mcp23017 at 0x20", "/dev/i2c-1", ("A",))
-    assert (second.chip, second.readings, second.switches) == (1, ("AB",), 2)
-    assert first.us == pytest.approx(97.5 + 1.3)
-    assert second.us == pytest.approx(120.0 + 1.3)
+    assert time.us == pytest.approx(97.5 + 1.3 + 120.0 + 1.3)
     assert time.share == pytest.approx((98.8 + 121.3) / (8 * 121.3))
 
 
@@ -79,7 +74,6 @@ def test_channels_are_selected_once_a_scan_and_another_mux_is_left_first(
     harness = behind(*places)
     time = scan_us(whole_scan(harness, harness.switches), harness)
     assert time.selects == selects
-    assert time.select_us == pytest.approx(selects * 51.3)
     assert time.us == pytest.approx(selects * 51.3 + len(places) * (97.5 + 1.3))
 
 
@@ -88,14 +82,13 @@ def test_each_bus_has_its_own_clock() -> None:
     slow = replace(bus, device="e", clock_hz=100_000, chips=(replace(bus.chips[0], pins={"P00": "t"}),))
     harness = Harness(name="x", buses=(bus, slow))
     time = scan_us(whole_scan(harness, harness.switches), harness)
-    assert [(chip.bus, chip.device) for chip in time.chips] == [(0, "d"), (1, "e")]
-    assert [chip.us for chip in time.chips] == pytest.approx([98.8, 394.7])
+    assert time.us == pytest.approx(98.8 + 394.7)
 
 
 def test_nothing_to_read_takes_no_time() -> None:
     harness = Harness(name="x")
     time = scan_us(whole_scan(harness, ()), harness)
-    assert (time.us, time.full_us, time.share, time.chips) == (0.0, 0.0, 0.0, ())
+    assert (time.us, time.full_us, time.share) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(("switches", "bits"), [(1, "1"), (8, "FF"), (9, "1FF"), (0, "")])

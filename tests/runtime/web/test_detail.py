@@ -1,6 +1,8 @@
 """What people see of a moment is what the build makes of it."""
 
+import json
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,13 +10,19 @@ from msgspec.structs import replace
 
 from thenar.runtime.build import Build
 from thenar.runtime.frames import SwitchFrame
+from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.recogniser import Moment
 from thenar.runtime.manifest import Calibration, Rejection
 from thenar.runtime.published import LiveGrasp
-from thenar.runtime.web.live import Details
+from thenar.runtime.web.live import FrameText
 
 MakeBuild = Callable[..., Build]
 MakeGrasp = Callable[..., LiveGrasp]
+
+
+def shown(build: Build, moment: Moment) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(FrameText(build, Harness(name="x"))(moment))
+    return found
 
 
 def mask(bits: np.ndarray) -> int:
@@ -37,16 +45,14 @@ def test_probabilities_are_those_of_the_build_and_joints_are_in_their_unit(
         frame = SwitchFrame(0, mask(bits))
         scores = build.scorer.biased_scores(bits, codes)
         moment = Moment(make_grasp(7), frame, None, codes.tolist(), scores=scores)
-        detail = Details(build)(moment)
-        assert [letter == "1" for letter in detail.closed] == bits.tolist()
+        detail = shown(build, moment)
+        assert [letter == "1" for letter in detail["closed"]] == bits.tolist()
         found = build.recognise(bits, codes)
-        assert detail.probabilities is not None
-        assert len(detail.probabilities) == len(build.manifest.classes)
+        assert len(detail["probabilities"]) == len(build.manifest.classes)
         at = build.manifest.classes.index(found.grasp)
-        assert detail.probabilities[at] == max(detail.probabilities) == pytest.approx(found.probability, abs=6e-5)
-        assert detail.joints is not None
+        assert detail["probabilities"][at] == max(detail["probabilities"]) == pytest.approx(found.probability, abs=6e-5)
         expected = codes if build is made else -5.0 + (codes - 10) / 2
-        assert detail.joints == pytest.approx(expected.tolist())
+        assert detail["joints"] == pytest.approx(expected.tolist())
 
 
 def test_a_refused_frame_shows_that_nothing_is_held(make_build: MakeBuild, make_grasp: MakeGrasp) -> None:
@@ -54,17 +60,14 @@ def test_a_refused_frame_shows_that_nothing_is_held(make_build: MakeBuild, make_
     rejection = Rejection(0.01, (0,) * 4, ((0, 6),) * 4, (((0, 255),) * 3,) * 4, 3)
     build = Build(replace(made.manifest, rejection=rejection), made.tables)
     scores = build.scorer.biased_scores([True] * 6, [9, 9, 9])
-    details = Details(build)
     shares = [
-        details(Moment(make_grasp(), None, None, None, scores=scores, refused=refused)).probabilities
+        shown(build, Moment(make_grasp(), None, None, None, scores=scores, refused=refused))["probabilities"]
         for refused in (False, True)
     ]
-    assert shares[0] is not None
-    assert shares[1] is not None
     assert shares[0][-1] == 0.0
     assert shares[1][-1] == max(shares[1]) > 0.7
 
 
 def test_before_anything_was_read_nothing_is_claimed(make_build: MakeBuild, make_grasp: MakeGrasp) -> None:
-    detail = Details(make_build())(Moment(make_grasp(), None, None, None))
-    assert (detail.closed, detail.joints, detail.probabilities) == ("000000", None, None)
+    detail = shown(make_build(), Moment(make_grasp(), None, None, None))
+    assert (detail["closed"], detail["joints"], detail["probabilities"]) == ("000000", None, None)

@@ -64,7 +64,7 @@ def test_what_the_build_makes_of_a_collection_stands_beside_its_labels(
         thread.start()
         try:
             assert page._scanned.wait(60)
-            first = page._index.first_us
+            first = page._first_us
             assert first is not None
             for number, row in enumerate(rows):
                 page._take({"do": "seek", "value": first + number * HELD_US + 900_000})

@@ -15,16 +15,16 @@ from thenar.compiler.firmware.classifier import LAG_US, Library
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import Predictions, Probes, lost_inputs
 from thenar.compiler.firmware.sensors import Sensor, sensors_of
+from thenar.compiler.firmware.softmax import Softmax
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Rejection, Threshold
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.terms.grid import Grid
-from thenar.runtime.model.terms.line import Slope
+from thenar.runtime.model.terms.line import Line
 from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.softmax import Softmax
 
 from ....conftest import tool
 from ....tables import code_of, describe, grid_code
@@ -63,7 +63,7 @@ def test_every_score_is_python_s_with_inputs_missing_too() -> None:
 
 def with_slopes(tables: IntegerTables) -> IntegerTables:
     row = np.arange(-3, tables.n_classes - 3, dtype=np.int8)
-    return tables.changed(further=(Slope(1, 20, 220, 0, row), Slope(2, 3, 50, 2, -row), Slope(3, 9, 250, -3, row)))
+    return tables.changed(further=(Line(1, 20, 220, row, 0), Line(2, 3, 50, -row, 2), Line(3, 9, 250, row, -3)))
 
 
 def with_pairs(tables: IntegerTables) -> IntegerTables:

@@ -5,7 +5,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from mpmath import exp, mpf
 
-from thenar.runtime.softmax import Softmax
+from thenar.compiler.firmware.softmax import Softmax
 
 SCORES = st.lists(st.integers(-32767, 32767), min_size=2, max_size=40)
 
