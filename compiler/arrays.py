@@ -116,3 +116,17 @@ def otsu(values: NDArray[np.float64]) -> float:
     between = (sums[-1] * below - sums[:-1] * total) ** 2 / (below * (total - below))
     best = int(np.argmax(between))
     return float(found[best] / 2 + found[best + 1] / 2)
+
+
+# What was measured is of use for so many seconds, or of its usual intervals.
+_AGE_S, _INTERVALS = 0.5, 10
+
+
+def latest(times: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return which of the ascending `times` (n,) in seconds is the last up to each time in `at` (m,).
+
+    It is -1 if there is none, or none for half a second and ten times the usual interval.
+    """
+    rows = np.searchsorted(times, at, "right") - 1
+    age = max(_AGE_S, _INTERVALS * float(np.median(np.diff(times)))) if len(times) > 1 else np.inf
+    return np.where((rows >= 0) & (at - times[rows] <= age), rows, -1)

@@ -186,6 +186,11 @@ def natural_key(text: str) -> tuple[list[tuple[int, str]], str]:
     return [(len(part.lstrip("0")), part.lstrip("0")) if odd % 2 else (-1, part) for odd, part in parts], text
 
 
+def unpadded(text: str) -> str:
+    """Return a whole number without leading zeros, another text as it is."""
+    return text.lstrip("0") or "0" if text.isdecimal() else text
+
+
 TimeUnit = Literal["s", "ms", "us", "ns"]
 # Units of time by the words that name them, and the smallest step between two frames for each: frames come 2 to 2000
 # times a second.
@@ -195,6 +200,8 @@ UNITS: dict[TimeUnit, tuple[set[str], float, float]] = {
     "us": ({"us", "usec", "µs", "μs", "micro", "micros", "microsecond", "microseconds"}, 500.0, 5e5),
     "ns": ({"ns", "nsec", "nano", "nanos", "nanosecond", "nanoseconds"}, 5e5, 5e8),
 }
+
+PER_SECOND: dict[TimeUnit, float] = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
 def unit_of_time(name: str, time: NDArray[np.float64]) -> TimeUnit | None:

@@ -1,4 +1,4 @@
-"""Tables of other programs: spreadsheets, Parquet, HDF5, MATLAB and npz files, read by their libraries.
+"""Tables of other programs: spreadsheets, Parquet, HDF5, MATLAB, npz, C3D and ROS bags, read by their libraries.
 
 They are read in a process with limits on memory and time, and returned as npz: so a file that claims a terabyte, that
 crashes a library or that never ends, ends in an error message. The process ends with the one that started it, and
@@ -11,12 +11,13 @@ import resource
 import signal
 import subprocess
 import sys
+import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from numpy.dtypes import StringDType
@@ -28,6 +29,7 @@ from thenar.runtime.names import list_names, shortened
 
 from ..arrays import AnyArray
 from . import COLUMNS, LARGEST, ROWS, TableError
+from .bags import is_folder, read_bag
 from .cells import preface
 
 # Bytes of memory that reading may take in addition to the libraries: a constant, and a factor per byte of the file.
@@ -43,12 +45,21 @@ _REFUSED = 3
 _PR_SET_PDEATHSIG = 1
 
 Columns = dict[str, AnyArray]
-# The columns of a table, the numbers of its rows, and how many rows precede its header.
-Foreign = tuple[Columns, NDArray[np.int64], int]
+
+
+class Foreign(NamedTuple):
+    """A table: its columns, text or numbers, the numbers of its rows for the user, how many rows precede its header,
+    and sentences on what was left out.
+    """
+
+    columns: Columns
+    rows: NDArray[np.int64]
+    skip: int
+    notes: tuple[str, ...]
 
 
 def read_foreign(paths: Sequence[Path], skip: int | None = 0) -> Iterator[Foreign]:
-    """Yield the columns of foreign tables, text or numbers, the numbers of their rows for the user, and `skip`.
+    """Yield foreign tables.
 
     paths  tables of one kind, read in one process
     skip   how many rows of a spreadsheet precede its header; None: find it
@@ -57,8 +68,7 @@ def read_foreign(paths: Sequence[Path], skip: int | None = 0) -> Iterator[Foreig
     """
     size = 0
     for path in paths:
-        with open_file(path, TableError) as file:
-            size += (length := os.fstat(file.fileno()).st_size)
+        size += (length := size_of(path))
         if length > LARGEST:
             raise TableError(f"{path.name} is larger than {LARGEST} bytes, the most that is read of a table")
     with TemporaryFile() as made:
@@ -75,11 +85,20 @@ def read_foreign(paths: Sequence[Path], skip: int | None = 0) -> Iterator[Foreig
         arrays: Mapping[str, AnyArray] = np.load(made) if os.fstat(made.fileno()).st_size else {}
         count = len([name for name in arrays if name.endswith(".rows")])
         for number in range(count):
-            names, rows, skipped = (arrays[f"{number}.{name}"] for name in ("names", "rows", "skip"))
+            names, rows, skipped, notes = (arrays[f"{number}.{name}"] for name in ("names", "rows", "skip", "notes"))
             columns = {str(name): arrays[f"{number}.{place}"] for place, name in enumerate(names)}
-            yield columns, rows.astype(np.int64), int(skipped.astype(np.int64)[0])
+            yield Foreign(columns, rows.astype(np.int64), int(skipped.astype(np.int64)[0]), tuple(map(str, notes)))
     if refusal:
         raise TableError(f"{paths[count].name}: {refusal}")
+
+
+def size_of(path: Path) -> int:
+    """Return the bytes of a file, or of those in a folder."""
+    sizes = []
+    for each in sorted(path.iterdir()) if path.is_dir() else [path]:
+        with open_file(each, TableError) as file:
+            sizes.append(os.fstat(file.fileno()).st_size)
+    return sum(sizes)
 
 
 def _run(paths: Sequence[Path], skip: int | None, seconds: int, made: IO[bytes]) -> str:
@@ -135,7 +154,7 @@ def _spreadsheet(path: Path, skip: int | None) -> tuple[Columns, Sequence[int], 
     return columns, [row + 1 for row in body], skip
 
 
-def _parquet(path: Path) -> Columns:
+def _parquet(path: Path, _: list[str]) -> Columns:
     import pyarrow
     from pyarrow import parquet
 
@@ -154,7 +173,7 @@ def _parquet(path: Path) -> Columns:
     return columns
 
 
-def _hdf5(path: Path) -> Columns:
+def _hdf5(path: Path, _: list[str]) -> Columns:
     import h5py
 
     found: Columns = {}
@@ -174,34 +193,43 @@ def _hdf5(path: Path) -> Columns:
     return _even(found)
 
 
-def _matlab(path: Path) -> Columns:
-    from scipy.io import loadmat
+def _matlab(path: Path, notes: list[str]) -> Columns:
+    from scipy.io import loadmat, whosmat
 
     try:
         found = loadmat(path, squeeze_me=False, chars_as_strings=True)
     except NotImplementedError:
         raise TableError("it is of MATLAB 7.3: save it with the option -v7") from None
-    return _even(
-        {
-            name: array
-            for name, value in found.items()
-            if not name.startswith("__")
-            for name, array in _fields(name, value)
-        }
-    )
+    named = (variable for name, value in found.items() if name[:2] != "__" for variable in _variables(name, value))
+    variables: dict[str, AnyArray] = {}
+    for name, value in named:
+        if name in variables:
+            raise TableError(f"two variables or fields are called {shortened(repr(name))}: rename one")
+        variables[name] = value
+    if not variables:
+        seen = [f"{name} ({kind} {_shape(shape)})" for name, shape, kind in whosmat(path)]
+        raise TableError(f"it holds no arrays of numbers or text: it holds {list_names(seen) or 'nothing'}")
+    frames = {name for name, value in variables.items() if value.dtype == object and any(map(_is_frames, value.flat))}
+    if frames:
+        return _of_cells(variables, frames, notes)
+    for name, value in variables.items():
+        if value.dtype == object:
+            variables[name] = _array([_cell(each) for each in value.flat])
+    return _even(variables)
 
 
-def _fields(name: str, value: Any) -> Iterator[tuple[str, AnyArray]]:
-    """Yield the columns in a MATLAB variable: an array, a cell array, or a structure of them."""
+def _variables(name: str, value: Any) -> Iterator[tuple[str, AnyArray]]:
+    """Yield the arrays and cell arrays in a MATLAB variable; the fields of structures, of several as cell arrays."""
     if not isinstance(value, np.ndarray):
         raise TableError(f"variable {shortened(repr(name))} is not an array: save each column of a table as an array")
-    if value.dtype.names and value.size == 1:
-        for field in value.dtype.names:
-            yield from _fields(field, value.ravel()[0][field])
-    elif value.dtype == object:
-        yield name, _array([_cell(each) for each in value.ravel()])
-    elif value.dtype.kind in "biufU":
+    for field in value.dtype.names or ():
+        yield from _variables(field, value[field] if value.size > 1 else value.ravel()[0][field])
+    if value.dtype == object or value.dtype.kind in "biufU":
         yield name, value
+
+
+def _is_frames(cell: Any) -> bool:
+    return isinstance(cell, np.ndarray) and cell.size > 1 and cell.ndim == 2 and cell.dtype.kind in "biuf"
 
 
 def _cell(value: Any) -> object:
@@ -209,7 +237,58 @@ def _cell(value: Any) -> object:
     return "" if not array.size else array.ravel()[0].item() if array.size == 1 else str(value)
 
 
-def _npz(path: Path) -> Columns:
+def _shape(shape: Sequence[int]) -> str:
+    return "x".join(map(str, shape))
+
+
+def _of_cells(variables: Mapping[str, AnyArray], frames: Collection[str], notes: list[str]) -> Columns:
+    """Return the columns of cell arrays `frames`, whose cells hold the frames of a trial each, and of other variables
+    with a value for each cell.
+    """
+    seen = list_names([f"{name} ({_shape(value.shape)})" for name, value in variables.items()])
+    stacked = {name: _stacked(name, variables[name]) for name in variables if name in frames}
+    (name, (_, lengths)), *others = stacked.items()
+    shape = variables[name].shape
+    for other, (_, its) in others:
+        if variables[other].shape != shape:
+            raise TableError(f"its cell arrays have unequal sizes: it holds {seen}")
+        if its != lengths:
+            cell = next(cell for cell, length in enumerate(lengths) if length != its[cell])
+            unequal = f"{lengths[cell]} frames in {name!r}, {its[cell]} in {other!r}"
+            raise TableError(f"cell {cell + 1} of its cell arrays has {shortened(unequal)}: it holds {seen}")
+    columns: Columns = {"trial": np.repeat(np.arange(1, len(lengths) + 1), lengths)}
+    if 1 not in shape:
+        for name, place in zip(("row", "column"), np.indices(shape), strict=False):
+            columns[name] = np.repeat(place.ravel() + 1, lengths)
+    for name, value in variables.items():
+        if name in frames:
+            _add(columns, name, stacked[name][0])
+            continue
+        try:
+            values = np.broadcast_to(value.reshape(shape) if value.size == len(lengths) else value, shape)
+        except ValueError:
+            notes.append(f"variable left out, of another size than the cells: {name} ({_shape(value.shape)})")
+            continue
+        columns[name] = np.repeat(_array([_cell(cell) for cell in values.flat]), lengths)
+    return columns
+
+
+def _stacked(name: str, cells: AnyArray) -> tuple[AnyArray, list[int]]:
+    """Return the frames (n, k) in all `cells`, one below the other, and how many are in each.
+
+    They are the rows of a cell, but its columns if the cells are equally high and not equally wide.
+    """
+    parts = [np.asarray(cell) for cell in cells.flat]
+    filled = [part for part in parts if part.size]
+    if len({part.shape[-1] for part in filled}) > 1:
+        filled, parts = [part.T for part in filled], [part.T for part in parts]
+    if len({part.shape[1:] for part in filled}) > 1 or any(part.dtype.kind not in "biuf" for part in filled):
+        shown = list_names([_shape(np.shape(cell)) for cell in cells.flat])
+        raise TableError(f"the cells of {shortened(repr(name))} are not trials of the same columns: {shown}")
+    return np.concatenate(filled), [len(part) if part.size else 0 for part in parts]
+
+
+def _npz(path: Path, _: list[str]) -> Columns:
     found: Columns = {}
     with path.open("rb") as file, np.lib.npyio.NpzFile(file) as arrays:
         for name in arrays.files:
@@ -229,6 +308,36 @@ def _npz(path: Path) -> Columns:
     return _even(found)
 
 
+def _c3d(path: Path, _: list[str]) -> Columns:
+    """Read a column for each coordinate of a point, and each analog channel: its last sample in a frame of the points,
+    or all samples if there are no points.
+    """
+    import c3d
+
+    with path.open("rb") as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.filterwarnings("error", "reached end of file")
+        reader = c3d.Reader(file)
+        frames = list(reader.read_frames())
+        rate, samples = reader.point_rate, reader.analog_per_frame
+        labels = {kind: reader.get(f"{kind}:LABELS") for kind in ("POINT", "ANALOG")}
+    names = {kind: [label.strip() for label in found.string_array] if found else [] for kind, found in labels.items()}
+    if not sum(points.size + analog.size for _, points, analog in frames):
+        shown = [list_names(names[kind]) or "none" for kind in ("POINT", "ANALOG")]
+        raise TableError(f"it holds no frames, of points {shown[0]} and analog channels {shown[1]}")
+    points = np.stack([points for _, points, _ in frames])
+    analog = np.concatenate([channels.T[-1:] if points.size else channels.T for _, _, channels in frames])
+    at = np.array([number - 1.0 for number, _, _ in frames])
+    columns: Columns = {"time_s": (at if points.size else (at[:, None] + np.arange(samples) / samples).ravel()) / rate}
+    for number, name in enumerate([*names["POINT"], *[""] * points.shape[1]][: points.shape[1]], start=1):
+        valid = points[:, number - 1, 3] >= 0
+        for axis, values in zip("xyz", points[:, number - 1].T, strict=False):
+            _add(columns, f"{name or f'point {number}'}.{axis}", np.where(valid, values, np.nan))
+    for number, name in enumerate([*names["ANALOG"], *[""] * analog.shape[1]][: analog.shape[1]], start=1):
+        _add(columns, name or f"analog {number}", analog[:, number - 1])
+    return columns
+
+
 def _even(arrays: Mapping[str, AnyArray]) -> Columns:
     """Return the arrays as columns; those with one element are left out if others have more."""
     columns: Columns = {}
@@ -238,7 +347,9 @@ def _even(arrays: Mapping[str, AnyArray]) -> Columns:
     if len(lengths) > 1:
         del lengths[1]
     if len(lengths) > 1:
-        raise TableError(f"its arrays have unequal lengths, {list_names(list(map(str, sorted(lengths))))}")
+        seen = list_names([f"{name} ({_shape(array.shape)})" for name, array in arrays.items()])
+        shown = list_names(list(map(str, sorted(lengths))))
+        raise TableError(f"its arrays have unequal lengths, {shown}: it holds {seen}")
     return {name: column for name, column in columns.items() if len(column) in lengths}
 
 
@@ -277,12 +388,14 @@ def _check(rows: int, columns: int) -> None:
 
 
 # By suffix: the kind of file, its package, and its reader, None for spreadsheets, whose table may begin anywhere.
-READERS: dict[str, tuple[str, str, Callable[[Path], Columns] | None]] = {
+READERS: dict[str, tuple[str, str, Callable[[Path, list[str]], Columns] | None]] = {
     **dict.fromkeys((".xlsx", ".xls", ".ods"), ("a spreadsheet", "python_calamine", None)),
     ".parquet": ("Parquet", "pyarrow.parquet", _parquet),
     **dict.fromkeys((".h5", ".hdf5"), ("HDF5", "h5py", _hdf5)),
     ".npz": ("npz", "numpy", _npz),
     ".mat": ("a MATLAB file", "scipy.io", _matlab),
+    ".c3d": ("C3D", "c3d", _c3d),
+    **dict.fromkeys((".bag", ".db3", ".mcap"), ("a ROS bag", "rosbags.highlevel", read_bag)),
 }
 
 
@@ -323,20 +436,21 @@ def main(skip: str, parent: str, *sources: str) -> int:
     # What a library prints is no part of the npz.
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    what, package, read = READERS[paths[0].suffix.lower()]
+    what, package, read = READERS[".db3" if is_folder(paths[0]) else paths[0].suffix.lower()]
     try:
         import_module(package)
     except ModuleNotFoundError as lack:
         print(f"reading {what}: {missing(lack.name or package)}")
         return _REFUSED
-    _limit(sum(path.stat().st_size for path in paths))
+    _limit(sum(map(size_of, paths)))
     made: dict[str, AnyArray] = {}
     code = 0
     for number, path in enumerate(paths):
+        notes: list[str] = []
         try:
             if read is None:
                 columns, rows, skipped = _spreadsheet(path, None if skip == "None" else int(skip))
-            elif columns := read(path):
+            elif columns := read(path, notes):
                 rows, skipped = range(1, len(next(iter(columns.values()))) + 1), 0
             else:
                 raise TableError("it holds no columns of numbers or text")
@@ -347,7 +461,12 @@ def main(skip: str, parent: str, *sources: str) -> int:
             print(reason if isinstance(reason, TableError) else cannot)
             code = _REFUSED
             break
-        described = {"names": np.array(list(columns)), "rows": np.array(rows, np.int64), "skip": np.array([skipped])}
+        described = {
+            "names": np.array(list(columns)),
+            "rows": np.array(rows, np.int64),
+            "skip": np.array([skipped]),
+            "notes": np.array(notes, np.str_),
+        }
         numbered = {str(place): column for place, column in enumerate(columns.values())}
         made |= {f"{number}.{name}": array for name, array in (described | numbered).items()}
     np.savez(output, **made)  # type: ignore[arg-type]

@@ -1,5 +1,6 @@
 """Read the columns of a table as rows of trials: labels, switches and joints, with missing cells filled or left out."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,7 +18,7 @@ from thenar.runtime.recording.reader import Oddity
 
 from ..arrays import groups, otsu
 from . import RecordingError, TableError, check_room, list_rows
-from .cells import Parsed, Value, bits, codes, integers, names, natural_key, numbers, times, unit_of_time
+from .cells import NUMBER, Parsed, Value, bits, codes, integers, names, natural_key, numbers, times, unit_of_time
 from .columns import KEYS, ColumnRoles, Selection
 from .table import Table
 from .taxonomy import plain
@@ -127,9 +128,18 @@ def nothing_held(columns: ColumnRoles, labels: NDArray[np.str_]) -> NDArray[np.b
     if isinstance(types, str) or NONE not in map(plain, types):
         meant.add(NONE)
     found, where = np.unique(labels, return_inverse=True)
-    aliases = dict(zip(found.tolist(), found.tolist(), strict=True)) | columns.labels
-    none = [not meant.isdisjoint(map(plain, (label, aliases[label]))) for label in found.tolist()]
-    return np.array(none, np.bool_)[where]
+    pairs = zip(found.tolist(), meanings(columns, found.tolist()), strict=True)
+    return np.array([not meant.isdisjoint(map(plain, pair)) for pair in pairs], np.bool_)[where]
+
+
+def meanings(columns: ColumnRoles, labels: Sequence[str]) -> list[str]:
+    """Return what the labels are called by `columns`, under which a number is listed without decimals."""
+    return [columns.labels.get(label, columns.labels.get(whole(label), label)) for label in labels]
+
+
+def whole(label: str) -> str:
+    """Return a whole number without its decimals, another label as it is."""
+    return re.sub(r"(?<=\d)\.0+$", "", label) if NUMBER.fullmatch(label) else label
 
 
 def _runs(readings: Readings, none: NDArray[np.bool_], timeless: bool) -> NDArray[np.int64]:

@@ -1,4 +1,4 @@
-"""Read tables of labelled grasps: delimited text, in a format that is detected, and Weka's ARFF.
+"""Read tables of labelled grasps: delimited text, in a format that is detected, OpenSim's files, and Weka's ARFF.
 
 foreign.py reads the tables of other programs. ARFF has numeric and nominal attributes, quoted names and values, and `?`
 for a missing value. It is read here because the reader of scipy loses quotes in nominal values, reports no rows, and is
@@ -15,8 +15,8 @@ import zlib
 from array import array
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from itertools import chain, islice
+from dataclasses import dataclass, field, replace
+from itertools import chain, islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -30,9 +30,10 @@ from thenar.runtime.names import shortened
 
 from ..text import text_of
 from . import COLUMNS, LARGEST, LINES, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
+from .bags import is_folder
 from .cells import NUMBER, Column, has_names, preface, skipped, unlisted
 from .columns import PLAIN, TextFormat
-from .foreign import READERS, read_foreign
+from .foreign import READERS, read_foreign, size_of
 
 if TYPE_CHECKING:
     from _csv import Reader
@@ -110,7 +111,8 @@ class Table:
 
     `rows` are the rows' numbers as the user sees them: the line in a CSV or spreadsheet, counted from 1 elsewhere.
     `size` is the size of its file in bytes. `cells` says that names are written as cells of a spreadsheet; `decimal` is
-    the decimal sign of numbers in text. `skip` is the number of rows of a spreadsheet that precede its header.
+    the decimal sign of numbers in text. `skip` is the number of rows of a spreadsheet that precede its header, `notes`
+    say what was left out. If its trials are segments, `segments` are the keys of a columns.toml about them.
     """
 
     what: str
@@ -120,10 +122,18 @@ class Table:
     cells: bool = False
     decimal: str = "."
     skip: int = 0
+    notes: tuple[str, ...] = ()
+    segments: Mapping[str, str] = field(default_factory=dict)
 
 
 _TEXTS = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz", ".txt.gz")
-SUFFIXES = (*_TEXTS, ".arff", ".arff.gz", *READERS)
+_MOTION = (".mot", ".sto", ".trc")
+SUFFIXES = (*_TEXTS, ".arff", ".arff.gz", *_MOTION, *READERS)
+
+
+def is_table(path: Path) -> bool:
+    """Return whether `path` is a file with the suffix of a table, or the folder of a rosbag2."""
+    return (path.name.lower().endswith(SUFFIXES) and path.is_file()) or is_folder(path)
 
 
 def is_text(path: Path) -> bool:
@@ -147,22 +157,22 @@ def read_tables(paths: Sequence[Path], text: TextFormat = PLAIN) -> Iterator[Tab
     """Yield the tables in `paths`, of one kind, as `read_table` does; an error is one of the first not yielded."""
     for start in range(0, len(paths), _TOGETHER):
         batch = paths[start : start + _TOGETHER]
-        is_foreign = batch[0].name.lower().endswith(tuple(READERS))
+        is_foreign = batch[0].name.lower().endswith(tuple(READERS)) or is_folder(batch[0])
         foreign = read_foreign(batch, text.skip) if is_foreign else None
         for path in batch:
             try:
                 if foreign is None:
                     table = _read_ours(path, text)
                 else:
-                    read, rows, skip = next(foreign)
+                    read, rows, skip, notes = next(foreign)
                     check_names("column", read)
-                    table = Table(path.name, read, rows, skip=skip)
+                    table = Table(path.name, read, rows, skip=skip, notes=notes)
                 columns = unlisted(table.what, table.columns, table.rows)
             except RecordingError as reason:
                 raise TableError(f"{path.name}: {reason}") from reason
             if not len(table.rows):
                 raise TableError(f"{path.name} has no rows")
-            yield replace(table, columns=columns, size=path.stat().st_size)
+            yield replace(table, columns=columns, size=size_of(path))
 
 
 def _read_ours(path: Path, text: TextFormat) -> Table:
@@ -174,6 +184,8 @@ def _read_ours(path: Path, text: TextFormat) -> Table:
     if name.endswith((".arff", ".arff.gz")):
         with open_lines(path) as lines:
             return read_arff(path.name, lines)
+    if name.endswith(_MOTION):
+        return _read_motion(path)
     raise TableError(f"{path.name}: a table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
 
 
@@ -224,6 +236,45 @@ def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str)
     except csv.Error as reason:
         raise TableError(f"{what} row {skip + reader.line_num}: {reason}") from reason
     return Table(what, columns, np.frombuffer(numbers, np.int64), cells=True, decimal=text.decimal)
+
+
+# Lines in which the header of a file of OpenSim ends.
+_MOTION_HEADER = 1000
+
+
+def _read_motion(path: Path) -> Table:
+    """Return the table in a file of OpenSim: in a .trc its names stand in two lines, of markers and of coordinates; in
+    others they follow the line endheader, and the vectors in cells are lists.
+    """
+    is_trc = path.suffix.lower() == ".trc"
+    top: list[str] = []
+    with open_lines(path) as lines:
+        for line in islice(lines, 3 if is_trc else _MOTION_HEADER):
+            top.append(line)
+            if not is_trc and line.strip().lower() == "endheader":
+                break
+        if not (top and (top[0].startswith("PathFileType") if is_trc else line.strip().lower() == "endheader")):
+            lacks = "does not begin with PathFileType" if is_trc else "has no line endheader"
+            first = shortened(repr(top[0].strip())) if top else "nothing"
+            raise TableError(f"{path.name} {lacks}, as files of OpenSim do: its first line is {first}")
+        names = next(lines, "")
+        delimiter = "\t" if is_trc or "\t" in names else " "
+        head = [_named_twice(names, next(lines, "")), ""] if is_trc else [names]
+        # The line below the names of a .trc holds nothing but tabs.
+        rows = (line if line.strip() else "" for line in lines)
+        table = _read_csv(path.name, chain(top, head, rows), TextFormat(skip=len(top)), delimiter)
+    vectors = {} if is_trc else {name: cells for name, cells in table.columns.items() if "," in str(cells[:1])}
+    listed = {name: [f"[{cell}]" for cell in cells] for name, cells in vectors.items()}
+    return replace(table, columns={**table.columns, **listed})
+
+
+def _named_twice(markers: str, axes: str) -> str:
+    """Return the line of names that two lines say: thumb.x, thumb.y, thumb.z."""
+    names, marker = [], ""
+    for name, axis in zip_longest(markers.rstrip().split("\t"), axes.rstrip().split("\t"), fillvalue=""):
+        marker, axis = name.strip() or marker, axis.strip().rstrip("0123456789").lower()
+        names.append(f"{marker}.{axis}" if axis else marker)
+    return "\t".join(names) + "\n"
 
 
 def _narrow(what: str, lines: Iterable[str], delimiter: str) -> Iterator[str]:

@@ -130,7 +130,7 @@ def test_an_npz_that_is_no_table_is_refused(
 
 
 def test_another_suffix_is_refused_naming_those_that_are_read(tmp_path: Path) -> None:
-    with pytest.raises(TableError, match=r"table\.doc: a table ends in \.csv, .* or \.mat"):
+    with pytest.raises(TableError, match=r"table\.doc: a table ends in \.csv, .*\.mat, .* or \.mcap"):
         read_table(tmp_path / "table.doc")
 
 
