@@ -5,14 +5,13 @@ of the topic that has most; the other topics give the values that they had last.
 """
 
 import os
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from collections.abc import Collection, Iterator
+from dataclasses import fields, is_dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thenar.runtime.files import open_file
 from thenar.runtime.names import LONGEST_NAME, list_names, shortened
@@ -48,27 +47,8 @@ def is_recording(path: Path) -> bool:
     return b"ros" not in content[:32] or any(name.encode() in content for name in ours)
 
 
-@dataclass(slots=True)
-class _Stream:
-    """The messages of one form: which numbers and texts they hold, and of each its nanosecond and these."""
-
-    numbers: list[str]
-    texts: list[str]
-    times: list[int] = field(default_factory=list)
-    values: list[NDArray[np.float64]] = field(default_factory=list)
-    said: list[tuple[str, ...]] = field(default_factory=list)
-
-    @classmethod
-    def of(cls, cells: Mapping[str, float | str]) -> "_Stream":
-        """Return the stream of messages with such cells, without any."""
-        texts = [name for name, cell in cells.items() if isinstance(cell, str)]
-        return cls([name for name in cells if name not in texts], texts)
-
-    def add(self, time: int, cells: Mapping[str, float | str]) -> None:
-        """Add a message."""
-        self.times.append(time)
-        self.values.append(np.array([cells[name] for name in self.numbers], np.float64))
-        self.said.append(tuple(str(cells[name]) for name in self.texts))
+# Messages of one form, which hold numbers and texts of the same names: the nanosecond of each, and these.
+_Stream = list[tuple[int, tuple[float | str, ...]]]
 
 
 def read_bag(path: Path, notes: list[str]) -> dict[str, AnyArray]:
@@ -78,7 +58,7 @@ def read_bag(path: Path, notes: list[str]) -> dict[str, AnyArray]:
 
     if is_recording(path):
         raise TableError("it is a recording of thenar: import it with others of its kind alone, without a pattern")
-    topics: dict[str, dict[frozenset[str], _Stream]] = {}
+    topics: dict[str, dict[tuple[str, ...], _Stream]] = {}
     out: dict[str, str] = {}
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         kinds = {connection.topic: connection.msgtype for connection in reader.connections}
@@ -94,28 +74,36 @@ def read_bag(path: Path, notes: list[str]) -> dict[str, AnyArray]:
             message = reader.deserialize(content, kind)
             cells = dict(islice(_cells(topic.strip("/"), message), _WIDEST + 1))
             forms = topics.setdefault(topic, {})
-            forms.setdefault(frozenset(cells), _Stream.of(cells)).add(time, cells)
+            forms.setdefault(tuple(cells), []).append((time, tuple(cells.values())))
             if why := _left_out(kind, len(cells), forms):
                 out[topic] = why
                 del topics[topic]
     shown = {topic: f"{shortened(topic)} ({kinds[topic]}, {count} messages" for topic, count in counts.items()}
     left = [f"{shown[topic]}: {why})" for topic, why in out.items()]
-    streams = [stream for topic in counts for stream in topics.get(topic, {}).values()]
-    if not any(stream.numbers for stream in streams):
+    streams = [stream for topic in counts for stream in topics.get(topic, {}).items()]
+    numeric = [messages for _, messages in streams if any(isinstance(cell, float) for cell in messages[0][1])]
+    if not numeric:
         seen = list_names(left or [f"{topic})" for topic in shown.values()]) or "nothing"
         raise TableError(f"no topic has numbers to read: it holds {seen}")
     if left:
         notes.append(f"topics left out: {list_names(left)}")
-    return _merged(streams)
+    at = np.array([time for time, _ in max(numeric, key=len)]) / 1e9
+    columns: dict[str, AnyArray] = {"time_s": at}
+    for names, messages in streams:
+        row = latest(np.array([time for time, _ in messages]) / 1e9, at)
+        for name, cells in zip(names, zip(*(cells for _, cells in messages), strict=True), strict=True):
+            columns[name] = np.array(cells, np.str_ if isinstance(cells[0], str) else np.float64)[row]
+            columns[name][row < 0] = "" if isinstance(cells[0], str) else np.nan
+    return columns
 
 
-def _left_out(kind: str, width: int, forms: Mapping[frozenset[str], _Stream]) -> str:
+def _left_out(kind: str, width: int, forms: Collection[tuple[str, ...]]) -> str:
     """Return why messages of a `kind`, the last with so many cells, are left out, "" if they are not."""
     if kind.partition("/")[0] in _SYSTEM:
-        return "on the system itself"
+        return "about ROS itself"
     if not 0 < width <= _WIDEST:
         return f"more than {_WIDEST} numbers in a message" if width else "no numbers or short texts"
-    differ = len(forms) > 1 and sum(map(len, forms)) > len(frozenset().union(*forms))
+    differ = sum(map(len, forms)) > len({name for form in forms for name in form})
     return "the lengths of its arrays differ" if differ or len(forms) > _FORMS else ""
 
 
@@ -128,7 +116,7 @@ def _cells(name: str, value: Any) -> Iterator[tuple[str, float | str]]:
             if part.name in _BESIDE or (inner is joints and isinstance(joints, list)) or part.name.startswith("__"):
                 continue
             if isinstance(joints, list) and isinstance(inner, np.ndarray) and len(inner) == len(joints):
-                inner = dict(zip(joints, inner.tolist(), strict=True))
+                inner = dict(sorted(zip(joints, inner.tolist(), strict=True)))
             yield from _cells(name if part.name == "data" else f"{name}.{part.name}", inner)
     elif isinstance(value, dict):
         yield from ((f"{name}.{joint}", number) for joint, number in value.items())
@@ -139,20 +127,3 @@ def _cells(name: str, value: Any) -> Iterator[tuple[str, float | str]]:
         yield name, float(value)
     elif len(value) <= LONGEST_NAME:
         yield name, value
-
-
-def _merged(streams: list[_Stream]) -> dict[str, AnyArray]:
-    """Return the columns of all streams, in rows at the times of the one that has most."""
-    longest = max((stream for stream in streams if stream.numbers), key=lambda stream: len(stream.times))
-    at = np.sort(np.array(longest.times, np.int64))
-    columns: dict[str, AnyArray] = {"time_s": at / 1e9}
-    for stream in streams:
-        order = np.argsort(times := np.array(stream.times, np.int64), kind="stable")
-        row = latest(times[order] / 1e9, at / 1e9)
-        values = np.stack(stream.values)[order[row]]
-        values[row < 0] = np.nan
-        columns |= dict(zip(stream.numbers, values.T, strict=True))
-        said = np.array(stream.said, np.str_)[order[row]]
-        said[row < 0] = ""
-        columns |= dict(zip(stream.texts, said.T, strict=True))
-    return columns

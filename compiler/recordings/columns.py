@@ -159,7 +159,6 @@ class ColumnRoles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     simulated: str = ""
     switches: tuple[str, ...] = ()
     missing: Literal["refuse", "drop", "keep"] = "refuse"
-    reduce: Literal["none", "middle", "median", "any"] = "none"
     delimiter: str | None = None
     decimal: Literal[".", ","] = "."
     encoding: str = "utf-8"

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from heapq import nsmallest
 from operator import itemgetter
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -98,7 +97,6 @@ def read_cells(
         missing = {name: mask[order] for name, mask in missing.items()}
     warnings += _filled(table, readings, selection, missing, trial_ids)
     micros = _micros(table, columns, readings.time, notes)
-    readings = _reduced(readings, columns.reduce, trial_ids, notes)
     times_us = np.rint(readings.time * micros).astype(np.int64) if micros else np.empty(0, np.int64)
     return readings, times_us, warnings, notes
 
@@ -192,30 +190,6 @@ def _filled(
         f"trial, {strange} with their column's median ({list_rows(rows)}; columns {list_names([*missing])})"
     )
     return [Oddity("filled cells", cells, message, tuple(rows[:SHOWN].tolist()), tuple(missing))]
-
-
-def _reduced(readings: Readings, how: str, trial_ids: NDArray[np.intp], notes: list[str]) -> Readings:
-    """Return one row per trial, computed from its frames; all rows if `how` is "none"."""
-    if how == "none":
-        return readings
-    rows = frame_of_each(trial_ids)
-    reduced = replace(readings, switches=readings.switches[:, :0], joints=readings.joints[:, :0]).kept(rows)
-    notes.append(f"{len(trial_ids)} frames of {len(rows)} trials were reduced to one row a trial ({how})")
-    switches, joints = (_of_trials(values, trial_ids, rows, how) for values in (readings.switches, readings.joints))
-    return replace(reduced, switches=switches, joints=joints)
-
-
-def _of_trials(
-    values: NDArray[np.generic], trial_ids: NDArray[np.intp], rows: NDArray[np.intp], how: str
-) -> NDArray[Any]:
-    """Return the values (m, d) of m trials: of their middle `rows` (m,), or column by column by `how`."""
-    if how == "middle":
-        return values[rows]
-    made = np.empty((len(rows), values.shape[1]), values.dtype, order="F")
-    for number in range(values.shape[1]):
-        frames = frame_of_each(trial_ids, values[:, number], how == "any" and values.dtype == np.bool_)
-        made[:, number] = values[frames, number]
-    return made
 
 
 _MISSING = 'missing (missing = "keep" fills them, "drop" leaves their rows out)'
@@ -440,20 +414,3 @@ def fill(values: NDArray[np.generic], missing: NDArray[np.bool_], trial_ids: NDA
     filled[alone] = present[(len(present) - 1) // 2]
     values[order[gaps]] = filled
     return int(alone.sum())
-
-
-def frame_of_each(
-    trial_ids: NDArray[np.intp], values: NDArray[np.generic] | None = None, largest: bool = False
-) -> NDArray[np.intp]:
-    """Return a row of each of the trials `trial_ids` (n,), in the order of their middle frames.
-
-    It is the middle frame; with `values` (n,) a frame with the lower median of them, for switches the majority, or with
-    the largest.
-    """
-    order = np.argsort(trial_ids, kind="stable")
-    starts = np.flatnonzero(np.diff(trial_ids[order], prepend=-1))
-    sizes = np.diff(starts, append=len(trial_ids))
-    middles = starts + (sizes - 1) // 2
-    by_value = order if values is None else np.lexsort((values, trial_ids))
-    chosen: NDArray[np.intp] = by_value[starts + sizes - 1 if largest else middles]
-    return chosen[np.argsort(order[middles])]

@@ -1,8 +1,6 @@
-"""Read tables of labelled grasps: delimited text, in a format that is detected, OpenSim's files, and Weka's ARFF.
+"""Read tables of labelled grasps: delimited text, in a format that is detected or that a header names.
 
-foreign.py reads the tables of other programs. ARFF has numeric and nominal attributes, quoted names and values, and `?`
-for a missing value. It is read here because the reader of scipy loses quotes in nominal values, reports no rows, and is
-not installed on a board.
+foreign.py reads the tables of other programs.
 """
 
 import codecs
@@ -182,14 +180,13 @@ def _read_ours(path: Path, text: TextFormat) -> Table:
             tabs = name.removesuffix(".gz").endswith(".tsv")
             return _read_csv(path.name, lines, text, text.delimiter or ("\t" if tabs else ","))
     if name.endswith((".arff", ".arff.gz")):
-        with open_lines(path) as lines:
-            return read_arff(path.name, lines)
+        return _read_arff(path)
     if name.endswith(_MOTION):
         return _read_motion(path)
     raise TableError(f"{path.name}: a table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
 
 
-def csv_rows(lines: Iterable[str], delimiter: str, quote: str, *, strict: bool) -> "Reader":
+def csv_rows(lines: Iterable[str], delimiter: str, quote: str, *, strict: bool, escape: str | None = None) -> "Reader":
     """Return a reader of the rows in `lines`. With a blank as `delimiter`, any run of blanks and tabs is one."""
     blanks = delimiter == " "
     return csv.reader(
@@ -198,7 +195,8 @@ def csv_rows(lines: Iterable[str], delimiter: str, quote: str, *, strict: bool) 
         strict=strict,
         quotechar=quote or None,
         quoting=csv.QUOTE_MINIMAL if quote else csv.QUOTE_NONE,
-        skipinitialspace=blanks,
+        escapechar=escape,
+        skipinitialspace=blanks or escape is not None,
     )
 
 
@@ -210,32 +208,66 @@ def named_by_comment(header: list[str], delimiter: str) -> list[str]:
     return [first[1:].strip(), *header[1:]] if first[:1] in ("#", "%") and first[1:].strip() else header
 
 
-def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str) -> Table:
-    skip = text.skip or 0
-    reader = csv_rows(_narrow(what, islice(lines, skip, None), delimiter), delimiter, text.quote, strict=True)
+def _read_csv(
+    what: str, lines: Iterator[str], text: TextFormat, delimiter: str, top: int = 0, names: Sequence[str] = ()
+) -> Table:
+    """Return the table in `lines`, after `top` others; if these held the `names`, cells may have backslash escapes."""
+    top += text.skip or 0
+    rows = _narrow(what, islice(lines, text.skip, None), delimiter)
+    reader = csv_rows(rows, delimiter, text.quote, strict=True, escape="\\" if names else None)
     numbers = array("q")
 
     def checked(rows: Iterable[list[str]]) -> Iterator[list[str]]:
         for row in rows:
-            numbers.append(skip + reader.line_num)
-            if len(row) > len(names) and not any(row[len(names) :]):
-                del row[len(names) :]
-            if len(row) != len(names):
-                top = "header" if text.header else "first row"
-                raise TableError(f"{what} row {numbers[-1]} has {len(row)} cells, its {top} {len(names)}")
+            numbers.append(top + reader.line_num)
+            if len(row) > len(columns) and not any(row[len(columns) :]):
+                del row[len(columns) :]
+            if len(row) != len(columns):
+                head = "header" if text.header else "first row"
+                raise TableError(f"{what} row {numbers[-1]} has {len(row)} cells, its {head} {len(columns)}")
             yield row
 
     try:
         filled: Iterator[list[str]] = filter(None, reader)
-        first: list[str] = next(filled, [])
+        first: list[str] = [] if names else next(filled, [])
         if text.header:
             first = named_by_comment(first, delimiter)
-        names = [text_of(name.strip()) if text.header else "" for name in first]
-        names = [name or f"column {number}" for number, name in enumerate(names, start=1)]
-        columns = _columns(what, names, checked(filled if text.header or not first else chain([first], filled)))
+        columns = names or [text_of(name.strip()) if text.header else "" for name in first]
+        columns = [name or f"column {number}" for number, name in enumerate(columns, start=1)]
+        body = checked(filled if text.header or not first else chain([first], filled))
+        read = _columns(what, columns, body)
     except csv.Error as reason:
-        raise TableError(f"{what} row {skip + reader.line_num}: {reason}") from reason
-    return Table(what, columns, np.frombuffer(numbers, np.int64), cells=True, decimal=text.decimal)
+        raise TableError(f"{what} row {top + reader.line_num}: {reason}") from reason
+    return Table(what, read, np.frombuffer(numbers, np.int64), cells=not names, decimal=text.decimal)
+
+
+# The name in a line of ARFF, in quotes with backslash escapes or bare. All quantifiers are possessive.
+_ATTRIBUTE = re.compile(
+    r"""\s*+@attribute\s++(?:'((?:\\.|[^'\\])*+)'|"((?:\\.|[^"\\])*+)"|([^\s'"]++))\s""", re.IGNORECASE
+)
+
+
+def _read_arff(path: Path) -> Table:
+    """Return the table in a file of Weka: names of attributes, the line @data, and rows with ' as quote."""
+    names: list[str] = []
+    with open_lines(path) as lines:
+        for top, line in enumerate(lines, start=1):
+            word = line.strip().lower()
+            if word == "@data":
+                break
+            if match := _ATTRIBUTE.match(line):
+                names.append(re.sub(r"\\(.)", r"\1", next(filter(None, match.groups()), "")))
+            elif word and not word.startswith(("%", "@relation")):
+                shown = shortened(repr(line.strip()))
+                raise TableError(
+                    f"{path.name} line {top}: expected @attribute, a name and a type, or @data, not {shown}"
+                )
+        else:
+            raise TableError(f"{path.name} is not ARFF: it has no line @data")
+        if not 0 < len(names) <= COLUMNS:
+            raise TableError(f"{path.name} has {len(names)} attributes, not 1 to {COLUMNS}")
+        rows = ("" if line.startswith("%") else line for line in lines)
+        return _read_csv(path.name, rows, TextFormat(quote="'"), ",", top, names)
 
 
 # Lines in which the header of a file of OpenSim ends.
@@ -246,35 +278,28 @@ def _read_motion(path: Path) -> Table:
     """Return the table in a file of OpenSim: in a .trc its names stand in two lines, of markers and of coordinates; in
     others they follow the line endheader, and the vectors in cells are lists.
     """
-    is_trc = path.suffix.lower() == ".trc"
-    top: list[str] = []
+    is_trc, names = path.suffix.lower() == ".trc", list[str]()
     with open_lines(path) as lines:
-        for line in islice(lines, 3 if is_trc else _MOTION_HEADER):
-            top.append(line)
-            if not is_trc and line.strip().lower() == "endheader":
+        top = line = next(lines, "")
+        for number, line in enumerate(chain([top], lines), start=1):
+            if number == _MOTION_HEADER or (number == 3 if is_trc else line.strip().lower() == "endheader"):
                 break
-        if not (top and (top[0].startswith("PathFileType") if is_trc else line.strip().lower() == "endheader")):
+        if not (top.startswith("PathFileType") if is_trc else line.strip().lower() == "endheader"):
             lacks = "does not begin with PathFileType" if is_trc else "has no line endheader"
-            first = shortened(repr(top[0].strip())) if top else "nothing"
-            raise TableError(f"{path.name} {lacks}, as files of OpenSim do: its first line is {first}")
-        names = next(lines, "")
-        delimiter = "\t" if is_trc or "\t" in names else " "
-        head = [_named_twice(names, next(lines, "")), ""] if is_trc else [names]
+            raise TableError(
+                f"{path.name} {lacks}, as files of OpenSim do: it begins with {shortened(repr(top.strip()))}"
+            )
+        if is_trc:
+            marker = ""
+            for name, axis in zip_longest(*(next(lines, "").rstrip().split("\t") for _ in "  "), fillvalue=""):
+                marker, axis = name.strip() or marker, axis.strip().rstrip("0123456789").lower()
+                names.append(f"{marker}.{axis}" if axis else marker)
         # The line below the names of a .trc holds nothing but tabs.
         rows = (line if line.strip() else "" for line in lines)
-        table = _read_csv(path.name, chain(top, head, rows), TextFormat(skip=len(top)), delimiter)
+        table = _read_csv(path.name, rows, PLAIN, "\t", number + 2 * is_trc, names)
     vectors = {} if is_trc else {name: cells for name, cells in table.columns.items() if "," in str(cells[:1])}
     listed = {name: [f"[{cell}]" for cell in cells] for name, cells in vectors.items()}
     return replace(table, columns={**table.columns, **listed})
-
-
-def _named_twice(markers: str, axes: str) -> str:
-    """Return the line of names that two lines say: thumb.x, thumb.y, thumb.z."""
-    names, marker = [], ""
-    for name, axis in zip_longest(markers.rstrip().split("\t"), axes.rstrip().split("\t"), fillvalue=""):
-        marker, axis = name.strip() or marker, axis.strip().rstrip("0123456789").lower()
-        names.append(f"{marker}.{axis}" if axis else marker)
-    return "\t".join(names) + "\n"
 
 
 def _narrow(what: str, lines: Iterable[str], delimiter: str) -> Iterator[str]:
@@ -283,93 +308,6 @@ def _narrow(what: str, lines: Iterable[str], delimiter: str) -> Iterator[str]:
         if line.count(delimiter) >= COLUMNS:
             raise TableError(f"{what} has more than {COLUMNS} columns, the most that are read of a table")
         yield line
-
-
-# A value: quoted, with backslash escapes, or a word; an unclosed quote takes the rest of the line. Commas and blanks
-# separate values. All quantifiers are possessive, so the time is linear.
-_QUOTED = r"""'(?:\\.|[^'\\])*+'|"(?:\\.|[^"\\])*+\""""
-_VALUE = re.compile(rf"""{_QUOTED}|['"].*+|[^\s,{{}}'"%]++""")
-_CLOSED = re.compile(_QUOTED)
-_ATTRIBUTE = re.compile(rf"@attribute\s++({_VALUE.pattern})\s++(.+)", re.IGNORECASE)
-_NUMERIC = ("numeric", "real", "integer")
-
-# The possible values of an attribute; None for numbers.
-_Kinds = dict[str, frozenset[str] | None]
-
-
-def read_arff(what: str, text: Iterable[str]) -> Table:
-    """Return the table in the lines `text` of an ARFF file that messages call `what`.
-
-    Its rows are counted from the first after @data; numbers stay text for the importer to parse. Raises TableError
-    naming the faulty line or row.
-    """
-    lines = enumerate(text, start=1)
-    kinds = _header(what, lines)
-    data = (line.strip() for _, line in lines)
-    numbered = enumerate((line for line in data if line and not line.startswith("%")), start=1)
-    columns = _columns(what, kinds, (_values(f"{what} row {row}", line, len(kinds)) for row, line in numbered))
-    for name, values in kinds.items():
-        for number, cell in enumerate(columns[name] if values else (), start=1):
-            if cell != "?" and cell not in (values or ()):
-                shown = f"{shortened(repr(cell))} is not among the values of attribute {shortened(repr(name))}"
-                raise TableError(f"{what} row {number}: {shown}")
-    return Table(what, columns, np.arange(1, len(next(iter(columns.values()), ())) + 1))
-
-
-def _header(what: str, lines: Iterator[tuple[int, str]]) -> _Kinds:
-    """Read up to @data."""
-    kinds: _Kinds = {}
-    listed = 0
-    for number, line in lines:
-        word = line.strip().split(maxsplit=1)[0].lower() if line.strip() else "%"
-        if word == "@data":
-            return kinds
-        if word == "@attribute":
-            name, kind = _attribute(f"{what} line {number}", line.strip())
-            if name in kinds:
-                raise TableError(f"{what} line {number}: attribute {shortened(repr(name))} occurs twice")
-            kinds[name] = kind
-            listed += len(kind or ())
-            if len(kinds) > COLUMNS or listed > ROWS:
-                raise TableError(f"{what} line {number}: more than {COLUMNS} attributes, or {ROWS} values of them")
-        elif word != "@relation" and not word.startswith("%"):
-            shown = shortened(repr(word))
-            raise TableError(f"{what} line {number}: expected @attribute or @data, not {shown}")
-    raise TableError(f"{what} is not ARFF: it has no line @data")
-
-
-def _attribute(where: str, line: str) -> tuple[str, frozenset[str] | None]:
-    match = _ATTRIBUTE.match(line)
-    if match is None:
-        raise TableError(f"{where}: an attribute has a name and a type: {shortened(repr(line))}")
-    name, kind = _unquote(where, match[1]), match[2].strip()
-    if kind.split(maxsplit=1)[0].lower() in _NUMERIC:
-        return name, None
-    if not kind.startswith("{") or "}" not in kind:
-        shown = f"attribute {shortened(repr(name))} is {shortened(kind)}"
-        raise TableError(f"{where}: {shown}; only numeric and nominal ones are read")
-    return name, frozenset(_unquote(where, value) for value in _VALUE.findall(kind))
-
-
-def _values(where: str, line: str, width: int) -> list[str]:
-    if not any(sign in line for sign in "'\"{}%"):
-        values = line.replace(",", " ").split()
-    elif _VALUE.sub("", line).strip(", \t"):
-        sparse = ": sparse rows are not read" if line.startswith("{") else ""
-        raise TableError(f"{where} cannot be read as values{sparse}: {shortened(repr(line))}")
-    else:
-        values = [_unquote(where, value) for value in _VALUE.findall(line)]
-    if len(values) != width:
-        raise TableError(f"{where} has {len(values)} values, the header {width} attributes")
-    return values
-
-
-def _unquote(where: str, value: str) -> str:
-    if value[0] not in "'\"":
-        return value
-    if not _CLOSED.fullmatch(value):
-        raise TableError(f"{where} cannot be read as values: nothing closes the quote of {shortened(repr(value))}")
-    return re.sub(r"\\(.)", r"\1", value[1:-1])
 
 
 # Lines examined, and cells of them.
