@@ -4,7 +4,6 @@ Read through `rosbags`: ROS 1 (.bag), and rosbag2 as .mcap, as .db3 or as the fo
 of the topic that has most; the other topics give the values that they had last.
 """
 
-import os
 from collections.abc import Collection, Iterator
 from dataclasses import fields, is_dataclass
 from itertools import islice
@@ -17,7 +16,7 @@ from thenar.runtime.files import open_file
 from thenar.runtime.names import LONGEST_NAME, list_names, shortened
 from thenar.runtime.recording.layout import CHANNELS, WRITER
 
-from ..arrays import AnyArray, latest
+from ..arrays import AnyArray, measured
 from . import TableError
 from .cells import natural_key
 
@@ -26,8 +25,6 @@ _WIDEST, _FORMS = 4096, 16
 # Packages of messages on the system itself, and fields that describe the others of a message.
 _SYSTEM = {"rcl_interfaces", "rosgraph_msgs", "tf2_msgs", "tf", "diagnostic_msgs"}
 _BESIDE = {"header", "layout"}
-# The bytes at either end of an MCAP in which it names its writer and its topics.
-_ENDS = 1 << 16
 
 
 def is_folder(path: Path) -> bool:
@@ -40,11 +37,8 @@ def is_recording(path: Path) -> bool:
     if path.suffix.lower() != ".mcap" or path.is_dir():
         return False
     with open_file(path, TableError) as file:
-        content = file.read(_ENDS)
-        file.seek(max(0, os.fstat(file.fileno()).st_size - _ENDS))
-        content += file.read()
-    ours = (WRITER, *(topic for topic, _ in CHANNELS.values()))
-    return b"ros" not in content[:32] or any(name.encode() in content for name in ours)
+        header = file.read(64)
+    return b"ros" not in header or WRITER.encode() in header
 
 
 # Messages of one form, which hold numbers and texts of the same names: the nanosecond of each, and these.
@@ -56,13 +50,16 @@ def read_bag(path: Path, notes: list[str]) -> dict[str, AnyArray]:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    if is_recording(path):
-        raise TableError("it is a recording of thenar: import it with others of its kind alone, without a pattern")
     topics: dict[str, dict[tuple[str, ...], _Stream]] = {}
     out: dict[str, str] = {}
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         kinds = {connection.topic: connection.msgtype for connection in reader.connections}
         counts = dict.fromkeys(sorted(kinds, key=natural_key), 0)
+        if any(topic in counts for topic, _ in CHANNELS.values()):
+            raise TableError(
+                "it is a recording of thenar, as `thenar record` wrote it or packed by another program: "
+                "import the original, without tables"
+            )
         for connection, time, content in reader.messages():
             topic, kind = connection.topic, connection.msgtype
             counts[topic] += 1
@@ -90,10 +87,10 @@ def read_bag(path: Path, notes: list[str]) -> dict[str, AnyArray]:
     at = np.array([time for time, _ in max(numeric, key=len)]) / 1e9
     columns: dict[str, AnyArray] = {"time_s": at}
     for names, messages in streams:
-        row = latest(np.array([time for time, _ in messages]) / 1e9, at)
-        for name, cells in zip(names, zip(*(cells for _, cells in messages), strict=True), strict=True):
-            columns[name] = np.array(cells, np.str_ if isinstance(cells[0], str) else np.float64)[row]
-            columns[name][row < 0] = "" if isinstance(cells[0], str) else np.nan
+        row = measured(at, np.array([time for time, _ in messages]) / 1e9)
+        for name, column in zip(names, zip(*(cells for _, cells in messages), strict=True), strict=True):
+            columns[name] = np.array(column, np.str_ if isinstance(column[0], str) else np.float64)[row]
+            columns[name][row < 0] = "" if isinstance(column[0], str) else np.nan
     return columns
 
 

@@ -326,7 +326,8 @@ def _c3d(path: Path, _: list[str]) -> Columns:
         shown = [list_names(names[kind]) or "none" for kind in ("POINT", "ANALOG")]
         raise TableError(f"it holds no frames, of points {shown[0]} and analog channels {shown[1]}")
     points = np.stack([points for _, points, _ in frames])
-    analog = np.concatenate([channels.T[-1:] if points.size else channels.T for _, _, channels in frames])
+    sampled = [np.atleast_2d(channels.T) for _, _, channels in frames]
+    analog = np.concatenate([channels[-1:] if points.size else channels for channels in sampled])
     at = np.array([number - 1.0 for number, _, _ in frames])
     columns: Columns = {"time_s": (at if points.size else (at[:, None] + np.arange(samples) / samples).ravel()) / rate}
     for number, name in enumerate([*names["POINT"], *[""] * points.shape[1]][: points.shape[1]], start=1):

@@ -5,27 +5,45 @@ pattern of paths, and keys of a columns.toml. A table with one row for each of t
 clock of the first table, or stand beside it row by row.
 """
 
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.names import SHOWN, list_names, shortened
 
-from ..arrays import AnyArray, groups, latest
+from ..arrays import AnyArray, Ids, Times, groups, latest, measured
 from . import FileRows, TableError, list_rows
 from .cells import PER_SECOND, Column, TimeUnit, is_numeric, names, numbers, times, unit_of_time, unpadded
-from .columns import KEYS, ColumnRoles, Counted
-from .inputs import WORDS, is_span, time_of, words_of
+from .columns import KEYS, ColumnRoles
+from .inputs import WORDS, is_count, is_span, is_time, time_of, words_of
+from .readings import restarts
 from .table import SUFFIXES, Table
 
-Rows = NDArray[np.intp]
-Seconds = NDArray[np.float64]
 # A row is in a segment from the time that this begins, and in the one before up to a share of the step between rows.
 _SAME = 0.01
+_COUNTS = {"time": "by the clock of the recording", "s": "in seconds from its first row", "rows": "in its rows from 0"}
+
+
+class _Clock(NamedTuple):
+    """A column of time, its cells (n,) in seconds, and the unit in which they are written; as they are, if unknown."""
+
+    name: str
+    seconds: Times
+    unit: TimeUnit | None
+
+
+class _Pair(NamedTuple):
+    """Two tables, numbers (n,) and (m,) that are equal in rows of one trial, and the other's columns that say so."""
+
+    first: Table
+    other: Table
+    ours: Ids
+    theirs: Ids
+    keys: list[str]
 
 
 def join(first: Table, other: Table, roles: ColumnRoles | None = None) -> Table:
@@ -33,54 +51,49 @@ def join(first: Table, other: Table, roles: ColumnRoles | None = None) -> Table:
 
     Raises TableError if the tables do not belong together, or a trial of the first is not in the other.
     """
-    start, end = _ends(other, roles)
-    if not start and _ends(first, roles)[0]:
+    ends = _ends(other, roles)
+    if not ends and _ends(first, roles):
         raise TableError(f"{first.what} is a table of segments: name the recording first, {other.what}")
-    trials, keys = _trials(first, other, bool(start))
-    if start:
-        return _segmented(first, other, (start, end), trials, keys, roles)
-    facts = bool(keys) and all(len(there) < 2 for _, there in trials)
-    clock = None if facts else _clock(first, other, roles)
-    beside = {*keys, clock[0] if clock else "", other.rows.column if isinstance(other.rows, FileRows) else ""}
-    more = [name for name in other.columns if name not in beside]
-    if not facts and {*more} <= {*first.columns}:
-        raise TableError(
-            f"{other.what} has no other columns than {first.what}: of tables with one trial each, name the pattern of "
-            "their paths, such as 'data/{label}_{trial}.csv'; of tables with the same trials, rename the columns of one"
-        )
-    match = np.full(len(first.rows), -1)
-    for here, there in trials:
-        if not there.size:
-            raise TableError(f"{other.what} has no rows of the trial with {list_rows(first.rows[here[:1]])}")
-        if facts:
-            match[here] = there[0]
-        elif clock:
-            match[here] = _at(clock[1][here], clock[2][there], there)
-            if (match[here] < 0).all():
-                ranges = [f"{part.min():.12g} to {part.max():.12g} s" for part in (clock[1][here], clock[2][there])]
-                raise TableError(f"{first.what} and {other.what} are not of one time: {' and '.join(ranges)}")
-        elif len(here) == len(there):
-            match[here] = there
-        else:
-            counts = f"{first.what} has {len(here)} rows where {other.what} has {len(there)}"
-            raise TableError(f"{counts}, and no time says which belong together: give both a column of time")
-    how = "one row for each trial" if facts else "row by row" if clock is None else f"by {shortened(clock[0])}"
-    columns = {_free(name, first, other): _taken(first, other, name, match) for name in more}
-    note = f"{other.what}: {len(more)} columns of the same trials, {how}"
-    return replace(first, columns={**first.columns, **columns}, notes=(*first.notes, *other.notes, note))
-
-
-def _ends(table: Table, roles: ColumnRoles | None) -> tuple[str, str]:
-    """Return the columns with the starts and the ends of segments, "" if it is no table of segments."""
-    if roles is not None:
-        start, end = (name if name in table.columns else "" for name in (roles.start or "", roles.end or ""))
+    pair = _paired(first, other, bool(ends))
+    before = {new: old for old, new in roles.rename.items()} if roles else {}
+    name = before.get(roles.time or "", roles.time or "") if roles else time_of(first)
+    clock = _clock(first, name, roles.time_unit if roles else None)
+    if ends:
+        match, counted = _segments(pair, ends, clock, roles)
+        beside, how = {*ends}, f"segments, {_COUNTS[counted]}"
     else:
-        start, end = (next((name for name in table.columns if is_span(key, name)), "") for key in ("start", "end"))
-    return (start, end) if start and end else ("", "")
+        match, beside, how = _rows(pair, clock)
+    more = [name for name in other.columns if name not in beside | {*pair.keys}]
+    twice = [name for name in more if name in first.columns and not ends]
+    # Counters of two devices have one name.
+    more = [name for name in more if name not in twice or not (is_time(words_of(name)) or is_count(words_of(name)))]
+    if twice := [repr(name) for name in twice if name in more]:
+        raise TableError(
+            f"{first.what} and {other.what} both have {list_names(twice)}: rename the columns of one; of tables with "
+            "one trial each, name the pattern of their paths, such as 'data/{label}_{trial}.csv'"
+        )
+    columns: dict[str, Column] = {name: _taken(first, other, name, match) for name in more}
+    segments = first.segments
+    if ends:
+        if "label" in first.columns and "label" not in columns:
+            columns["label"] = np.where(match < 0, "", np.asarray(first.columns["label"], np.str_))
+        trial = next(name for name in ("segment", "segment number") if name not in {*first.columns, *columns})
+        columns[trial] = _numbers(match, pair)
+        segments = {"start": ends[0], "end": ends[1], "segments": counted, "trial": trial}
+    notes = (*first.notes, *other.notes, f"{other.what}: {how}")
+    return replace(first, columns={**first.columns, **columns}, notes=notes, segments=segments)
 
 
-def _trials(first: Table, other: Table, segments: bool) -> tuple[list[tuple[Rows, Rows]], list[str]]:
-    """Return the rows of both tables that belong together, and the columns of the other that say so."""
+def _ends(table: Table, roles: ColumnRoles | None) -> tuple[str, ...]:
+    """Return the columns with the starts and the ends of segments, () if it is no table of segments."""
+    given = (roles.start, roles.end) if roles else ()
+    found = (next((name for name in table.columns if is_span(key, name)), None) for key in ("start", "end"))
+    ends = tuple(name for name in given or found if name is not None and name in table.columns)
+    return ends if len(ends) == 2 else ()
+
+
+def _paired(first: Table, other: Table, segments: bool) -> _Pair:
+    """Return which rows belong together. Raises TableError if none do."""
     fields = {name for table in (first, other) if isinstance(table.rows, FileRows) for name in table.rows.fields}
     naming = ({*KEYS} | fields) - {"time"} - ({"label"} if segments else set())
     keys = [name for name in other.columns if name in first.columns and name in naming]
@@ -94,18 +107,12 @@ def _trials(first: Table, other: Table, segments: bool) -> tuple[list[tuple[Rows
         pairs.append((_each(ours, bare), _each(theirs, bare)))
         keys.append(files[0])
     count = len(first.rows)
-    both = groups(np.zeros(count + len(other.rows)), *map(np.concatenate, pairs))
-    parts = []
-    for ids in (both[:count], both[count:]):
-        order = np.argsort(ids, kind="stable")
-        parts.append(np.split(order, np.searchsorted(ids[order], np.arange(1, both.max() + 1))))
-    trials = [(here, there) for here, there in zip(*parts, strict=True) if here.size]
-    if not any(there.size for _, there in trials):
-        shown = [
-            f"{name} {list_names(np.unique(pair[1])[:SHOWN].tolist())}" for name, pair in zip(keys, pairs, strict=True)
-        ]
+    ids = groups(np.zeros(count + len(other.rows)), *map(np.concatenate, pairs))
+    if not np.isin(ids[:count], ids[count:]).any():
+        said = [np.unique(theirs)[:SHOWN].tolist() for _, theirs in pairs]
+        shown = [f"{name} {list_names(texts)}" for name, texts in zip(keys, said, strict=True)]
         raise TableError(f"{other.what} has no rows of any trial of {first.what}, but of {' and of '.join(shown)}")
-    return trials, keys
+    return _Pair(first, other, ids[:count], ids[count:], keys)
 
 
 def _texts(table: Table, column: Column) -> NDArray[np.str_]:
@@ -125,52 +132,64 @@ def _bare(path: str, whole: bool) -> str:
     return path if whole else path.rpartition("/")[2]
 
 
-def _clock(first: Table, other: Table, roles: ColumnRoles | None) -> tuple[str, Seconds, Seconds] | None:
-    """Return the other table's column of time, and the times in both tables (n,) and (m,); None if one has none."""
-    ours = _time(first, roles)
-    theirs = ours if ours in other.columns else time_of(other)
-    if not (ours and theirs):
+def _clock(table: Table, name: str, unit: TimeUnit | None = None) -> _Clock | None:
+    """Return the column of time called `name`, None if there is none. Raises TableError for a cell that is no time."""
+    if name not in table.columns:
         return None
-    (here, unit), (there, its) = (
-        _seconds(first, ours, roles),
-        _seconds(other, theirs, roles if ours == theirs else None),
-    )
-    alike = bool(unit) == bool(its) and (bool(unit) or ours == theirs)
-    return (theirs, here, there) if alike else None
+    parsed = times(table.columns[name], table.decimal)
+    if (wrong := parsed.missing | parsed.wrong).any():
+        rows = list_rows(table.rows[wrong])
+        raise TableError(f"{table.what}: {shortened(repr(name))} is no time in {rows}, by which tables are joined")
+    unit = unit or unit_of_time(name, parsed.values)
+    return _Clock(name, parsed.values / (PER_SECOND[unit] if unit else 1.0), unit)
 
 
-def _time(table: Table, roles: ColumnRoles | None) -> str:
-    if roles is None:
-        return time_of(table)
-    before = {new: old for old, new in roles.rename.items()}
-    return before.get(roles.time or "", roles.time or "")
+def _starts_again(clock: _Clock, ids: Ids) -> bool:
+    """Return whether the times of rows of one trial start again."""
+    order = np.argsort(ids, kind="stable")
+    return bool(restarts(ids[order], clock.seconds[order])[-1] > len(np.unique(ids)))
 
 
-def _seconds(table: Table, name: str, roles: ColumnRoles | None) -> tuple[Seconds, TimeUnit | None]:
-    """Return the times (n,) in a column in seconds, or as they are if their unit is not known, and the unit."""
-    values = times(table.columns[name], table.decimal).values
-    unit = (roles and roles.time_unit) or unit_of_time(name, values[np.isfinite(values)])
-    return values / (PER_SECOND[unit] if unit else 1.0), unit
+def _places(ids: Ids) -> Times:
+    """Return the place (n,) of each row among those with equal `ids` (n,), from 0."""
+    order = np.argsort(ids, kind="stable")
+    first = np.flatnonzero(np.diff(ids[order], prepend=-1))
+    place = np.empty(len(ids))
+    place[order] = np.arange(len(ids)) - np.repeat(first, np.diff(first, append=len(ids)))
+    return place
 
 
-def _at(times: Seconds, theirs: Seconds, rows: Rows) -> Rows:
-    """Return those of the `rows` (m,) at times `theirs` (m,) that are the latest at `times` (n,), -1 if none is."""
-    order = np.argsort(theirs, kind="stable")
-    found = latest(theirs[order], times)
-    return np.where(found < 0, -1, rows[order][found])
+def _rows(pair: _Pair, clock: _Clock | None) -> tuple[Ids, set[str], str]:
+    """Return the row of the other table for each row (n,), -1 for none, columns without more to say, and a remark."""
+    first, other, ours, theirs, keys = pair
+    files = {other.rows.column} if isinstance(other.rows, FileRows) else set[str]()
+    if (alone := ~np.isin(ours, theirs)).any():
+        raise TableError(f"{other.what} has no rows of the trial with {list_rows(first.rows[alone][:1])}")
+    if keys and len(np.unique(theirs)) == len(theirs):
+        return latest(np.zeros(len(ours)), np.zeros(len(theirs)), ours, theirs), files, "one row for each trial"
+    its = _clock(other, clock.name if clock.name in other.columns else time_of(other)) if clock else None
+    if clock is None or its is None or bool(clock.unit) != bool(its.unit) or not (clock.unit or clock.name == its.name):
+        counts = [np.bincount(ids, minlength=ours.max() + 1)[ours] for ids in (ours, theirs)]
+        if (uneven := np.flatnonzero(counts[0] != counts[1])).size:
+            here = f"the trial with {list_rows(first.rows[uneven[:1]])}"
+            said = " and ".join(str(count[uneven[0]]) for count in counts)
+            raise TableError(
+                f"{first.what} and {other.what} have {said} rows of {here}: give both a time, in one clock"
+            )
+        return latest(_places(ours), _places(theirs), ours, theirs), files, "row by row"
+    if _starts_again(clock, ours) or _starts_again(its, theirs):
+        raise TableError(f"{first.what} and {other.what}: {its.name} starts again within a trial: name trials in both")
+    order = np.lexsort((its.seconds, theirs))
+    match = measured(clock.seconds, its.seconds[order], ours, theirs[order])
+    match = np.where(match < 0, -1, order[match])
+    if (apart := ~np.isin(ours, ours[match >= 0])).any():
+        ranges = [f"{part.min():.12g} to {part.max():.12g} s" for part in (clock.seconds, its.seconds)]
+        here = f"the trial with {list_rows(first.rows[apart][:1])}"
+        raise TableError(f"{first.what} and {other.what} have no time of {here} in common: {' and '.join(ranges)}")
+    return match, files | {its.name}, f"by {its.name}"
 
 
-def _free(name: str, first: Table, other: Table) -> str:
-    """Return a name for a column that the first table does not have: with the words that tell the tables apart."""
-    if name in first.columns:
-        ours, theirs = (re.findall(r"[^\W_]+", re.sub(r"\{.*?\}", " ", table.what)) for table in (first, other))
-        name = ".".join([*(word for word in theirs if word not in ours), name])
-        while name in {*first.columns, *other.columns}:
-            name += ".2"
-    return name
-
-
-def _taken(first: Table, other: Table, name: str, match: Rows) -> AnyArray:
+def _taken(first: Table, other: Table, name: str, match: Ids) -> AnyArray:
     """Return the cells of a column in the rows `match` (n,) of the other table, empty where that is -1."""
     column = np.asarray(other.columns[name])
     if not is_numeric(column) and other.decimal != first.decimal:
@@ -183,88 +202,55 @@ def _taken(first: Table, other: Table, name: str, match: Rows) -> AnyArray:
     return taken
 
 
-def _segmented(
-    first: Table,
-    other: Table,
-    ends: tuple[str, str],
-    trials: list[tuple[Rows, Rows]],
-    keys: list[str],
-    roles: ColumnRoles | None,
-) -> Table:
-    """Return `first` with the columns of the segments in `other`, empty in rows that are in none, and their numbers.
-
-    Rows between segments have the number of the next one in their recording, or of its last.
+def _segments(pair: _Pair, ends: Sequence[str], clock: _Clock | None, roles: ColumnRoles | None) -> tuple[Ids, str]:
+    """Return the segment in which each row is (n,), -1 for none, and what the ends of segments count: that by which
+    they cover most rows, unless it is known. Raises TableError for a segment without rows of its own.
     """
+    first, other, ours, theirs, _ = pair
     parsed = [numbers(other.columns[name], other.decimal) for name in ends]
     start, end = (part.values for part in parsed)
-    wrong = np.logical_or.reduce([part.missing | part.wrong for part in parsed]) | ~(start < end)
-    if wrong.any():
+    if (wrong := np.logical_or.reduce([part.missing | part.wrong for part in parsed]) | ~(start < end)).any():
         rows = list_rows(other.rows[wrong])
-        raise TableError(
-            f"{other.what}: a segment lasts from {ends[0]} to {ends[1]}, two numbers, but not that of {rows}"
-        )
-    axes = _axes(first, trials, ends[0], roles)
-    found = {how: _inside(axis, start / unit, end / unit, trials) for how, (axis, unit) in axes.items()}
-    how = max(found, key=lambda how: int(np.count_nonzero(found[how][0] >= 0)))
-    (match, lengths), (axis, unit) = found[how], axes[how]
-    used = np.concatenate([there for _, there in trials])
-    counts = {"time": f"by {_time(first, roles)}", "s": "in seconds from the first row", "rows": "in rows from 0"}[how]
-    if (empty := used[lengths[used] == 0]).size:
-        rows, lasts = list_rows(other.rows[empty]), f"{axis.min() * unit:.12g} to {axis.max() * unit:.12g} {counts}"
-        raise TableError(f"{other.what}: the segment of {rows} has no row of {first.what}, which has {lasts}")
-    if (lost := used[np.bincount(match[match >= 0], minlength=len(start))[used] < lengths[used]]).size:
-        raise TableError(f"{other.what}: the segment of {list_rows(other.rows[lost])} shares rows with another one")
-    number = np.empty(len(match), np.int64)
-    for place, (here, _) in enumerate(trials, start=1):
-        inside = np.flatnonzero(match[here] >= 0)
-        following = (
-            inside[np.searchsorted(inside, np.arange(len(here))).clip(max=len(inside) - 1)] if inside.size else inside
-        )
-        number[here] = match[here][following] + 1 if inside.size else len(start) + place
-    columns = {name: _taken(first, other, name, match) for name in other.columns if name not in {*ends, *keys}}
-    if "label" in first.columns and "label" not in columns:
-        columns["label"] = np.where(match < 0, "", np.asarray(first.columns["label"], np.str_))
-    trial = next(name for name in ("segment", "segment number") if name not in {*first.columns, *columns})
-    return replace(
-        first,
-        columns={**first.columns, **columns, trial: number},
-        notes=(*first.notes, *other.notes, f"{other.what}: {len(used)} segments, {counts}"),
-        segments={"start": ends[0], "end": ends[1], "segments": how, "trial": trial},
-    )
+        raise TableError(f"{other.what}: a segment goes up from {ends[0]} to {ends[1]}, but not in {rows}")
+    order = np.lexsort((start, theirs))
+    overlap = (np.diff(theirs[order]) == 0) & (start[order][1:] < end[order][:-1])
+    if (both := order[1:][overlap & np.isin(theirs[order][1:], ours)]).size:
+        raise TableError(f"{other.what}: the segment of {list_rows(other.rows[np.sort(both)])} begins in another one")
+    unit = unit_of_time(ends[0], np.empty(0))
+    axes: dict[str, tuple[Times, float]] = {"rows": (_places(ours), 1.0)}
+    if clock is not None and not _starts_again(clock, ours):
+        begin = np.full(ours.max() + 1, np.inf)
+        np.minimum.at(begin, ours, clock.seconds)
+        own = unit or clock.unit
+        axes = {
+            "time": (clock.seconds, PER_SECOND[own] if own else 1.0),
+            "s": (clock.seconds - begin[ours], PER_SECOND[unit or "s"]),
+            **axes,
+        }
+    known = roles.segments if roles else "rows" if words_of(ends[0]) & WORDS["row"] else None
+    if known not in (None, *axes):
+        raise TableError(f"segments = {known!r} needs a column of time in {first.what} that does not start again")
+    found: dict[str, Ids] = {}
+    for how, (axis, per) in axes.items() if known is None else [(known, axes[known])]:
+        at = axis + _SAME * float(np.median(np.abs(np.diff(axis)))) if len(axis) > 1 else axis
+        match = latest(at, start / per, ours, theirs)
+        found[how] = np.where((match >= 0) & (at < end[match] / per), match, -1)
+    counted = max(found, key=lambda how: int(np.count_nonzero(found[how] >= 0)))
+    match = found[counted]
+    if (empty := np.isin(theirs, ours) & ~np.isin(np.arange(len(theirs)), match)).any():
+        axis, per = axes[counted]
+        lasts = f"{axis.min() * per:.12g} to {axis.max() * per:.12g} {_COUNTS[counted]}"
+        rows = list_rows(other.rows[empty])
+        raise TableError(f"{other.what}: no row of {first.what}, {lasts}, is in the segment of {rows}")
+    return match, counted
 
 
-def _axes(
-    first: Table, trials: list[tuple[Rows, Rows]], start: str, roles: ColumnRoles | None
-) -> dict[Counted, tuple[Seconds, float]]:
-    """Return what segments may count, by its name: the place (n,) of each row, and what makes up a unit of it."""
-    name = _time(first, roles)
-    clock, unit = _seconds(first, name, roles) if name else (np.zeros(len(first.rows)), None)
-    since, place = clock.copy(), np.empty(len(first.rows))
-    for here, _ in trials:
-        since[here] -= clock[here].min()
-        place[here] = np.arange(len(here))
-    its = unit_of_time(start, np.empty(0))
-    axes: dict[Counted, tuple[Seconds, float]] = {"rows": (place, 1.0)}
-    if name:
-        axes = {"time": (clock, PER_SECOND[its or unit] if unit else 1.0), "s": (since, PER_SECOND[its or "s"]), **axes}
-    counted = roles.segments if roles else "rows" if words_of(start) & WORDS["row"] else None
-    if counted is not None and counted not in axes:
-        raise TableError(f"segments = {counted!r} needs a column of time in {first.what}: name it (`time`)")
-    return axes if counted is None else {counted: axes[counted]}
-
-
-def _inside(
-    axis: Seconds, start: Seconds, end: Seconds, trials: list[tuple[Rows, Rows]]
-) -> tuple[Rows, NDArray[np.int64]]:
-    """Return the segment in which each row is (n,), at its place on an `axis` (n,), -1 for none; and how many rows (k,)
-    each segment from `start` (k,) to `end` (k,) has: those of its recording that are not before the one nor the other.
+def _numbers(match: Ids, pair: _Pair) -> Ids:
+    """Return the number of the segment of each row (n,), from 1; between segments of the next one in the recording, or
+    its last; in a recording without, a number beyond all.
     """
-    match, lengths = np.full(len(axis), -1), np.zeros(len(start), np.int64)
-    for here, there in trials:
-        order = here[np.argsort(axis[here], kind="stable")]
-        same = _SAME * float(np.median(np.diff(axis[order]))) if len(order) > 1 else 0.0
-        low, high = (np.searchsorted(axis[order], edge[there] - same) for edge in (start, end))
-        lengths[there] = high - low
-        for segment, begin, stop in zip(there.tolist(), low.tolist(), high.tolist(), strict=True):
-            match[order[begin:stop]] = segment
-    return match, lengths
+    place, inside = _places(pair.ours), np.flatnonzero(match >= 0)
+    rows = inside, pair.ours[inside]
+    following, before = (latest(sign * place, sign * place[inside], *(pair.ours, rows[1])) for sign in (-1, 1))
+    nearest = np.where(following < 0, before, following)
+    return np.where(nearest < 0, len(pair.other.rows) + pair.ours, match[inside[nearest]]) + 1
