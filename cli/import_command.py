@@ -62,8 +62,7 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream
     from thenar.compiler.recordings.bags import is_folder, is_recording
     from thenar.compiler.recordings.mcap_recording import import_files
 
-    several = (_patterns(path, tables) if path.is_dir() and not is_folder(path) else [path] for path in tables)
-    tables = tuple(path for paths in several for path in paths)
+    tables = tuple(_pattern(path, tables) if path.is_dir() and not is_folder(path) else path for path in tables)
     if columns is None and not stream and not all(map(is_recording, tables)):
         grasp_set, report = _found(tables, output, yes)
     else:
@@ -73,14 +72,14 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream
     show(report, _print, output)
 
 
-def _patterns(folder: Path, tables: tuple[Path, ...]) -> list[Path]:
-    """Return the patterns of the tables in a folder beside others, and say what they are."""
-    from thenar.compiler.recordings.trial_files import propose_patterns
+def _pattern(folder: Path, tables: tuple[Path, ...]) -> Path:
+    """Return the pattern of the tables in a folder beside others, and say what it is."""
+    from thenar.compiler.recordings.trial_files import propose_pattern
 
-    patterns, remarks = propose_patterns(folder, tables)
+    pattern, remarks = propose_pattern(folder, tables)
     for remark in remarks:
         echo(remark, err=wants_json())
-    return patterns
+    return pattern
 
 
 def _found(tables: tuple[Path, ...], output: Path, yes: bool) -> "tuple[GraspSet, ImportReport]":

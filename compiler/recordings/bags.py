@@ -56,10 +56,7 @@ def read_bag(path: Path, notes: list[str]) -> dict[str, AnyArray]:
         kinds = {connection.topic: connection.msgtype for connection in reader.connections}
         counts = dict.fromkeys(sorted(kinds, key=natural_key), 0)
         if any(topic in counts for topic, _ in CHANNELS.values()):
-            raise TableError(
-                "it is a recording of thenar, as `thenar record` wrote it or packed by another program: "
-                "import the original, without tables"
-            )
+            raise TableError("it is a recording of thenar, or a copy of one: import the original, without tables")
         for connection, time, content in reader.messages():
             topic, kind = connection.topic, connection.msgtype
             counts[topic] += 1
@@ -84,10 +81,11 @@ def read_bag(path: Path, notes: list[str]) -> dict[str, AnyArray]:
         raise TableError(f"no topic has numbers to read: it holds {seen}")
     if left:
         notes.append(f"topics left out: {list_names(left)}")
-    at = np.array([time for time, _ in max(numeric, key=len)]) / 1e9
-    columns: dict[str, AnyArray] = {"time_s": at}
+    at = np.array([time for time, _ in max(numeric, key=len)])
+    columns: dict[str, AnyArray] = {"time_s": at / 1e9}
     for names, messages in streams:
-        row = measured(at, np.array([time for time, _ in messages]) / 1e9)
+        # From the first row on, so that a double holds each nanosecond.
+        row = measured((at - at[0]) / 1e9, (np.array([time for time, _ in messages]) - at[0]) / 1e9)
         for name, column in zip(names, zip(*(cells for _, cells in messages), strict=True), strict=True):
             columns[name] = np.array(column, np.str_ if isinstance(column[0], str) else np.float64)[row]
             columns[name][row < 0] = "" if isinstance(column[0], str) else np.nan

@@ -220,11 +220,11 @@ def _matlab(path: Path, notes: list[str]) -> Columns:
 
 def _variables(name: str, value: Any) -> Iterator[tuple[str, AnyArray]]:
     """Yield the arrays and cell arrays in a MATLAB variable; the fields of structures, of several as cell arrays."""
-    if not isinstance(value, np.ndarray):
+    if not isinstance(value, np.ndarray) or type(value).__name__ == "MatlabOpaque":
         raise TableError(f"variable {shortened(repr(name))} is not an array: save each column of a table as an array")
     for field in value.dtype.names or ():
         yield from _variables(field, value[field] if value.size > 1 else value.ravel()[0][field])
-    if value.dtype == object or value.dtype.kind in "biufU":
+    if value.dtype.kind in "biufU" or (value.dtype == object and any(cell is not None for cell in value.flat)):
         yield name, value
 
 
@@ -234,7 +234,7 @@ def _is_frames(cell: Any) -> bool:
 
 def _cell(value: Any) -> object:
     array = np.asarray(value)
-    return "" if not array.size else array.ravel()[0].item() if array.size == 1 else str(value)
+    return "" if not array.size else array.item() if array.size == 1 else str(value)
 
 
 def _shape(shape: Sequence[int]) -> str:

@@ -345,10 +345,6 @@ class _Reader:
         return f"{count} cell{'s' if count > 1 else ''}, {list_names(shown, count)}"
 
 
-# Number of labels named in a message, and of those shown with suggestions.
-_NAMED, _SUGGESTED = 30, 3
-
-
 def numbered(columns: Sequence[NDArray[np.str_]]) -> tuple[NDArray[np.int64], list[str]]:
     """Return a number (n,) from 1 for each row, equal where all `columns` (n,) are, and the texts in that order."""
     number = groups(*columns)

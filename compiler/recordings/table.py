@@ -126,7 +126,7 @@ class Table:
 
 _TEXTS = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz", ".txt.gz")
 _MOTION = (".mot", ".sto", ".trc")
-SUFFIXES = (*_TEXTS, ".arff", ".arff.gz", *_MOTION, *READERS)
+SUFFIXES = (*_TEXTS, *_MOTION, *READERS)
 
 
 def is_table(path: Path) -> bool:
@@ -179,14 +179,12 @@ def _read_ours(path: Path, text: TextFormat) -> Table:
         with open_lines(path, text.encoding) as lines:
             tabs = name.removesuffix(".gz").endswith(".tsv")
             return _read_csv(path.name, lines, text, text.delimiter or ("\t" if tabs else ","))
-    if name.endswith((".arff", ".arff.gz")):
-        return _read_arff(path)
     if name.endswith(_MOTION):
         return _read_motion(path)
     raise TableError(f"{path.name}: a table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
 
 
-def csv_rows(lines: Iterable[str], delimiter: str, quote: str, *, strict: bool, escape: str | None = None) -> "Reader":
+def csv_rows(lines: Iterable[str], delimiter: str, quote: str, *, strict: bool) -> "Reader":
     """Return a reader of the rows in `lines`. With a blank as `delimiter`, any run of blanks and tabs is one."""
     blanks = delimiter == " "
     return csv.reader(
@@ -195,8 +193,7 @@ def csv_rows(lines: Iterable[str], delimiter: str, quote: str, *, strict: bool, 
         strict=strict,
         quotechar=quote or None,
         quoting=csv.QUOTE_MINIMAL if quote else csv.QUOTE_NONE,
-        escapechar=escape,
-        skipinitialspace=blanks or escape is not None,
+        skipinitialspace=blanks,
     )
 
 
@@ -208,97 +205,55 @@ def named_by_comment(header: list[str], delimiter: str) -> list[str]:
     return [first[1:].strip(), *header[1:]] if first[:1] in ("#", "%") and first[1:].strip() else header
 
 
-def _read_csv(
-    what: str, lines: Iterator[str], text: TextFormat, delimiter: str, top: int = 0, names: Sequence[str] = ()
-) -> Table:
-    """Return the table in `lines`, after `top` others; if these held the `names`, cells may have backslash escapes."""
+def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str, top: int = 0) -> Table:
+    """Return the table in `lines`, before which `top` others were read."""
     top += text.skip or 0
-    rows = _narrow(what, islice(lines, text.skip, None), delimiter)
-    reader = csv_rows(rows, delimiter, text.quote, strict=True, escape="\\" if names else None)
+    reader = csv_rows(_narrow(what, islice(lines, text.skip, None), delimiter), delimiter, text.quote, strict=True)
     numbers = array("q")
 
     def checked(rows: Iterable[list[str]]) -> Iterator[list[str]]:
         for row in rows:
             numbers.append(top + reader.line_num)
-            if len(row) > len(columns) and not any(row[len(columns) :]):
-                del row[len(columns) :]
-            if len(row) != len(columns):
+            if len(row) > len(names) and not any(row[len(names) :]):
+                del row[len(names) :]
+            if len(row) != len(names):
                 head = "header" if text.header else "first row"
-                raise TableError(f"{what} row {numbers[-1]} has {len(row)} cells, its {head} {len(columns)}")
+                raise TableError(f"{what} row {numbers[-1]} has {len(row)} cells, its {head} {len(names)}")
             yield row
 
     try:
         filled: Iterator[list[str]] = filter(None, reader)
-        first: list[str] = [] if names else next(filled, [])
+        first: list[str] = next(filled, [])
         if text.header:
             first = named_by_comment(first, delimiter)
-        columns = names or [text_of(name.strip()) if text.header else "" for name in first]
-        columns = [name or f"column {number}" for number, name in enumerate(columns, start=1)]
-        body = checked(filled if text.header or not first else chain([first], filled))
-        read = _columns(what, columns, body)
+        names = [text_of(name.strip()) if text.header else "" for name in first]
+        names = [name or f"column {number}" for number, name in enumerate(names, start=1)]
+        columns = _columns(what, names, checked(filled if text.header or not first else chain([first], filled)))
     except csv.Error as reason:
         raise TableError(f"{what} row {top + reader.line_num}: {reason}") from reason
-    return Table(what, read, np.frombuffer(numbers, np.int64), cells=not names, decimal=text.decimal)
-
-
-# The name in a line of ARFF, in quotes with backslash escapes or bare. All quantifiers are possessive.
-_ATTRIBUTE = re.compile(
-    r"""\s*+@attribute\s++(?:'((?:\\.|[^'\\])*+)'|"((?:\\.|[^"\\])*+)"|([^\s'"]++))\s""", re.IGNORECASE
-)
-
-
-def _read_arff(path: Path) -> Table:
-    """Return the table in a file of Weka: names of attributes, the line @data, and rows with ' as quote."""
-    names: list[str] = []
-    with open_lines(path) as lines:
-        for top, line in enumerate(lines, start=1):
-            word = line.strip().lower()
-            if word == "@data":
-                break
-            if match := _ATTRIBUTE.match(line):
-                names.append(re.sub(r"\\(.)", r"\1", next(filter(None, match.groups()), "")))
-            elif word and not word.startswith(("%", "@relation")):
-                shown = shortened(repr(line.strip()))
-                raise TableError(
-                    f"{path.name} line {top}: expected @attribute, a name and a type, or @data, not {shown}"
-                )
-        else:
-            raise TableError(f"{path.name} is not ARFF: it has no line @data")
-        if not 0 < len(names) <= COLUMNS:
-            raise TableError(f"{path.name} has {len(names)} attributes, not 1 to {COLUMNS}")
-        rows = ("" if line.startswith("%") else line for line in lines)
-        return _read_csv(path.name, rows, TextFormat(quote="'"), ",", top, names)
-
-
-# Lines in which the header of a file of OpenSim ends.
-_MOTION_HEADER = 1000
+    return Table(what, columns, np.frombuffer(numbers, np.int64), cells=True, decimal=text.decimal)
 
 
 def _read_motion(path: Path) -> Table:
     """Return the table in a file of OpenSim: in a .trc its names stand in two lines, of markers and of coordinates; in
     others they follow the line endheader, and the vectors in cells are lists.
     """
-    is_trc, names = path.suffix.lower() == ".trc", list[str]()
     with open_lines(path) as lines:
-        top = line = next(lines, "")
-        for number, line in enumerate(chain([top], lines), start=1):
-            if number == _MOTION_HEADER or (number == 3 if is_trc else line.strip().lower() == "endheader"):
-                break
-        if not (top.startswith("PathFileType") if is_trc else line.strip().lower() == "endheader"):
-            lacks = "does not begin with PathFileType" if is_trc else "has no line endheader"
-            raise TableError(
-                f"{path.name} {lacks}, as files of OpenSim do: it begins with {shortened(repr(top.strip()))}"
-            )
-        if is_trc:
-            marker = ""
-            for name, axis in zip_longest(*(next(lines, "").rstrip().split("\t") for _ in "  "), fillvalue=""):
-                marker, axis = name.strip() or marker, axis.strip().rstrip("0123456789").lower()
-                names.append(f"{marker}.{axis}" if axis else marker)
+        first = next(lines, "")
         # The line below the names of a .trc holds nothing but tabs.
         rows = (line if line.strip() else "" for line in lines)
-        table = _read_csv(path.name, rows, PLAIN, "\t", number + 2 * is_trc, names)
-    vectors = {} if is_trc else {name: cells for name, cells in table.columns.items() if "," in str(cells[:1])}
-    listed = {name: [f"[{cell}]" for cell in cells] for name, cells in vectors.items()}
+        if path.suffix.lower() == ".trc" and first.startswith("PathFileType"):
+            marker, header = "", []
+            for name, axis in zip_longest(*(line.rstrip().split("\t") for line in islice(lines, 2, 4)), fillvalue=""):
+                marker, axis = name.strip() or marker, axis.strip().rstrip("0123456789").lower()
+                header.append(f"{marker}.{axis}" if axis else marker)
+            return _read_csv(path.name, chain(["\t".join(header)], rows), PLAIN, "\t", 4)
+        ends = (number for number, line in enumerate(lines, start=2) if line.strip().lower() == "endheader")
+        if path.suffix.lower() == ".trc" or not (top := next(ends, 0)):
+            seen = f"it begins with {shortened(repr(first.strip()))}"
+            raise TableError(f"{path.name} has no PathFileType or endheader, as files of OpenSim have: {seen}")
+        table = _read_csv(path.name, rows, PLAIN, "\t", top)
+    listed = {name: [f"[{cell}]" for cell in cells] for name, cells in table.columns.items() if "," in str(cells[:1])}
     return replace(table, columns={**table.columns, **listed})
 
 

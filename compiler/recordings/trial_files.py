@@ -22,7 +22,6 @@ from .cells import Column, is_numeric, name_of_number, natural_key, skipped, unp
 from .cells import names as names_of
 from .columns import KEYS, PLAIN, TextFormat
 from .foreign import size_of
-from .inputs import is_time, words_of
 from .table import SUFFIXES, Table, is_table, is_text, read_table, read_tables, sniff
 from .taxonomy import plain, published_for
 
@@ -31,9 +30,6 @@ FILES = 100_000
 # The column that names the file of a row; the second name if the files have a column of the first.
 _FILE = ("file", "path")
 _FIELD = re.compile(r"\{(?P<name>[^\W\d]\w*)\}|(?P<star>\*)|[{}]")
-
-# The most files of a trial with their own columns.
-_KINDS = 5
 
 # Takes how many of how many files were read.
 Report = Callable[[int, int], None]
@@ -206,7 +202,8 @@ def _check_alike(first: str, table: Table, other: str, its: Table) -> None:
     lacks = [shortened(repr(name)) for name in table.columns if name not in its.columns]
     more = [shortened(repr(name)) for name in its.columns if name not in table.columns]
     said = [f"it lacks {list_names(lacks)}"] * bool(lacks) + [f"it has {list_names(more)}"] * bool(more)
-    raise TableError(f"{other} has other columns than {first}: {' and '.join(said)}")
+    advice = "if a trial has several files, name a pattern for each kind of them"
+    raise TableError(f"{other} has other columns than {first}: {' and '.join(said)}; {advice}")
 
 
 def _joined(parts: Sequence[Column]) -> Column:
@@ -254,12 +251,11 @@ class _Part(NamedTuple):
         return all(text.isdecimal() for text in self.texts)
 
 
-def propose_patterns(folder: Path, beside: Sequence[Path] = ()) -> tuple[list[Path], list[str]]:
+def propose_pattern(folder: Path, beside: Sequence[Path] = ()) -> tuple[Path, list[str]]:
     """Return the pattern of the tables in `folder`, and sentences on what was found.
 
-    The tables are those of the most frequent kind and depth. If a trial is several files with their own columns, there
-    is a pattern for each of these, first for that with the most rows. What paths say is called as in the tables
-    `beside`, if these say the same. Raises TableError if there are none, OSError.
+    The tables are those of the most frequent kind and depth. What paths say is called as in the tables `beside`, if
+    these say the same. Raises TableError if there are none, OSError.
     """
     found, most = _tables(folder)
     found = [path for path in found if path.absolute() not in [other.absolute() for other in beside]]
@@ -267,56 +263,33 @@ def propose_patterns(folder: Path, beside: Sequence[Path] = ()) -> tuple[list[Pa
         raise TableError(f"{folder} holds no tables ({', '.join(SUFFIXES)}): name another folder, or a file")
     paths = [path.relative_to(folder) for path in found]
     if len(paths) == 1:
-        return found, [f"{folder} holds one table, {shortened(str(paths[0]))}"]
+        return found[0], [f"{folder} holds one table, {shortened(str(paths[0]))}"]
     levels = [_tokens([path.parts[depth] for path in paths]) for depth in range(len(paths[0].parts) - 1)]
     levels.append([*_tokens([path.name.removesuffix(_suffix(path)) for path in found]), _suffix(found[0])])
     parts = [part for level in levels for part in level if isinstance(part, _Part)]
-    kind, firsts, columns = _kinds(found, parts)
+    columns, *others = [
+        [*read_path(path, None, lambda _done, _total: None)[0].columns.items()]
+        for path in (found[0], *(path for path in beside if path.is_file()))
+    ]
     known: dict[tuple[str, ...], str] = {}
-    for table in (read_path(path, None, _quiet)[0] for path in beside if path.is_file()):
-        columns += table.columns
-        for name in (name for name in KEYS if name in table.columns and name != "time"):
-            said = {*map(unpadded, names_of(table.columns[name]).values.tolist())}
-            same = [part.texts for part in parts if part.texts not in known and {*map(unpadded, part.texts)} <= said]
-            known |= dict.fromkeys(same[:1], name)
-    names = known | _named([part for part in parts if part.texts not in (kind, *known)], columns)
-
-    def text(token: _Part | str, file: int) -> str:
-        fixed = token if isinstance(token, str) else token.texts[file]
-        return (
-            f"{{{names[token.texts]}}}"
-            if isinstance(token, _Part) and token.texts != kind
-            else re.sub("[{}]", "*", fixed)
-        )
-
-    patterns = [folder / "/".join("".join(text(token, file) for token in level) for level in levels) for file in firsts]
-    remarks = [f"{len(paths)} files as {' and '.join(map(str, patterns))}"]
+    for name, column in ((name, column) for table in others for name, column in table if name in {*KEYS} - {"time"}):
+        said = {*map(unpadded, names_of(column).values.tolist())}
+        same = [part.texts for part in parts if part.texts not in known and {*map(unpadded, part.texts)} <= said]
+        known |= dict.fromkeys(same[:1], name)
+    columns += [column for table in others for column in table]
+    rest = [part for part in parts if part.texts not in known]
+    names = known | _named(rest, [name for name, _ in columns])
+    pattern = "/".join(
+        "".join(f"{{{names[part.texts]}}}" if isinstance(part, _Part) else re.sub(r"[{}]", "*", part) for part in level)
+        for level in levels
+    )
+    remarks = [f"{len(paths)} files as {folder / pattern}"]
     for texts, name in names.items():
         different = sorted({*texts}, key=natural_key)
         shown = list_names([shortened(text) for text in different[:SHOWN]], len(different))
         remarks.append(f"{name}: {len(different)} different, {shown}")
     remarks += [f"left out: {most} tables of another kind or depth, or with other names"] * bool(most)
-    return patterns, remarks
-
-
-def _kinds(found: Sequence[Path], parts: Sequence[_Part]) -> tuple[tuple[str, ...], list[int], list[str]]:
-    """Return the texts of the part that tells apart files of one trial with their own columns, () if none does; the
-    first file of each kind, that with the most rows first; and their columns.
-    """
-    for part in parts:
-        kinds = sorted({*part.texts}, key=natural_key)
-        trials = {*zip(*(other.texts for other in parts if other.texts != part.texts), strict=True)} or {()}
-        if not 1 < len(kinds) <= _KINDS or len(kinds) * len(trials) != len(found):
-            continue
-        firsts = {place: read_path(found[place], None, _quiet)[0] for place in map(part.texts.index, kinds)}
-        columns = [name for table in firsts.values() for name in table.columns if not is_time(words_of(name))]
-        if len({*columns}) == len(columns):
-            return part.texts, sorted(firsts, key=lambda place: -len(firsts[place].rows)), columns
-    return (), [0], [*read_path(found[0], None, _quiet)[0].columns]
-
-
-def _quiet(_done: int, _total: int) -> None:
-    """Report nothing."""
+    return folder / pattern, remarks
 
 
 def _tables(folder: Path) -> tuple[list[Path], int]:

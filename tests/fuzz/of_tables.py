@@ -1,4 +1,4 @@
-"""Recordings as tables and as sets: CSV, ARFF, npz, gzipped or not, columns.toml, `.grasps`."""
+"""Recordings as tables and as sets: CSV, npz, gzipped or not, columns.toml, `.grasps`."""
 
 import gzip
 from collections.abc import Callable
@@ -60,11 +60,6 @@ def _strange() -> bytes:
     lists = [[f"[{first},{second}]" for first, second in row] for row in values.tolist()]
     rows = [f"{grasp}   {trial} {lists[trial][n]}" for trial in range(9) for n, grasp in enumerate(GRASPS)]
     return "\n".join(["nRows=27", "endheader", "# grasp trial data", *rows]).encode()
-
-
-@cache
-def _arff() -> bytes:
-    return to_arff(grasp_set(), meta=True).encode()
 
 
 @cache
@@ -188,8 +183,6 @@ FORMATS = (
     *map(_of, (".xlsx", ".parquet", ".h5", ".mat")),
     Format("csv", lambda: [_csv()], table_file, _table(".csv")),
     Format("csv.gz", lambda: [gzip.compress(_csv(), mtime=0)], zipped(table_file), _table(".csv.gz")),
-    Format("arff", lambda: [_arff()], table_file, _table(".arff")),
-    Format("arff.gz", lambda: [gzip.compress(_arff(), mtime=0)], zipped(table_file), _table(".arff.gz")),
     Format("npz", lambda: [_npz()], npz_file, _table(".npz"), weight=0.03),
     Format("columns.toml", lambda: [_COLUMNS.encode(), _OF_TYPES.encode()], toml_file, _columns),
     Format("grasps", lambda: [_grasps()], sealed(npz_file), _set),
