@@ -73,7 +73,7 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream
 
 
 def _pattern(folder: Path, tables: tuple[Path, ...]) -> Path:
-    """Return the pattern of the tables in a folder beside others, and say what it is."""
+    """Return the pattern of the tables in a folder, given others, and say what it is."""
     from thenar.compiler.recordings.trial_files import propose_pattern
 
     pattern, remarks = propose_pattern(folder, tables)

@@ -118,7 +118,7 @@ def otsu(values: NDArray[np.float64]) -> float:
     return float(found[best] / 2 + found[best + 1] / 2)
 
 
-# What was measured is of use for so many seconds, or of its usual intervals.
+# How long what was measured is of use: in seconds, and in usual intervals.
 _AGE_S, _INTERVALS = 0.5, 10
 
 Ids = NDArray[np.intp]

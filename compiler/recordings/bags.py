@@ -93,7 +93,7 @@ def read_bag(path: Path, notes: list[str]) -> dict[str, AnyArray]:
 
 
 def _left_out(kind: str, width: int, forms: Collection[tuple[str, ...]]) -> str:
-    """Return why messages of a `kind`, the last with so many cells, are left out, "" if they are not."""
+    """Return why messages of a `kind`, the last with `width` cells, are left out, "" if they are not."""
     if kind.partition("/")[0] in _SYSTEM:
         return "about ROS itself"
     if not 0 < width <= _WIDEST:

@@ -129,10 +129,6 @@ class TextFormat(NamedTuple):
 PLAIN = TextFormat()
 
 
-# What the ends of segments count: the clock of the time column, seconds or rows from the start of the recording.
-Counted = Literal["time", "s", "rows"]
-
-
 class ColumnRoles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A columns.toml, key by key. Lists of inputs hold globs (`*`, `?`, `[...]`); other keys hold columns by name.
 
@@ -140,7 +136,8 @@ class ColumnRoles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     `frames` defines the trials: "independent" makes each row one; with "restart" a trial begins where `time` starts
     again, or the label, subject, object or session changes. Labels in `none` mean that nothing is held, as "none"
     always does; with "" among them, so does an empty cell. `start` and `end` are columns of a table of segments, which
-    count `segments`. `rename` gives columns of the table other names, which all other keys use, and the set has.
+    count `segments`: in the clock of `time`, or seconds or rows from the start of a recording. `rename` gives columns
+    of the table other names, which all other keys use, and the set has.
     """
 
     label: str | tuple[str, ...]
@@ -152,7 +149,7 @@ class ColumnRoles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     time_unit: TimeUnit | None = None
     start: str | None = None
     end: str | None = None
-    segments: Counted | None = None
+    segments: Literal["time", "s", "rows"] | None = None
     none: str | tuple[str, ...] = ()
     frames: Literal["independent", "restart"] | None = None
     taxonomy: str | tuple[str, ...] | dict[str, tuple[str, ...]] = "own"

@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 import numpy as np
 from numpy.dtypes import StringDType
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from thenar.drivers.extras import missing
 from thenar.runtime.files import open_file
-from thenar.runtime.names import list_names, shortened
+from thenar.runtime.names import SHOWN, list_names, shortened
 
 from ..arrays import AnyArray
 from . import COLUMNS, LARGEST, ROWS, TableError
@@ -45,17 +45,9 @@ _REFUSED = 3
 _PR_SET_PDEATHSIG = 1
 
 Columns = dict[str, AnyArray]
-
-
-class Foreign(NamedTuple):
-    """A table: its columns, text or numbers, the numbers of its rows for the user, how many rows precede its header,
-    and sentences on what was left out.
-    """
-
-    columns: Columns
-    rows: NDArray[np.int64]
-    skip: int
-    notes: tuple[str, ...]
+# A table: its columns, text or numbers, the numbers of its rows for the user, how many rows precede its header, and
+# sentences on what was left out.
+Foreign = tuple[Columns, NDArray[np.int64], int, tuple[str, ...]]
 
 
 def read_foreign(paths: Sequence[Path], skip: int | None = 0) -> Iterator[Foreign]:
@@ -87,7 +79,7 @@ def read_foreign(paths: Sequence[Path], skip: int | None = 0) -> Iterator[Foreig
         for number in range(count):
             names, rows, skipped, notes = (arrays[f"{number}.{name}"] for name in ("names", "rows", "skip", "notes"))
             columns = {str(name): arrays[f"{number}.{place}"] for place, name in enumerate(names)}
-            yield Foreign(columns, rows.astype(np.int64), int(skipped.astype(np.int64)[0]), tuple(map(str, notes)))
+            yield columns, rows.astype(np.int64), int(skipped.astype(np.int64)[0]), tuple(map(str, notes))
     if refusal:
         raise TableError(f"{paths[count].name}: {refusal}")
 
@@ -237,6 +229,15 @@ def _cell(value: Any) -> object:
     return "" if not array.size else array.item() if array.size == 1 else str(value)
 
 
+def _seen(arrays: Mapping[str, AnyArray]) -> str:
+    """Return the names and shapes of arrays, and the shapes of what is in their cells."""
+    shown = []
+    for name, array in arrays.items():
+        cells = [_shape(np.shape(cell)) for cell in array.flat] if array.dtype == object else []
+        shown.append(f"{name} ({_shape(array.shape)}{': ' * bool(cells)}{list_names(cells[:SHOWN], len(cells))})")
+    return f"it holds {list_names(shown) or 'nothing'}"
+
+
 def _shape(shape: Sequence[int]) -> str:
     return "x".join(map(str, shape))
 
@@ -245,21 +246,13 @@ def _of_cells(variables: Mapping[str, AnyArray], frames: Collection[str], notes:
     """Return the columns of cell arrays `frames`, whose cells hold the frames of a trial each, and of other variables
     with a value for each cell.
     """
-    seen = list_names([f"{name} ({_shape(value.shape)})" for name, value in variables.items()])
-    stacked = {name: _stacked(name, variables[name]) for name in variables if name in frames}
-    (name, (_, lengths)), *others = stacked.items()
+    stacked = {name: _stacked(variables[name]) for name in variables if name in frames}
+    (name, (_, lengths)), *_ = stacked.items()
     shape = variables[name].shape
-    for other, (_, its) in others:
-        if variables[other].shape != shape:
-            raise TableError(f"its cell arrays have unequal sizes: it holds {seen}")
-        if its != lengths:
-            cell = next(cell for cell, length in enumerate(lengths) if length != its[cell])
-            unequal = f"{lengths[cell]} frames in {name!r}, {its[cell]} in {other!r}"
-            raise TableError(f"cell {cell + 1} of its cell arrays has {shortened(unequal)}: it holds {seen}")
+    alike = (variables[name].shape == shape and sizes == lengths for name, (_, sizes) in stacked.items())
+    if not all(alike) or any(len(rows) != sum(lengths) for rows, _ in stacked.values()):
+        raise TableError(f"its cells are not trials with columns of equal length: {_seen(variables)}")
     columns: Columns = {"trial": np.repeat(np.arange(1, len(lengths) + 1), lengths)}
-    if 1 not in shape:
-        for name, place in zip(("row", "column"), np.indices(shape), strict=False):
-            columns[name] = np.repeat(place.ravel() + 1, lengths)
     for name, value in variables.items():
         if name in frames:
             _add(columns, name, stacked[name][0])
@@ -273,19 +266,16 @@ def _of_cells(variables: Mapping[str, AnyArray], frames: Collection[str], notes:
     return columns
 
 
-def _stacked(name: str, cells: AnyArray) -> tuple[AnyArray, list[int]]:
-    """Return the frames (n, k) in all `cells`, one below the other, and how many are in each.
-
-    They are the rows of a cell, but its columns if the cells are equally high and not equally wide.
+def _stacked(cells: AnyArray) -> tuple[AnyArray, list[int]]:
+    """Return the frames (n, k) in all `cells`, one below the other, and how many are in each; no frames if the cells
+    have unequal columns. Frames are rows, but columns if the cells are equally high and not equally wide.
     """
     parts = [np.asarray(cell) for cell in cells.flat]
     filled = [part for part in parts if part.size]
     if len({part.shape[-1] for part in filled}) > 1:
         filled, parts = [part.T for part in filled], [part.T for part in parts]
-    if len({part.shape[1:] for part in filled}) > 1 or any(part.dtype.kind not in "biuf" for part in filled):
-        shown = list_names([_shape(np.shape(cell)) for cell in cells.flat])
-        raise TableError(f"the cells of {shortened(repr(name))} are not trials of the same columns: {shown}")
-    return np.concatenate(filled), [len(part) if part.size else 0 for part in parts]
+    alike = len({part.shape[1:] for part in filled}) == 1 and all(part.dtype.kind in "biuf" for part in filled)
+    return np.concatenate(filled) if alike else np.empty(0), [len(part) if part.size else 0 for part in parts]
 
 
 def _npz(path: Path, _: list[str]) -> Columns:
@@ -348,9 +338,8 @@ def _even(arrays: Mapping[str, AnyArray]) -> Columns:
     if len(lengths) > 1:
         del lengths[1]
     if len(lengths) > 1:
-        seen = list_names([f"{name} ({_shape(array.shape)})" for name, array in arrays.items()])
         shown = list_names(list(map(str, sorted(lengths))))
-        raise TableError(f"its arrays have unequal lengths, {shown}: it holds {seen}")
+        raise TableError(f"its arrays have unequal lengths, {shown}: {_seen(arrays)}")
     return {name: column for name, column in columns.items() if len(column) in lengths}
 
 
@@ -462,12 +451,8 @@ def main(skip: str, parent: str, *sources: str) -> int:
             print(reason if isinstance(reason, TableError) else cannot)
             code = _REFUSED
             break
-        described = {
-            "names": np.array(list(columns)),
-            "rows": np.array(rows, np.int64),
-            "skip": np.array([skipped]),
-            "notes": np.array(notes, np.str_),
-        }
+        described = {"names": np.array(list(columns)), "rows": np.array(rows, np.int64), "skip": np.array([skipped])}
+        described["notes"] = np.array(notes, np.str_)
         numbered = {str(place): column for place, column in enumerate(columns.values())}
         made |= {f"{number}.{name}": array for name, array in (described | numbered).items()}
     np.savez(output, **made)  # type: ignore[arg-type]

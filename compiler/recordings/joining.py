@@ -2,7 +2,7 @@
 
 Rows belong together where the columns agree that both tables have and that name a trial: its file, the fields of a
 pattern of paths, and keys of a columns.toml. A table with one row for each of these holds facts; others follow the
-clock of the first table, or stand beside it row by row.
+clock of the first table, or go with it row by row.
 """
 
 from collections.abc import Callable, Sequence
@@ -60,10 +60,10 @@ def join(first: Table, other: Table, roles: ColumnRoles | None = None) -> Table:
     clock = _clock(first, name, roles.time_unit if roles else None)
     if ends:
         match, counted = _segments(pair, ends, clock, roles)
-        beside, how = {*ends}, f"segments, {_COUNTS[counted]}"
+        known, how = {*ends}, f"segments, {_COUNTS[counted]}"
     else:
-        match, beside, how = _rows(pair, clock)
-    more = [name for name in other.columns if name not in beside | {*pair.keys}]
+        match, known, how = _rows(pair, clock)
+    more = [name for name in other.columns if name not in known | {*pair.keys}]
     twice = [name for name in more if name in first.columns and not ends]
     # Counters of two devices have one name.
     more = [name for name in more if name not in twice or not (is_time(words_of(name)) or is_count(words_of(name)))]
@@ -204,7 +204,7 @@ def _taken(first: Table, other: Table, name: str, match: Ids) -> AnyArray:
 
 def _segments(pair: _Pair, ends: Sequence[str], clock: _Clock | None, roles: ColumnRoles | None) -> tuple[Ids, str]:
     """Return the segment in which each row is (n,), -1 for none, and what the ends of segments count: that by which
-    they cover most rows, unless it is known. Raises TableError for a segment without rows of its own.
+    they cover most rows, unless it is known. Raises TableError for a segment without rows.
     """
     first, other, ours, theirs, _ = pair
     parsed = [numbers(other.columns[name], other.decimal) for name in ends]

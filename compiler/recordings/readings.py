@@ -131,7 +131,7 @@ def nothing_held(columns: ColumnRoles, labels: NDArray[np.str_]) -> NDArray[np.b
 
 
 def meanings(columns: ColumnRoles, labels: Sequence[str]) -> list[str]:
-    """Return what the labels are called by `columns`, under which a number is listed without decimals."""
+    """Return the names of labels by `columns`, under which a number is listed without decimals."""
     return [columns.labels.get(label, columns.labels.get(whole(label), label)) for label in labels]
 
 

@@ -68,7 +68,7 @@ def find_files(pattern: Path) -> tuple[list[TrialFile], list[str]]:
         there = f": next to them are {list_names(others)}" if others else ""
         raise TableError(f"no table matches {pattern}{there}")
     if bags := [file for file in found if file.path.is_dir()]:
-        # A pattern without a suffix matches whatever lies beside them.
+        # A pattern without a suffix matches whatever is next to them.
         others += [file.name for file in found if file not in bags]
         found = bags
     kinds = sorted({_suffix(file.path).lower() for file in found})
@@ -169,15 +169,15 @@ def read_files(files: Sequence[TrialFile], text: TextFormat, report: Report) -> 
 
 
 def read_path(
-    path: Path, text: TextFormat | None, report: Report, beside: Sequence[Path] = ()
+    path: Path, text: TextFormat | None, report: Report, more: Sequence[Path] = ()
 ) -> tuple[Table, TextFormat, list[str]]:
     """Return the table in `path`, or in the files that match it as a pattern, its format, and sentences on that.
 
-    Without `text` the format is found. Files are left out that one of the patterns `beside` it describes more closely.
+    Without `text` the format is found. Files are left out that one of the patterns `more` describes more closely.
     Raises TableError, OSError.
     """
     files, others = find_files(path) if is_pattern(path) else ([], [])
-    for other in (other for other in beside if files and other != path):
+    for other in (other for other in more if files and other != path):
         theirs = {file.path.absolute() for file in find_files(other)[0]} if is_pattern(other) else {other.absolute()}
         others = [name for name in others if name not in {file.name for file in theirs}]
         if theirs < {file.path.absolute() for file in files}:
@@ -251,14 +251,14 @@ class _Part(NamedTuple):
         return all(text.isdecimal() for text in self.texts)
 
 
-def propose_pattern(folder: Path, beside: Sequence[Path] = ()) -> tuple[Path, list[str]]:
+def propose_pattern(folder: Path, more: Sequence[Path] = ()) -> tuple[Path, list[str]]:
     """Return the pattern of the tables in `folder`, and sentences on what was found.
 
-    The tables are those of the most frequent kind and depth. What paths say is called as in the tables `beside`, if
-    these say the same. Raises TableError if there are none, OSError.
+    The tables are those of the most frequent kind and depth. What paths say is called as in the tables `more`, if these
+    say the same. Raises TableError if there are none, OSError.
     """
     found, most = _tables(folder)
-    found = [path for path in found if path.absolute() not in [other.absolute() for other in beside]]
+    found = [path for path in found if path.absolute() not in [other.absolute() for other in more]]
     if not found:
         raise TableError(f"{folder} holds no tables ({', '.join(SUFFIXES)}): name another folder, or a file")
     paths = [path.relative_to(folder) for path in found]
@@ -269,7 +269,7 @@ def propose_pattern(folder: Path, beside: Sequence[Path] = ()) -> tuple[Path, li
     parts = [part for level in levels for part in level if isinstance(part, _Part)]
     columns, *others = [
         [*read_path(path, None, lambda _done, _total: None)[0].columns.items()]
-        for path in (found[0], *(path for path in beside if path.is_file()))
+        for path in (found[0], *(path for path in more if path.is_file()))
     ]
     known: dict[tuple[str, ...], str] = {}
     for name, column in ((name, column) for table in others for name, column in table if name in {*KEYS} - {"time"}):

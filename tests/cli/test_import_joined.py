@@ -1,6 +1,5 @@
 """Several tables of the same trials: further columns, facts about trials, segments of a recording."""
 
-import json
 import os
 from itertools import pairwise
 from pathlib import Path
@@ -288,13 +287,3 @@ def test_tables_that_do_not_belong_together_are_told(capsys: pytest.CaptureFixtu
     arguments = ["import", "anna.csv", "segments.csv", "-o", "set.grasps", "--columns", "columns.toml"]
     assert run(arguments) == 2
     assert "segments = 's' needs a column of time in anna.csv that does not start again" in capsys.readouterr().err
-
-
-def test_a_report_tells_how_tables_were_joined(capsys: pytest.CaptureFixture[str]) -> None:
-    write_trials("d/{subject}_{label}_{trial}.csv", "e/{subject}_{label}_{trial}.csv")
-    arguments = ["d/{subject}_{label}_{trial}.csv", "e/{subject}_{label}_{trial}.csv"]
-    imported(*arguments)
-    capsys.readouterr()
-    columns = ["--columns", "set.columns.toml", "--overwrite", "--json"]
-    assert run(["import", *arguments, "-o", "set.grasps", *columns]) == 0
-    assert f"{arguments[1]}: by t" in json.loads(capsys.readouterr().out)["notes"]

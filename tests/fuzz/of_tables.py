@@ -94,7 +94,7 @@ def _use(grasps: GraspSet) -> None:
     if grasps.switch_names:
         place(grasps, prune=2)
     to_csv(grasps)
-    to_arff(grasps, meta=True)
+    to_arff(grasps)
     grasps.fingerprint()
 
 

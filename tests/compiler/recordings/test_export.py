@@ -77,12 +77,6 @@ def test_an_arff_is_switches_joints_and_the_class_last(small: GraspSet) -> None:
     ]
 
 
-def test_an_arff_with_meta_begins_with_subject_object_and_trial(small: GraspSet) -> None:
-    lines = to_arff(small, meta=True).splitlines()
-    assert lines[2:5] == ["@attribute subject {A,B}", "@attribute object {mug}", "@attribute trial numeric"]
-    assert lines[-1] == "A,mug,5,0,0,0,0,-8,3.5,PoH"
-
-
 def test_what_arff_would_misread_is_quoted(small: GraspSet) -> None:
     joints = (replace(small.joints[0], name="50 % {a}"), replace(small.joints[1], name="it's \\"))
     grasp_set = replace(small, joints=joints)
