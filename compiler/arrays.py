@@ -142,3 +142,12 @@ def measured(at: Times, times: Times, at_ids: Ids | None = None, ids: Ids | None
     steps = np.diff(np.sort(times)) if ids is None else np.diff(times)[np.diff(ids) == 0]
     age = max(_AGE_S, _INTERVALS * float(np.median(steps))) if len(steps) else np.inf
     return np.where((found >= 0) & (at - times[found] <= age), found, -1)
+
+
+def places(ids: Ids) -> Times:
+    """Return the place (n,) of each row among those with equal `ids` (n,), from 0."""
+    order = np.argsort(ids, kind="stable")
+    first = np.flatnonzero(np.diff(ids[order], prepend=-1))
+    place = np.empty(len(ids))
+    place[order] = np.arange(len(ids)) - np.repeat(first, np.diff(first, append=len(ids)))
+    return place

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.names import SHOWN, list_names, shortened
 
-from ..arrays import AnyArray, Ids, Times, groups, latest, measured
+from ..arrays import AnyArray, Ids, Times, groups, latest, measured, places
 from . import FileRows, TableError, list_rows
 from .cells import PER_SECOND, Column, TimeUnit, is_numeric, names, numbers, times, unit_of_time, unpadded
 from .columns import KEYS, ColumnRoles
@@ -150,15 +150,6 @@ def _starts_again(clock: _Clock, ids: Ids) -> bool:
     return bool(restarts(ids[order], clock.seconds[order])[-1] > len(np.unique(ids)))
 
 
-def _places(ids: Ids) -> Times:
-    """Return the place (n,) of each row among those with equal `ids` (n,), from 0."""
-    order = np.argsort(ids, kind="stable")
-    first = np.flatnonzero(np.diff(ids[order], prepend=-1))
-    place = np.empty(len(ids))
-    place[order] = np.arange(len(ids)) - np.repeat(first, np.diff(first, append=len(ids)))
-    return place
-
-
 def _rows(pair: _Pair, clock: _Clock | None) -> tuple[Ids, set[str], str]:
     """Return the row of the other table for each row (n,), -1 for none, columns without more to say, and a remark."""
     first, other, ours, theirs, keys = pair
@@ -176,7 +167,7 @@ def _rows(pair: _Pair, clock: _Clock | None) -> tuple[Ids, set[str], str]:
             raise TableError(
                 f"{first.what} and {other.what} have {said} rows of {here}: give both a time, in one clock"
             )
-        return latest(_places(ours), _places(theirs), ours, theirs), files, "row by row"
+        return latest(places(ours), places(theirs), ours, theirs), files, "row by row"
     if _starts_again(clock, ours) or _starts_again(its, theirs):
         raise TableError(f"{first.what} and {other.what}: {its.name} starts again within a trial: name trials in both")
     order = np.lexsort((its.seconds, theirs))
@@ -217,7 +208,7 @@ def _segments(pair: _Pair, ends: Sequence[str], clock: _Clock | None, roles: Col
     if (both := order[1:][overlap & np.isin(theirs[order][1:], ours)]).size:
         raise TableError(f"{other.what}: the segment of {list_rows(other.rows[np.sort(both)])} begins in another one")
     unit = unit_of_time(ends[0], np.empty(0))
-    axes: dict[str, tuple[Times, float]] = {"rows": (_places(ours), 1.0)}
+    axes: dict[str, tuple[Times, float]] = {"rows": (places(ours), 1.0)}
     if clock is not None and not _starts_again(clock, ours):
         begin = np.full(ours.max() + 1, np.inf)
         np.minimum.at(begin, ours, clock.seconds)
@@ -249,7 +240,7 @@ def _numbers(match: Ids, pair: _Pair) -> Ids:
     """Return the number of the segment of each row (n,), from 1; between segments of the next one in the recording, or
     its last; in a recording without, a number beyond all.
     """
-    place, inside = _places(pair.ours), np.flatnonzero(match >= 0)
+    place, inside = places(pair.ours), np.flatnonzero(match >= 0)
     rows = inside, pair.ours[inside]
     following, before = (latest(sign * place, sign * place[inside], *(pair.ours, rows[1])) for sign in (-1, 1))
     nearest = np.where(following < 0, before, following)

@@ -15,7 +15,7 @@ from thenar.runtime.names import SHOWN, list_names, shortened
 from thenar.runtime.published import NONE
 from thenar.runtime.recording.reader import Oddity
 
-from ..arrays import groups, otsu
+from ..arrays import groups, latest, otsu, places
 from . import RecordingError, TableError, check_room, list_rows
 from .cells import NUMBER, Parsed, Value, bits, codes, integers, names, natural_key, numbers, times, unit_of_time
 from .columns import KEYS, ColumnRoles, Selection
@@ -397,16 +397,12 @@ def fill(values: NDArray[np.generic], missing: NDArray[np.bool_], trial_ids: NDA
     If the trial has none, use the lower median of all known values. Return the number of cells filled that way. Labels
     are not used.
     """
-    order = np.argsort(trial_ids, kind="stable")
-    trial, known, gaps = trial_ids[order], np.flatnonzero(~missing[order]), np.flatnonzero(missing[order])
-    following = np.searchsorted(known, gaps)
-    before, after = known[following - 1], known[following % len(known)]
-    beyond = len(order)
-    back = np.where((following > 0) & (trial[before] == trial[gaps]), gaps - before, beyond)
-    ahead = np.where((following < len(known)) & (trial[after] == trial[gaps]), after - gaps, beyond)
-    alone = (back == beyond) & (ahead == beyond)
+    known, gaps, place = np.flatnonzero(~missing), np.flatnonzero(missing), places(trial_ids)
+    before, after = (
+        latest(sign * place[gaps], sign * place[known], trial_ids[gaps], trial_ids[known]) for sign in (1, -1)
+    )
+    back, ahead = place[gaps] - place[known[before]], place[known[after]] - place[gaps]
+    nearest = np.where((before < 0) | ((after >= 0) & (ahead < back)), after, before)
     present = np.sort(values[~missing])
-    filled = values[order[np.where(back <= ahead, before, after)]]
-    filled[alone] = present[(len(present) - 1) // 2]
-    values[order[gaps]] = filled
-    return int(alone.sum())
+    values[gaps] = np.where(nearest < 0, present[(len(present) - 1) // 2], values[known[nearest]])
+    return int((nearest < 0).sum())
