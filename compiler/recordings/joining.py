@@ -57,14 +57,16 @@ def join(first: Table, other: Table, roles: ColumnRoles | None = None) -> Table:
     pair = _paired(first, other, bool(ends))
     before = {new: old for old, new in roles.rename.items()} if roles else {}
     name = before.get(roles.time or "", roles.time or "") if roles else time_of(first)
-    clock = _clock(first, name, roles.time_unit if roles else None)
+    clock = partial(_clock, first, name, roles.time_unit if roles else None)
     if ends:
         match, counted = _segments(pair, ends, clock, roles)
-        known, how = {*ends}, f"segments, {_COUNTS[counted]}"
+        time, how = "", f"segments, {_COUNTS[counted]}"
     else:
-        match, known, how = _rows(pair, clock)
-    more = [name for name in other.columns if name not in known | {*pair.keys}]
-    twice = [name for name in more if name in first.columns and not ends]
+        match, time, how = _rows(pair, clock)
+    known = {*ends, *pair.keys, time, other.rows.column if isinstance(other.rows, FileRows) else ""}
+    more = [name for name in other.columns if name not in known]
+    replaced = {*KEYS} - {"time"} if ends else set()
+    twice = [name for name in more if name in first.columns and name not in replaced]
     # Counters of two devices have one name.
     more = [name for name in more if name not in twice or not (is_time(words_of(name)) or is_count(words_of(name)))]
     if twice := [repr(name) for name in twice if name in more]:
@@ -150,16 +152,17 @@ def _starts_again(clock: _Clock, ids: Ids) -> bool:
     return bool(restarts(ids[order], clock.seconds[order])[-1] > len(np.unique(ids)))
 
 
-def _rows(pair: _Pair, clock: _Clock | None) -> tuple[Ids, set[str], str]:
-    """Return the row of the other table for each row (n,), -1 for none, columns without more to say, and a remark."""
+def _rows(pair: _Pair, read_clock: Callable[[], _Clock | None]) -> tuple[Ids, str, str]:
+    """Return the row of the other table for each row (n,), -1 for none, the time that says so, if any, and a remark."""
     first, other, ours, theirs, keys = pair
-    files = {other.rows.column} if isinstance(other.rows, FileRows) else set[str]()
     if (alone := ~np.isin(ours, theirs)).any():
         raise TableError(f"{other.what} has no rows of the trial with {list_rows(first.rows[alone][:1])}")
     if keys and len(np.unique(theirs)) == len(theirs):
-        return latest(np.zeros(len(ours)), np.zeros(len(theirs)), ours, theirs), files, "one row for each trial"
-    its = _clock(other, clock.name if clock.name in other.columns else time_of(other)) if clock else None
-    if clock is None or its is None or bool(clock.unit) != bool(its.unit) or not (clock.unit or clock.name == its.name):
+        return latest(np.zeros(len(ours)), np.zeros(len(theirs)), ours, theirs), "", "one row for each trial"
+    clock = read_clock()
+    same = clock is not None and clock.name in other.columns
+    its = _clock(other, clock.name if same else time_of(other), clock.unit if same else None) if clock else None
+    if clock is None or its is None or not (same or (clock.unit and its.unit)):
         counts = [np.bincount(ids, minlength=ours.max() + 1)[ours] for ids in (ours, theirs)]
         if (uneven := np.flatnonzero(counts[0] != counts[1])).size:
             here = f"the trial with {list_rows(first.rows[uneven[:1]])}"
@@ -167,7 +170,7 @@ def _rows(pair: _Pair, clock: _Clock | None) -> tuple[Ids, set[str], str]:
             raise TableError(
                 f"{first.what} and {other.what} have {said} rows of {here}: give both a time, in one clock"
             )
-        return latest(places(ours), places(theirs), ours, theirs), files, "row by row"
+        return latest(places(ours), places(theirs), ours, theirs), "", "row by row"
     if _starts_again(clock, ours) or _starts_again(its, theirs):
         raise TableError(f"{first.what} and {other.what}: {its.name} starts again within a trial: name trials in both")
     order = np.lexsort((its.seconds, theirs))
@@ -177,7 +180,7 @@ def _rows(pair: _Pair, clock: _Clock | None) -> tuple[Ids, set[str], str]:
         ranges = [f"{part.min():.12g} to {part.max():.12g} s" for part in (clock.seconds, its.seconds)]
         here = f"the trial with {list_rows(first.rows[apart][:1])}"
         raise TableError(f"{first.what} and {other.what} have no time of {here} in common: {' and '.join(ranges)}")
-    return match, files | {its.name}, f"by {its.name}"
+    return match, its.name, f"by {its.name}"
 
 
 def _taken(first: Table, other: Table, name: str, match: Ids) -> AnyArray:
@@ -193,7 +196,9 @@ def _taken(first: Table, other: Table, name: str, match: Ids) -> AnyArray:
     return taken
 
 
-def _segments(pair: _Pair, ends: Sequence[str], clock: _Clock | None, roles: ColumnRoles | None) -> tuple[Ids, str]:
+def _segments(
+    pair: _Pair, ends: Sequence[str], read_clock: Callable[[], _Clock | None], roles: ColumnRoles | None
+) -> tuple[Ids, str]:
     """Return the segment in which each row is (n,), -1 for none, and what the ends of segments count: that by which
     they cover most rows, unless it is known. Raises TableError for a segment without rows.
     """
@@ -209,6 +214,8 @@ def _segments(pair: _Pair, ends: Sequence[str], clock: _Clock | None, roles: Col
         raise TableError(f"{other.what}: the segment of {list_rows(other.rows[np.sort(both)])} begins in another one")
     unit = unit_of_time(ends[0], np.empty(0))
     axes: dict[str, tuple[Times, float]] = {"rows": (places(ours), 1.0)}
+    known = roles.segments if roles else "rows" if words_of(ends[0]) & WORDS["row"] else None
+    clock = None if known == "rows" else read_clock()
     if clock is not None and not _starts_again(clock, ours):
         begin = np.full(ours.max() + 1, np.inf)
         np.minimum.at(begin, ours, clock.seconds)
@@ -218,7 +225,6 @@ def _segments(pair: _Pair, ends: Sequence[str], clock: _Clock | None, roles: Col
             "s": (clock.seconds - begin[ours], PER_SECOND[unit or "s"]),
             **axes,
         }
-    known = roles.segments if roles else "rows" if words_of(ends[0]) & WORDS["row"] else None
     if known not in (None, *axes):
         raise TableError(f"segments = {known!r} needs a column of time in {first.what} that does not start again")
     found: dict[str, Ids] = {}
