@@ -19,12 +19,12 @@ from . import TYPES, RecordingError, TableError, check_names, check_room, list_r
 from .columns import ColumnRoles, JointColumns, TaxelColumns, read_columns, select, sound_grid
 from .graspset import CODES, GraspSet, Joint
 from .inputs import WORDS, Course, possible_clocks, words_of
-from .joining import join
+from .joining import read_joined
 from .readings import Readings, meanings, nothing_held, read_cells, whole
 from .summary import check_trials, find_oddities, looks_like_frames
 from .table import Table
 from .taxonomy import Taxonomy, own, plain, published
-from .trial_files import Report, read_path
+from .trial_files import Report
 
 
 class CodingCost(msgspec.Struct, frozen=True):
@@ -75,10 +75,7 @@ def import_file(
     RecordingError naming file, rows and columns, and OSError.
     """
     wanted = read_columns(columns)
-    joined = read_path(table, wanted.text, progress, more)[0]
-    for other in more:
-        joined = join(joined, read_path(other, None, progress)[0], wanted)
-    return import_table(joined, wanted)
+    return import_table(read_joined(table, more, progress, wanted)[0], wanted)
 
 
 def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportReport]:

@@ -8,6 +8,7 @@ clock of the first table, or go with it row by row.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -18,10 +19,11 @@ from thenar.runtime.names import SHOWN, list_names, shortened
 from ..arrays import AnyArray, Ids, Times, groups, latest, measured, places
 from . import FileRows, TableError, list_rows
 from .cells import PER_SECOND, Column, TimeUnit, is_numeric, names, numbers, times, unit_of_time, unpadded
-from .columns import KEYS, ColumnRoles
+from .columns import KEYS, ColumnRoles, TextFormat
 from .inputs import WORDS, is_count, is_span, is_time, time_of, words_of
 from .readings import restarts
 from .table import SUFFIXES, Table
+from .trial_files import Report, read_path
 
 # A row is in a segment from the time that this begins, and in the one before up to a share of the step between rows.
 _SAME = 0.01
@@ -44,6 +46,19 @@ class _Pair(NamedTuple):
     ours: Ids
     theirs: Ids
     keys: list[str]
+
+
+def read_joined(
+    path: Path, more: Sequence[Path], progress: Report, roles: ColumnRoles | None = None
+) -> tuple[Table, TextFormat, list[str]]:
+    """Return the table in `path`, a file or a pattern, joined with `more`; its format, and sentences on that.
+
+    Without `roles` the format is found, as it is for `more`. Raises TableError, OSError.
+    """
+    table, text, remarks = read_path(path, roles.text if roles else None, progress, more)
+    for other in more:
+        table = join(table, read_path(other, None, progress)[0], roles)
+    return table, text, remarks
 
 
 def join(first: Table, other: Table, roles: ColumnRoles | None = None) -> Table:

@@ -20,11 +20,11 @@ from . import FileRows, TableError, list_rows
 from .cells import names, numbers, times, unit_of_time
 from .columns import KEYS, PLAIN, ColumnRoles, JointColumns, TaxelColumns, TextFormat, globs_of
 from .inputs import MOST_TYPES, ON_GRID, WORDS, Course, Facts, Role, doubts, facts_of, inputs_of, may_be, numbers_trials
-from .joining import join
+from .joining import read_joined
 from .readings import in_runs, restarts
 from .table import Table
 from .taxonomy import plain, published_for
-from .trial_files import Report, read_path
+from .trial_files import Report
 
 # The share of a stream's label changes that lead to or from the label for nothing held.
 _BETWEEN = 0.9
@@ -68,9 +68,7 @@ def propose_file(
     Further tables of the same trials are `more`. `progress` takes the number of files that were read, and of all.
     Raises TableError, OSError.
     """
-    table, text, remarks = read_path(path, None, progress, more)
-    for other in more:
-        table = join(table, read_path(other, None, progress)[0])
+    table, text, remarks = read_joined(path, more, progress)
     # What a path says is no input, and only a field that is called so has a role.
     rows = table.rows
     paths = [*sorted({*rows.fields} - {*KEYS}), rows.column] if isinstance(rows, FileRows) else []
