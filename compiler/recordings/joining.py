@@ -70,6 +70,17 @@ def join(first: Table, other: Table, roles: ColumnRoles | None = None) -> Table:
     if not ends and _ends(first, roles):
         raise TableError(f"{first.what} is a table of segments: name the recording first, {other.what}")
     pair = _paired(first, other, bool(ends))
+    # A segment replaces what names a trial; counters of two devices have one name.
+    known = {*ends, *pair.keys, other.rows.column if isinstance(other.rows, FileRows) else ""}
+    more = [name for name in other.columns if name not in known]
+    twice = [name for name in more if name in first.columns and not (ends and name in KEYS[:-1])]
+    counters = [name for name in twice if is_time(words_of(name)) or is_count(words_of(name))]
+    if len(twice) > len(counters):
+        shown = list_names([repr(name) for name in twice if name not in counters])
+        raise TableError(
+            f"{first.what} and {other.what} both have {shown}: rename the columns of one; of tables with one trial "
+            "each, name the pattern of their paths, such as 'data/{label}_{trial}.csv'"
+        )
     before = {new: old for old, new in roles.rename.items()} if roles else {}
     name = before.get(roles.time or "", roles.time or "") if roles else time_of(first)
     clock = partial(_clock, first, name, roles.time_unit if roles else None)
@@ -78,17 +89,7 @@ def join(first: Table, other: Table, roles: ColumnRoles | None = None) -> Table:
         time, how = "", f"segments, {_COUNTS[counted]}"
     else:
         match, time, how = _rows(pair, clock)
-    known = {*ends, *pair.keys, time, other.rows.column if isinstance(other.rows, FileRows) else ""}
-    more = [name for name in other.columns if name not in known]
-    replaced = {*KEYS} - {"time"} if ends else set()
-    twice = [name for name in more if name in first.columns and name not in replaced]
-    # Counters of two devices have one name.
-    more = [name for name in more if name not in twice or not (is_time(words_of(name)) or is_count(words_of(name)))]
-    if twice := [repr(name) for name in twice if name in more]:
-        raise TableError(
-            f"{first.what} and {other.what} both have {list_names(twice)}: rename the columns of one; of tables with "
-            "one trial each, name the pattern of their paths, such as 'data/{label}_{trial}.csv'"
-        )
+    more = [name for name in more if name != time and name not in counters]
     columns: dict[str, Column] = {name: _taken(first, other, name, match) for name in more}
     segments = first.segments
     if ends:
