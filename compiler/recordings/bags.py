@@ -29,7 +29,11 @@ _BESIDE = {"header", "layout"}
 
 def is_folder(path: Path) -> bool:
     """Return whether `path` is the folder of a rosbag2."""
-    return (path / "metadata.yaml").is_file()
+    told = path / "metadata.yaml"
+    if not told.is_file():
+        return False
+    with told.open("rb") as file:
+        return b"rosbag2" in file.read(1000)
 
 
 def is_recording(path: Path) -> bool:

@@ -86,11 +86,10 @@ def read_foreign(paths: Sequence[Path], skip: int | None = 0) -> Iterator[Foreig
 
 def size_of(path: Path) -> int:
     """Return the bytes of a file, or of those in a folder."""
-    sizes = []
-    for each in sorted(path.iterdir()) if path.is_dir() else [path]:
-        with open_file(each, TableError) as file:
-            sizes.append(os.fstat(file.fileno()).st_size)
-    return sum(sizes)
+    if path.is_dir():
+        return sum(each.stat().st_size for each in path.iterdir() if each.is_file())
+    with open_file(path, TableError) as file:
+        return os.fstat(file.fileno()).st_size
 
 
 def _run(paths: Sequence[Path], skip: int | None, seconds: int, made: IO[bytes]) -> str:
@@ -399,6 +398,8 @@ def _limit(size: int) -> None:
     # SIGXCPU comes at the first limit; at the second, SIGKILL, which does not say why.
     resource.setrlimit(resource.RLIMIT_CPU, (_cpu_s(size), _cpu_s(size) + 5))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    # A compressed bag is unpacked into a file.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (MEMORY + MEMORY_EACH * size,) * 2)
     status = Path("/proc/self/statm")
     if status.exists():
         taken = int(status.read_text().split()[0]) * resource.getpagesize()

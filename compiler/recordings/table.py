@@ -244,7 +244,8 @@ def _read_motion(path: Path) -> Table:
         rows = (line if line.strip() else "" for line in lines)
         if path.suffix.lower() == ".trc" and first.startswith("PathFileType"):
             marker, header = "", []
-            for name, axis in zip_longest(*(line.rstrip().split("\t") for line in islice(lines, 2, 4)), fillvalue=""):
+            _, _, *names = (next(lines, "").rstrip().split("\t") for _ in range(4))
+            for name, axis in zip_longest(*names, fillvalue=""):
                 marker, axis = name.strip() or marker, axis.strip().rstrip("0123456789").lower()
                 header.append(f"{marker}.{axis}" if axis else marker)
             return _read_csv(path.name, chain(["\t".join(header)], rows), PLAIN, "\t", 4)

@@ -226,7 +226,8 @@ def test_bags_follow_a_table_of_segments(capsys: pytest.CaptureFixture[str]) -> 
     assert np.array_equal(found.is_none, np.tile([*[True] * 10, *[False] * 20, *[True] * 10], 9))
     assert found.grasps[~found.is_none].tolist() == np.repeat([*POSES] * 3, 20).tolist()
     assert imported("bags", "segments.csv", output="b.grasps").fingerprint() == found.fingerprint()
-    # A bag alone is a table, and a file beside bags is none of them.
+    # A bag alone is a table, and a file next to bags is none of them, nor is a folder with other metadata.
+    Path("bags/metadata.yaml").write_text("authors: us\n")
     assert "no column looks like the grasp type" in refused(capsys, "bags/trial_01")
     Path("segments.csv").rename("bags/segments.csv")
     assert imported("bags/trial_{trial}", "bags/segments.csv").fingerprint() == found.fingerprint()
