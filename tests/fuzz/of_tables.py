@@ -62,6 +62,10 @@ def _strange() -> bytes:
     return "\n".join(["nRows=27", "endheader", "# grasp trial data", *rows]).encode()
 
 
+def _tabs() -> bytes:
+    return to_csv(grasp_set(), delimiter="\t").encode()
+
+
 @cache
 def _npz() -> bytes:
     grasps = grasp_set()
@@ -183,6 +187,8 @@ FORMATS = (
     *map(_of, (".xlsx", ".parquet", ".h5", ".mat")),
     Format("csv", lambda: [_csv()], table_file, _table(".csv")),
     Format("csv.gz", lambda: [gzip.compress(_csv(), mtime=0)], zipped(table_file), _table(".csv.gz")),
+    Format("mot", lambda: [b"x\nendheader\n" + _tabs()], table_file, _table(".mot")),
+    Format("trc", lambda: [b"PathFileType\n\n\n" + _tabs().replace(b"\n", b"\n\n", 1)], table_file, _table(".trc")),
     Format("npz", lambda: [_npz()], npz_file, _table(".npz"), weight=0.03),
     Format("columns.toml", lambda: [_COLUMNS.encode(), _OF_TYPES.encode()], toml_file, _columns),
     Format("grasps", lambda: [_grasps()], sealed(npz_file), _set),
