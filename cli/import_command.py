@@ -62,7 +62,8 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream
     from thenar.compiler.recordings.bags import is_folder, is_recording
     from thenar.compiler.recordings.mcap_recording import import_files
 
-    tables = tuple(_pattern(path, tables) if path.is_dir() and not is_folder(path) else path for path in tables)
+    if len(tables) == 1 and tables[0].is_dir() and not is_folder(tables[0]):
+        tables = (_pattern(tables[0]),)
     if columns is None and not stream and not all(map(is_recording, tables)):
         grasp_set, report = _found(tables, output, yes)
     else:
@@ -72,11 +73,11 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream
     show(report, _print, output)
 
 
-def _pattern(folder: Path, tables: tuple[Path, ...]) -> Path:
-    """Return the pattern of the tables in a folder, given others, and say what it is."""
+def _pattern(folder: Path) -> Path:
+    """Return the pattern of the tables in a folder, and say what it is."""
     from thenar.compiler.recordings.trial_files import propose_pattern
 
-    pattern, remarks = propose_pattern(folder, tables)
+    pattern, remarks = propose_pattern(folder)
     for remark in remarks:
         echo(remark, err=wants_json())
     return pattern

@@ -135,9 +135,8 @@ class ColumnRoles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     A label, subject, object, session or trial may be spread over several columns, whose values are combined. Otherwise
     `frames` defines the trials: "independent" makes each row one; with "restart" a trial begins where `time` starts
     again, or the label, subject, object or session changes. Labels in `none` mean that nothing is held, as "none"
-    always does; with "" among them, so does an empty cell. `start` and `end` are columns of a table of segments, which
-    count `segments`: in the clock of `time`, or seconds or rows from the start of a recording. `rename` gives columns
-    of the table other names, which all other keys use, and the set has.
+    always does; with "" among them, so does an empty cell. `rename` gives
+    columns of the table other names, which all other keys use, and the set has.
     """
 
     label: str | tuple[str, ...]
@@ -147,9 +146,6 @@ class ColumnRoles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     trial: str | tuple[str, ...] | None = None
     time: str | None = None
     time_unit: TimeUnit | None = None
-    start: str | None = None
-    end: str | None = None
-    segments: Literal["time", "s", "rows"] | None = None
     none: str | tuple[str, ...] = ()
     frames: Literal["independent", "restart"] | None = None
     taxonomy: str | tuple[str, ...] | dict[str, tuple[str, ...]] = "own"
@@ -180,8 +176,6 @@ class ColumnRoles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
             raise ValueError(f"`trial` and `frames` = {self.frames!r} both say what a trial is: leave one out")
         if self.time_unit is not None and self.time is None:
             raise ValueError("`time_unit` is given without `time`")
-        if len({self.start is None, self.end is None, self.segments is None}) > 1:
-            raise ValueError("`start`, `end` and `segments` belong together: give all of them or none")
         if isinstance(self.taxonomy, dict) and len(self.taxonomy) != 1:
             raise ValueError("`taxonomy` as a table holds one name and its list of types")
         if not self.parts("label"):

@@ -27,7 +27,6 @@ from .trial_files import Report, read_path
 
 # A row is in a segment from the time that this begins, and in the one before up to a share of the step between rows.
 _SAME = 0.01
-_COUNTS = {"time": "by the clock of the recording", "s": "in seconds from its first row", "rows": "in its rows from 0"}
 
 
 class _Clock(NamedTuple):
@@ -62,12 +61,12 @@ def read_joined(
 
 
 def join(first: Table, other: Table, roles: ColumnRoles | None = None) -> Table:
-    """Return `first` with what `other` says about its rows; `roles` name the time and the ends of segments, if given.
+    """Return `first` with what `other` says about its rows; `roles` name the time, if given.
 
     Raises TableError if the tables do not belong together, or a trial of the first is not in the other.
     """
-    ends = _ends(other, roles)
-    if not ends and _ends(first, roles):
+    ends = _ends(other)
+    if not ends and _ends(first):
         raise TableError(f"{first.what} is a table of segments: name the recording first, {other.what}")
     pair = _paired(first, other, bool(ends))
     # A segment replaces what names a trial; counters of two devices have one name.
@@ -85,29 +84,26 @@ def join(first: Table, other: Table, roles: ColumnRoles | None = None) -> Table:
     name = before.get(roles.time or "", roles.time or "") if roles else time_of(first)
     clock = partial(_clock, first, name, roles.time_unit if roles else None)
     if ends:
-        match, counted = _segments(pair, ends, clock, roles)
-        time, how = "", f"segments, {_COUNTS[counted]}"
+        match, how = _segments(pair, ends, clock)
+        time = ""
     else:
         match, time, how = _rows(pair, clock)
     more = [name for name in more if name != time and name not in counters]
     columns: dict[str, Column] = {name: _taken(first, other, name, match) for name in more}
-    segments = first.segments
+    trial = first.segment
     if ends:
         if "label" in first.columns and "label" not in columns:
             columns["label"] = np.where(match < 0, "", np.asarray(first.columns["label"], np.str_))
         trial = next(name for name in ("segment", "segment number") if name not in {*first.columns, *columns})
         columns[trial] = _numbers(match, pair)
-        segments = {"start": ends[0], "end": ends[1], "segments": counted, "trial": trial}
     notes = (*first.notes, *other.notes, f"{other.what}: {how}")
-    return replace(first, columns={**first.columns, **columns}, notes=notes, segments=segments)
+    return replace(first, columns={**first.columns, **columns}, notes=notes, segment=trial)
 
 
-def _ends(table: Table, roles: ColumnRoles | None) -> tuple[str, ...]:
-    """Return the columns with the starts and the ends of segments, () if it is no table of segments."""
-    given = (roles.start, roles.end) if roles else ()
-    found = (next((name for name in table.columns if is_span(key, name)), None) for key in ("start", "end"))
-    ends = tuple(name for name in given or found if name is not None and name in table.columns)
-    return ends if len(ends) == 2 else ()
+def _ends(table: Table) -> list[str]:
+    """Return the columns with the starts and the ends of segments, none if it is no table of segments."""
+    found = [[name for name in table.columns if is_span(key, name)] for key in ("start", "end")]
+    return [names[0] for names in found] if all(found) else []
 
 
 def _paired(first: Table, other: Table, segments: bool) -> _Pair:
@@ -212,11 +208,9 @@ def _taken(first: Table, other: Table, name: str, match: Ids) -> AnyArray:
     return taken
 
 
-def _segments(
-    pair: _Pair, ends: Sequence[str], read_clock: Callable[[], _Clock | None], roles: ColumnRoles | None
-) -> tuple[Ids, str]:
-    """Return the segment in which each row is (n,), -1 for none, and what the ends of segments count: that by which
-    they cover most rows, unless it is known. Raises TableError for a segment without rows.
+def _segments(pair: _Pair, ends: Sequence[str], read_clock: Callable[[], _Clock | None]) -> tuple[Ids, str]:
+    """Return the segment in which each row is (n,), -1 for none, and a remark on what the ends of segments count: that
+    by which they cover most rows. Raises TableError for a segment without rows.
     """
     first, other, ours, theirs, _ = pair
     parsed = [numbers(other.columns[name], other.decimal) for name in ends]
@@ -229,33 +223,24 @@ def _segments(
     if (both := order[1:][overlap & np.isin(theirs[order][1:], ours)]).size:
         raise TableError(f"{other.what}: the segment of {list_rows(other.rows[np.sort(both)])} begins in another one")
     unit = unit_of_time(ends[0], np.empty(0))
-    axes: dict[str, tuple[Times, float]] = {"rows": (places(ours), 1.0)}
-    known = roles.segments if roles else "rows" if words_of(ends[0]) & WORDS["row"] else None
-    clock = None if known == "rows" else read_clock()
+    counts = [("in its rows from 0", places(ours), 1.0)]
+    clock = None if words_of(ends[0]) & WORDS["row"] else read_clock()
     if clock is not None and not _starts_again(clock, ours):
         begin = np.full(ours.max() + 1, np.inf)
         np.minimum.at(begin, ours, clock.seconds)
         own = unit or clock.unit
-        axes = {
-            "time": (clock.seconds, PER_SECOND[own] if own else 1.0),
-            "s": (clock.seconds - begin[ours], PER_SECOND[unit or "s"]),
-            **axes,
-        }
-    if known not in (None, *axes):
-        raise TableError(f"segments = {known!r} needs a column of time in {first.what} that does not start again")
-    found: dict[str, Ids] = {}
-    for how, (axis, per) in axes.items() if known is None else [(known, axes[known])]:
+        counts.insert(0, ("in seconds from its first row", clock.seconds - begin[ours], PER_SECOND[unit or "s"]))
+        counts.insert(0, ("by the clock of the recording", clock.seconds, PER_SECOND[own] if own else 1.0))
+    found = []
+    for how, axis, per in counts:
         at = axis + _SAME * float(np.median(np.abs(np.diff(axis)))) if len(axis) > 1 else axis
         match = latest(at, start / per, ours, theirs)
-        found[how] = np.where((match >= 0) & (at < end[match] / per), match, -1)
-    counted = max(found, key=lambda how: int(np.count_nonzero(found[how] >= 0)))
-    match = found[counted]
+        found.append((np.where((match >= 0) & (at < end[match] / per), match, -1), how, axis * per))
+    match, how, axis = max(found, key=lambda each: int(np.count_nonzero(each[0] >= 0)))
     if (empty := np.isin(theirs, ours) & ~np.isin(np.arange(len(theirs)), match)).any():
-        axis, per = axes[counted]
-        lasts = f"{axis.min() * per:.12g} to {axis.max() * per:.12g} {_COUNTS[counted]}"
-        rows = list_rows(other.rows[empty])
+        lasts, rows = f"{axis.min():.12g} to {axis.max():.12g} {how}", list_rows(other.rows[empty])
         raise TableError(f"{other.what}: no row of {first.what}, {lasts}, is in the segment of {rows}")
-    return match, counted
+    return match, f"segments, {how}"
 
 
 def _numbers(match: Ids, pair: _Pair) -> Ids:

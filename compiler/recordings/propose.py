@@ -72,7 +72,7 @@ def propose_file(
     # What a path says is no input, and only a field that is called so has a role.
     rows = table.rows
     paths = [*sorted({*rows.fields} - {*KEYS}), rows.column] if isinstance(rows, FileRows) else []
-    paths += [table.segments["trial"]] if table.segments else []
+    paths += [table.segment] if table.segment else []
     emptied = dict.fromkeys(paths, np.full(len(rows), ""))
     try:
         proposal = propose(dataclasses.replace(table, columns={**table.columns, **emptied}), text, remarks)
@@ -115,8 +115,8 @@ def _by_file(table: Table, proposal: ColumnProposal, paths: tuple[str, ...]) -> 
         replace(role, columns=tuple(name for name in role.columns if name not in paths)) for role in proposal.roles
     ]
     roles = [role for role in roles if role.columns]
-    if table.segments:
-        trials: tuple[str, ...] = (table.segments["trial"],)
+    if table.segment:
+        trials: tuple[str, ...] = (table.segment,)
         reason = "each segment is one trial"
     else:
         assert isinstance(rows, FileRows)
@@ -128,10 +128,9 @@ def _by_file(table: Table, proposal: ColumnProposal, paths: tuple[str, ...]) -> 
         trials = (rows.column, *columns.parts("trial"))
         reason = "each file is one trial" if len(trials) == 1 else "numbers of trials are of one file"
     rest = tuple(name for name in paths if name not in trials)
-    columns = replace(columns, trial=trials if len(trials) > 1 else trials[0], frames=None)
     return replace(
         proposal,
-        columns=replace(columns, **table.segments),
+        columns=replace(columns, trial=trials if len(trials) > 1 else trials[0], frames=None),
         roles=(
             *(role for role in roles if role.role != "trial"),
             Role(trials, "trial", reason),

@@ -13,7 +13,7 @@ import zlib
 from array import array
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import chain, islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -110,7 +110,7 @@ class Table:
     `rows` are the rows' numbers as the user sees them: the line in a CSV or spreadsheet, counted from 1 elsewhere.
     `size` is the size of its file in bytes. `cells` says that names are written as cells of a spreadsheet; `decimal` is
     the decimal sign of numbers in text. `skip` is the number of rows of a spreadsheet that precede its header, `notes`
-    say what was left out. If its trials are segments, `segments` are the keys of a columns.toml about them.
+    say what was left out. `segment` is the column that numbers the segments of recordings, "" without them.
     """
 
     what: str
@@ -121,7 +121,7 @@ class Table:
     decimal: str = "."
     skip: int = 0
     notes: tuple[str, ...] = ()
-    segments: Mapping[str, str] = field(default_factory=dict)
+    segment: str = ""
 
 
 _TEXTS = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz", ".txt.gz")
@@ -181,6 +181,10 @@ def _read_ours(path: Path, text: TextFormat) -> Table:
             return _read_csv(path.name, lines, text, text.delimiter or ("\t" if tabs else ","))
     if name.endswith(_MOTION):
         return _read_motion(path)
+    if path.is_dir():
+        raise TableError(
+            f"{path} is a folder: name the pattern of its tables, such as '{path}/{{label}}_{{trial}}.csv'"
+        )
     raise TableError(f"{path.name}: a table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
 
 

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from thenar.runtime.names import SHOWN, list_names, shortened
 
 from . import LARGEST, ROWS, FileRows, TableError, check_room
-from .cells import Column, is_numeric, name_of_number, natural_key, skipped, unpadded
-from .cells import names as names_of
-from .columns import KEYS, PLAIN, TextFormat
+from .cells import Column, is_numeric, name_of_number, natural_key, skipped
+from .columns import PLAIN, TextFormat
 from .foreign import size_of
 from .table import SUFFIXES, Table, is_table, is_text, read_table, read_tables, sniff
 from .taxonomy import plain, published_for
@@ -251,14 +250,12 @@ class _Part(NamedTuple):
         return all(text.isdecimal() for text in self.texts)
 
 
-def propose_pattern(folder: Path, more: Sequence[Path] = ()) -> tuple[Path, list[str]]:
+def propose_pattern(folder: Path) -> tuple[Path, list[str]]:
     """Return the pattern of the tables in `folder`, and sentences on what was found.
 
-    The tables are those of the most frequent kind and depth. What paths say is called as in the tables `more`, if these
-    say the same. Raises TableError if there are none, OSError.
+    The tables are those of the most frequent kind and depth. Raises TableError if there are none, OSError.
     """
     found, most = _tables(folder)
-    found = [path for path in found if path.absolute() not in [other.absolute() for other in more]]
     if not found:
         raise TableError(f"{folder} holds no tables ({', '.join(SUFFIXES)}): name another folder, or a file")
     paths = [path.relative_to(folder) for path in found]
@@ -266,19 +263,8 @@ def propose_pattern(folder: Path, more: Sequence[Path] = ()) -> tuple[Path, list
         return found[0], [f"{folder} holds one table, {shortened(str(paths[0]))}"]
     levels = [_tokens([path.parts[depth] for path in paths]) for depth in range(len(paths[0].parts) - 1)]
     levels.append([*_tokens([path.name.removesuffix(_suffix(path)) for path in found]), _suffix(found[0])])
-    parts = [part for level in levels for part in level if isinstance(part, _Part)]
-    columns, *others = [
-        [*read_path(path, None, lambda _done, _total: None)[0].columns.items()]
-        for path in (found[0], *(path for path in more if path.is_file()))
-    ]
-    known: dict[tuple[str, ...], str] = {}
-    for name, column in ((name, column) for table in others for name, column in table if name in {*KEYS} - {"time"}):
-        said = {*map(unpadded, names_of(column).values.tolist())}
-        same = [part.texts for part in parts if part.texts not in known and {*map(unpadded, part.texts)} <= said]
-        known |= dict.fromkeys(same[:1], name)
-    columns += [column for table in others for column in table]
-    rest = [part for part in parts if part.texts not in known]
-    names = known | _named(rest, [name for name, _ in columns])
+    inside = read_path(found[0], None, lambda _done, _total: None)[0].columns
+    names = _named([part for level in levels for part in level if isinstance(part, _Part)], [*inside])
     pattern = "/".join(
         "".join(f"{{{names[part.texts]}}}" if isinstance(part, _Part) else re.sub(r"[{}]", "*", part) for part in level)
         for level in levels

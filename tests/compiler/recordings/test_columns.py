@@ -73,8 +73,6 @@ def test_every_key_is_read(tmp_path: Path) -> None:
         ('label = "a"\ntime_unit = "s"', "`time_unit` is given without `time`"),
         ('label = "a"\ntrial = "b"\nframes = "restart"', "`trial` and `frames` = 'restart' both say what"),
         ('label = "a"\nreduce = "mean"', "reduce: this key is unknown"),
-        ('label = "a"\nstart = "b"', "`start`, `end` and `segments` belong together"),
-        ('label = "a"\nstart = "b"\nend = "c"\nsegments = "ms"', "segments: 'ms' is not among its values"),
         ("label = []", "`label` must name a column"),
         ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = inf', "`threshold` must be a finite number, 'otsu' or"),
         ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = "max"', "'max' is not among its values"),
