@@ -186,11 +186,6 @@ def natural_key(text: str) -> tuple[list[tuple[int, str]], str]:
     return [(len(part.lstrip("0")), part.lstrip("0")) if odd % 2 else (-1, part) for odd, part in parts], text
 
 
-def unpadded(text: str) -> str:
-    """Return a whole number without leading zeros, another text as it is."""
-    return text.lstrip("0") or "0" if text.isdecimal() else text
-
-
 TimeUnit = Literal["s", "ms", "us", "ns"]
 # Units of time by the words that name them, and the smallest step between two frames for each: frames come 2 to 2000
 # times a second.

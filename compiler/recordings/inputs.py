@@ -273,7 +273,7 @@ _LISTS = {
     "file": "file filename path recording bag datei fichier archivo",
     "start": "start begin onset from beginn von début inicio",
     "end": "end stop offset to until ende bis fin",
-    "row": "row sample index",
+    "row": "row sample index frame bild",
     # Words in the names of texts that are subjects or sessions if they are constant within trials.
     "person": "name tester operator volunteer",
     "occasion": "batch date round block group week recording",

@@ -18,7 +18,7 @@ from thenar.runtime.names import SHOWN, list_names, shortened
 
 from ..arrays import AnyArray, Ids, Times, groups, latest, measured, places
 from . import FileRows, TableError, list_rows
-from .cells import PER_SECOND, Column, TimeUnit, is_numeric, names, numbers, times, unit_of_time, unpadded
+from .cells import PER_SECOND, Column, TimeUnit, is_numeric, names, numbers, times, unit_of_time
 from .columns import KEYS, ColumnRoles, TextFormat
 from .inputs import WORDS, is_count, is_span, is_time, time_of, words_of
 from .readings import restarts
@@ -131,7 +131,8 @@ def _paired(first: Table, other: Table, segments: bool) -> _Pair:
 
 def _texts(table: Table, column: Column) -> NDArray[np.str_]:
     """Return the cells of a column that names trials, numbers without leading zeros."""
-    return _each(names(column, table.cells, table.size).values, unpadded)
+    texts = names(column, table.cells, table.size).values
+    return np.where(np.char.isdecimal(texts), np.char.lstrip(texts, "0"), texts)
 
 
 def _each(texts: NDArray[np.str_], change: Callable[[str], str]) -> NDArray[np.str_]:
