@@ -29,10 +29,10 @@ _BESIDE = {"header", "layout"}
 
 def is_folder(path: Path) -> bool:
     """Return whether `path` is the folder of a rosbag2."""
-    told = path / "metadata.yaml"
-    if not told.is_file():
+    metadata = path / "metadata.yaml"
+    if not metadata.is_file():
         return False
-    with told.open("rb") as file:
+    with metadata.open("rb") as file:
         return b"rosbag2" in file.read(1000)
 
 
