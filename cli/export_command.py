@@ -19,14 +19,13 @@ from .printing import echo, json_flag, progress, show
 )
 @overwrite_flag
 @click.option("--codes", is_flag=True, help="Write the joints' integer codes, not values in their units.")
-@click.option("--meta", is_flag=True, help="ARFF: also write subject, object, session and trial, as --columns does.")
 @click.option("--columns", type=OutputFile(".toml"), help="Also write the columns.toml that imports the table again.")
 @json_flag
-def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path | None) -> None:
+def command(grasps: Path, output: Path, codes: bool, columns: Path | None) -> None:
     """Export GRASPS, a .grasps file, as CSV, as Parquet, or as ARFF for Weka.
 
     With --columns, the table imports again as the same set: a table alone does not say what its codes mean, or that its
-    grasps were simulated.
+    grasps were simulated. An ARFF holds inputs and grasp types alone, and is not imported.
 
     \b
     Example:
@@ -39,7 +38,7 @@ def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path |
     keep_apart(grasps, output, columns)
     grasp_set = GraspSet.load(grasps)
     with progress(f"exporting {grasps.name}"):
-        export(grasp_set, output, codes, meta, columns)
+        export(grasp_set, output, codes, columns)
     columns_file = None if columns is None else str(columns)
     counts = {"trials": grasp_set.n_trials, "frames": len(grasp_set)}
     show({"output": str(output), "columns": columns_file, **counts}, lambda _: echo(f"{output}: {grasp_set.size}"))

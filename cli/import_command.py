@@ -35,7 +35,7 @@ def _existing(context: click.Context, argument: click.Parameter, given: tuple[st
 @click.option("-y", "--yes", is_flag=True, help="Accept the detected columns without asking.")
 @json_flag
 def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream: bool, yes: bool) -> None:
-    """Import TABLE (.csv, .tsv, .txt, .xlsx, .parquet, .h5, .mat, .arff or .npz) as labelled grasps.
+    """Import TABLE (.csv, .xlsx, .parquet, .h5, .mat, .mot, .c3d, .bag, a rosbag2, ...) as labelled grasps.
 
     Without --columns, the command detects the meaning of each column, shows it with reasons, and writes it next to the
     output, to set.columns.toml for set.grasps, for you to correct; on a terminal it then asks whether to continue.
@@ -44,8 +44,8 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream
     For a folder the command proposes the pattern. Quote patterns, and name fields as keys of columns.toml: label,
     subject, object, session, trial.
 
-    Malformed cells and unknown labels stop the import, which names their rows and columns. Merely odd data (constant
-    switches, rows shared by two subjects, ...) are counted in warnings.
+    Further TABLEs hold more of the same trials: columns, or segments (start, end, label) of the first one's rows.
+    Malformed cells and unknown labels stop the import; merely odd data are counted in warnings.
 
     Recordings of `thenar record` (.mcap) describe themselves; several, also of several subjects, become one set. With
     --stream they become whole movements: a grasp counts as held while the hand stays as it was captured.
@@ -55,16 +55,17 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream
         thenar import glove.csv -o set.grasps
         thenar import trials.csv.gz -o set.grasps --columns columns.toml
         thenar import 'data/{label}/{subject}_{trial}.csv' -o set.grasps
-        thenar import anna.mcap ben.mcap -o set.grasps
-        thenar import anna.mcap -o movements.grasps --stream
+        thenar import 'bags/{subject}_{trial}' segments.csv -o set.grasps
+        thenar import anna.mcap ben.mcap -o movements.grasps --stream
     """
     keep_apart(*tables, columns, output)
+    from thenar.compiler.recordings.bags import is_folder, is_recording
     from thenar.compiler.recordings.mcap_recording import import_files
 
-    if len(tables) == 1 and tables[0].is_dir():
+    if len(tables) == 1 and tables[0].is_dir() and not is_folder(tables[0]):
         tables = (_pattern(tables[0]),)
-    if columns is None and not stream and len(tables) == 1 and tables[0].suffix.lower() != ".mcap":
-        grasp_set, report = _found(tables[0], output, yes)
+    if columns is None and not stream and not all(map(is_recording, tables)):
+        grasp_set, report = _found(tables, output, yes)
     else:
         with progress(f"importing {', '.join(table.name for table in tables)}") as report_files:
             grasp_set, report = import_files(tables, columns, stream, report_files)
@@ -82,14 +83,14 @@ def _pattern(folder: Path) -> Path:
     return pattern
 
 
-def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport]":
-    """Import the table in `path` with the detected columns, if the user agrees."""
+def _found(tables: tuple[Path, ...], output: Path, yes: bool) -> "tuple[GraspSet, ImportReport]":
+    """Import `tables` of the same trials with the detected columns, if the user agrees."""
     from thenar.compiler.recordings import TableError
     from thenar.compiler.recordings.importer import import_table
     from thenar.compiler.recordings.propose import propose_file
 
-    with progress(f"reading {path.name}") as report_files:
-        read, proposal = propose_file(path, report_files)
+    with progress(f"reading {', '.join(table.name for table in tables)}") as report_files:
+        read, proposal = propose_file(tables[0], report_files, tables[1:])
     asked = not yes and os.isatty(0) and not wants_json()
     if not wants_json():
         _print_proposal(proposal)
@@ -97,15 +98,15 @@ def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport
         proposal = proposal.independent()
     written = _write(proposal.toml(), output.with_suffix(".columns.toml"), asked)
     echo(f"{written}: the detected columns", err=wants_json())
-    replacing = ["--overwrite"] if output.exists() else []
-    again = shlex.join(["thenar", "import", str(path), "-o", str(output), *replacing, "--columns", str(written)])
+    words = ["thenar", "import", *map(str, tables), "-o", str(output), *["--overwrite"] * output.exists()]
+    again = shlex.join([*words, "--columns", str(written)])
     if proposal.lacks:
         raise TableError(f"{proposal.lacks}: do so in {written}, then run: {again}")
     if asked and not click.confirm("Import with these columns?"):
         raise TableError(f"nothing was imported: correct {written}, then run: {again}")
     if not yes and not asked:
         raise TableError(f"nobody confirmed the columns on a terminal: review {written}, then run: {again}")
-    with progress(f"importing {path.name}"):
+    with progress(f"importing {tables[0].name}"):
         return import_table(read, proposal.columns)
 
 

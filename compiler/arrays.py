@@ -116,3 +116,38 @@ def otsu(values: NDArray[np.float64]) -> float:
     between = (sums[-1] * below - sums[:-1] * total) ** 2 / (below * (total - below))
     best = int(np.argmax(between))
     return float(found[best] / 2 + found[best + 1] / 2)
+
+
+# How long what was measured is of use: in seconds, and in usual intervals.
+_AGE_S, _INTERVALS = 0.5, 10
+
+Ids = NDArray[np.intp]
+Times = NDArray[np.float64]
+
+
+def latest(at: Times, times: Times, at_ids: Ids | None = None, ids: Ids | None = None) -> Ids:
+    """Return which of `times` (n,) is the last up to each of `at` (m,), -1 if none is; of those with equal `ids`."""
+    count, total = len(times), len(times) + len(at)
+    both = np.zeros(total, np.intp) if ids is None or at_ids is None else np.concatenate([ids, at_ids])
+    order = np.lexsort((np.arange(total) >= count, np.concatenate([times, at]), both))
+    last = np.maximum.accumulate(np.where(order < count, np.arange(total), -1))
+    found = np.empty(total, np.intp)
+    found[order] = np.where((last >= 0) & (both[order[last]] == both[order]), order[last], -1)
+    return found[count:]
+
+
+def measured(at: Times, times: Times, at_ids: Ids | None = None, ids: Ids | None = None) -> Ids:
+    """Return `latest`, -1 also where that is older than half a second and ten usual intervals. Times are in seconds."""
+    found = latest(at, times, at_ids, ids)
+    steps = np.diff(np.sort(times)) if ids is None else np.diff(times)[np.diff(ids) == 0]
+    age = max(_AGE_S, _INTERVALS * float(np.median(steps))) if len(steps) else np.inf
+    return np.where((found >= 0) & (at - times[found] <= age), found, -1)
+
+
+def places(ids: Ids) -> Times:
+    """Return the place (n,) of each row among those with equal `ids` (n,), from 0."""
+    order = np.argsort(ids, kind="stable")
+    first = np.flatnonzero(np.diff(ids[order], prepend=-1))
+    place = np.empty(len(ids))
+    place[order] = np.arange(len(ids)) - np.repeat(first, np.diff(first, append=len(ids)))
+    return place

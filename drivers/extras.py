@@ -9,7 +9,7 @@ from .errors import ThenarError
 EXTRAS: Mapping[str, tuple[str, ...]] = {
     "compiler": (
         *("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "clevercsv"),
-        *("python_calamine", "pyarrow", "pandas", "h5py", "mcap"),
+        *("python_calamine", "pyarrow", "pandas", "h5py", "mcap", "rosbags", "c3d"),
     ),
     "stability": ("mpmath",),
     "ros": ("cyclonedds",),

@@ -65,21 +65,26 @@ class FileRows(np.ndarray[tuple[int], np.dtype[np.int64]]):
     """Rows (n,) of a table that was read from several files, counted through all of them from 1.
 
     column  the table's column that names the file
+    fields  the columns that the paths say
     """
 
     column: str
+    fields: tuple[str, ...]
     _places: NDArray[np.generic]
 
     @classmethod
-    def of(cls, files: Sequence[tuple[str, NDArray[np.int64]]], column: str) -> "FileRows":
+    def of(
+        cls, files: Sequence[tuple[str, NDArray[np.int64]]], column: str, fields: tuple[str, ...] = ()
+    ) -> "FileRows":
         """Return the rows of `files`, each a name and the numbers of its rows as the user sees them."""
         places = [f"{number} of {shortened(name)}" for name, rows in files for number in rows.tolist()]
         made = np.arange(1, len(places) + 1).view(cls)
-        made.column, made._places = column, np.array(places, StringDType())
+        made.column, made.fields, made._places = column, fields, np.array(places, StringDType())
         return made
 
     def __array_finalize__(self, source: object) -> None:
-        self.column, self._places = getattr(source, "column", ""), getattr(source, "_places", np.empty(0))
+        self.column, self.fields = getattr(source, "column", ""), getattr(source, "fields", ())
+        self._places = getattr(source, "_places", np.empty(0))
 
     def shown(self) -> list[str]:
         """Return each row as its number in its file, and the file."""

@@ -196,6 +196,8 @@ UNITS: dict[TimeUnit, tuple[set[str], float, float]] = {
     "ns": ({"ns", "nsec", "nano", "nanos", "nanosecond", "nanoseconds"}, 5e5, 5e8),
 }
 
+PER_SECOND: dict[TimeUnit, float] = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+
 
 def unit_of_time(name: str, time: NDArray[np.float64]) -> TimeUnit | None:
     """Return the unit of times (n,) in a column called `name`, by its name or by the distance between frames.

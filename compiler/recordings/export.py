@@ -111,17 +111,15 @@ COLUMNS_TOML = "thenar"
 _BARE = re.compile(r"[A-Za-z0-9_.+-]+")
 
 
-def export(
-    grasp_set: GraspSet, path: Path, codes: bool = False, meta: bool = False, columns: Path | None = None
-) -> None:
+def export(grasp_set: GraspSet, path: Path, codes: bool = False, columns: Path | None = None) -> None:
     """Write `grasp_set` to a file with one of SUFFIXES, completely or not at all; joints as values, or as `codes`.
 
-    An ARFF holds subject, object, session and trial only with `meta` or `columns`. `columns` is the file for the
-    columns.toml that imports the table again. Raises TableError for any other suffix.
+    `columns` is the file for the columns.toml that imports the table again, unless it is ARFF, which holds the inputs
+    and the grasp type alone. Raises TableError for any other suffix.
     """
     name = path.name.lower()
     if name.endswith(".arff"):
-        data = to_arff(grasp_set, codes, meta or columns is not None).encode()
+        data = to_arff(grasp_set, codes).encode()
     elif name.endswith(".parquet"):
         data = to_dataframe(grasp_set, codes).to_parquet(index=False)
     elif name.removesuffix(".gz").endswith((".csv", ".tsv")):
@@ -192,19 +190,13 @@ def to_dataframe(grasp_set: GraspSet, codes: bool = False) -> "pd.DataFrame":
     return frame
 
 
-def to_arff(grasp_set: GraspSet, codes: bool = False, meta: bool = False) -> str:
+def to_arff(grasp_set: GraspSet, codes: bool = False) -> str:
     """Return the set as ARFF: switches nominal {0,1}, joints numeric, the grasp type nominal and last."""
-    heads, who = heads_of(grasp_set), meta_of(grasp_set) if meta else {}
-    kinds = {
-        key: _nominal(np.unique(column).tolist()) if column.dtype.kind == "U" else "numeric"
-        for key, column in who.items()
-    }
-    attributes = [f"{_quote(heads[key])} {kind}" for key, kind in kinds.items()]
-    attributes += [f"{_quote(name)} {{0,1}}" for name in grasp_set.switch_names]
+    attributes = [f"{_quote(name)} {{0,1}}" for name in grasp_set.switch_names]
     attributes += [f"{_quote(joint.name)} numeric" for joint, _ in _coded(grasp_set)]
-    attributes.append(f"{_quote(heads['label'])} {_nominal(types_of(grasp_set))}")
-    first = ([_quote(str(value)) for value in column.tolist()] for column in who.values())
-    rows = zip(*first, *_inputs(grasp_set, codes), map(_quote, grasp_set.grasps.tolist()), strict=True)
+    types = ",".join(map(_quote, types_of(grasp_set)))
+    attributes.append(f"{_quote(heads_of(grasp_set)['label'])} {{{types}}}")
+    rows = zip(*_inputs(grasp_set, codes), map(_quote, grasp_set.grasps.tolist()), strict=True)
     lines = ["@relation grasps", "", *(f"@attribute {attribute}" for attribute in attributes), "", "@data"]
     return "\n".join([*lines, *map(",".join, rows), ""])
 
@@ -222,10 +214,6 @@ def _coded(grasp_set: GraspSet) -> Iterable[tuple[Joint, NDArray[np.uint16]]]:
     """Yield the taxels and then the joints, each with its codes (n,)."""
     yield from zip(grasp_set.taxel_columns, grasp_set.taxels.T, strict=True)
     yield from zip(grasp_set.joints, grasp_set.codes.T, strict=True)
-
-
-def _nominal(names: Iterable[str]) -> str:
-    return "{" + ",".join(map(_quote, names)) + "}"
 
 
 def _quote(name: str) -> str:

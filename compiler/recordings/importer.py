@@ -1,7 +1,7 @@
 """Import a table and its columns.toml as a `GraspSet`, with a report on the content and on coding losses."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,11 +19,12 @@ from . import TYPES, RecordingError, TableError, check_names, check_room, list_r
 from .columns import ColumnRoles, JointColumns, TaxelColumns, read_columns, select, sound_grid
 from .graspset import CODES, GraspSet, Joint
 from .inputs import WORDS, Course, possible_clocks, words_of
-from .readings import Readings, nothing_held, read_cells
+from .joining import read_joined
+from .readings import Readings, meanings, nothing_held, read_cells, whole
 from .summary import check_trials, find_oddities, looks_like_frames
-from .table import Table, read_table
+from .table import Table
 from .taxonomy import Taxonomy, own, plain, published
-from .trial_files import Report, find_files, is_pattern, read_files
+from .trial_files import Report
 
 
 class CodingCost(msgspec.Struct, frozen=True):
@@ -66,16 +67,15 @@ class ImportReport(msgspec.Struct, frozen=True):
 
 
 def import_file(
-    table: Path, columns: Path, progress: Report = lambda _done, _total: None
+    table: Path, columns: Path, progress: Report = lambda _done, _total: None, more: Sequence[Path] = ()
 ) -> tuple[GraspSet, ImportReport]:
     """Import the table in file `table`, or the files that it matches as a pattern, with the columns.toml `columns`.
 
-    Raises TableError or RecordingError naming file, rows and columns, and OSError.
+    Further tables of the same trials are `more`; how their text is written is found. Raises TableError or
+    RecordingError naming file, rows and columns, and OSError.
     """
     wanted = read_columns(columns)
-    if not is_pattern(table):
-        return import_table(read_table(table, wanted.text), wanted)
-    return import_table(read_files(find_files(table)[0], wanted.text, progress), wanted)
+    return import_table(read_joined(table, more, progress, wanted)[0], wanted)
 
 
 def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportReport]:
@@ -129,7 +129,7 @@ def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportRe
             f"{len(taxels)} taxels stay analog: a placement chooses their levels; to make switches of them, say under "
             '[[taxels]] of the columns.toml above which value they are closed (threshold = 0.4), or threshold = "otsu"'
         )
-    return grasp_set, report_of(table.what, grasp_set, costs, warnings, notes)
+    return grasp_set, report_of(table.what, grasp_set, costs, warnings, (*table.notes, *notes))
 
 
 def _trials_by_name(grasp_set: GraspSet, columns: ColumnRoles) -> tuple[GraspSet, list[Oddity]]:
@@ -203,8 +203,7 @@ def _labels(table: Table, columns: ColumnRoles, readings: Readings) -> tuple[NDA
             f"more than {TYPES}: is it the label?"
         )
     none = nothing_held(columns, labels).tolist()
-    aliases = dict(zip(labels.tolist(), labels.tolist(), strict=True)) | columns.labels
-    aliased = [aliases[label] for label in labels.tolist()]
+    aliased = meanings(columns, labels.tolist())
     taxonomy = _taxonomy(columns, [label for label, nothing in zip(aliased, none, strict=True) if not nothing])
     find = taxonomy.finder()
     types = [NONE if nothing else find(label) for label, nothing in zip(aliased, none, strict=True)]
@@ -216,9 +215,9 @@ def _labels(table: Table, columns: ColumnRoles, readings: Readings) -> tuple[NDA
             f"{taxonomy.name}: {_unknown(names, taxonomy)}; {unknown.sum()} rows have them, "
             f"{list_rows(readings.rows[unknown])}; [labels] can translate them"
         )
-    unused = sorted(columns.labels.keys() - {*labels.tolist()})
-    meanings = {*map(plain, (*labels.tolist(), *aliased))}
-    unused += [label for label in columns.parts("none") if plain(label) not in meanings]
+    unused = sorted(columns.labels.keys() - {*labels.tolist()} - {*map(whole, labels.tolist())})
+    meant = {*map(plain, (*labels.tolist(), *aliased))}
+    unused += [label for label in columns.parts("none") if plain(label) not in meant]
     message = f"{len(unused)} entries of [labels] and `none` occur in no row: {list_names(unused)}"
     check_room(len(where), max(map(len, filter(None, types))), table.size)
     return (

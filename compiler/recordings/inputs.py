@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from thenar.runtime.names import list_names
 from thenar.runtime.recording.reader import Oddity
 
-from .cells import UNITS, bits, names, numbers, times
+from .cells import UNITS, bits, names, numbers, times, unit_of_time
 from .columns import sound_grid, stem_of
 from .graspset import CODES
 from .table import Table
@@ -39,6 +39,8 @@ _TRIALS, _ERRORS = 8, 4.4
 _EQUAL, _ON_LINE = 0.9, 0.95
 # Steps of a clock are within this factor of each other, and its rates in different trials within the second.
 _JITTER, _RATES = 2.0, 1.05
+# Columns with more distinct values than this are not grasp types.
+MOST_TYPES = 200
 # The fewest rises that are suspicious, rows that tell much, and frames of a trial on average.
 _RISES, _MANY_ROWS, _FRAMES = 5, 20, 10
 
@@ -268,6 +270,10 @@ _LISTS = {
     "trial": "trial rep repetition rerepetition repeat attempt take run versuch wiederholung durchgang essai "
     "répétition ensayo",
     "number": "no nr number",
+    "file": "file filename path recording bag datei fichier archivo",
+    "start": "start begin onset from beginn von début inicio",
+    "end": "end stop offset to until ende bis fin",
+    "row": "row sample index frame bild",
     # Words in the names of texts that are subjects or sessions if they are constant within trials.
     "person": "name tester operator volunteer",
     "occasion": "batch date round block group week recording",
@@ -435,3 +441,43 @@ def _no_input(column: Facts) -> str:
     if column.words and any(column.words <= WORDS[key] - {"y"} for key in ("label", "trial")) and column.nominal:
         return "by its name another label, or number of a trial"
     return ""
+
+
+def may_be(key: str, column: Facts) -> bool:
+    """Return whether name and values of a column fit the role `key`."""
+    if key == "time":
+        if column.values is None or column.distinct < 2 or not is_time(column.words):
+            return False
+        # Whole seconds date no rows, nor does what wraps every second.
+        steps = np.diff(column.values)
+        wraps = column.values.max() < 1e9 and unit_of_time(column.name, column.values) == "ns"
+        return bool(2 * np.count_nonzero(steps) > len(steps) and not (wraps and (steps < 0).any()))
+    named = column.words <= WORDS[key] | WORDS["number"] if column.bits else True
+    fits = named and column.nominal and (key != "label" or 1 < column.distinct <= MOST_TYPES)
+    return fits and bool(column.words & WORDS[key])
+
+
+def doubts(key: str, column: Facts) -> tuple[int, bool, bool]:
+    """Return the doubts about a column for `key`: a vague unit of time, other words in its name, no value twice."""
+    vague = 0
+    if key == "time" and column.values is not None and not unit_of_time(column.name, column.values[:0]):
+        vague = 1 if unit_of_time(column.name, column.values) else 2
+    other = key != "time" and not column.words <= WORDS[key] | WORDS["number"]
+    return vague, other, column.distinct == column.rows
+
+
+def time_of(table: Table) -> str:
+    """Return the column of time of `table` by its name and values, "" without one."""
+    fitting = (facts_of(table, name) for name in table.columns if is_time(words_of(name)))
+    best = min(
+        (column for column in fitting if may_be("time", column)),
+        key=lambda column: doubts("time", column),
+        default=None,
+    )
+    return best.name if best else ""
+
+
+def is_span(end: str, name: str) -> bool:
+    """Return whether a column called `name` holds the starts or ends of segments, as `end` says."""
+    words = words_of(name)
+    return bool(words & WORDS[end]) and words <= WORDS[end] | WORDS["row"] | _TIMES | _BESIDE

@@ -32,6 +32,7 @@ from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.taxels import TaxelLine
 
 from . import TableError, list_rows
+from .bags import is_recording
 from .columns import CalibrationPoints, JointColumns
 from .graspset import CODES, GraspSet, Joint
 from .importer import CodingCost, ImportReport, code_joint, import_file, report_of
@@ -90,26 +91,21 @@ def import_files(
     stream: bool = False,
     progress: Report = lambda _done, _total: None,
 ) -> tuple[GraspSet, ImportReport]:
-    """Import one table with the columns.toml in file `columns`, or self-describing recordings.
+    """Import tables of the same trials with the columns.toml in file `columns`, or self-describing recordings.
 
-    A path with fields in braces, such as data/{label}_{trial}.csv, is a table in many files; `progress` takes how many
-    of how many were read. Recordings are imported as a `stream` or trial by trial. Raises TableError, RecordingError or
-    FormatError naming file, rows and columns, and OSError.
+    The first table says which rows there are. A path with fields in braces, such as data/{label}_{trial}.csv, is a
+    table in many files; `progress` takes how many of how many were read. Recordings are imported as a `stream` or trial
+    by trial. Raises TableError, RecordingError or FormatError naming file, rows and columns, and OSError.
     """
-    if all(path.suffix.lower() == ".mcap" for path in paths):
+    if all(map(is_recording, paths)):
         if columns is not None:
             raise TableError(f"a recording describes its own columns: leave {columns.name} out")
         return import_recordings(paths, stream)
     if stream:
         raise TableError("each row of a table is imported as it is: ``stream`` is for recordings (.mcap), leave it out")
-    if len(paths) > 1:
-        raise TableError(
-            "several recordings (.mcap) can be imported together, but only one table: of tables with one trial each, "
-            "name the pattern of their paths, such as 'data/{label}_{trial}.csv'"
-        )
     if columns is None:
         raise TableError(f"{paths[0].name}: name the columns.toml that says what its columns are")
-    return import_file(paths[0], columns, progress)
+    return import_file(paths[0], columns, progress, paths[1:])
 
 
 def import_recordings(

@@ -17,20 +17,19 @@ from thenar.runtime.published import NONE
 
 from ..arrays import groups
 from . import FileRows, TableError, list_rows
-from .cells import names, numbers, skipped, times, unit_of_time
+from .cells import names, numbers, times, unit_of_time
 from .columns import KEYS, PLAIN, ColumnRoles, JointColumns, TaxelColumns, TextFormat, globs_of
-from .inputs import ON_GRID, WORDS, Course, Facts, Role, facts_of, inputs_of, is_time, numbers_trials
+from .inputs import MOST_TYPES, ON_GRID, WORDS, Course, Facts, Role, doubts, facts_of, inputs_of, may_be, numbers_trials
+from .joining import read_joined
 from .readings import in_runs, restarts
-from .table import Table, is_text, read_table, sniff
+from .table import Table
 from .taxonomy import plain, published_for
-from .trial_files import Report, find_files, is_pattern, read_files
+from .trial_files import Report
 
 # The share of a stream's label changes that lead to or from the label for nothing held.
 _BETWEEN = 0.9
 # Nothing is held before and after a grasp; a number shared by more runs than these is not the number of a movement.
 _SHARED = 3
-# Columns with more distinct values than this are not grasp types.
-_TYPES = 200
 # Resolutions in bits of existing converters.
 _CONVERTERS = (8, 10, 12, 14, 16)
 
@@ -61,29 +60,25 @@ def listed(columns: Sequence[str]) -> str:
     return f"{shortened(columns[0])} ... {shortened(columns[-1])} ({len(columns)})"
 
 
-def propose_file(path: Path, progress: Report = lambda _done, _total: None) -> tuple[Table, ColumnProposal]:
+def propose_file(
+    path: Path, progress: Report = lambda _done, _total: None, more: Sequence[Path] = ()
+) -> tuple[Table, ColumnProposal]:
     """Return the table in `path`, or in the files that match it as a pattern, and the proposed roles of its columns.
 
-    `progress` takes the number of files that were read, and of all. Raises TableError, OSError.
+    Further tables of the same trials are `more`. `progress` takes the number of files that were read, and of all.
+    Raises TableError, OSError.
     """
-    files, others = find_files(path) if is_pattern(path) else ([], [])
-    first = files[0].path if files else path
-    text, remarks = sniff(first) if is_text(first) else (PLAIN._replace(skip=None), [])
-    table = read_files(files, text, progress) if files else read_table(path, text)
-    if text.skip is None:
-        text, remarks = PLAIN._replace(skip=table.skip), [skipped(table.skip)] * bool(table.skip)
+    table, text, remarks = read_joined(path, more, progress)
     # What a path says is no input, and only a field that is called so has a role.
-    fields = {*files[0].fields} - {*KEYS} if files else set()
-    paths = [*sorted(fields), *([table.rows.column] if isinstance(table.rows, FileRows) else [])]
-    emptied = dict.fromkeys(paths, np.full(len(table.rows), ""))
+    rows = table.rows
+    paths = [*sorted({*rows.fields} - {*KEYS}), rows.column] if isinstance(rows, FileRows) else []
+    paths += [table.segment] if table.segment else []
+    emptied = dict.fromkeys(paths, np.full(len(rows), ""))
     try:
         proposal = propose(dataclasses.replace(table, columns={**table.columns, **emptied}), text, remarks)
     except TableError as reason:
         raise TableError(f"{reason}; {odd}" if (odd := _first_oddity(table)) else str(reason)) from reason
-    if others:
-        left = f"{len(others)} tables next to them do not match: {list_names([shortened(name) for name in others])}"
-        proposal = replace(proposal, remarks=(f"files: {len(files)}; {left}", *proposal.remarks))
-    return table, _by_file(table, proposal, tuple(paths)) if files else proposal
+    return table, _by_file(table, proposal, tuple(paths)) if paths else proposal
 
 
 def _first_oddity(table: Table) -> str:
@@ -112,23 +107,27 @@ def _oddities(table: Table, names: Iterable[str]) -> Iterator[tuple[int, str, st
 def _by_file(table: Table, proposal: ColumnProposal, paths: tuple[str, ...]) -> ColumnProposal:
     """Return the proposal with the file among the columns of the trial, unless no trial is in two files.
 
-    Not in a stream with rest, whose trials are runs of rows of one label. `paths` are the columns that only the path
-    fills.
+    Not in a stream with rest, whose trials are runs of rows of one label; and segments are trials. `paths` are the
+    columns that nothing but the path or the segments fill.
     """
     columns, rows = proposal.columns, table.rows
-    assert isinstance(rows, FileRows)
     roles = [
         replace(role, columns=tuple(name for name in role.columns if name not in paths)) for role in proposal.roles
     ]
     roles = [role for role in roles if role.columns]
-    parts = [name for key in KEYS if key != "time" for name in columns.parts(key)]
-    file, trial = groups(_texts(table, [rows.column])), groups(*(_texts(table, [name]) for name in parts))
-    is_stream = columns.frames == "restart" and columns.none
-    if is_stream or (columns.parts("trial") and len(np.unique(groups(trial, file))) == trial.max() + 1):
-        return replace(proposal, roles=(*roles, Role(paths, "left out", "of the path")))
-    trials = (rows.column, *columns.parts("trial"))
-    reason = "each file is one trial" if len(trials) == 1 else "numbers of trials are of one file"
-    rest = tuple(name for name in paths if name != rows.column)
+    if table.segment:
+        trials: tuple[str, ...] = (table.segment,)
+        reason = "each segment is one trial"
+    else:
+        assert isinstance(rows, FileRows)
+        parts = [name for key in KEYS if key != "time" for name in columns.parts(key)]
+        file, trial = groups(_texts(table, [rows.column])), groups(*(_texts(table, [name]) for name in parts))
+        is_stream = columns.frames == "restart" and columns.none
+        if is_stream or (columns.parts("trial") and len(np.unique(groups(trial, file))) == trial.max() + 1):
+            return replace(proposal, roles=(*roles, Role(paths, "left out", "of the path")))
+        trials = (rows.column, *columns.parts("trial"))
+        reason = "each file is one trial" if len(trials) == 1 else "numbers of trials are of one file"
+    rest = tuple(name for name in paths if name not in trials)
     return replace(
         proposal,
         columns=replace(columns, trial=trials if len(trials) > 1 else trials[0], frames=None),
@@ -252,8 +251,8 @@ class _Search:
     def by_names(self) -> None:
         """Choose columns by their names; without such a label, the objects, or the text with the fewest values."""
         for key in ("time", "session", "trial", "subject", "object", "label"):
-            if fitting := [column for column in self.rest if _may_be(key, column)]:
-                best = min(fitting, key=lambda column: _doubts(key, column))
+            if fitting := [column for column in self.rest if may_be(key, column)]:
+                best = min(fitting, key=lambda column: doubts(key, column))
                 self.choose(key, best, f"its name; {best.distinct} different")
         if "label" in self.chosen:
             return
@@ -262,7 +261,7 @@ class _Search:
             self.chosen["label"] = self.chosen.pop("object")
             self.why["label"] = f"{unnamed}: the objects are what can be recognised"
             return
-        texts = [column for column in self.free if column.values is None and 1 < column.distinct <= _TYPES]
+        texts = [column for column in self.free if column.values is None and 1 < column.distinct <= MOST_TYPES]
         if not texts:
             raise TableError(
                 f"{self.table.what}: no column looks like the grasp type: name it in a columns.toml (`label`)"
@@ -312,7 +311,7 @@ class _Search:
         trial = np.cumsum(np.diff(self.grouped("label", "subject", "object", "session", "trial"), prepend=-1) != 0)
         types = len(np.unique(label))
         for column in self.free:
-            if column.values is not None or not 1 < column.distinct <= _TYPES:
+            if column.values is not None or not 1 < column.distinct <= MOST_TYPES:
                 continue
             text = _texts(self.table, [column.name])
             changes = text[1:] != text[:-1]
@@ -384,7 +383,7 @@ class _Search:
             return
         time = groups(self.time)
         twice = len(ids) - len(np.unique(groups(ids, time)))
-        texts = [column for column in self.rest if column.values is None and 1 < column.distinct <= _TYPES]
+        texts = [column for column in self.rest if column.values is None and 1 < column.distinct <= MOST_TYPES]
         for column in sorted(texts, key=lambda column: column.distinct) if twice else ():
             finer = groups(ids, _texts(self.table, [column.name]))
             left = len(ids) - len(np.unique(groups(finer, time)))
@@ -410,29 +409,6 @@ class _Search:
             if certain:
                 signs[column.name] = reason
         return signs
-
-
-def _may_be(key: str, column: Facts) -> bool:
-    """Return whether name and values of a column fit the role `key`."""
-    if key == "time":
-        if column.values is None or column.distinct < 2 or not is_time(column.words):
-            return False
-        # Whole seconds date no rows, nor does what wraps every second.
-        steps = np.diff(column.values)
-        wraps = column.values.max() < 1e9 and unit_of_time(column.name, column.values) == "ns"
-        return bool(2 * np.count_nonzero(steps) > len(steps) and not (wraps and (steps < 0).any()))
-    named = column.words <= WORDS[key] | WORDS["number"] if column.bits else True
-    fits = named and column.nominal and (key != "label" or 1 < column.distinct <= _TYPES)
-    return fits and bool(column.words & WORDS[key])
-
-
-def _doubts(key: str, column: Facts) -> tuple[int, bool, bool]:
-    """Return the doubts about a column for `key`: a vague unit of time, other words in its name, no value twice."""
-    vague = 0
-    if key == "time" and column.values is not None and not unit_of_time(column.name, column.values[:0]):
-        vague = 1 if unit_of_time(column.name, column.values) else 2
-    other = key != "time" and not column.words <= WORDS[key] | WORDS["number"]
-    return vague, other, column.distinct == column.rows
 
 
 def _none(labels: NDArray[np.str_]) -> tuple[str, ...]:

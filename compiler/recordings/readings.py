@@ -1,11 +1,11 @@
 """Read the columns of a table as rows of trials: labels, switches and joints, with missing cells filled or left out."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from heapq import nsmallest
 from operator import itemgetter
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -15,9 +15,9 @@ from thenar.runtime.names import SHOWN, list_names, shortened
 from thenar.runtime.published import NONE
 from thenar.runtime.recording.reader import Oddity
 
-from ..arrays import groups, otsu
+from ..arrays import groups, latest, otsu, places
 from . import RecordingError, TableError, check_room, list_rows
-from .cells import Parsed, Value, bits, codes, integers, names, natural_key, numbers, times, unit_of_time
+from .cells import NUMBER, Parsed, Value, bits, codes, integers, names, natural_key, numbers, times, unit_of_time
 from .columns import KEYS, ColumnRoles, Selection
 from .table import Table
 from .taxonomy import plain
@@ -97,7 +97,6 @@ def read_cells(
         missing = {name: mask[order] for name, mask in missing.items()}
     warnings += _filled(table, readings, selection, missing, trial_ids)
     micros = _micros(table, columns, readings.time, notes)
-    readings = _reduced(readings, columns.reduce, trial_ids, notes)
     times_us = np.rint(readings.time * micros).astype(np.int64) if micros else np.empty(0, np.int64)
     return readings, times_us, warnings, notes
 
@@ -127,9 +126,18 @@ def nothing_held(columns: ColumnRoles, labels: NDArray[np.str_]) -> NDArray[np.b
     if isinstance(types, str) or NONE not in map(plain, types):
         meant.add(NONE)
     found, where = np.unique(labels, return_inverse=True)
-    aliases = dict(zip(found.tolist(), found.tolist(), strict=True)) | columns.labels
-    none = [not meant.isdisjoint(map(plain, (label, aliases[label]))) for label in found.tolist()]
-    return np.array(none, np.bool_)[where]
+    pairs = zip(found.tolist(), meanings(columns, found.tolist()), strict=True)
+    return np.array([not meant.isdisjoint(map(plain, pair)) for pair in pairs], np.bool_)[where]
+
+
+def meanings(columns: ColumnRoles, labels: Sequence[str]) -> list[str]:
+    """Return the names of labels by `columns`, under which a number is listed without decimals."""
+    return [columns.labels.get(label, columns.labels.get(whole(label), label)) for label in labels]
+
+
+def whole(label: str) -> str:
+    """Return a whole number without its decimals, another label as it is."""
+    return re.sub(r"(?<=\d)\.0+$", "", label) if NUMBER.fullmatch(label) else label
 
 
 def _runs(readings: Readings, none: NDArray[np.bool_], timeless: bool) -> NDArray[np.int64]:
@@ -182,30 +190,6 @@ def _filled(
         f"trial, {strange} with their column's median ({list_rows(rows)}; columns {list_names([*missing])})"
     )
     return [Oddity("filled cells", cells, message, tuple(rows[:SHOWN].tolist()), tuple(missing))]
-
-
-def _reduced(readings: Readings, how: str, trial_ids: NDArray[np.intp], notes: list[str]) -> Readings:
-    """Return one row per trial, computed from its frames; all rows if `how` is "none"."""
-    if how == "none":
-        return readings
-    rows = frame_of_each(trial_ids)
-    reduced = replace(readings, switches=readings.switches[:, :0], joints=readings.joints[:, :0]).kept(rows)
-    notes.append(f"{len(trial_ids)} frames of {len(rows)} trials were reduced to one row a trial ({how})")
-    switches, joints = (_of_trials(values, trial_ids, rows, how) for values in (readings.switches, readings.joints))
-    return replace(reduced, switches=switches, joints=joints)
-
-
-def _of_trials(
-    values: NDArray[np.generic], trial_ids: NDArray[np.intp], rows: NDArray[np.intp], how: str
-) -> NDArray[Any]:
-    """Return the values (m, d) of m trials: of their middle `rows` (m,), or column by column by `how`."""
-    if how == "middle":
-        return values[rows]
-    made = np.empty((len(rows), values.shape[1]), values.dtype, order="F")
-    for number in range(values.shape[1]):
-        frames = frame_of_each(trial_ids, values[:, number], how == "any" and values.dtype == np.bool_)
-        made[:, number] = values[frames, number]
-    return made
 
 
 _MISSING = 'missing (missing = "keep" fills them, "drop" leaves their rows out)'
@@ -361,10 +345,6 @@ class _Reader:
         return f"{count} cell{'s' if count > 1 else ''}, {list_names(shown, count)}"
 
 
-# Number of labels named in a message, and of those shown with suggestions.
-_NAMED, _SUGGESTED = 30, 3
-
-
 def numbered(columns: Sequence[NDArray[np.str_]]) -> tuple[NDArray[np.int64], list[str]]:
     """Return a number (n,) from 1 for each row, equal where all `columns` (n,) are, and the texts in that order."""
     number = groups(*columns)
@@ -417,33 +397,12 @@ def fill(values: NDArray[np.generic], missing: NDArray[np.bool_], trial_ids: NDA
     If the trial has none, use the lower median of all known values. Return the number of cells filled that way. Labels
     are not used.
     """
-    order = np.argsort(trial_ids, kind="stable")
-    trial, known, gaps = trial_ids[order], np.flatnonzero(~missing[order]), np.flatnonzero(missing[order])
-    following = np.searchsorted(known, gaps)
-    before, after = known[following - 1], known[following % len(known)]
-    beyond = len(order)
-    back = np.where((following > 0) & (trial[before] == trial[gaps]), gaps - before, beyond)
-    ahead = np.where((following < len(known)) & (trial[after] == trial[gaps]), after - gaps, beyond)
-    alone = (back == beyond) & (ahead == beyond)
+    known, gaps, place = np.flatnonzero(~missing), np.flatnonzero(missing), places(trial_ids)
+    before, after = (
+        latest(sign * place[gaps], sign * place[known], trial_ids[gaps], trial_ids[known]) for sign in (1, -1)
+    )
+    back, ahead = place[gaps] - place[known[before]], place[known[after]] - place[gaps]
+    nearest = np.where((before < 0) | ((after >= 0) & (ahead < back)), after, before)
     present = np.sort(values[~missing])
-    filled = values[order[np.where(back <= ahead, before, after)]]
-    filled[alone] = present[(len(present) - 1) // 2]
-    values[order[gaps]] = filled
-    return int(alone.sum())
-
-
-def frame_of_each(
-    trial_ids: NDArray[np.intp], values: NDArray[np.generic] | None = None, largest: bool = False
-) -> NDArray[np.intp]:
-    """Return a row of each of the trials `trial_ids` (n,), in the order of their middle frames.
-
-    It is the middle frame; with `values` (n,) a frame with the lower median of them, for switches the majority, or with
-    the largest.
-    """
-    order = np.argsort(trial_ids, kind="stable")
-    starts = np.flatnonzero(np.diff(trial_ids[order], prepend=-1))
-    sizes = np.diff(starts, append=len(trial_ids))
-    middles = starts + (sizes - 1) // 2
-    by_value = order if values is None else np.lexsort((values, trial_ids))
-    chosen: NDArray[np.intp] = by_value[starts + sizes - 1 if largest else middles]
-    return chosen[np.argsort(order[middles])]
+    values[gaps] = np.where(nearest < 0, present[(len(present) - 1) // 2], values[known[nearest]])
+    return int((nearest < 0).sum())

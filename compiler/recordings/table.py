@@ -1,8 +1,6 @@
-"""Read tables of labelled grasps: delimited text, in a format that is detected, and Weka's ARFF.
+"""Read tables of labelled grasps: delimited text, in a format that is detected or that a header names.
 
-foreign.py reads the tables of other programs. ARFF has numeric and nominal attributes, quoted names and values, and `?`
-for a missing value. It is read here because the reader of scipy loses quotes in nominal values, reports no rows, and is
-not installed on a board.
+foreign.py reads the tables of other programs.
 """
 
 import codecs
@@ -16,7 +14,7 @@ from array import array
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import chain, islice
+from itertools import chain, islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -30,9 +28,10 @@ from thenar.runtime.names import shortened
 
 from ..text import text_of
 from . import COLUMNS, LARGEST, LINES, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
+from .bags import is_folder
 from .cells import NUMBER, Column, has_names, preface, skipped, unlisted
 from .columns import PLAIN, TextFormat
-from .foreign import READERS, read_foreign
+from .foreign import READERS, read_foreign, size_of
 
 if TYPE_CHECKING:
     from _csv import Reader
@@ -110,7 +109,8 @@ class Table:
 
     `rows` are the rows' numbers as the user sees them: the line in a CSV or spreadsheet, counted from 1 elsewhere.
     `size` is the size of its file in bytes. `cells` says that names are written as cells of a spreadsheet; `decimal` is
-    the decimal sign of numbers in text. `skip` is the number of rows of a spreadsheet that precede its header.
+    the decimal sign of numbers in text. `skip` is the number of rows of a spreadsheet that precede its header, `notes`
+    say what was left out. `segment` is the column that numbers the segments of recordings, "" without them.
     """
 
     what: str
@@ -120,10 +120,18 @@ class Table:
     cells: bool = False
     decimal: str = "."
     skip: int = 0
+    notes: tuple[str, ...] = ()
+    segment: str = ""
 
 
 _TEXTS = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz", ".txt.gz")
-SUFFIXES = (*_TEXTS, ".arff", ".arff.gz", *READERS)
+_MOTION = (".mot", ".sto", ".trc")
+SUFFIXES = (*_TEXTS, *_MOTION, *READERS)
+
+
+def is_table(path: Path) -> bool:
+    """Return whether `path` is a file with the suffix of a table, or the folder of a rosbag2."""
+    return (path.name.lower().endswith(SUFFIXES) and path.is_file()) or is_folder(path)
 
 
 def is_text(path: Path) -> bool:
@@ -147,22 +155,22 @@ def read_tables(paths: Sequence[Path], text: TextFormat = PLAIN) -> Iterator[Tab
     """Yield the tables in `paths`, of one kind, as `read_table` does; an error is one of the first not yielded."""
     for start in range(0, len(paths), _TOGETHER):
         batch = paths[start : start + _TOGETHER]
-        is_foreign = batch[0].name.lower().endswith(tuple(READERS))
+        is_foreign = batch[0].name.lower().endswith(tuple(READERS)) or is_folder(batch[0])
         foreign = read_foreign(batch, text.skip) if is_foreign else None
         for path in batch:
             try:
                 if foreign is None:
                     table = _read_ours(path, text)
                 else:
-                    read, rows, skip = next(foreign)
+                    read, rows, skip, notes = next(foreign)
                     check_names("column", read)
-                    table = Table(path.name, read, rows, skip=skip)
+                    table = Table(path.name, read, rows, skip=skip, notes=notes)
                 columns = unlisted(table.what, table.columns, table.rows)
             except RecordingError as reason:
                 raise TableError(f"{path.name}: {reason}") from reason
             if not len(table.rows):
                 raise TableError(f"{path.name} has no rows")
-            yield replace(table, columns=columns, size=path.stat().st_size)
+            yield replace(table, columns=columns, size=size_of(path))
 
 
 def _read_ours(path: Path, text: TextFormat) -> Table:
@@ -171,9 +179,12 @@ def _read_ours(path: Path, text: TextFormat) -> Table:
         with open_lines(path, text.encoding) as lines:
             tabs = name.removesuffix(".gz").endswith(".tsv")
             return _read_csv(path.name, lines, text, text.delimiter or ("\t" if tabs else ","))
-    if name.endswith((".arff", ".arff.gz")):
-        with open_lines(path) as lines:
-            return read_arff(path.name, lines)
+    if name.endswith(_MOTION):
+        return _read_motion(path)
+    if path.is_dir():
+        raise TableError(
+            f"{path} is a folder: name the pattern of its tables, such as '{path}/{{label}}_{{trial}}.csv'"
+        )
     raise TableError(f"{path.name}: a table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
 
 
@@ -198,19 +209,20 @@ def named_by_comment(header: list[str], delimiter: str) -> list[str]:
     return [first[1:].strip(), *header[1:]] if first[:1] in ("#", "%") and first[1:].strip() else header
 
 
-def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str) -> Table:
-    skip = text.skip or 0
-    reader = csv_rows(_narrow(what, islice(lines, skip, None), delimiter), delimiter, text.quote, strict=True)
+def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str, top: int = 0) -> Table:
+    """Return the table in `lines`, before which `top` others were read."""
+    top += text.skip or 0
+    reader = csv_rows(_narrow(what, islice(lines, text.skip, None), delimiter), delimiter, text.quote, strict=True)
     numbers = array("q")
 
     def checked(rows: Iterable[list[str]]) -> Iterator[list[str]]:
         for row in rows:
-            numbers.append(skip + reader.line_num)
+            numbers.append(top + reader.line_num)
             if len(row) > len(names) and not any(row[len(names) :]):
                 del row[len(names) :]
             if len(row) != len(names):
-                top = "header" if text.header else "first row"
-                raise TableError(f"{what} row {numbers[-1]} has {len(row)} cells, its {top} {len(names)}")
+                head = "header" if text.header else "first row"
+                raise TableError(f"{what} row {numbers[-1]} has {len(row)} cells, its {head} {len(names)}")
             yield row
 
     try:
@@ -222,8 +234,32 @@ def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str)
         names = [name or f"column {number}" for number, name in enumerate(names, start=1)]
         columns = _columns(what, names, checked(filled if text.header or not first else chain([first], filled)))
     except csv.Error as reason:
-        raise TableError(f"{what} row {skip + reader.line_num}: {reason}") from reason
+        raise TableError(f"{what} row {top + reader.line_num}: {reason}") from reason
     return Table(what, columns, np.frombuffer(numbers, np.int64), cells=True, decimal=text.decimal)
+
+
+def _read_motion(path: Path) -> Table:
+    """Return the table in a file of OpenSim: in a .trc its names stand in two lines, of markers and of coordinates; in
+    others they follow the line endheader, and the vectors in cells are lists.
+    """
+    with open_lines(path) as lines:
+        first = next(lines, "")
+        # The line below the names of a .trc holds nothing but tabs.
+        rows = (line if line.strip() else "" for line in lines)
+        if path.suffix.lower() == ".trc" and first.startswith("PathFileType"):
+            marker, header = "", []
+            _, _, *names = (next(lines, "").rstrip().split("\t") for _ in range(4))
+            for name, axis in zip_longest(*names, fillvalue=""):
+                marker, axis = name.strip() or marker, axis.strip().rstrip("0123456789").lower()
+                header.append(f"{marker}.{axis}" if axis else marker)
+            return _read_csv(path.name, chain(["\t".join(header)], rows), PLAIN, "\t", 4)
+        ends = (number for number, line in enumerate(lines, start=2) if line.strip().lower() == "endheader")
+        if path.suffix.lower() == ".trc" or not (top := next(ends, 0)):
+            seen = f"it begins with {shortened(repr(first.strip()))}"
+            raise TableError(f"{path.name} has no PathFileType or endheader, as files of OpenSim have: {seen}")
+        table = _read_csv(path.name, rows, PLAIN, "\t", top)
+    listed = {name: [f"[{cell}]" for cell in cells] for name, cells in table.columns.items() if "," in str(cells[:1])}
+    return replace(table, columns={**table.columns, **listed})
 
 
 def _narrow(what: str, lines: Iterable[str], delimiter: str) -> Iterator[str]:
@@ -232,93 +268,6 @@ def _narrow(what: str, lines: Iterable[str], delimiter: str) -> Iterator[str]:
         if line.count(delimiter) >= COLUMNS:
             raise TableError(f"{what} has more than {COLUMNS} columns, the most that are read of a table")
         yield line
-
-
-# A value: quoted, with backslash escapes, or a word; an unclosed quote takes the rest of the line. Commas and blanks
-# separate values. All quantifiers are possessive, so the time is linear.
-_QUOTED = r"""'(?:\\.|[^'\\])*+'|"(?:\\.|[^"\\])*+\""""
-_VALUE = re.compile(rf"""{_QUOTED}|['"].*+|[^\s,{{}}'"%]++""")
-_CLOSED = re.compile(_QUOTED)
-_ATTRIBUTE = re.compile(rf"@attribute\s++({_VALUE.pattern})\s++(.+)", re.IGNORECASE)
-_NUMERIC = ("numeric", "real", "integer")
-
-# The possible values of an attribute; None for numbers.
-_Kinds = dict[str, frozenset[str] | None]
-
-
-def read_arff(what: str, text: Iterable[str]) -> Table:
-    """Return the table in the lines `text` of an ARFF file that messages call `what`.
-
-    Its rows are counted from the first after @data; numbers stay text for the importer to parse. Raises TableError
-    naming the faulty line or row.
-    """
-    lines = enumerate(text, start=1)
-    kinds = _header(what, lines)
-    data = (line.strip() for _, line in lines)
-    numbered = enumerate((line for line in data if line and not line.startswith("%")), start=1)
-    columns = _columns(what, kinds, (_values(f"{what} row {row}", line, len(kinds)) for row, line in numbered))
-    for name, values in kinds.items():
-        for number, cell in enumerate(columns[name] if values else (), start=1):
-            if cell != "?" and cell not in (values or ()):
-                shown = f"{shortened(repr(cell))} is not among the values of attribute {shortened(repr(name))}"
-                raise TableError(f"{what} row {number}: {shown}")
-    return Table(what, columns, np.arange(1, len(next(iter(columns.values()), ())) + 1))
-
-
-def _header(what: str, lines: Iterator[tuple[int, str]]) -> _Kinds:
-    """Read up to @data."""
-    kinds: _Kinds = {}
-    listed = 0
-    for number, line in lines:
-        word = line.strip().split(maxsplit=1)[0].lower() if line.strip() else "%"
-        if word == "@data":
-            return kinds
-        if word == "@attribute":
-            name, kind = _attribute(f"{what} line {number}", line.strip())
-            if name in kinds:
-                raise TableError(f"{what} line {number}: attribute {shortened(repr(name))} occurs twice")
-            kinds[name] = kind
-            listed += len(kind or ())
-            if len(kinds) > COLUMNS or listed > ROWS:
-                raise TableError(f"{what} line {number}: more than {COLUMNS} attributes, or {ROWS} values of them")
-        elif word != "@relation" and not word.startswith("%"):
-            shown = shortened(repr(word))
-            raise TableError(f"{what} line {number}: expected @attribute or @data, not {shown}")
-    raise TableError(f"{what} is not ARFF: it has no line @data")
-
-
-def _attribute(where: str, line: str) -> tuple[str, frozenset[str] | None]:
-    match = _ATTRIBUTE.match(line)
-    if match is None:
-        raise TableError(f"{where}: an attribute has a name and a type: {shortened(repr(line))}")
-    name, kind = _unquote(where, match[1]), match[2].strip()
-    if kind.split(maxsplit=1)[0].lower() in _NUMERIC:
-        return name, None
-    if not kind.startswith("{") or "}" not in kind:
-        shown = f"attribute {shortened(repr(name))} is {shortened(kind)}"
-        raise TableError(f"{where}: {shown}; only numeric and nominal ones are read")
-    return name, frozenset(_unquote(where, value) for value in _VALUE.findall(kind))
-
-
-def _values(where: str, line: str, width: int) -> list[str]:
-    if not any(sign in line for sign in "'\"{}%"):
-        values = line.replace(",", " ").split()
-    elif _VALUE.sub("", line).strip(", \t"):
-        sparse = ": sparse rows are not read" if line.startswith("{") else ""
-        raise TableError(f"{where} cannot be read as values{sparse}: {shortened(repr(line))}")
-    else:
-        values = [_unquote(where, value) for value in _VALUE.findall(line)]
-    if len(values) != width:
-        raise TableError(f"{where} has {len(values)} values, the header {width} attributes")
-    return values
-
-
-def _unquote(where: str, value: str) -> str:
-    if value[0] not in "'\"":
-        return value
-    if not _CLOSED.fullmatch(value):
-        raise TableError(f"{where} cannot be read as values: nothing closes the quote of {shortened(repr(value))}")
-    return re.sub(r"\\(.)", r"\1", value[1:-1])
 
 
 # Lines examined, and cells of them.

@@ -8,6 +8,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,9 +18,10 @@ from numpy.typing import NDArray
 from thenar.runtime.names import SHOWN, list_names, shortened
 
 from . import LARGEST, ROWS, FileRows, TableError, check_room
-from .cells import Column, is_numeric, name_of_number, natural_key
+from .cells import Column, is_numeric, name_of_number, natural_key, skipped
 from .columns import PLAIN, TextFormat
-from .table import SUFFIXES, Table, is_text, read_table, read_tables, sniff
+from .foreign import size_of
+from .table import SUFFIXES, Table, is_table, is_text, read_table, read_tables, sniff
 from .taxonomy import plain, published_for
 
 # The most files of a set.
@@ -64,12 +66,21 @@ def find_files(pattern: Path) -> tuple[list[TrialFile], list[str]]:
     if not found:
         there = f": next to them are {list_names(others)}" if others else ""
         raise TableError(f"no table matches {pattern}{there}")
-    kinds = sorted({file.path.suffix.lower() for file in found})
+    if bags := [file for file in found if file.path.is_dir()]:
+        # A pattern without a suffix matches whatever is next to them.
+        others += [file.name for file in found if file not in bags]
+        found = bags
+    kinds = sorted({_suffix(file.path).lower() for file in found})
     if len(kinds) > 1:
         raise TableError(f"{pattern} matches files of several kinds, {list_names(kinds)}: name one")
     found.sort(key=lambda file: natural_key(file.name))
     _check_distinct(found)
     return found, sorted(others)
+
+
+def _suffix(path: Path) -> str:
+    """Return the suffix of a file, "" of a folder."""
+    return "" if path.is_dir() else path.suffix
 
 
 def _expression(part: str, pattern: Path) -> re.Pattern[str]:
@@ -90,9 +101,8 @@ def _matches(folder: TrialFile, expression: re.Pattern[str], last: bool, others:
     """Yield the entries of a folder that match; add to `others` the names of tables that do not."""
     with os.scandir(folder.path) as entries:
         for entry in entries:
-            if entry.name.startswith(".") or entry.is_dir() == last or not (entry.is_dir() or entry.is_file()):
-                continue
-            if last and not entry.name.lower().endswith(SUFFIXES):
+            here = is_table(Path(entry.path))
+            if entry.name.startswith(".") or not (here if last else entry.is_dir() and not here):
                 continue
             match = expression.fullmatch(entry.name)
             fields = match.groupdict() if match else {}
@@ -117,7 +127,7 @@ def read_files(files: Sequence[TrialFile], text: TextFormat, report: Report) -> 
 
     The last column is the path of each row's file. Raises TableError naming the file, and OSError.
     """
-    if (size := sum(file.path.stat().st_size for file in files)) > LARGEST:
+    if (size := sum(size_of(file.path) for file in files)) > LARGEST:
         raise TableError(f"{len(files)} files have more than {LARGEST} bytes, the most that are read of a set")
     tables: list[Table] = []
     rows = 0
@@ -148,12 +158,40 @@ def read_files(files: Sequence[TrialFile], text: TextFormat, report: Report) -> 
     return Table(
         f"{len(files)} files",
         {**fields, **columns, named_by: paths},
-        FileRows.of([(file.name, table.rows) for file, table in zip(files, tables, strict=True)], named_by),
+        FileRows.of([(file.name, table.rows) for file, table in zip(files, tables, strict=True)], named_by, (*fields,)),
         size=size,
         cells=tables[0].cells,
         decimal=tables[0].decimal,
         skip=tables[0].skip,
+        notes=tuple(dict.fromkeys(note for table in tables for note in table.notes)),
     )
+
+
+def read_path(
+    path: Path, text: TextFormat | None, report: Report, more: Sequence[Path] = ()
+) -> tuple[Table, TextFormat, list[str]]:
+    """Return the table in `path`, or in the files that match it as a pattern, its format, and sentences on that.
+
+    Without `text` the format is found. Files are left out that one of the patterns `more` describes more closely.
+    Raises TableError, OSError.
+    """
+    files, others = find_files(path) if is_pattern(path) else ([], [])
+    for other in (other for other in more if files and other != path):
+        theirs = {file.path.absolute() for file in find_files(other)[0]} if is_pattern(other) else {other.absolute()}
+        others = [name for name in others if name not in {file.name for file in theirs}]
+        if theirs < {file.path.absolute() for file in files}:
+            files = [file for file in files if file.path.absolute() not in theirs]
+    first = files[0].path if files else path
+    remarks: list[str] = []
+    if text is None:
+        text, remarks = sniff(first) if is_text(first) else (PLAIN._replace(skip=None), [])
+    table = replace(read_files(files, text, report), what=str(path)) if files else read_table(path, text)
+    if text.skip is None:
+        text, remarks = PLAIN._replace(skip=table.skip), [skipped(table.skip)] * bool(table.skip)
+    if others:
+        left = f"{len(others)} tables next to them do not match: {list_names([shortened(name) for name in others])}"
+        remarks = [f"files: {len(files)}; {left}", *remarks]
+    return table, text, remarks
 
 
 def _check_alike(first: str, table: Table, other: str, its: Table) -> None:
@@ -163,7 +201,8 @@ def _check_alike(first: str, table: Table, other: str, its: Table) -> None:
     lacks = [shortened(repr(name)) for name in table.columns if name not in its.columns]
     more = [shortened(repr(name)) for name in its.columns if name not in table.columns]
     said = [f"it lacks {list_names(lacks)}"] * bool(lacks) + [f"it has {list_names(more)}"] * bool(more)
-    raise TableError(f"{other} has other columns than {first}: {' and '.join(said)}")
+    advice = "if a trial has several files, name a pattern for each kind of them"
+    raise TableError(f"{other} has other columns than {first}: {' and '.join(said)}; {advice}")
 
 
 def _joined(parts: Sequence[Column]) -> Column:
@@ -223,10 +262,8 @@ def propose_pattern(folder: Path) -> tuple[Path, list[str]]:
     if len(paths) == 1:
         return found[0], [f"{folder} holds one table, {shortened(str(paths[0]))}"]
     levels = [_tokens([path.parts[depth] for path in paths]) for depth in range(len(paths[0].parts) - 1)]
-    suffix = paths[0].suffix
-    levels.append([*_tokens([path.name.removesuffix(path.suffix) for path in paths]), suffix])
-    first = found[0]
-    inside = read_table(first, sniff(first)[0] if is_text(first) else PLAIN._replace(skip=None)).columns
+    levels.append([*_tokens([path.name.removesuffix(_suffix(path)) for path in found]), _suffix(found[0])])
+    inside = read_path(found[0], None, lambda _done, _total: None)[0].columns
     names = _named([part for level in levels for part in level if isinstance(part, _Part)], [*inside])
     pattern = "/".join(
         "".join(f"{{{names[part.texts]}}}" if isinstance(part, _Part) else re.sub(r"[{}]", "*", part) for part in level)
@@ -247,19 +284,19 @@ def _tables(folder: Path) -> tuple[list[Path], int]:
     total = 0
     for place, folders, names in os.walk(folder):
         depth = len(Path(place).relative_to(folder).parts)
-        folders[:] = sorted(name for name in folders if not name.startswith(".")) if depth < _DEPTH else []
-        for name in sorted(names):
-            if name.lower().endswith(SUFFIXES) and not name.startswith("."):
-                total += 1
-                shapes.setdefault((depth, Path(name).suffix.lower()), []).append(Path(place, name))
+        here = {name for name in (*folders, *names) if not name.startswith(".") and is_table(Path(place, name))}
+        folders[:] = sorted(name for name in folders if name[0] != "." and name not in here) if depth < _DEPTH else []
+        for path in (Path(place, name) for name in sorted(here)):
+            total += 1
+            shapes.setdefault((depth, _suffix(path).lower()), []).append(path)
         if total > FILES:
             raise TableError(f"{folder} holds more than {FILES} tables, the most that are read of a set")
     tables = max(shapes.values(), key=len, default=[])
     # Notes of another form lie among the data: README.txt.
-    forms = Counter(_form(path.stem) for path in tables)
+    forms = Counter(_form(path.name.removesuffix(_suffix(path))) for path in tables)
     form, count = forms.most_common(1)[0] if forms else ("", 0)
     if count >= 0.5 * len(tables):
-        tables = [path for path in tables if _form(path.stem) == form]
+        tables = [path for path in tables if _form(path.name.removesuffix(_suffix(path))) == form]
     return tables, total - len(tables)
 
 

@@ -95,7 +95,7 @@ def span(x: float, to_x: float, y: float) -> str:
 def way_of_data() -> tuple[int, str, list[str]]:
     """Return the five steps from recordings to a robot."""
     steps = (
-        ("recordings", "CSV, ARFF, npz,", "MCAP"),
+        ("recordings", "CSV, ROS, npz,", "MCAP"),
         ("compiler", "chooses inputs,", "trains"),
         ("build", "integer tables,", "C firmware"),
         ("runtime", "or firmware:", "predicts live"),

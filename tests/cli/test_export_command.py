@@ -8,7 +8,7 @@ from thenar.cli import run
 from thenar.compiler import GraspSet
 
 
-@pytest.mark.parametrize("suffix", ["csv", "csv.gz", "tsv", "tsv.gz", "arff", "parquet"])
+@pytest.mark.parametrize("suffix", ["csv", "csv.gz", "tsv", "tsv.gz", "parquet"])
 @pytest.mark.parametrize("flags", [[], ["--codes"]])
 def test_an_exported_table_imports_again(grasps: Path, suffix: str, flags: list[str]) -> None:
     table, columns, again = (str(grasps.with_name(name)) for name in (f"t.{suffix}", "columns.toml", "again.grasps"))

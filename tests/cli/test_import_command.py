@@ -281,7 +281,7 @@ def test_a_cut_recording_is_imported_with_a_warning(
     ("arguments", "said"),
     [
         (("a.mcap", "--columns", "columns.toml"), "leave columns.toml out"),
-        (("table.csv", "a.mcap", "--columns", "columns.toml"), "only one table"),
+        (("table.csv", "a.mcap", "--columns", "columns.toml"), "import the original, without tables"),
         (("a.mcap", "a.mcap"), "a.mcap is named twice"),
         ((), "Missing argument 'TABLE'"),
     ],

@@ -221,7 +221,7 @@ def test_what_is_no_set_of_files_is_said(capsys: pytest.CaptureFixture[str]) -> 
     paths[0].rename("{label}.csv")
     assert "no column looks like the grasp type" in refused(capsys, "{label}.csv", "--yes")
     two = refused(capsys, "data/cup/anna_2.csv", "data/cup/ben_2.csv")
-    assert "only one table: of tables with one trial each, name the pattern of their paths" in two
+    assert "of tables with one trial each, name the pattern of their paths" in two
 
 
 def test_fields_cannot_leave_the_folder(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""Recordings as tables and as sets: CSV, ARFF, npz, gzipped or not, columns.toml, `.grasps`."""
+"""Recordings as tables and as sets: CSV, npz, gzipped or not, columns.toml, `.grasps`."""
 
 import gzip
 from collections.abc import Callable
@@ -62,9 +62,8 @@ def _strange() -> bytes:
     return "\n".join(["nRows=27", "endheader", "# grasp trial data", *rows]).encode()
 
 
-@cache
-def _arff() -> bytes:
-    return to_arff(grasp_set(), meta=True).encode()
+def _tabs() -> bytes:
+    return to_csv(grasp_set(), delimiter="\t").encode()
 
 
 @cache
@@ -99,7 +98,7 @@ def _use(grasps: GraspSet) -> None:
     if grasps.switch_names:
         place(grasps, prune=2)
     to_csv(grasps)
-    to_arff(grasps, meta=True)
+    to_arff(grasps)
     grasps.fingerprint()
 
 
@@ -188,8 +187,8 @@ FORMATS = (
     *map(_of, (".xlsx", ".parquet", ".h5", ".mat")),
     Format("csv", lambda: [_csv()], table_file, _table(".csv")),
     Format("csv.gz", lambda: [gzip.compress(_csv(), mtime=0)], zipped(table_file), _table(".csv.gz")),
-    Format("arff", lambda: [_arff()], table_file, _table(".arff")),
-    Format("arff.gz", lambda: [gzip.compress(_arff(), mtime=0)], zipped(table_file), _table(".arff.gz")),
+    Format("mot", lambda: [b"x\nendheader\n" + _tabs()], table_file, _table(".mot")),
+    Format("trc", lambda: [b"PathFileType\n\n\n" + _tabs().replace(b"\n", b"\n\n", 1)], table_file, _table(".trc")),
     Format("npz", lambda: [_npz()], npz_file, _table(".npz"), weight=0.03),
     Format("columns.toml", lambda: [_COLUMNS.encode(), _OF_TYPES.encode()], toml_file, _columns),
     Format("grasps", lambda: [_grasps()], sealed(npz_file), _set),

@@ -41,7 +41,6 @@ def csv(columns: int, cell: str, rows: int, label: str = "a") -> bytes:
     return (f"{head}\n" + (label + f",{cell}" * columns + "\n") * rows).encode()
 
 
-ARFF = b"@relation r\n@attribute g {a,b}\n"
 HOSTILE: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "narrow": ("csv", lambda: csv(1, "1", 400_000), JOINTS),
     "two digits": ("csv", lambda: csv(22, "12", 40_000), JOINTS),
@@ -60,13 +59,6 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "bomb": ("csv.gz", lambda: gzip.compress(b"g,s\n" + b" " * 300_000_000, 1), SWITCHES),
     "packed": ("csv.gz", lambda: gzip.compress(csv(1, "1", 1_000_000)[:5_900_000]), JOINTS),
     "packed and wide": ("csv.gz", lambda: gzip.compress(csv(99_000, "1", 26)), JOINTS),
-    "quotes": ("arff", lambda: ARFF + b"@attribute s numeric\n@data\n" + b"\\'" * 2_500_000, SWITCHES),
-    "values": ("arff", lambda: ARFF + b"@attribute s numeric\n@data\n" + b"aa " * 4_000_000, SWITCHES),
-    "nominal": (
-        "arff",
-        lambda: ARFF + b"@attribute s {" + b",".join(b"%x" % i for i in range(900_000)) + b"}",
-        SWITCHES,
-    ),
 }
 
 
@@ -105,14 +97,6 @@ def _peak(*files: Path) -> int:
     return int(done.stdout) * 1000
 
 
-def test_five_megabytes_of_escaped_quotes_are_refused_in_linear_time(tmp_path: Path) -> None:
-    """Tried from every quote, as it once was, this takes a day."""
-    for line in (b"\\'" * 2_500_000, b"'" + b"\\'" * 2_500_000, b"@attribute '" + b'\\"' * 2_500_000):
-        (tmp_path / "t.arff").write_bytes(ARFF + b"@attribute s numeric\n@data\n" + line)
-        with pytest.raises(TableError, match=r"t\.arff row 1 cannot be read as values: nothing closes the quote of"):
-            read_table(tmp_path / "t.arff")
-
-
 @pytest.mark.parametrize(
     ("suffix", "content", "reason"),
     [
@@ -124,9 +108,8 @@ def test_five_megabytes_of_escaped_quotes_are_refused_in_linear_time(tmp_path: P
             gzip.compress(b"a\n" + b" " * 10_000_000, mtime=0),
             "unpacks to more than 6.*: unpack it and import",
         ),
-        ("arff", ARFF + b"@data\n" + b"a\n" * 1_000_001, "more than 1000000 rows"),
     ],
-    ids=range(5),
+    ids=range(4),
 )
 def test_what_is_beyond_a_limit_is_refused_with_the_limit(
     suffix: str, content: bytes, reason: str, tmp_path: Path
@@ -137,7 +120,7 @@ def test_what_is_beyond_a_limit_is_refused_with_the_limit(
 
 
 def test_a_link_to_an_endless_device_is_refused(tmp_path: Path) -> None:
-    for suffix in ("csv", "csv.gz", "arff", "npz"):
+    for suffix in ("csv", "csv.gz", "mot", "npz"):
         (tmp_path / f"t.{suffix}").symlink_to("/dev/zero")
         with pytest.raises(TableError, match="is a device or a pipe"):
             read_table(tmp_path / f"t.{suffix}")

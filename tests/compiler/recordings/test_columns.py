@@ -72,7 +72,7 @@ def test_every_key_is_read(tmp_path: Path) -> None:
         ('label = "a"\nencoding = "a\\u0000b"', "`encoding` must be one that Python knows"),
         ('label = "a"\ntime_unit = "s"', "`time_unit` is given without `time`"),
         ('label = "a"\ntrial = "b"\nframes = "restart"', "`trial` and `frames` = 'restart' both say what"),
-        ('label = "a"\nreduce = "mean"', "reduce: 'mean' is not among its values"),
+        ('label = "a"\nreduce = "mean"', "reduce: this key is unknown"),
         ("label = []", "`label` must name a column"),
         ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = inf', "`threshold` must be a finite number, 'otsu' or"),
         ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = "max"', "'max' is not among its values"),

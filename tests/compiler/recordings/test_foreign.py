@@ -104,6 +104,10 @@ BEGINNINGS = {
     ".parquet": b"PAR1\1\0\0\0PAR1",
     **dict.fromkeys((".h5", ".hdf5"), b"\x89HDF\r\n\x1a\n\0\0"),
     ".mat": b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + b"\xff" * 40,
+    ".c3d": b"\2P" + bytes(600),
+    ".bag": b"#ROSBAG V2.0\n" + bytes(40),
+    ".db3": b"SQLite format 3\0" + bytes(100),
+    ".mcap": b"\x89MCAP0\r\n\1" + (16).to_bytes(8, "little") + b"\4\0\0\0ros2\4\0\0\0peer" + bytes(40),
 }
 
 
@@ -113,7 +117,7 @@ BEGINNINGS = {
         *((suffix, BEGINNINGS[suffix]) for suffix in foreign.READERS),
         *(
             (suffix, content)
-            for suffix in (".xlsx", ".parquet", ".h5", ".npz", ".mat")
+            for suffix in (".xlsx", ".parquet", ".h5", ".npz", ".mat", ".c3d", ".bag", ".db3")
             for content in (b"", b"junk" * 999)
         ),
     ],

@@ -73,7 +73,7 @@ def test_rows_that_may_be_frames_of_one_trial_are_asked_about() -> None:
 
 def frames(**cells: Any) -> tuple[GraspSet, ImportReport]:
     """Import six frames of three trials of a and b, with other cells, or keys of a columns.toml."""
-    keys = {name: cells.pop(name) for name in ("reduce", "missing", "taxels", "time") if name in cells}
+    keys = {name: cells.pop(name) for name in ("missing", "taxels", "time") if name in cells}
     rows: dict[str, Column] = {
         "g": ["a", "a", "a", "b", "b", "a"],
         "rep": ["T1", "T1", "T1", "T1", "T1", "T10"],
@@ -96,23 +96,11 @@ def test_text_trials_are_numbered_in_natural_order_and_it_is_said() -> None:
     assert (grasp_set.trials.tolist(), report.notes) == ([7, 7, 8, -1, -1, 9], ())
 
 
-@pytest.mark.parametrize(
-    ("reduce", "joints", "switches"),
-    [
-        ("none", [1, 2, 3, 5, 7, 9], [0, 1, 0, 1, 0, 0]),
-        ("middle", [2, 5, 9], [1, 1, 0]),
-        ("median", [2, 5, 9], [0, 0, 0]),
-        ("any", [2, 5, 9], [1, 1, 0]),
-    ],
-)
-def test_the_frames_of_a_trial_are_put_in_order_and_reduced(
-    reduce: str, joints: list[int], switches: list[int]
-) -> None:
-    grasp_set, report = frames(time="t", reduce=reduce)
-    assert grasp_set.codes[:, 0].tolist() == joints
-    assert grasp_set.switches[:, 0].tolist() == switches
+def test_the_frames_of_a_trial_are_put_in_order() -> None:
+    grasp_set, report = frames(time="t")
+    assert grasp_set.codes[:, 0].tolist() == [1, 2, 3, 5, 7, 9]
+    assert grasp_set.switches[:, 0].tolist() == [0, 1, 0, 1, 0, 0]
     assert report.trials == 3
-    assert ("6 frames of 3 trials were reduced to one row a trial" in " ".join(report.notes)) == (reduce != "none")
 
 
 def test_a_trial_begins_where_time_starts_anew() -> None:

@@ -264,10 +264,8 @@ def test_times_of_no_known_unit_order_frames_and_are_not_kept() -> None:
     assert report.notes == (
         "frame orders frames, but does not say when they were recorded: its unit is not known (`time_unit`)",
     )
-    grasp_set, report = import_table(
-        table, ColumnRoles("g", trial="n", time="frame", time_unit="ms", switches=("s",), reduce="middle")
-    )
-    assert grasp_set.times_us.tolist() == [1000, 3000]
+    grasp_set, report = import_table(table, ColumnRoles("g", trial="n", time="frame", time_unit="ms", switches=("s",)))
+    assert grasp_set.times_us.tolist() == [1000, 2000, 3000]
 
 
 def test_a_time_that_is_none_is_refused() -> None:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from thenar.compiler.recordings import TableError
 from thenar.compiler.recordings.cells import numbers
 from thenar.compiler.recordings.columns import TextFormat
-from thenar.compiler.recordings.table import Table, read_arff, read_table, sniff
+from thenar.compiler.recordings.table import Table, read_table, sniff
 
 from ...conftest import calls
 
@@ -130,7 +130,7 @@ def test_an_npz_that_is_no_table_is_refused(
 
 
 def test_another_suffix_is_refused_naming_those_that_are_read(tmp_path: Path) -> None:
-    with pytest.raises(TableError, match=r"table\.doc: a table ends in \.csv, .* or \.mat"):
+    with pytest.raises(TableError, match=r"table\.doc: a table ends in \.csv, .*\.mat, .* or \.mcap"):
         read_table(tmp_path / "table.doc")
 
 
@@ -139,14 +139,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("tables")
 
 
-ARFF = st.text("@{}',\"%? \\\nab01").map(
-    lambda text: f"@relation r\n@attribute a numeric\n{text}\n@data\n{text}\n".encode()
+MOTION = st.tuples(st.sampled_from(["PathFileType\t4\n1\n2\n", "x\nendheader\n"]), st.text("a1.,\t\n")).map(
+    lambda parts: "".join(parts).encode()
 )
 
 
 @given(
-    st.sampled_from(["csv", "csv.gz", "arff", "arff.gz"]),
-    st.one_of(st.binary(), st.text('a1,"\r\n \0').map(str.encode), ARFF),
+    st.sampled_from(["csv", "csv.gz", "mot", "trc"]),
+    st.one_of(st.binary(), st.text('a1,"\r\n \0').map(str.encode), MOTION),
     st.booleans(),
 )
 def test_any_bytes_are_a_table_or_refused_and_never_crash(
@@ -164,57 +164,6 @@ def test_a_number_too_large_for_a_double_becomes_infinite_in_its_row(tmp_path: P
     np.savez(tmp_path / "t.npz", a=np.array([1, largest, -largest], np.longdouble))
     column = numbers(read_table(tmp_path / "t.npz").columns["a"]).values
     assert column.tolist() == [1.0, float(largest), -float(largest)]
-
-
-HEADER = """% a comment
-@RELATION 'a b'
-@attribute 'my joint' NUMERIC
-@ATTRIBUTE s {0, 1}
-@attribute\tclass {'Disk (power)', 'Hook, platform, push', "it's", 'it\\'s not', x}
-
-@data
-"""
-
-
-def arff(text: str) -> Table:
-    return read_arff("t.arff", text.splitlines(keepends=True))
-
-
-def test_numbers_nominals_quotes_and_missing_values_are_read() -> None:
-    table = arff(
-        HEADER + "1.5,0,'Disk (power)'\n% between\n?,1, 'Hook, platform, push'\n\n-2e1 ? \"it's\"\n3,0,'it\\'s not'\n"
-    )
-    assert {name: list(column) for name, column in table.columns.items()} == {
-        "my joint": ["1.5", "?", "-2e1", "3"],
-        "s": ["0", "1", "?", "0"],
-        "class": ["Disk (power)", "Hook, platform, push", "it's", "it's not"],
-    }
-    assert table.rows.tolist() == [1, 2, 3, 4]
-
-
-def test_a_gzipped_arff_is_read_by_its_suffix(tmp_path: Path) -> None:
-    (tmp_path / "t.arff.gz").write_bytes(gzip.compress((HEADER + "1,0,x\n").encode()))
-    assert list(read_table(tmp_path / "t.arff.gz").columns["class"]) == ["x"]
-
-
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        ("", "t.arff is not ARFF: it has no line @data"),
-        ("garbage\n", "t.arff line 1: expected @attribute or @data, not 'garbage'"),
-        (HEADER.replace("s {", "'my joint' {"), "line 4: attribute 'my joint' occurs twice"),
-        (HEADER.replace("NUMERIC", "string"), "line 3: attribute 'my joint' is string; only numeric and nominal"),
-        (HEADER.replace("{0, 1}", "{0, 1"), r"line 4: attribute 's' is \{0, 1; only"),
-        (HEADER.replace("s {0, 1}", "s"), "line 4: an attribute has a name and a type"),
-        (HEADER + "1,0\n", "row 1 has 2 values, the header 3 attributes"),
-        (HEADER + "1,0,x\n1,2,x\n", "row 2: '2' is not among the values of attribute 's'"),
-        (HEADER + "{0 1, 2 x}\n", "row 1 cannot be read as values: sparse rows are not read"),
-        (HEADER + "1,0,'x\n", "row 1 cannot be read as values: "),
-    ],
-)
-def test_what_is_no_arff_is_refused_with_the_line_or_row(text: str, reason: str) -> None:
-    with pytest.raises(TableError, match=reason):
-        arff(text)
 
 
 ROWS = [["Griff", "Person", "Daumen"], ["Größe", "Jörg", "1,5"], ["Haken", "Käthe", "12,25"], ["Haken", "Anna", "3"]]
