@@ -23,9 +23,10 @@ def test_every_target_describes_itself_and_its_folder(name: str) -> None:
         assert target.compiler is not None
 
 
-def test_the_page_on_firmware_names_every_target() -> None:
-    page = (Path(__file__).parents[4] / "docs" / "how-to" / "firmware.md").read_text()
-    assert [name for name in TARGETS if f"`{name}`" not in page] == []
+def test_the_pages_on_firmware_and_on_boards_name_every_target() -> None:
+    docs = Path(__file__).parents[4] / "docs"
+    pages = (docs / "how-to" / "firmware.md").read_text() + (docs / "reference" / "boards.md").read_text()
+    assert [name for name in TARGETS if f"`{name}`" not in pages] == []
 
 
 def test_what_is_verified_and_what_is_timed_is_read_off_the_targets() -> None:
@@ -36,7 +37,7 @@ def test_what_is_verified_and_what_is_timed_is_read_off_the_targets() -> None:
 def test_a_target_without_a_simulator_says_so() -> None:
     core = Target(name="rv64", part="rv64gc", help="a core", flash=1 << 17, ram=1 << 14)
     layout = Layout(make_tables())
-    assert core.missing() == "thenar has no simulator of an rv64gc"
+    assert core.missing() == "thenar has no simulator of an rv64gc: measure its cost on the board"
     with pytest.raises(FirmwareError, match="no simulator of an rv64gc"):
         core.run({}, "hand", layout, np.zeros((1, 5), np.uint8))
 
