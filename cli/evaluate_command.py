@@ -114,7 +114,8 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     type=ListOf("table", lambda: TABLES, none=True),
     default=",".join(_USUAL),
     show_default=True,
-    help="Tables to print, or none; trainers takes longer.",
+    help="Tables to print, or none: compositions (the paper's II, V), generality (III, VI), pruning (IV, VII), "
+    "baselines, and trainers, which takes longer.",
 )
 @click.option(
     "--streams",

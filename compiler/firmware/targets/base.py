@@ -102,7 +102,7 @@ class Target:
 
     def missing(self) -> str | None:
         """Return why code cannot be compiled and run here, and what to install; None if it can."""
-        return f"thenar has no simulator of {self.named}"
+        return f"thenar has no simulator of {self.named}: measure its cost on the board"
 
     def run(
         self, files: Mapping[str, str], name: str, layout: "Layout", frames: "Frames", *, lost: "Lost | None" = None

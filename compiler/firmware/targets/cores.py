@@ -5,7 +5,7 @@ from functools import partial
 from ..tools import ARM_COMPILER, RISCV_COMPILER
 from .base import Formula, Target
 
-_core = partial(Target, help="a library for this core, to link with the vendor's start-up code")
+_core = partial(Target, help="C files for this core, to compile into your project")
 _cortex = partial(_core, compiler=ARM_COMPILER)
 
 # Memories and clocks are those of common boards: SAMD21 (Arduino Zero), nRF52840 (Arduino Nano 33 BLE), GD32VF103CB
