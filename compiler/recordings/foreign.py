@@ -118,14 +118,19 @@ def _run(paths: Sequence[Path], skip: int | None, seconds: int, made: IO[bytes])
     return shortened(said, 600) if done.returncode else ""
 
 
-def _spreadsheet(path: Path, skip: int | None) -> tuple[Columns, Sequence[int], int]:
+def _spreadsheet(path: Path, skip: int | None, notes: list[str]) -> tuple[Columns, Sequence[int], int]:
     from python_calamine import load_workbook
 
     book = load_workbook(path)
-    sheets = (
-        book.get_sheet_by_index(number).to_python(skip_empty_area=False) for number in range(len(book.sheet_names))
-    )
-    cells = next((sheet for sheet in sheets if any(cell != "" for row in sheet for cell in row)), [])
+    sheets = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in book.sheet_names}
+    lengths = {name: sum(any(cell != "" for cell in row) for row in sheet) for name, sheet in sheets.items()}
+    # The longest one holds the frames; a sheet of notes may precede it.
+    longest = max(lengths, key=lengths.__getitem__, default="")
+    if left := [name for name, length in lengths.items() if length and name != longest]:
+        notes.append(
+            f"sheets left out: {list_names([shortened(name) for name in left])}; {shortened(longest)} was read"
+        )
+    cells = sheets.get(longest, [])
     filled = [number for number, row in enumerate(cells) if any(cell != "" for cell in row)]
     if not filled:
         raise TableError("it holds no sheet with cells")
@@ -440,7 +445,7 @@ def main(skip: str, parent: str, *sources: str) -> int:
         notes: list[str] = []
         try:
             if read is None:
-                columns, rows, skipped = _spreadsheet(path, None if skip == "None" else int(skip))
+                columns, rows, skipped = _spreadsheet(path, None if skip == "None" else int(skip), notes)
             elif columns := read(path, notes):
                 rows, skipped = range(1, len(next(iter(columns.values()))) + 1), 0
             else:

@@ -436,7 +436,8 @@ def _no_input(column: Facts) -> str:
         return "it never changes"
     if is_time(column.words) or is_count(column.words):
         return "by its name a clock or a counter"
-    if column.words & WORDS["note"]:
+    # A unit is no word of the name: "Force (N)".
+    if words_of(re.sub(r"[(\[][^)\]]*[)\]]", "", column.name)) & WORDS["note"]:
         return "by its name a note on the row"
     if column.words and any(column.words <= WORDS[key] - {"y"} for key in ("label", "trial")) and column.nominal:
         return "by its name another label, or number of a trial"

@@ -164,7 +164,7 @@ def read_tables(paths: Sequence[Path], text: TextFormat = PLAIN) -> Iterator[Tab
                 else:
                     read, rows, skip, notes = next(foreign)
                     check_names("column", read)
-                    table = Table(path.name, read, rows, skip=skip, notes=notes)
+                    table = Table(path.name, read, rows, skip=skip, notes=notes, decimal=text.decimal)
                 columns = unlisted(table.what, table.columns, table.rows)
             except RecordingError as reason:
                 raise TableError(f"{path.name}: {reason}") from reason

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from thenar.runtime.names import SHOWN, list_names, shortened
 
 from . import LARGEST, ROWS, FileRows, TableError, check_room
-from .cells import Column, is_numeric, name_of_number, natural_key, skipped
+from .cells import Column, is_numeric, name_of_number, natural_key, pieces, skipped
 from .columns import PLAIN, TextFormat
 from .foreign import size_of
 from .table import SUFFIXES, Table, is_table, is_text, read_table, read_tables, sniff
@@ -188,10 +188,19 @@ def read_path(
     table = replace(read_files(files, text, report), what=str(path)) if files else read_table(path, text)
     if text.skip is None:
         text, remarks = PLAIN._replace(skip=table.skip), [skipped(table.skip)] * bool(table.skip)
+        if any(_has_comma_numbers(column) for column in table.columns.values()):
+            text, table = text._replace(decimal=","), replace(table, decimal=",")
+            remarks.append("decimal sign: a comma")
     if others:
         left = f"{len(others)} tables next to them do not match: {list_names([shortened(name) for name in others])}"
         remarks = [f"files: {len(files)}; {left}", *remarks]
     return table, text, remarks
+
+
+def _has_comma_numbers(column: Column) -> bool:
+    """Return whether a column is text that holds nothing but numbers, of which some have a decimal comma."""
+    cells = [] if is_numeric(column) else [cell for piece in pieces(column) for cell in piece if cell]
+    return any("," in cell for cell in cells) and all(re.fullmatch(r"[-+]?\d+(,\d+)?", cell) for cell in cells)
 
 
 def _check_alike(first: str, table: Table, other: str, its: Table) -> None:

@@ -260,3 +260,24 @@ def test_any_table_is_proposed_for_or_refused(columns: list[tuple[str, str, str,
 def test_many_columns_are_listed_by_the_first_and_the_last() -> None:
     assert listed(("a", "b", "c")) == "a, b, c"
     assert listed(("a", "b", "c", "d")) == "a ... d (4)"
+
+
+def test_a_workbook_of_a_german_study_needs_no_columns_toml(tmp_path: Path) -> None:
+    """Notes on the first sheet, the frames on the longest, decimal commas in text, and a unit (N), which is no note."""
+    draw = random.Random(1)
+    rows = [
+        (person, grip, trial, *(f"{draw.uniform(0, 90):.1f}".replace(".", ",") for _ in range(2)))
+        for person in ("P1", "P2")
+        for grip in ("Hakengriff", "Spitzgriff")
+        for trial in range(1, 5)
+        for _ in range(3)
+    ]
+    frame = pd.DataFrame(rows, columns=["Proband", "Griffart", "Versuch", "Zeigef. MCP", "Kraft Daumen (N)"])
+    with pd.ExcelWriter(tmp_path / "study.xlsx", engine="openpyxl") as writer:
+        pd.DataFrame({"Studie": ["2025"]}).to_excel(writer, sheet_name="Info", index=False)
+        frame.to_excel(writer, sheet_name="Daten", index=False)
+    table, proposal = propose_file(tmp_path / "study.xlsx")
+    assert len(table.rows) == len(frame)
+    assert table.notes == ("sheets left out: Info; Daten was read",)
+    assert "decimal sign: a comma" in proposal.remarks
+    assert roles(proposal)["Kraft Daumen (N)"] == "taxels"

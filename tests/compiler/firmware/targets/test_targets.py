@@ -36,7 +36,7 @@ def test_what_is_verified_and_what_is_timed_is_read_off_the_targets() -> None:
 def test_a_target_without_a_simulator_says_so() -> None:
     core = Target(name="rv64", part="rv64gc", help="a core", flash=1 << 17, ram=1 << 14)
     layout = Layout(make_tables())
-    assert core.missing() == "thenar has no simulator of an rv64gc"
+    assert core.missing() == "thenar has no simulator of an rv64gc: measure its cost on the board"
     with pytest.raises(FirmwareError, match="no simulator of an rv64gc"):
         core.run({}, "hand", layout, np.zeros((1, 5), np.uint8))
 
