@@ -174,7 +174,7 @@ def _frontier() -> list[bytes]:
         replace(made.point(known), number=number, switches=SWITCHES[: number + 1])
         for number, known in enumerate((1, 9, 10), 1)
     )
-    few = {"points": points, "tried": made.tried[:1], "curves": made.curves[:1], "marks": made.marks[:1], "picked": 1}
+    few = {"points": points, "tried": made.tried[:1], "marks": made.marks[:1], "picked": 1}
     return [frontier_to_bytes(replace(made, fingerprint=grasp_set().fingerprint(), **few))]
 
 
