@@ -86,7 +86,7 @@ def played(asked: tuple[int, GraspSet | None, Equipment]) -> Case:
     with tempfile.TemporaryDirectory() as folder, Store(Path(folder) / "store", "") as store:
         asking = Cache(store, lambda _done, _all: None, jobs=1)
         survey = Survey(grasp_set, SCENE, samples, None, search, cuts, equipment, asking)
-        screened, _ = screen(survey)
+        screened = screen(survey)
         finalists = evaluate_finalists(survey, select_finalists(screened, [], search.finalists))
     designs = [design for finalist in finalists for design in designs_of(finalist)]
     luck = lucks(designs, screened, survey)

@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import IO, NamedTuple, Self
 from unicodedata import combining, east_asian_width
@@ -31,19 +31,14 @@ class Text(NamedTuple):
 
 
 @dataclass
-class Column:
-    """A column of a table: its head, whether it is aligned right, and whether its cells are never wrapped."""
-
-    head: str
-    right: bool = False
-    no_wrap: bool = False
-
-
-@dataclass
 class Table:
-    """A table. One that is too wide is split into several, each with the first column; a `grid` has no frame."""
+    """A table. One that is too wide is split into several, each with the first column; a `grid` has no frame.
 
-    columns: list[Column]
+    Columns with heads in `numbers` are aligned right, and their cells are never wrapped.
+    """
+
+    heads: list[str]
+    numbers: Container[str] = ()
     title: str | None = None
     grid: bool = False
     rows: list[list[Text]] = field(default_factory=list)
@@ -59,7 +54,7 @@ class Table:
 
     def lines(self, width: int) -> Iterator[str]:
         """Yield the lines of each part."""
-        heads = [Text(shown(column.head), "bold") for column in self.columns]
+        heads = [Text(shown(head), "bold") for head in self.heads]
         columns = [[row[number].text for row in (heads, *self.rows)] for number in range(len(heads))]
         naturals = [max(map(cells, "\n".join(texts).split("\n"))) for texts in columns]
         if self.grid:
@@ -67,8 +62,8 @@ class Table:
                 yield from ("    ".join(line).rstrip() for line in self._laid_out(row, range(len(row)), naturals))
             return
         needed = [
-            natural if column.no_wrap else max(min(natural, _READABLE), *map(cells, "\n".join(texts).split()), 0)
-            for column, texts, natural in zip(self.columns, columns, naturals, strict=True)
+            natural if head in self.numbers else max(min(natural, _READABLE), *map(cells, "\n".join(texts).split()), 0)
+            for head, texts, natural in zip(self.heads, columns, naturals, strict=True)
         ]
         if self.title is not None:
             yield from Text(self.title, "bold").lines(width)
@@ -103,7 +98,7 @@ class Table:
             for number, texts in lines.items():
                 text = texts[at] if at < len(texts) else ""
                 blank, styled = " " * (widths[number] - cells(text)), _styled(text, row[number].style)
-                found.append(blank + styled if self.columns[number].right else styled + blank)
+                found.append(blank + styled if self.heads[number] in self.numbers else styled + blank)
             yield found
 
 
@@ -112,7 +107,7 @@ Printed = str | Text | Table
 
 def grid(columns: int) -> Table:
     """Return a table without a frame and heads."""
-    return Table([Column("") for _ in range(columns)], grid=True)
+    return Table([""] * columns, grid=True)
 
 
 def cells(text: str) -> int:

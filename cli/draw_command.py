@@ -10,42 +10,25 @@ from .parameters import existing_file, keep_apart, overwrite_flag, picture_file
 from .printing import echo, write_picture
 
 
-def _titled_paths(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> list[tuple[str, Path]]:
-    """Return title and path of each [NAME=]PATH; without a NAME, the title is the file's name."""
-    found = []
-    for text in given:
-        title, is_named, rest = text.partition("=")
-        if not is_named or Path(text).exists():
-            title, rest = Path(text).resolve().stem, text
-        if not title or not rest:
-            raise click.BadParameter(f"'{text}' is not NAME=PATH")
-        if not Path(rest).exists():
-            raise click.BadParameter(f"There is no file or folder '{rest}'.")
-        found.append((title, Path(rest)))
-    return found
-
-
 @click.command("draw")
 @click.argument("grasps", type=existing_file, required=False)
 @click.option("-o", "--output", type=picture_file, required=True, help="The picture to write: an .svg or .png file.")
 @overwrite_flag
 @layout_option
-@click.option("--numbers", is_flag=True, help="Label each switch with its number in the set, from 0.")
 @click.option("--per-grasp", is_flag=True, help="Draw one hand per grasp type of GRASPS, all on one scale.")
 @click.option(
     "--kept",
     multiple=True,
-    callback=_titled_paths,
-    metavar="[NAME=]PATH",
+    type=click.Path(exists=True, path_type=Path),
+    metavar="PATH",
     help="Draw what a placement, a build or a list of names keeps; several are drawn side by side.",
 )
 def command(
     grasps: Path | None,
     output: Path,
     layout: Path | None,
-    numbers: bool,
     per_grasp: bool,
-    kept: list[tuple[str, Path]],
+    kept: tuple[Path, ...],
 ) -> None:
     """Draw a glove palm up, each switch as a circle: your own with --layout, else the glove of the shipped scenes.
 
@@ -55,17 +38,15 @@ def command(
 
     \b
     Example:
-        thenar draw --numbers -o glove.svg
+        thenar draw -o glove.svg
         thenar draw set.grasps --layout layout.toml --per-grasp -o contacts.png
-        thenar draw --kept A=a.json --kept build/ -o kept.svg
+        thenar draw --kept placement.json --kept build/ -o kept.svg
     """
     if grasps is None and per_grasp:
         raise click.UsageError("--per-grasp needs recordings: name a .grasps file as GRASPS")
-    if grasps is not None and (kept or numbers):
-        raise click.UsageError("--kept and --numbers draw the glove itself: leave GRASPS out")
-    if numbers and kept:
-        raise click.UsageError("--kept already numbers the kept switches: leave out --numbers")
-    for source in (grasps, layout, *(path for _, path in kept)):
+    if grasps is not None and kept:
+        raise click.UsageError("--kept draws the glove itself: leave GRASPS out")
+    for source in (grasps, layout, *kept):
         keep_apart(source, output)
     from thenar.compiler.placement.kept import kept_names
     from thenar.compiler.recordings.graspset import GraspSet
@@ -75,9 +56,9 @@ def command(
     if grasps is not None:
         picture = handpanels.contacts(hand, GraspSet.load(grasps), per_grasp)
     elif kept:
-        picture = handpanels.kept(hand, [(title, kept_names(path)) for title, path in kept])
+        picture = handpanels.kept(hand, [(path.resolve().stem, kept_names(path)) for path in kept])
     else:
-        picture = handpanels.all_switches(hand, numbers)
+        picture = handpanels.all_switches(hand)
     write_picture(output, partial(handpanels.draw, picture))
     hands = len(picture.panels)
     echo(f"{output}: {hands} hand{'s' if hands > 1 else ''}")

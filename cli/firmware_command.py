@@ -105,8 +105,12 @@ def command(
         if given := [option for option, value in libraries.items() if value]:
             raise click.UsageError(f"--{given[0]} is for libraries, not for sketches that print rows: leave it out.")
         return _write_sketches(build, glove, output, name, overwrite=overwrite)
-    _check(target, output is not None, measure)
-    assert target is not None
+    if target is None:
+        raise click.UsageError("A library needs a target: name one with --target.")
+    if TARGETS[target].kind == "host" and measure:
+        raise click.UsageError("The host has no cycle counts: --measure is for microcontrollers.")
+    if output is None and not measure:
+        raise click.UsageError("Nothing to do: name a folder to write with -o, or add --measure.")
     loaded = Build.load(build)
     sensors = None if glove is None else sensors_of(loaded.manifest, load_harness(glove))
     member = TARGETS[target]
@@ -142,18 +146,6 @@ def _write_sketches(build: Path, glove: Path | None, output: Path | None, name: 
     line = f"{output}: a sketch for Arduino's cores; {readme} explains how to compile it"
     show({"files": sorted(files)}, lambda _: echo(line))
     return 0
-
-
-def _check(target: str | None, writes: bool, measures: bool) -> None:
-    """Raise UsageError for options of a library that conflict, or are missing."""
-    from thenar.compiler.firmware.targets import TARGETS
-
-    if target is None:
-        raise click.UsageError("A library needs a target: name one with --target.")
-    if TARGETS[target].kind == "host" and measures:
-        raise click.UsageError("The host has no cycle counts: --measure is for microcontrollers.")
-    if not writes and not measures:
-        raise click.UsageError("Nothing to do: name a folder to write with -o, or add --measure.")
 
 
 def _print(target: "Target", fit: "PartFit", measured: "Measured | None", output: Path | None) -> None:

@@ -39,7 +39,9 @@ def _timed() -> tuple[str, ...]:
 
 @click.command("frontier", cls=TrainingCommand)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
-@click.option("-o", "--output", type=OutputFolder(), required=True, help="Folder for tables, pictures and the store.")
+@click.option(
+    "-o", "--output", type=OutputFolder(), required=True, help="Folder for tables, the picture and the store."
+)
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring too, and choose by its ports.")
 @click.option(
     "--target",
@@ -98,7 +100,7 @@ def command(
     """Show the trade-off between accuracy and time: which switches, joints, rounds, tables and wirings pay.
 
     Every placement is screened by a nested cross-validation. Those near the front are refined, priced for the target,
-    simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, two pictures and store.sqlite,
+    simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, frontier.svg and store.sqlite,
     from which an interrupted run continues.
 
     \b

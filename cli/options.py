@@ -176,14 +176,6 @@ class LazyOption(click.Option):
         return super().get_help_record(ctx)
 
 
-class _SettingOption(click.Option):
-    """Its help shows the trainer's default, although the option itself has none."""
-
-    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        record = super().get_help_record(ctx)
-        return record and (record[0], record[1].replace(f"({self.show_default})", str(self.show_default)))
-
-
 def _trainers_help() -> str:
     from thenar.compiler.trainers.base import TRAINERS
 
@@ -301,8 +293,8 @@ def _option(setting: "Setting", chosen: bool) -> click.Option:
     what, _, default = setting.what.partition("  [default: ")
     default = "chosen" if chosen else default.rstrip("]") if setting.default is None else str(setting.default)
     # Without a value, click treats the option as not given.
-    decls, shown = [f"--{setting.name.replace('_', '-')}", setting.name], default or False
-    return _SettingOption(decls, type=kind, show_default=shown, help=what)
+    shown = f"{what}  [default: {default}]" if default else what
+    return click.Option([f"--{setting.name.replace('_', '-')}", setting.name], type=kind, help=shown)
 
 
 layout_option = click.option("--layout", type=existing_file, help="Your glove's switch positions, a .toml file.")

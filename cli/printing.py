@@ -17,7 +17,7 @@ import msgspec
 
 from thenar.drivers.names import shown
 
-from .consoles import Column, Console, Live, Table, Text, bar
+from .consoles import Console, Live, Table, Text, bar
 
 _JSON = "thenar.json"
 _REDRAW_S = 0.1
@@ -111,7 +111,7 @@ def table(
     rows: Iterable[Iterable[str | Text]] = (),
 ) -> Table:
     """Return a table of these columns, with `numbers` aligned right."""
-    made = Table([Column(column, right=column in numbers, no_wrap=column in numbers) for column in columns], title)
+    made = Table(list(columns), numbers, title)
     for row in rows:
         made.add_row(*row)
     return made

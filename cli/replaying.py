@@ -4,7 +4,6 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import islice
-from operator import eq
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,9 +12,6 @@ import click
 from .printing import echo, err, say, warning
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from thenar.runtime import Build
     from thenar.runtime.live.recogniser import Moment
     from thenar.runtime.policy import Policy
@@ -73,16 +69,15 @@ def replay_set(
     frames: int | None,
 ) -> None:
     """Classify every row of a set of grasps alone and send it to each sink, or as a JSON line to stdout if there is
-    none; on stderr, print the accuracy, and whether the build was trained on these trials.
+    none. `thenar verify` measures the accuracy.
     """
     import msgspec
 
-    from thenar.compiler.artifact.training import trained_on
-    from thenar.compiler.artifact.verify import replayed, trials_recognised
+    from thenar.compiler.artifact.verify import replayed
     from thenar.compiler.recordings.graspset import GraspSet
 
-    whole, found = GraspSet.load(replay), list[str]()
-    grasp_set = whole.rows(range(len(whole))[:frames])
+    grasp_set = GraspSet.load(replay)
+    grasp_set = grasp_set.rows(range(len(grasp_set))[:frames])
 
     def line(grasp: "LiveGrasp", shape: "Preshape | None") -> bytes:
         shown = {
@@ -97,31 +92,7 @@ def replay_set(
 
     with _published(build, sinks, selector, line) as publish:
         for grasp in replayed(build, grasp_set, _PERIOD_US):
-            found.append(grasp.grasp)
             publish(grasp, None)
-    rows = len(grasp_set)
-    correct = sum(map(eq, found, grasp_set.grasps.tolist()))
-    echo(f"{correct} of {rows} frames predicted correctly ({correct / max(rows, 1):.1%})", err=True)
-    if not rows:
-        return
-    hits = trials_recognised(grasp_set, found)
-    if len(hits) < rows:
-        echo(f"{hits.sum()} of {len(hits)} trials by majority of their frames ({hits.mean():.1%})", err=True)
-    # Of whole trials, even if the last one is replayed in part.
-    echo(_seen(build, hits, trained_on(build.manifest, whole)[: len(hits)]), err=True)
-
-
-def _seen(build: "Build", hits: "NDArray[np.bool_]", seen: "NDArray[np.bool_]") -> str:
-    """Return a sentence that says how many of the replayed trials (T,) the build was trained on."""
-    if not seen.any():
-        return "the build was trained on none of these trials"
-    new = ~seen
-    if new.any():
-        others = f"{hits[new].sum()} of the other {new.sum()} are predicted correctly ({hits[new].mean():.1%})"
-        return f"the build was trained on {seen.sum()} of these {len(seen)} trials; {others}"
-    rate = build.manifest.headline
-    expected = "their accuracy was not measured" if rate is None else f"accuracy, {rate}"
-    return f"the build was trained on these trials: new grasps are recognised less often ({expected})"
 
 
 @contextmanager

@@ -16,19 +16,13 @@ if TYPE_CHECKING:
 
     from thenar.compiler.artifact.timeline import FoundSegment
 
-_ENDINGS = (".csv", ".mcap")
 _SHOWN = 20
 
 
 @click.command("segment")
 @click.argument("recordings", metavar="FILE", type=existing_file)
 @click.option("-b", "--build", type=existing_folder, required=True, help="The build that recognises.")
-@click.option(
-    "-o",
-    "--output",
-    type=OutputFile(*_ENDINGS),
-    help="Write the segments as a table (.csv), or annotations (.mcap).",
-)
+@click.option("-o", "--output", type=OutputFile(".csv"), help="Write the segments as a table.")
 @click.option(
     "--lag-ms",
     type=Number(min=0, max=10_000),
@@ -55,10 +49,10 @@ def command(
     \b
     Example:
         thenar segment movements.grasps -b build/ -o segments.csv
-        thenar segment run.mcap -b build/ -o segments.mcap --lag-ms 150
+        thenar segment run.mcap -b build/ -o segments.csv --lag-ms 150
         thenar segment movements.grasps -b build/ --picture timeline.svg --transitions graph.json
     """
-    from thenar.compiler.artifact.timeline import draw, overlap_f1, segment, write
+    from thenar.compiler.artifact.timeline import as_csv, draw, overlap_f1, segment
     from thenar.compiler.movements.transitions import Transitions
     from thenar.runtime.files import write_atomically
 
@@ -71,7 +65,7 @@ def command(
         sequences = ([part.type for part in timeline.segments()] for timeline in found)
         write_atomically(transitions, Transitions.of(sequences, found[0].types).to_json())
     if output is not None:
-        write(output, found)
+        write_atomically(output, as_csv(found))
     segments = [one for timeline in found for one in timeline.segments()]
     seconds, f1 = sum(len(one.states) * one.tick_us for one in found) / 1e6, overlap_f1(found)
     summary = {"segments": segments, "streams": len(found), "seconds": seconds, "f1": f1}

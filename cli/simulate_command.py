@@ -112,7 +112,6 @@ def _print_report(report: "SimulationReport", path: Path, size: str) -> None:
         *("N between switches", "largest residual N", "N mm"),
     )
     grasps = table(("grasp type", *columns), columns, "Grasps, simulated")
-    grasps.columns[0].no_wrap = True
     for grasp in report.grasps:
         counts = (grasp.patterns, grasp.no_contact, grasp.unsettled)
         grasps.add_row(

@@ -100,14 +100,6 @@ def _print(spec: "SpecSummary", expected: "Iterable[str]", written: str | None) 
     for reader in spec.readers:
         words = counted_sensors([spec.sensors[number - 1] for number in reader.switches])
         console.print(f"{reader.ref}: {reader.place}, {words}")
-    bundles = table(("bundle", "connector", "signals", "returns", "wire, m"), title="Bundles")
-    for connector in dict.fromkeys(wire.connector for wire in spec.wires):
-        wires = [wire for wire in spec.wires if wire.connector == connector]
-        signals = sum(bool(wire.unit) for wire in wires)
-        lengths = [wire.length_mm for wire in wires if wire.length_mm is not None]
-        metres = f"{sum(lengths) / 1000:.2f}" if lengths else ""
-        bundles.add_row(wires[0].bundle, connector, str(signals), str(len(wires) - signals), metres)
-    console.print(bundles)
     materials = table(("quantity", "what", "part number", "note", "price"), title="Materials")
     for line in spec.materials:
         part = line.part if line.sure else f"{line.part} (not confirmed)"

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from .frontier.search import Search
     from .placement.methods.base import METHODS
     from .placement.placement import Placement, place
-    from .placement.selectors import SwitchSelector
     from .placement.tree import grow_id3
     from .recordings.columns import ColumnRoles
     from .recordings.export import from_dataframe, to_dataframe
@@ -69,7 +68,6 @@ _HOMES = {
     ".placement.tree": ("grow_id3",),
     ".placement.methods.base": ("METHODS",),
     ".placement.placement": ("Placement", "place"),
-    ".placement.selectors": ("SwitchSelector",),
     ".recordings.columns": ("ColumnRoles",),
     ".recordings.export": ("from_dataframe", "to_dataframe"),
     ".recordings.graspset": ("GraspSet", "Joint"),
@@ -107,7 +105,6 @@ __all__ = [
     "Setting",
     "Study",
     "StudyDesign",
-    "SwitchSelector",
     "Term",
     "ThenarError",
     "Trainer",

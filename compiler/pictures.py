@@ -63,11 +63,8 @@ class PictureError(ThenarError, ValueError):
 
 
 @contextmanager
-def painting(font_size: float, *, letters: bool = False) -> Iterator[None]:
-    """Set matplotlib up for drawing and rendering in this context. Raises PictureError if it is not installed.
-
-    With `letters`, text in SVG stays text, in a font of the reader, instead of outlines.
-    """
+def painting(font_size: float) -> Iterator[None]:
+    """Set matplotlib up for drawing and rendering in this context. Raises PictureError if it is not installed."""
     mpl = _matplotlib()
     with mpl.rc_context(), warnings.catch_warnings():
         mpl.rcdefaults()
@@ -80,8 +77,6 @@ def painting(font_size: float, *, letters: bool = False) -> Iterator[None]:
                 "text.parse_math": False,  # a dollar in a name is a dollar
             }
         )
-        if letters:
-            mpl.rcParams.update({"svg.fonttype": "none", "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"]})
         # A letter that the font lacks is drawn as a box, which does not spoil the picture.
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
         yield

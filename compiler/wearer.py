@@ -34,7 +34,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.drivers.errors import ThenarError
+from thenar.drivers.errors import SettingError
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.base import Tabulated
 from thenar.runtime.model.terms.grid import Grid
@@ -65,10 +65,6 @@ _TOLERANCE, _ROUGHLY, _MOST_STEPS = 1e-5, 1e-3, 500
 Labels = NDArray[np.intp]
 
 
-class AdaptationError(ThenarError, ValueError):
-    """Trials from which a build cannot be adapted."""
-
-
 @dataclass(frozen=True, eq=False)
 class Adaptation:
     """The change of score tables to trials of one person.
@@ -95,7 +91,7 @@ class Adaptation:
 
     Raises
     ------
-    AdaptationError
+    SettingError
         If there are no trials, or more than a thousand.
     """
 
@@ -112,11 +108,11 @@ class Adaptation:
     def __post_init__(self) -> None:
         names, trial = np.unique(self.trials, return_inverse=True)
         if not len(names):
-            raise AdaptationError("there are no trials to adapt to: record some of each type")
+            raise SettingError("there are no trials to adapt to: record some of each type")
         if len(names) > _MOST:
-            raise AdaptationError(f"{len(names)} trials of one person: adapt to at most {_MOST}, or compile a build")
+            raise SettingError(f"{len(names)} trials of one person: adapt to at most {_MOST}, or compile a build")
         if not self.strength > 0:
-            raise AdaptationError(f"a strength of {self.strength}: it must be above 0")
+            raise SettingError(f"a strength of {self.strength}: it must be above 0")
         frames = np.bincount(trial)
         place = np.empty(len(trial), np.intp)
         place[np.argsort(trial, kind="stable")] = np.concatenate([np.arange(count) for count in frames])

@@ -28,7 +28,8 @@ from ..recordings.graspset import GraspSet, Joint
 from ..recordings.taxonomy import ANY, own
 from ..samples import Samples, check_types, decided, select_inputs
 from ..scan_file import SCAN_NAME
-from ..wearer import STRENGTH, Adaptation, AdaptationError
+from ..wearer import STRENGTH, Adaptation
+from . import CompileError
 from .compile import check_target, closed_shares, origin_of, proof_of, publish, sha256
 from .documents import SPEC_FOLDER
 from .ensemble import ensemble_to_bytes
@@ -100,10 +101,11 @@ def adapt(
 
     Raises
     ------
-    AdaptationError
-        If there are no trials, or of a type that the build does not know; if a type to add is known or has no trials.
+    SettingError
+        If there are no trials, or too many.
     CompileError
-        If the recordings lack inputs of the build, or `output` is not a folder for one.
+        If there are trials of a type that the build does not know; if a type to add is known or has no trials; if the
+        recordings lack inputs of the build, or `output` is not a folder for one.
     RecordingError
         If an array holds no bits and codes.
     BuildError, FormatError
@@ -130,7 +132,7 @@ def adapt(
     crowd = Build.load(source)
     manifest, old, wearing = crowd.manifest, crowd.tables, crowd.manifest.wearing or Wearing(STRENGTH)
     if target == source.resolve() or manifest.adapted is not None:
-        raise AdaptationError(f"{source} must be the build of everybody, and the folder to write another one")
+        raise CompileError(f"{source} must be the build of everybody, and the folder to write another one")
     recordings, bits, codes = _inputs(manifest, X, y, trials)
     place = len(manifest.grasps) - manifest.knows_none
     new, names = range(place, place + len(add_type)), manifest.grasps_with(add_type)
@@ -191,7 +193,7 @@ def _inputs(
         return recordings, *select_inputs(recordings, manifest)
     frames, grasps, s = np.asarray(X), np.asarray([] if y is None else y, np.str_), len(manifest.switches)
     if frames.shape != (len(grasps), s + len(manifest.joints)):
-        raise AdaptationError(
+        raise CompileError(
             f"X has shape {frames.shape}: it needs a row for each of the {len(grasps)} names in y, and a column for "
             f"each of the build's {s} switches, then {len(manifest.joints)} joints"
         )
@@ -211,19 +213,19 @@ def _inputs(
 
 
 def _check_types(manifest: Manifest, recordings: GraspSet, add_type: Sequence[str]) -> None:
-    """Raise AdaptationError for trials of unknown types, and for types that are not new or have no trials."""
+    """Raise CompileError for trials of unknown types, and for types that are not new or have no trials."""
     present = {*recordings.grasps.tolist()}
     if unknown := sorted(present - {*manifest.grasps, *add_type}):
-        raise AdaptationError(
+        raise CompileError(
             f"the build does not know {list_names(unknown)}{nearest(unknown[0], manifest.grasps)}: leave these trials "
             "out, or teach new types with ``add_type``"
         )
-    check_types(len(manifest.grasps) + len(add_type), AdaptationError)
+    check_types(len(manifest.grasps) + len(add_type), CompileError)
     for number, name in enumerate(add_type):
         if name in (*manifest.grasps, *add_type[:number], NONE):
-            raise AdaptationError(f"{shortened(name)} is no new type: leave it out of ``add_type``")
+            raise CompileError(f"{shortened(name)} is no new type: leave it out of ``add_type``")
         if name not in present:
-            raise AdaptationError(f"there are no trials of {shortened(name)} to teach it with: record three")
+            raise CompileError(f"there are no trials of {shortened(name)} to teach it with: record three")
 
 
 def _closed(switches: Sequence[Switch], trials: Samples, new: range) -> tuple[Switch, ...]:

@@ -1,12 +1,9 @@
-"""Timelines: the segments that a build finds in whole movements or in a recording of a live glove; written and drawn.
-
-Files are a table (.csv) or annotations in an MCAP file (.mcap): JSON messages on one topic, with their schema, logged
-at the start of each segment. Files carry no date: equal segments give equal bytes.
+"""Timelines: the segments that a build finds in whole movements or in a recording of a live glove, and their table and
+picture.
 """
 
 import io
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +14,6 @@ from numpy.typing import NDArray
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.build import Build
-from thenar.runtime.files import write_atomically
 from thenar.runtime.live.replay import recognised
 from thenar.runtime.scores import refused
 from thenar.runtime.segmenting.decoder import decode, emissions
@@ -36,7 +32,6 @@ if TYPE_CHECKING:
 
 _LONGEST_LAG_US = 10_000_000
 MCAP = ".mcap"
-TOPIC = "/thenar/segments"
 _WIDTH_IN, _LINE_IN, _MOST_LINES = 11.0, 0.62, 60
 # With this many seconds per line and this font size, the name of a type fits into most grasps.
 _SECONDS, _POINTS = 10.0, 7.0
@@ -247,13 +242,6 @@ def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], 
     return tuple(timelines)
 
 
-def write(path: Path, timelines: Sequence[Timeline]) -> None:
-    """Write the segments in the format of the suffix of `path`, one of WRITERS, completely or not at all. Raises
-    OSError.
-    """
-    write_atomically(path, WRITERS[path.suffix.lower()](timelines))
-
-
 def as_csv(timelines: Sequence[Timeline]) -> bytes:
     """Return a table with one row per segment."""
     import csv
@@ -266,32 +254,6 @@ def as_csv(timelines: Sequence[Timeline]) -> bytes:
             names = cell(one.type), cell(one.subject), cell(one.session)
             writer.writerow((f"{one.start_s:.6f}", f"{one.end_s:.6f}", names[0], f"{one.confidence:.4f}", *names[1:]))
     return text.getvalue().encode()
-
-
-def as_mcap(timelines: Sequence[Timeline]) -> bytes:
-    """Return an MCAP file with a message for each segment on TOPIC."""
-    import msgspec
-    from mcap.writer import CompressionType, Writer
-
-    file = io.BytesIO()
-    writer = Writer(file, compression=CompressionType.NONE)
-    writer.start(profile="", library="thenar")
-    _, parts = msgspec.json.schema_components([FoundSegment])
-    schema = {"title": "thenar.Segment", **parts["FoundSegment"]}
-    known = writer.register_schema("thenar.Segment", "jsonschema", json.dumps(schema, sort_keys=True).encode())
-    channel = writer.register_channel(TOPIC, "json", known)
-    segments = (
-        (timeline.zero_us + round(1e6 * segment.start_s), segment)
-        for timeline in timelines
-        for segment in timeline.segments()
-    )
-    for number, (at_us, segment) in enumerate(sorted(segments, key=lambda pair: pair[0])):
-        writer.add_message(channel, 1000 * at_us, msgspec.json.encode(segment), 1000 * at_us, number)
-    writer.finish()  # type: ignore[no-untyped-call]
-    return file.getvalue()
-
-
-WRITERS: Mapping[str, Callable[[Sequence[Timeline]], bytes]] = {".csv": as_csv, ".mcap": as_mcap}
 
 
 def draw(timelines: Sequence[Timeline], kind: str) -> bytes:

@@ -17,7 +17,7 @@ from ..model.compare import WorstCase, compare, worst_case
 from ..model.faults import count_faults, groups_of, worst_faults
 from ..recogniser import predicted_classes
 from ..recordings.graspset import GraspSet
-from ..samples import decided, select_inputs
+from ..samples import select_inputs
 from ..scan_file import load_scan
 from ..trainers.base import Model, Report
 from ..trainers.stumps import Stumps
@@ -314,10 +314,3 @@ def replayed(build: Build, grasp_set: GraspSet, period_us: int) -> Iterator[Live
             glove_age_us=None,
             latency_us=0,
         )
-
-
-def trials_recognised(grasp_set: GraspSet, rows: Sequence[str]) -> NDArray[np.bool_]:
-    """Return which trials (T,) the majority of their frames predicts correctly, by each row's prediction."""
-    _, first, trial = np.unique(grasp_set.trial_ids, return_index=True, return_inverse=True)
-    names, predicted = np.unique(rows, return_inverse=True)
-    return np.asarray(names[decided(predicted[np.newaxis], trial)[0]] == grasp_set.grasps[first])

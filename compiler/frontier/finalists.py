@@ -16,7 +16,7 @@ from ..evaluation.folds import Fold
 from ..evaluation.rates import Rate
 from ..placement.elements import Elements
 from ..placement.methods.base import BEST, METHODS, PAPERS
-from .points import STEP, By, Curve, ReferencePoint, front
+from .points import STEP, By, ReferencePoint, front
 from .price import PricedTables
 from .search import JOINTS, PAPERS_ROUNDS, SHAPES, Search, placed, tabled
 from .survey import FoldHits, Survey, TrialAccuracy
@@ -69,15 +69,14 @@ class EvaluatedFinalist:
     priced: tuple[PricedTables, ...]
 
 
-def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
+def screen(survey: Survey) -> tuple[Screened, ...]:
     """Train every placement once, on the folds of one repeat, and price it in the fastest of its wirings.
 
-    Return the accuracy and frame time of every recipe that can be built, with the first trainer; and the curves of all
-    methods.
+    Return the accuracy and frame time of every recipe that can be built, with the first trainer.
     """
     search, cuts, trainer = survey.search, survey.cuts, survey.search.trainers[0]
     if search.by_sensors:
-        return _screened_sensors(survey, trainer), ()
+        return _screened_sensors(survey, trainer)
     sizes = {levels: survey.size(levels) for levels in survey.levels}
     kinds = ALL_INPUTS if survey.inputs.n_joints else ALL_INPUTS[1:]
     recipes = [
@@ -93,9 +92,7 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     recipes = [recipe for recipe in recipes if survey.elements(recipe)]
     recipes += [Recipe(trainer=trainer, inputs="joints")] if survey.inputs.n_joints else []
     survey.tune(recipes, (cuts.everything, *cuts.screening))
-    rates = _rates(survey, recipes)
-    methods = search.methods if sizes[survey.levels[-1]] else ()
-    return _screened(survey, recipes, rates), tuple(_curve(survey, method, rates) for method in methods)
+    return _screened(survey, recipes, _rates(survey, recipes))
 
 
 def _screened_sensors(survey: Survey, trainer: str) -> tuple[Screened, ...]:
@@ -150,16 +147,6 @@ def _screened(survey: Survey, recipes: Sequence[Recipe], rates: Mapping[Recipe, 
         if us is not None and (priced.scans or not survey.elements(recipe)):
             screened.append(Screened(recipe, survey.elements(recipe), rates[recipe], us))
     return tuple(screened)
-
-
-def _curve(survey: Survey, method: str, rates: Mapping[Recipe, TrialAccuracy]) -> Curve:
-    """Return a method's rates by the mean number of switches that it kept in the folds, switches alone."""
-    folds, points = survey.cuts.screening, {}
-    for recipe, judged in rates.items():
-        if (recipe.placement, recipe.inputs, recipe.levels) == (method, "switches", survey.levels[-1]):
-            points[sum(len(survey.elements(recipe, fold)) for fold in folds) / len(folds)] = judged.rate
-    sizes = tuple(sorted(points))
-    return Curve(method, METHODS[method].help, sizes, tuple(points[size] for size in sizes))
 
 
 def select_finalists(screened: Sequence[Screened], recipes: Collection[Recipe], number: int) -> tuple[Screened, ...]:

@@ -41,15 +41,15 @@ from .finalists import (
     screen_others,
     select_finalists,
 )
-from .plots import PICTURES, pictures
+from .plots import picture
 from .points import SCHEMA, Frontier, FrontierError, Tried, frontier_to_bytes
 from .price import equipment_for
 from .search import TAXEL_LEVELS, Search, placement_of
 from .survey import Cuts, Survey
 from .words import csv_bytes
 
-FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.sqlite"
-_DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in PICTURES)})
+FRONTIER_NAME, TABLE_NAME, PICTURE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "frontier.svg", "store.sqlite"
+_DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, PICTURE_NAME})
 # Placements to screen with the other trainers, as a multiple of the finalists.
 _WIDER = 3
 # Number of placements to try with fewer joints.
@@ -87,7 +87,7 @@ def find_frontier(
         Recordings of at least two grasp types; no fold splits a trial. Rows in which nothing is held are left
         out.
     output : Path, optional
-        Folder for frontier.json, frontier.csv, two pictures, and the store, from which an interrupted run resumes.
+        Folder for frontier.json, frontier.csv, the picture, and the store, from which an interrupted run resumes.
         By default nothing is written or stored.
     source : str
         Name of the recordings.
@@ -110,8 +110,8 @@ def find_frontier(
     report : callable, optional
         Called with the done and total steps; every round of work has the same number of them.
     rough : callable, optional
-        Called after the first screening, with a frontier of which only what was tried is known. Its pictures are in
-        `output` until the finished ones replace them.
+        Called after the first screening, with a frontier of which only what was tried is known. Its picture is in
+        `output` until the finished one replaces it.
 
     Returns
     -------
@@ -148,8 +148,7 @@ def find_frontier(
 
         def show_rough(early: Frontier) -> None:
             if output is not None:
-                for name, data in pictures(early, "svg").items():
-                    write_atomically(output / f"{name}.svg", data)
+                write_atomically(output / PICTURE_NAME, picture(early, "svg"))
             if rough is not None:
                 rough(early)
 
@@ -215,14 +214,14 @@ def kept_entries(folder: Path) -> list[str]:
 
 
 def _documents(frontier: Frontier) -> dict[str, bytes]:
-    drawn = {f"{name}.svg": data for name, data in pictures(frontier, "svg").items()}
-    return {FRONTIER_NAME: frontier_to_bytes(frontier), TABLE_NAME: csv_bytes(frontier), **drawn}
+    files = frontier_to_bytes(frontier), csv_bytes(frontier), picture(frontier, "svg")
+    return dict(zip((FRONTIER_NAME, TABLE_NAME, PICTURE_NAME), files, strict=True))
 
 
 def _found(survey: Survey, rough: Callable[[Frontier], None]) -> Frontier:
     """Return the frontier of a survey, without a picked point; call `rough` with what the first screening tried."""
     search, equipment, n_switches = survey.search, survey.equipment, survey.samples.n_switches
-    screened, curves = screen(survey)
+    screened = screen(survey)
     if not screened:
         raise FrontierError(
             f"no placement that was tried can be built for {equipment.model.target}: name other ``methods`` or "
@@ -253,7 +252,6 @@ def _found(survey: Survey, rough: Callable[[Frontier], None]) -> Frontier:
         combinations=len(tried),
         points=(),
         tried=tried,
-        curves=curves,
         marks=(),
         have=() if survey.limits is None else survey.limits.keep,
         never=() if survey.limits is None else survey.limits.never,

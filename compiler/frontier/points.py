@@ -14,7 +14,7 @@ from thenar.runtime.recipe import PAPERS_TRAINER, Inputs, Name, TableBits, Value
 from ..evaluation.rates import Rate
 from ..placement.sensors import SENSORS
 
-SCHEMA = 4
+SCHEMA = 5
 MAX_BYTES = 64 << 20
 
 # measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: calculated from
@@ -150,17 +150,8 @@ class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True)
     levels: Annotated[int, Meta(ge=1, le=65535)] | None = None
 
 
-class Curve(Struct, frozen=True, forbid_unknown_fields=True):
-    """Accuracy against the number of switches, switches alone: one method."""
-
-    method: str
-    what: str
-    sizes: tuple[Annotated[float, Meta(ge=0.0, le=1e12)], ...]
-    rates: tuple[Rate, ...]
-
-
 class ReferencePoint(Struct, frozen=True, forbid_unknown_fields=True):
-    """A reference mark on the pictures: the paper's choices, all switches, the user's build."""
+    """A reference mark on the picture: the paper's choices, all switches, the user's build."""
 
     name: str
     n_switches: Count
@@ -197,7 +188,6 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     combinations: Count
     points: tuple[FrontierPoint, ...]
     tried: tuple[Tried, ...]
-    curves: tuple[Curve, ...]
     marks: tuple[ReferencePoint, ...]
     skipped: tuple[str, ...]
     picked: int | None = None
@@ -280,11 +270,8 @@ def _contradictions(frontier: Frontier) -> Iterator[str]:
         yield f"picked point {frontier.picked}, which it does not have"
     rates = [rate for point in frontier.points for rate in (point.rate, point.frames, point.other_rate)]
     rates += [each.rate for each in frontier.tried] + [mark.rate for mark in frontier.marks]
-    rates += [rate for curve in frontier.curves for rate in curve.rates]
     if not all(rate is None or 0 <= rate.low <= rate.mean <= rate.high <= 1 for rate in rates):
         yield "has a rate that is no share"
-    if any(len(curve.sizes) != len(curve.rates) for curve in frontier.curves):
-        yield "has a curve of more sizes than rates, or fewer"
     for point in frontier.points:
         if fault := _fault(point, frontier):
             yield f"has a point {point.number} that {fault}"

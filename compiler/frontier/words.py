@@ -131,7 +131,7 @@ def summary(frontier: Frontier) -> str:
 
 LUCK = (
     "A point is the best of many, so its rate is corrected for luck by a bootstrap over everything tried; the rates of "
-    "marks, of placements as they were screened and of the curves are not."
+    "marks and of placements as they were screened are not."
 )
 
 

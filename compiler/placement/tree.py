@@ -302,14 +302,6 @@ def _refuse(bad: NDArray[np.bool_], matrix: NDArray[Any], why: str) -> None:
         raise TrainingError(f"X holds {matrix[row, column]} in row {row}, column {column}: {why}")
 
 
-def check_bits(X: ArrayLike) -> NDArray[np.bool_]:
-    """Return X (n, d) as bool; raise TrainingError that names the first entry that is neither 0 nor 1."""
-    matrix = check_matrix(X)
-    if matrix.size and matrix.dtype != np.bool_ and matrix.max() > 1:
-        _refuse(matrix > 1, matrix, "neither 0 nor 1")
-    return matrix.astype(np.bool_, copy=False)
-
-
 def check_labels(y: ArrayLike, n_rows: int) -> tuple[NDArray[Any], NDArray[np.intp]]:
     """Return the sorted classes (K,) of y and the class number of each row (n,).
 

@@ -6,11 +6,10 @@ from functools import lru_cache, partial
 from thenar.drivers.extras import optional
 
 from ..facts import SensorCount
-from ..pictures import colour_variables, embedded, policy_hash, templates
+from ..pictures import colour_variables, templates
 from ..text import sentence
-from . import sections
+from . import frontier, sections
 from .content import HandPicture, ReportContent, hand_picture
-from .frontier import frontier_view
 
 with optional():
     from jinja2 import Environment
@@ -20,25 +19,20 @@ with optional():
 def report_html(content: ReportContent) -> bytes:
     """Return the report in UTF-8; the same content gives the same bytes.
 
-    The page's policy allows only its script, by SHA-256, and no requests: any name stays text.
-    Raises PictureError where a frontier's charts cannot be drawn without matplotlib.
+    The page's policy allows no script and no requests: any name stays text.
     """
-    environment, manifest, frontier = _environment(), content.manifest, None
-    if content.frontier is not None:
-        frontier = frontier_view(content.frontier, manifest.source.fingerprint, content.hand, content.point)
-    script = _file(environment, "report.js")
+    environment = _environment()
+    assert environment.loader is not None
+    style = environment.loader.get_source(environment, "report.css")[0]
     page = environment.get_template("report.html.j2").render(
         content=content,
-        manifest=manifest,
+        manifest=content.manifest,
         facts=partial(_facts, content),
         sections=sections,
         hand=_hand(content),
         confusion=sections.confusion_of(content),
         frontier=frontier,
-        style=Markup(colour_variables()) + _file(environment, "report.css"),
-        script=script,
-        script_sha256=policy_hash(script),
-        points=embedded({str(detail.number): detail for detail in (() if frontier is None else frontier.details)}),
+        style=Markup(colour_variables() + style),
     )
     return page.encode()
 
@@ -54,12 +48,6 @@ def _environment() -> Environment:
     environment = templates(__package__, "templates")
     environment.filters["sentence"] = sentence
     return environment
-
-
-def _file(environment: Environment, name: str) -> Markup:
-    """Return a file of the templates' folder verbatim."""
-    assert environment.loader is not None
-    return Markup(environment.loader.get_source(environment, name)[0])
 
 
 def _hand(content: ReportContent) -> HandPicture | None:

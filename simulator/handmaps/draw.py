@@ -60,7 +60,6 @@ class Picture:
     full: str
     hollow: str
     bar_top: float | None = None
-    hollow_mark: str = ""  # text in the hollow dot of the key
 
 
 # The drawn event: as a word, for one switch, and for several.
@@ -69,16 +68,14 @@ _PRESSED = ("pressed", "the taxel was pressed", "taxels pressed")
 _EITHER = ("touched", "the switch closed or the taxel was pressed", "switches and taxels touched")
 
 
-def all_switches(glove: HandShape, numbered: bool) -> Picture:
-    """Return the glove with all its switches, with their numbers in the set (from 0) if `numbered`."""
-    dots = tuple(Dot(f"{n} {name}", mark=str(n) if numbered else "") for n, name in enumerate(glove.names))
-    words = "switch and its number, from 0" if numbered else "switch"
+def all_switches(glove: HandShape) -> Picture:
+    """Return the glove with all its switches."""
+    dots = tuple(Dot(f"{n} {name}") for n, name in enumerate(glove.names))
     return Picture(
         glove,
         (Panel(glove.glove, _counts(glove, np.arange(len(dots)), "switches"), dots),),
         "",
-        words,
-        hollow_mark="7" if numbered else "",
+        "switch",
     )
 
 
@@ -275,7 +272,7 @@ def _draw_key(figure: "Figure", picture: Picture) -> None:
     axes.set(xlim=(0, width), ylim=(0, _KEY_INCHES))
     axes.axis("off")
     graded = picture.bar_top is not None
-    dots = [(Dot("", mark=picture.hollow_mark), picture.hollow)]
+    dots = [(Dot(""), picture.hollow)]
     if picture.full and not graded:
         dots.append((Dot("", 1.0, "7"), picture.full))
     if any(dot.absent for panel in picture.panels for dot in panel.dots):

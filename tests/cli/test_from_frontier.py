@@ -10,10 +10,8 @@ from msgspec.structs import replace
 from thenar.cli import run
 from thenar.compiler import GraspSet
 from thenar.compiler.frontier.points import (
-    FrontierError,
     FrontierPoint,
     PlacementChoice,
-    frontier_from_bytes,
     frontier_to_bytes,
 )
 from thenar.compiler.glove.propose import propose_harness
@@ -104,10 +102,3 @@ def test_a_point_that_lists_other_switches_than_its_placement_keeps_is_refused(
     code, complaint = compiled(lambda point: replace(point, switches=point.switches[1:]))
     assert (code, "lists 5 switches, but its placement keeps 6" in complaint) == (2, True), complaint
     assert not (tmp_path / "build").exists()
-
-
-def test_curves_have_as_many_rates_as_sizes(examples: Any) -> None:
-    found = examples.example_frontier()
-    crooked = replace(found, curves=(replace(found.curves[0], sizes=found.curves[0].sizes[1:]), *found.curves[1:]))
-    with pytest.raises(FrontierError, match="has a curve of more sizes than rates, or fewer"):
-        frontier_from_bytes(frontier_to_bytes(crooked))

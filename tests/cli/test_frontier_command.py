@@ -48,9 +48,9 @@ def found(found_folder: Path) -> Frontier:
     return frontier_from_bytes((found_folder / "frontier.json").read_bytes())
 
 
-def test_the_folder_holds_tables_pictures_and_the_store(found_folder: Path) -> None:
+def test_the_folder_holds_tables_the_picture_and_the_store(found_folder: Path) -> None:
     names = {path.name for path in found_folder.iterdir()}
-    assert names == {"frontier.json", "frontier.csv", "frontier.svg", "switches.svg", "store.sqlite"}
+    assert names == {"frontier.json", "frontier.csv", "frontier.svg", "store.sqlite"}
 
 
 def test_every_point_stands_in_the_csv(found_folder: Path, found: Frontier) -> None:

@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.cli.consoles import Console
-from thenar.cli.live_view import LiveView, drawn
+from thenar.cli.run_command import LiveView, drawn
 from thenar.runtime.published import DeviceHealth, Health, HealthReport, LiveGrasp, OutputTrouble, Quarantined
 
 
@@ -79,7 +79,7 @@ def test_quarantined_switches_and_stalled_sinks_are_drawn_with_their_reason() ->
 
 def test_the_newest_grasp_is_drawn_ten_times_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = 7.0
-    monkeypatch.setattr("thenar.cli.live_view.monotonic", lambda: now_s)
+    monkeypatch.setattr("thenar.cli.run_command.monotonic", lambda: now_s)
     terminal = Terminal()
     health = HealthReport(0, 100.0, 90.0, 120, 0, 0, 0)
     with LiveView(Console(terminal, width=80)) as view:

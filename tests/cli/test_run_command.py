@@ -46,52 +46,6 @@ def test_every_frame_gives_one_line(small_set: GraspSet, set_file: Path, build_f
     assert [line["recorded"] for line in lines] == small_set.grasps.tolist()
     assert list(lines[0]) == ["time_us", "grasp", "probability", "margin", "degraded", "recorded"]
     assert all(1 / 3 <= line["probability"] <= 1 and line["margin"] >= 0 and not line["degraded"] for line in lines)
-    correct = sum(line["grasp"] == line["recorded"] for line in lines)
-    assert f"{correct} of 60 frames predicted correctly" in done.stderr
-    assert "by majority" not in done.stderr
-
-
-def test_a_replay_counts_trials_where_they_have_several_frames(
-    build_folder: Path, small_set: GraspSet, tmp_path: Path
-) -> None:
-    small_set.rows([row for row in range(60) for _ in range(3)]).save(tmp_path / "framed.grasps")
-    found = json.loads(thenar("verify", build_folder, tmp_path / "framed.grasps", "--json").stdout)["recognised"]
-    done = thenar("run", build_folder, "--replay", tmp_path / "framed.grasps")
-    assert f"{found[0]['integers']} of 60 trials by majority of their frames" in done.stderr
-    assert f"{found[1]['integers']} of 180 frames predicted correctly" in done.stderr
-
-
-def test_the_last_line_of_a_replay_says_which_trials_were_trained_on(small_set: GraspSet, tmp_path: Path) -> None:
-    """Six frames a trial; the build knows the first six trials. Parts, other names and repeated rows change nothing."""
-    whole = replace(
-        small_set, trials=np.arange(60) // 18, codes=small_set.codes + np.arange(60, dtype=np.uint16)[:, None]
-    )
-    known, rate = whole.rows(np.arange(36)), "accuracy, within subject: "
-    known.save(tmp_path / "known.grasps")
-    build = tmp_path / "build"
-    compiled = thenar("compile", tmp_path / "known.grasps", "-o", build, "--rounds", 5, "--folds", 2, "--no-report")
-    assert compiled.returncode == 0, compiled.stderr
-
-    def last_line(grasp_set: GraspSet, *options: object) -> str:
-        grasp_set.save(tmp_path / "set.grasps")
-        done = thenar("run", build, "--replay", tmp_path / "set.grasps", *options)
-        assert done.returncode == 0, done.stderr
-        return str(done.stderr.splitlines()[-1])
-
-    headline = next(line for line in compiled.stdout.splitlines() if line.startswith(rate))
-    renamed = replace(known, subjects=np.full(36, "B"), trials=known.trials + 7)
-    for same in (known, renamed, known.rows(np.arange(18)), known.rows(np.repeat(np.arange(36), 2))):
-        said = last_line(same)
-        assert said.startswith("the build was trained on these trials: new grasps are recognised less often")
-        assert headline in said
-    assert last_line(whole.rows(np.arange(36, 60))) == "the build was trained on none of these trials"
-    partly = last_line(whole)
-    assert partly.startswith("the build was trained on 6 of these 12 trials; ")
-    correct = json.loads(thenar("verify", build, tmp_path / "set.grasps", "--json").stdout)["recognised"][0]["integers"]
-    here = json.loads(thenar("verify", build, tmp_path / "known.grasps", "--json").stdout)["recognised"][0]["integers"]
-    assert f"{correct - here} of the other 6 are predicted correctly" in partly
-    # The last trial is cut short, and counts as one that was trained on.
-    assert last_line(known, "--frames", 4).startswith("the build was trained on these trials")
 
 
 def test_it_runs_with_the_base_dependencies_alone(set_file: Path, build_folder: Path) -> None:
@@ -180,7 +134,6 @@ def test_a_replayed_set_takes_sinks_and_preshapes_as_a_live_run_does(
     done = thenar(*run)
     assert done.returncode == 0, done.stderr
     assert "none for rod: nothing is sent to the hand for those" in done.stderr
-    assert "of 50 frames predicted correctly" in done.stderr
     lines = [json.loads(line) for line in done.stdout.splitlines()]
     shapes = [line["preshape"] and line["preshape"]["name"] for line in lines]
     assert shapes == preshapes_of(gripper, lines, 10_000)

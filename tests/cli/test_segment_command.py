@@ -51,7 +51,7 @@ def build(movements: Path) -> Path:
 def test_segments_are_those_that_were_recorded(
     movements: Path, build: Path, lag: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    names = [tmp_path / name for name in ("s.csv", "s.mcap", "s.svg")]
+    names = [tmp_path / name for name in ("s.csv", "s.svg")]
     for name in names:
         option = "--picture" if name.suffix == ".svg" else "-o"
         assert run(["segment", str(movements), "-b", str(build), option, str(name), *lag]) == 0

@@ -74,7 +74,7 @@ def _empty_store() -> str:
 BUILD = {"build.json": "new", "ensemble.bin": "new", "spec/spec.json": "new"}
 SPEC = {"spec.json": "new", "bom.csv": "new"}
 FIRMWARE = {"thenar_glove.c": "new\n", "examples/one/one.ino": "new\n", "Makefile": "all:\n"}
-FRONTIER = {"frontier.json": "new", "frontier.csv": "new", "switches.svg": "new"}
+FRONTIER = {"frontier.json": "new", "frontier.csv": "new", "frontier.svg": "new"}
 OLD_FIRMWARE = {"thenar_glove.c": "old\n", "examples/one/one.ino": "old\n", "gone.h": "old\n"}
 
 KINDS = {
@@ -96,7 +96,7 @@ KINDS = {
         lambda files, folder: firmware.write_folder(files, folder, overwrite=True),
     ),
     "frontier": Kind(
-        {"frontier.json": "old", "frontier.csv": "old", "switches.svg": "old"},
+        {"frontier.json": "old", "frontier.csv": "old", "frontier.svg": "old"},
         *(FRONTIER, FRONTIER, {"store.sqlite": _empty_store(), "sub/set.grasps": "mine"}),
         _publish_frontier,
     ),

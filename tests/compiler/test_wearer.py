@@ -8,7 +8,8 @@ from scipy.optimize import minimize
 from scipy.special import softmax
 
 from thenar.compiler.artifact.wearers import chosen_strength
-from thenar.compiler.wearer import FREE, STRENGTH, STRENGTHS, Adaptation, AdaptationError, correlations
+from thenar.compiler.wearer import FREE, STRENGTH, STRENGTHS, Adaptation, correlations
+from thenar.drivers.errors import SettingError
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Line
@@ -173,9 +174,9 @@ def test_correlations_are_those_of_numpy() -> None:
 def test_no_trials_and_too_many_are_refused() -> None:
     mine = adaptation("bits")
     none = {name: getattr(mine, name)[:0] for name in ("bits", "codes", "labels", "trials")}
-    with pytest.raises(AdaptationError, match="no trials"):
+    with pytest.raises(SettingError, match="no trials"):
         replace(mine, **none)
-    with pytest.raises(AdaptationError, match="above 0"):
+    with pytest.raises(SettingError, match="above 0"):
         replace(mine, strength=0.0)
 
 

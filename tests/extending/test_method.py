@@ -49,7 +49,6 @@ def test_a_method_of_another_package_is_listed_chosen_by_and_compared(
         )
     )
     assert {point["setting"]["placement"]["method"] for point in found["points"]} == {"chi2"}
-    assert [curve["method"] for curve in found["curves"]] == ["chi2"]
 
     study = json.loads(
         there.thenar(

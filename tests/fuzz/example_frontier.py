@@ -12,7 +12,6 @@ import msgspec
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.points import (
     SCHEMA,
-    Curve,
     Frontier,
     FrontierPoint,
     PlacementChoice,
@@ -51,37 +50,6 @@ _POINTS: tuple[tuple[Any, ...], ...] = (
     ("both", 12, "id3-cost", 0.25, 80, 6, "pca9555", 400, 122.0, 363.0, 0.961),
 )  # fmt: skip
 
-# What each method recognises with so many switches.
-_SIZES = (1, 2, 4, 8, 16, 33, 64, 100, 160)
-_CURVES: tuple[tuple[str, str, tuple[float, ...]], ...] = (
-    (
-        "elimination",
-        "Backward elimination on the boosted tables",
-        (0.19, 0.32, 0.571, 0.768, 0.868, 0.930, 0.935, 0.936, 0.936),
-    ),
-    (
-        "id3-cost",
-        "ID3, gain against marginal scan time",
-        (0.19, 0.30, 0.540, 0.731, 0.853, 0.924, 0.933, 0.936, 0.936),
-    ),
-    (
-        "id3",
-        "The paper's ID3, pruned by S",
-        (0.19, 0.29, 0.512, 0.690, 0.829, 0.914, 0.932, 0.935, 0.936),
-    ),
-    (
-        "cmim",
-        "Greedy by conditional mutual information",
-        (0.18, 0.30, 0.548, 0.752, 0.858, 0.925, 0.935, 0.936, 0.936),
-    ),
-    (
-        "mutual-information",
-        "The greatest mutual information, one by one",
-        (0.19, 0.25, 0.381, 0.518, 0.651, 0.802, 0.905, 0.929, 0.936),
-    ),
-    ("random", "Drawn at random", (0.10, 0.15, 0.243, 0.389, 0.542, 0.714, 0.862, 0.917, 0.936)),
-)  # fmt: skip
-
 
 def example_frontier(**changes: object) -> Frontier:
     """Return the frontier, some of its fields changed; it has gone through JSON, so all types hold."""
@@ -104,7 +72,6 @@ def example_frontier(**changes: object) -> Frontier:
         combinations=184_320,
         points=_points(),
         tried=_tried(),
-        curves=tuple(Curve(name, what, _SIZES, tuple(map(rate, means))) for name, what, means in _CURVES),
         marks=_marks(),
         skipped=("qemu-system-arm is missing: no Cortex-M was measured.",),
         picked=5,

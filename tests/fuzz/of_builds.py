@@ -25,7 +25,7 @@ from thenar.compiler.frontier.words import csv_bytes
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.kept import kept_names
 from thenar.compiler.placement.placement import place
-from thenar.compiler.report.frontier import frontier_view
+from thenar.compiler.report.frontier import marks_table, notes, points_table
 from thenar.compiler.scan_file import SCAN_NAME, load_scan
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME, Build
@@ -174,7 +174,7 @@ def _frontier() -> list[bytes]:
         replace(made.point(known), number=number, switches=SWITCHES[: number + 1])
         for number, known in enumerate((1, 9, 10), 1)
     )
-    few = {"points": points, "tried": made.tried[:1], "curves": made.curves[:1], "marks": made.marks[:1], "picked": 1}
+    few = {"points": points, "tried": made.tried[:1], "marks": made.marks[:1], "picked": 1}
     return [frontier_to_bytes(replace(made, fingerprint=grasp_set().fingerprint(), **few))]
 
 
@@ -189,7 +189,9 @@ def _compile_from(data: bytes, folder: Path) -> None:
         if callable(wired):
             wired(chosen.point.switches)
     csv_bytes(chosen.frontier)
-    frontier_view(chosen.frontier, grasp_set().fingerprint(), None, chosen.point.number)
+    points_table(chosen.frontier)
+    marks_table(chosen.frontier)
+    list(notes(chosen.frontier, chosen.point.number))
 
 
 class _Answer(msgspec.Struct, frozen=True):

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from thenar.compiler import Build, GraspSet, adapt, compile_build, verify
+from thenar.compiler.artifact import CompileError
 from thenar.compiler.artifact.wearers import study_wearers
 from thenar.compiler.recordings import RecordingError
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own, tasks_of
 from thenar.compiler.samples import select_inputs
-from thenar.compiler.wearer import AdaptationError
 from thenar.runtime.model.integers import MAX_CLASSES
 from thenar.runtime.recipe import Recipe, changed
 
@@ -109,25 +109,25 @@ def test_wrong_types_and_arrays_are_named(folder: Path, tmp_path: Path) -> None:
     few = mine.rows(mine.grasps != "rod")
     X = np.hstack([*select_inputs(few, Build.load(folder / "build").manifest)])
     wrong = (
-        (mine, None, (), AdaptationError, "does not know rod .*, or teach new types with ``add_type``"),
-        (mine, None, ("rod", "rod"), AdaptationError, "rod is no new type"),
-        (few, None, ("cup",), AdaptationError, "cup is no new type: leave it out of ``add_type``"),
-        (few, None, ("none",), AdaptationError, "none is no new type"),
-        (few, None, ("rod",), AdaptationError, "no trials of rod to teach it with: record three"),
+        (mine, None, (), CompileError, "does not know rod .*, or teach new types with ``add_type``"),
+        (mine, None, ("rod", "rod"), CompileError, "rod is no new type"),
+        (few, None, ("cup",), CompileError, "cup is no new type: leave it out of ``add_type``"),
+        (few, None, ("none",), CompileError, "none is no new type"),
+        (few, None, ("rod",), CompileError, "no trials of rod to teach it with: record three"),
         (
             few,
             None,
             [f"t{number}" for number in range(MAX_CLASSES - 2)],
-            AdaptationError,
+            CompileError,
             "1025 grasp types, a build has",
         ),
-        (X[:, :2], few.grasps, (), AdaptationError, r"X has shape \(18, 2\): it needs a row for each of the 18 names"),
-        (X, few.grasps[:4], (), AdaptationError, "each of the 4 names in y"),
+        (X[:, :2], few.grasps, (), CompileError, r"X has shape \(18, 2\): it needs a row for each of the 18 names"),
+        (X, few.grasps[:4], (), CompileError, "each of the 4 names in y"),
         (
             X,
             None,
             (),
-            AdaptationError,
+            CompileError,
             "each of the 0 names in y, and a column for each of the build's 3 switches, then 2",
         ),
         (X + 2, few.grasps, (), RecordingError, "switches holds numbers that do not fit into bool"),

@@ -6,16 +6,29 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sklearn.base import BaseEstimator
+from sklearn.feature_selection import SelectorMixin
 from sklearn.model_selection import GroupKFold, LeaveOneGroupOut, cross_val_predict
 from sklearn.pipeline import make_pipeline
 
-from thenar.compiler import GraspSet, LogitBoostClassifier, SwitchSelector, evaluate
+from thenar.compiler import GraspSet, LogitBoostClassifier, evaluate, grow_id3
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.text import INDEPENDENT
 
 from .conftest import make_grasps
 
 NESTED: dict[str, Any] = {"protocols": ("nested",), "tables": ("compositions",), "rounds": 10, "jobs": 1}
+
+
+class PapersSwitches(SelectorMixin, BaseEstimator):  # type: ignore[misc]
+    """The paper's placement, as scikit-learn's feature selection."""
+
+    def fit(self, X: np.ndarray, y: np.ndarray) -> "PapersSwitches":
+        self.kept = np.isin(np.arange(X.shape[1]), grow_id3(X, y).inputs)
+        return self
+
+    def _get_support_mask(self) -> np.ndarray:
+        return self.kept
 
 
 def framed(frames: int = 3) -> GraspSet:
@@ -38,7 +51,7 @@ def majorities(predicted: list[str], grasp_set: GraspSet) -> int:
 def test_leaving_subjects_out_matches_a_scikit_learn_pipeline() -> None:
     grasp_set = framed()
     study = evaluate(grasp_set, scheme="subject", **NESTED)
-    selected = make_pipeline(SwitchSelector("id3"), LogitBoostClassifier(rounds=10))
+    selected = make_pipeline(PapersSwitches(), LogitBoostClassifier(rounds=10))
     predicted = cross_val_predict(
         selected, grasp_set.switches, grasp_set.grasps, groups=grasp_set.subjects, cv=LeaveOneGroupOut()
     )

@@ -1,4 +1,4 @@
-"""The pictures: the same every time, every point named, names as they are."""
+"""The picture: the same every time, every point named, names as they are."""
 
 import xml.etree.ElementTree as ElementTree
 from typing import Any
@@ -8,16 +8,16 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from thenar.compiler.frontier.plots import PICTURES, POINT_ID, pictures
-from thenar.compiler.frontier.points import Frontier, FrontierPoint, PointTime, ReferencePoint
+from thenar.compiler.frontier.plots import draw, picture
+from thenar.compiler.frontier.points import Frontier, PointTime, ReferencePoint
 from thenar.compiler.pictures import painting
 
 NASTY = r"$\left{<&> -- ü = ]]> 'x'"
 
 
-def _drawn(frontier: Frontier, name: str) -> Figure:
+def _drawn(frontier: Frontier) -> Figure:
     with painting(9):
-        return PICTURES[name](frontier)
+        return draw(frontier)
 
 
 def _texts(figure: Figure) -> list[str]:
@@ -28,24 +28,17 @@ def _key(figure: Figure) -> list[str]:
     return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
 
-def _is_shown(point: FrontierPoint, name: str) -> bool:
-    """Return whether a picture has anything to say of a point."""
-    return name == "frontier" or bool(point.switches)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_equal_frontiers_give_equal_bytes(examples: Any, kind: Any) -> None:
-    first, second = (pictures(examples.example_frontier(), kind) for _ in range(2))
-    assert list(first) == ["frontier", "switches"]
+    first, second = (picture(examples.example_frontier(), kind) for _ in range(2))
     assert first == second
 
 
-@pytest.mark.parametrize("name", list(PICTURES))
-def test_every_point_and_mark_is_named(examples: Any, name: str) -> None:
+def test_every_point_and_mark_is_named(examples: Any) -> None:
     frontier = examples.example_frontier()
-    figure = _drawn(frontier, name)
-    numbers, shown = list(map(int, _texts(figure))), [point for point in frontier.points if _is_shown(point, name)]
+    figure = _drawn(frontier)
+    numbers, shown = list(map(int, _texts(figure))), frontier.points
     # Of points next to each other, one has its number.
     assert len(shown) - 2 <= len(set(numbers)) == len(numbers)
     assert {frontier.picked} <= set(numbers) <= {point.number for point in shown}
@@ -61,7 +54,7 @@ def test_no_number_lies_on_a_mark(examples: Any, factor: float) -> None:
         msgspec.structs.replace(frontier.marks[0], name=f"mark {point.number}", frame_us=factor * point.frame.us)
         for point in frontier.points
     ]
-    figure = _drawn(msgspec.structs.replace(frontier, marks=tuple(marks)), "frontier")
+    figure = _drawn(msgspec.structs.replace(frontier, marks=tuple(marks)))
     renderer, axes = FigureCanvasAgg(figure).get_renderer(), figure.axes[0]  # type: ignore[no-untyped-call]
     for box in (text.get_window_extent(renderer) for text in axes.texts):
         for mark in marks:
@@ -72,17 +65,9 @@ def test_no_number_lies_on_a_mark(examples: Any, factor: float) -> None:
 
 def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:
     mark = ReferencePoint(NASTY, 160, examples.rate(0.93), 2000.0)
-    curves = examples.example_frontier().curves
-    frontier = examples.example_frontier(
-        source=NASTY,
-        target="host",
-        machine=NASTY,
-        marks=(mark,),
-        curves=(msgspec.structs.replace(curves[0], method=NASTY), *curves[1:]),
-    )
-    for name, svg in pictures(frontier, "svg").items():
-        ElementTree.fromstring(svg)
-        assert any(NASTY in text for text in _key(_drawn(frontier, name)))
+    frontier = examples.example_frontier(source=NASTY, target="host", machine=NASTY, marks=(mark,))
+    ElementTree.fromstring(picture(frontier, "svg"))
+    assert any(NASTY in text for text in _key(_drawn(frontier)))
 
 
 def test_zero_costs_and_strange_names_are_drawn(examples: Any) -> None:
@@ -90,17 +75,15 @@ def test_zero_costs_and_strange_names_are_drawn(examples: Any) -> None:
     first = replace(found.points[0], frame=replace(found.points[0].frame, us=0.0))
     mark = replace(found.marks[0], name="bell \x07 and no character \ufffe", frame_us=0.0)
     frontier = replace(found, points=(first, *found.points[1:]), marks=(mark,), source="\x1b[31m")
-    read = {name: ElementTree.fromstring(svg) for name, svg in pictures(frontier, "svg", letters=True).items()}
-    marker = read["frontier"].find(f".//{{*}}g[@id='{POINT_ID}{first.number}']")
-    assert marker is not None
-    assert marker.find(".//{*}use") is not None
+    ElementTree.fromstring(picture(frontier, "svg"))
+    assert str(first.number) in _texts(_drawn(frontier))
 
 
 @pytest.mark.parametrize(
     "changes",
     [
-        {"points": (), "tried": (), "curves": (), "marks": (), "picked": None},
-        {"tried": (), "curves": (), "marks": ()},
+        {"points": (), "tried": (), "marks": (), "picked": None},
+        {"tried": (), "marks": ()},
         {"points": (), "picked": None},
         {"picked": None},
     ],
@@ -108,28 +91,17 @@ def test_zero_costs_and_strange_names_are_drawn(examples: Any) -> None:
 )
 def test_what_is_missing_is_left_out(examples: Any, changes: dict[str, object]) -> None:
     frontier = examples.example_frontier(**changes)
-    drawn = pictures(frontier, "svg")
-    for svg in drawn.values():
-        ElementTree.fromstring(svg)
-    against_time = drawn["frontier"]
+    against_time = picture(frontier, "svg")
+    ElementTree.fromstring(against_time)
     assert (b"<!-- tried -->" in against_time) == bool(frontier.tried)
     assert (b"<!-- switches alone -->" in against_time) == bool(frontier.points)
     assert (b"(paper, S = 62), " in against_time) == bool(frontier.marks)
     assert (b"<!-- point " in against_time) == bool(frontier.points)
 
 
-def test_every_point_that_is_shown_has_a_marker_with_its_number(examples: Any) -> None:
-    frontier = examples.example_frontier()
-    for name, svg in pictures(frontier, "svg", letters=True).items():
-        ids = {element.get("id", "") for element in ElementTree.fromstring(svg).iter()}
-        shown = {f"{POINT_ID}{point.number}" for point in frontier.points if _is_shown(point, name)}
-        assert {one for one in ids if one.startswith(POINT_ID)} == shown
-
-
 def test_the_axis_mentions_an_unknown_time_of_joints(examples: Any) -> None:
     found, replace = examples.example_frontier(), msgspec.structs.replace
-    assert "left out" not in _drawn(found, "frontier").axes[0].get_xlabel()
+    assert "left out" not in _drawn(found).axes[0].get_xlabel()
     points = tuple(replace(point, transfer=PointTime(0.0, "unknown")) for point in found.points)
     unknown = replace(found, points=points)
-    assert "reading the joints is left out" in _drawn(unknown, "frontier").axes[0].get_xlabel()
-    assert "left out" not in _drawn(unknown, "switches").axes[0].get_xlabel()
+    assert "reading the joints is left out" in _drawn(unknown).axes[0].get_xlabel()

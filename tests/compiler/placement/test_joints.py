@@ -1,13 +1,17 @@
 """Which joints are kept: those that tell something, in the end the one that tells most; the same on every machine."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.folds import trial_folds
 from thenar.compiler.placement.methods.elimination import joint_order
-from thenar.compiler.placement.placement import kept_joints
+from thenar.compiler.placement.placement import kept_joints, place
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import Training
+
+from ..conftest import make_set, with_none
 
 
 def hand(rows: int = 240, told: int = 3) -> Samples:
@@ -57,3 +61,11 @@ def test_a_few_recognise_as_well_as_all(most: int) -> None:
         return float(np.mean(hits))
 
     assert rate(most) >= rate(None) - 0.01
+
+
+def test_rows_in_which_nothing_is_held_place_no_switch() -> None:
+    grasps = make_set(subjects=8, types=2)
+    more = with_none(grasps)
+    found, other = place(grasps, prune=4, keep_joints=1), place(more, prune=4, keep_joints=1)
+    assert other.fingerprint == more.fingerprint()
+    assert replace(other, fingerprint=found.fingerprint) == found

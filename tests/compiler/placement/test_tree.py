@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.placement.tree import Tree, check_bits, check_matrix, grow_id3
+from thenar.compiler.placement.tree import Tree, check_matrix, grow_id3
 from thenar.compiler.samples import TrainingError
 
 
@@ -91,8 +91,3 @@ def test_no_rows_and_a_negative_number_of_samples_are_refused() -> None:
 
 def test_whole_floats_are_taken_as_whole_numbers() -> None:
     assert check_matrix([[0.0, 7.0]]).tolist() == [[0, 7]]
-
-
-def test_a_two_among_bits_is_refused_where_it_is() -> None:
-    with pytest.raises(TrainingError, match="X holds 2 in row 1, column 0: neither 0 nor 1"):
-        check_bits([[0], [2]])

@@ -114,11 +114,10 @@ def nasty(tmp_path_factory: pytest.TempPathFactory, examples: Any) -> ReportCont
     made: Frontier = examples.example_frontier(source=f"{NASTY[0]}.grasps")
     point = msgspec.structs.replace(made.points[0], switches=switches[:6])
     marks = (msgspec.structs.replace(made.marks[0], name=NASTY[1]), *made.marks[1:])
-    curves = (msgspec.structs.replace(made.curves[0], method=NASTY[0], what=NASTY[1]), *made.curves[1:])
     points = (point, *made.points[1:])
     return replace(
         content,
-        frontier=msgspec.structs.replace(made, points=points, marks=marks, curves=curves, skipped=(*NASTY, "\u2028")),
+        frontier=msgspec.structs.replace(made, points=points, marks=marks, skipped=(*NASTY, "\u2028")),
     )
 
 

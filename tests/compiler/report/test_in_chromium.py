@@ -9,9 +9,7 @@ from selenium import webdriver
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.remote.webelement import WebElement
 
-from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.report.content import ReportContent
 from thenar.compiler.report.page import report_html
 
@@ -22,30 +20,6 @@ pytestmark = pytest.mark.slow
 
 class Reader(Browser):
     """A browser with one report open."""
-
-    def kept_on_hand(self) -> list[str]:
-        """Return the names of the switches marked on the frontier's hand, in their order."""
-        dots = self.script(
-            "return [...document.querySelectorAll('#picked-hand .dot.kept')].map((dot) =>"
-            " [Number(dot.querySelector('text').textContent), dot.querySelector('title').textContent])"
-        )
-        assert isinstance(dots, list)
-        return [name for _, name in sorted(dots)]
-
-    def said(self) -> str:
-        return self.driver.find_element(By.ID, "picked-said").text
-
-    def marker(self, chart: str, number: int) -> WebElement:
-        """Return the marker of a point in a chart, where it can be seen."""
-        element = self.driver.find_element(By.CSS_SELECTOR, f"#{chart} .point[data-point='{number}']")
-        self.script("arguments[0].scrollIntoView({block: 'center'})", element)
-        return element
-
-    def picked(self) -> set[str]:
-        """Return the numbers of the points whose markers and rows are picked, in the charts and in the table."""
-        numbers = self.script("return [...document.querySelectorAll('.picked')].map((one) => one.dataset.point)")
-        assert isinstance(numbers, list)
-        return set(numbers)
 
 
 @pytest.fixture(scope="module")
@@ -69,69 +43,17 @@ def opened(reader: Reader, path: Path) -> Iterator[Reader]:
     assert reader.requests() == [path.as_uri()]
 
 
-def switches(frontier: Frontier, number: int) -> list[str]:
-    return list(frontier.point(number).switches)
-
-
-def test_the_report_opens_with_all_its_charts_and_the_picked_point(opened: Reader, frontier: Frontier) -> None:
-    drawn = opened.driver.find_elements(By.CSS_SELECTOR, "figure:has(.scroll > svg)")
-    charts = ["terms", "by-frontier", "by-switches"]
-    assert [chart.get_attribute("id") for chart in drawn] == charts
+def test_the_report_opens_with_its_drawings(opened: Reader) -> None:
+    drawn = opened.driver.find_elements(By.CSS_SELECTOR, "figure:has(svg)")
     assert all(chart.find_element(By.TAG_NAME, "svg").size["height"] > 100 for chart in drawn)
-    assert frontier.picked is not None
-    assert opened.picked() == {str(frontier.picked)}
-    assert opened.kept_on_hand() == switches(frontier, frontier.picked)
+    assert [chart.get_attribute("id") for chart in drawn] == ["", "terms"]
 
 
-@pytest.mark.parametrize("chart", ["by-frontier", "by-switches"])
-def test_a_click_on_a_point_shows_its_switches_on_the_hand(opened: Reader, frontier: Frontier, chart: str) -> None:
-    opened.marker(chart, 2).find_element(By.CSS_SELECTOR, ".target").click()
-    opened.wait(lambda: opened.said().startswith("Point 2:"))
-    assert opened.kept_on_hand() == switches(frontier, 2)
-    checked = opened.driver.find_element(By.CSS_SELECTOR, "#points input:checked")
-    assert checked.get_attribute("value") == "2"
-    assert opened.picked() == {"2"}
-    command = opened.driver.find_element(By.ID, "picked-command").text
-    assert command == "thenar compile kamakura.grasps -o build/ --from frontier/frontier.json --point 2"
-
-
-def test_hovering_over_a_point_describes_it_and_marks_its_row(opened: Reader) -> None:
-    marker = opened.marker("by-frontier", 2)
-    assert opened.script("return arguments[0].querySelector('title').textContent", marker).startswith("Point 2: 10 of ")
-    ActionChains(opened.driver).move_to_element(marker.find_element(By.CSS_SELECTOR, ".target")).perform()
-    opened.wait(lambda: opened.driver.find_elements(By.CSS_SELECTOR, "#points tr.near[data-point='2']"))
-    ActionChains(opened.driver).move_to_element(opened.driver.find_element(By.ID, "picked-heading")).perform()
-    opened.wait(lambda: not opened.driver.find_elements(By.CSS_SELECTOR, ".near"))
-
-
-def test_arrow_keys_go_from_point_to_point(opened: Reader, frontier: Frontier) -> None:
-    assert frontier.picked is not None
-    following = frontier.picked + 1
-    radio = opened.driver.find_element(By.CSS_SELECTOR, "#points input:checked")
-    radio.send_keys(Keys.ARROW_DOWN)
-    opened.wait(lambda: opened.said().startswith(f"Point {following}:"))
-    assert opened.kept_on_hand() == switches(frontier, following)
-    assert opened.picked() == {str(following)}
-
-
-def test_what_is_picked_is_told_in_words_and_numbers(opened: Reader, frontier: Frontier) -> None:
-    opened.driver.find_element(By.CSS_SELECTOR, "#points input[value='10']").click()
-    opened.wait(lambda: opened.said().startswith("Point 10:"))
-    names = [item.text for item in opened.driver.find_elements(By.CSS_SELECTOR, "#picked-switches li")]
-    assert names == switches(frontier, 10)
-    facts = opened.driver.find_element(By.ID, "picked-facts").text
-    assert "board 1 Mbaud" in facts
-    assert "99.2 [98.9, 99.4]" in facts
-    summary = opened.driver.find_element(By.ID, "picked-hand-summary").get_attribute("textContent")
-    assert summary == opened.said()
-
-
-def test_colours_follow_the_readers_system_in_page_hand_and_charts(opened: Reader) -> None:
+def test_colours_follow_the_readers_system_in_page_and_hand(opened: Reader) -> None:
     look = (
         "return [getComputedStyle(document.body).backgroundColor,"
         " getComputedStyle(document.querySelector('#kept-hand .skin')).fill,"
-        " getComputedStyle(document.querySelector('#by-frontier .point use')).fill,"
-        " getComputedStyle(document.querySelector('#by-frontier text')).fill]"
+        " getComputedStyle(document.querySelector('#terms text')).fill]"
     )
     light = opened.script(look)
     assert isinstance(light, list)
@@ -157,7 +79,6 @@ def test_a_narrow_screen_shows_all_tables_and_letters_that_can_be_read(opened: R
     opened.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     try:
         opened.wait(lambda: opened.script("return document.documentElement.clientWidth") == 400)
-        opened.script("for (const each of document.querySelectorAll('details')) each.open = true")
         assert opened.script("return document.documentElement.scrollWidth") == 400
         assert opened.script(_BROAD) == []
         assert opened.script(_SMALL) == []
@@ -165,16 +86,15 @@ def test_a_narrow_screen_shows_all_tables_and_letters_that_can_be_read(opened: R
         opened.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
-def test_on_paper_the_report_is_light_and_charts_fit(opened: Reader) -> None:
+def test_on_paper_the_report_is_light(opened: Reader) -> None:
     features = [{"name": "prefers-color-scheme", "value": "dark"}]
     opened.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print", "features": features})
     try:
         colours = opened.script(
             "return [getComputedStyle(document.body).backgroundColor, getComputedStyle(document.documentElement)"
-            ".colorScheme, getComputedStyle(document.querySelector('#by-frontier .point use')).fill]"
+            ".colorScheme, getComputedStyle(document.querySelector('#terms text')).fill]"
         )
-        assert colours == ["rgb(255, 255, 255)", "light", "rgb(0, 114, 178)"]
-        assert opened.script("return getComputedStyle(document.querySelector('#by-frontier svg')).minWidth") == "0px"
+        assert colours == ["rgb(255, 255, 255)", "light", "rgb(27, 31, 36)"]
         assert base64.b64decode(opened.driver.print_page()).startswith(b"%PDF")
     finally:
         opened.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
@@ -191,10 +111,10 @@ def test_a_screen_reader_finds_landmarks_and_names(opened: Reader) -> None:
     nodes = opened.driver.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
     told = [(node["role"]["value"], node.get("name", {}).get("value", "")) for node in nodes if not node["ignored"]]
     roles = [role for role, _ in told]
-    assert {"banner", "navigation", "main", "status"} <= set(roles)
+    assert {"banner", "navigation", "main"} <= set(roles)
     assert roles.count("main") == 1
-    named = [(role, name) for role, name in told if role in {"image", "radio", "table", "region", "link"}]
-    assert len(named) > 40
+    named = [(role, name) for role, name in told if role in {"image", "table", "region", "link"}]
+    assert len(named) > 36
     assert [role for role, name in named if not name] == []
 
 
@@ -203,16 +123,8 @@ def test_names_that_hold_scripts_run_nothing(
 ) -> None:
     path = write(report_html(nasty))
     reader.open_file(path)
-    reader.driver.find_element(By.CSS_SELECTOR, "#points input[value='1']").click()
-    reader.wait(lambda: reader.said().startswith("Point 1:"))
     assert reader.driver.title == "thenar: report of a build"
     assert reader.driver.find_elements(By.TAG_NAME, "img") == []
-    names = [item.text for item in reader.driver.find_elements(By.CSS_SELECTOR, "#picked-switches li")]
-    assert nasty.frontier is not None
-    assert [" ".join(name.split()) for name in switches(nasty.frontier, 1)] == [
-        " ".join(name.split()) for name in names
-    ]
-    charted = reader.driver.find_element(By.ID, "by-frontier").text
-    assert "<img src=x onerror=" in charted
+    assert "<img src=x onerror=" in reader.driver.find_element(By.TAG_NAME, "body").text
     assert reader.log() == []
     assert reader.requests() == [path.as_uri()]

@@ -14,7 +14,7 @@ from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.hand import HandShape
 from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.report.content import ReportContent, hand_picture
-from thenar.compiler.report.frontier import frontier_view
+from thenar.compiler.report.frontier import marks_table, notes, points_table
 from thenar.compiler.report.sections import (
     MOST_LINES,
     confusion_view,
@@ -101,28 +101,26 @@ def test_a_placement_without_a_tree_names_its_method_and_shows_no_shares(bare: R
 
 
 def test_the_section_names_its_machine_and_labels_guesses(frontier: Frontier) -> None:
-    view = frontier_view(frontier, frontier.fingerprint, None)
-    assert any(f"times on {frontier.machine}." in note for note in view.notes)
-    assert "guess" not in repr(view)
+    assert any(f"times on {frontier.machine}." in note for note in notes(frontier, None))
+    marks = marks_table(frontier)
+    assert marks is not None
+    assert "guess" not in repr((points_table(frontier), marks, *notes(frontier, None)))
     guess = frontier.points[0].frame
     points = [replaced(point, frame=replaced(guess, us=point.frame.us, how="guess")) for point in frontier.points]
-    view = frontier_view(replaced(frontier, points=tuple(points)), frontier.fingerprint, None)
-    assert "Frame, µs (guess)" in view.points.columns
-    timed = [column for each in view.tables for column in each.columns if column.startswith("Frame")]
-    assert timed == ["Frame, µs (guess)"]
-    assert all("µs (guess)" in detail.said for detail in view.details)
-    assert ["(guess)</text>" in drawing for _, _, drawing in view.charts] == [True, False]
+    guessed = replaced(frontier, points=tuple(points))
+    marks = marks_table(guessed)
+    assert marks is not None
+    for table in (points_table(guessed), marks):
+        assert [column for column in table.columns if column.startswith("Frame")] == ["Frame, µs (guess)"]
 
 
-def test_the_point_that_the_build_is_comes_first(frontier: Frontier, hand: HandShape) -> None:
-    for built in (frontier.points[0].number, frontier.points[-1].number):
-        view = frontier_view(frontier, frontier.fingerprint, hand, built)
-        assert all(drawing.count('class="point picked"') <= 1 for _, _, drawing in view.charts)
-        marker = f'<g data-point="{built}" class="point picked">'
-        assert any(marker in drawing for _, _, drawing in view.charts)
-        assert view.picked is not None
-        assert view.picked.number == built
-        assert f"This build is point {built}." in view.notes
+def test_the_section_has_a_row_a_point_and_names_that_of_the_build(frontier: Frontier) -> None:
+    table = points_table(frontier)
+    assert [row[0] for row in table.rows] == [str(point.number) for point in frontier.points]
+    wirings = {row[table.columns.index("Wiring")] for row in table.rows}
+    assert "board 1 Mbaud" in wirings
+    assert "This build is point 2." in notes(frontier, 2)
+    assert not any("This build" in note for note in notes(frontier, None))
 
 
 def test_every_kept_switch_is_read_in_one_transaction(bare: ReportContent) -> None:

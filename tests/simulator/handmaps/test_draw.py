@@ -59,7 +59,7 @@ def titles(svg: bytes, hand: int = 0) -> dict[int, str]:
 
 
 def test_every_switch_is_drawn_once_and_named_on_hovering() -> None:
-    svg = draw(all_switches(HAND, numbered=False), "svg")
+    svg = draw(all_switches(HAND), "svg")
     assert titles(svg) == {number: f"{number} {name}" for number, name in enumerate(NAMES)}
 
 
@@ -135,7 +135,7 @@ def test_sets_that_are_not_of_this_glove_are_refused() -> None:
 
 def test_only_svg_and_png_are_drawn() -> None:
     with pytest.raises(PictureError, match=r"not in \.pdf"):
-        draw(all_switches(HAND, numbered=False), "pdf")
+        draw(all_switches(HAND), "pdf")
 
 
 def test_taxels_are_drawn_by_how_often_they_were_pressed(pads: GraspSet) -> None:
