@@ -1,6 +1,6 @@
 """The page *Choose*: click sensors on and off, and see what they recognise.
 
-Every browser has its own choice, so a page sends it whole and gets its own answer. What takes longer, a measurement
+Every browser has its own choice, so a page sends it whole and gets its own reply. What takes longer, a measurement
 with nested folds or the curve of what sensors are worth, is queued, done one at a time by `run`, and sent to all pages.
 """
 
@@ -131,13 +131,13 @@ class ChoosePage(Closing):
         self.server.close()
 
     def _take(self, fields: Mapping[str, object]) -> bytes | None:
-        """Answer a page. Raises ThenarError for what cannot be answered."""
+        """Reply to a page. Raises ThenarError for a request that cannot be met."""
         try:
             asked = msgspec.convert(fields, _Asked)
         except msgspec.ValidationError as wrong:
             raise ThenarError(f"the page sent an invalid message: {wrong}") from None
         if asked.do == "choose":
-            return self._answer(asked.sensors)
+            return self._reply(asked.sensors)
         if asked.do in ("add", "drop"):
             self._names(asked.sensors)
             find = self._quick.best_next if asked.do == "add" else self._quick.least
@@ -162,7 +162,7 @@ class ChoosePage(Closing):
             raise ThenarError(f"there are {len(self._quick.names)} sensors, numbered from 0")
         return tuple(self._quick.names[sensor] for sensor in sensors)
 
-    def _answer(self, sensors: Sequence[int]) -> bytes:
+    def _reply(self, sensors: Sequence[int]) -> bytes:
         names = self._names(sensors)
         return message(
             "quick",
@@ -187,7 +187,7 @@ class ChoosePage(Closing):
         return scan_us(whole_scan(harness, read), harness).us if read else 0.0
 
     def _levels_of(self) -> dict[str, str]:
-        """Return what a switch or a pad is read as, by its name: itself, or a level."""
+        """Return the element that a switch or a pad is read as, by its name: itself, or a level."""
         held = self._set.without_none()
         elements = elements_of(Samples.of(held), 1)
         every = self._set.element_names

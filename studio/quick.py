@@ -144,7 +144,7 @@ class QuickAccuracy:
         return max(sensors, key=lambda one: self._right([other for other in sensors if other != one]), default=None)
 
     def trial(self, number: int, sensors: Sequence[int]) -> SeenTrial:
-        """Return what was seen in a trial, and how these sensors read it.
+        """Return a trial as it was seen, and as these sensors read it.
 
         Raises EvaluationError if there is no such trial or sensor.
         """

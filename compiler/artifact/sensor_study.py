@@ -276,7 +276,7 @@ def _task(
     folds: Sequence[Fold],
     fold: int | None,
 ) -> "_Found | dict[int, SensorSet]":
-    """Return what the fold of a number finds; None: the best sensors by all rows."""
+    """Return the result of a fold by its number; None: the best sensors by all rows."""
     if fold is None:
         return _sets(search_of(samples, limits), recipe)
     test = folds[fold].test

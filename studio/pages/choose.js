@@ -1,4 +1,4 @@
-// The page Choose: sensors are clicked on and off, and the server answers with what they recognise.
+// The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
 import { drawHand } from "./hand.js";
 import { cell, connect, list, say } from "./wire.js";
 
@@ -13,7 +13,7 @@ let hand = null;
 let error = -1; // the place among the misread trials of the one that is shown
 let boxes = [];
 let chosen = []; // numbers of sensors, in the order in which they were chosen
-let shown = null; // the last answer
+let shown = null; // the last reply
 const measured = new Map(); // accuracies that were measured, by the sensors
 
 const send = connect({
@@ -33,8 +33,8 @@ const send = connect({
     hand = drawHand($("hand"), drawn, { onSwitch: (sensor) => toggle(sensor) });
     mark();
   },
-  quick: (answer) => {
-    if (String(answer.sensors) === String(chosen)) show(answer);
+  quick: (reply) => {
+    if (String(reply.sensors) === String(chosen)) show(reply);
   },
   add: ({ sensor }) => sensor === null || choose([...chosen, sensor]),
   drop: ({ sensor }) => sensor === null || choose(chosen.filter((one) => one !== sensor)),
@@ -107,28 +107,28 @@ function listSensors() {
   $("list").replaceChildren(...groups.filter(Boolean));
 }
 
-function show(answer) {
+function show(reply) {
   const before = shown;
-  shown = answer;
-  say($("rate"), interval(answer));
+  shown = reply;
+  say($("rate"), interval(reply));
   say($("count"), `${chosen.length} of ${set.sensors.length}`);
-  say($("scan"), answer.scan_us ? `${answer.scan_us.toFixed(0)} µs on the wire` : "none is read");
-  $("price").hidden = $("price-term").hidden = answer.price === null;
-  if (answer.price !== null) say($("price"), answer.price.toFixed(2));
-  const change = before && before.sensors.length !== chosen.length ? 100 * (answer.mean - before.mean) : null;
+  say($("scan"), reply.scan_us ? `${reply.scan_us.toFixed(0)} µs on the wire` : "none is read");
+  $("price").hidden = $("price-term").hidden = reply.price === null;
+  if (reply.price !== null) say($("price"), reply.price.toFixed(2));
+  const change = before && before.sensors.length !== chosen.length ? 100 * (reply.mean - before.mean) : null;
   const moved = change === null ? "" : `; ${change >= 0 ? "+" : ""}${change.toFixed(1)} points by the last click`;
-  say($("change"), `trials, ${answer.of}; quick: not nested, and chosen while looking at it${moved}`);
-  say($("weakest"), weakest(answer));
-  say($("command"), answer.command || "choose a sensor");
-  say($("spoken"), `${chosen.length} sensors, ${percent(answer.mean)} percent`);
+  say($("change"), `trials, ${reply.of}; quick: not nested, and chosen while looking at it${moved}`);
+  say($("weakest"), weakest(reply));
+  say($("command"), reply.command || "choose a sensor");
+  say($("spoken"), `${chosen.length} sensors, ${percent(reply.mean)} percent`);
   $("measure").disabled = $("train").disabled = !chosen.length;
   $("trial").hidden = true;
   $("trials").replaceChildren();
   error = -1;
-  confusion(answer);
+  confusion(reply);
   certify();
   // After the accuracy is painted: a map may have thousands of marks.
-  setTimeout(() => answer === shown && drawMap(answer));
+  setTimeout(() => reply === shown && drawMap(reply));
 }
 
 function weakest({ confusion: counts }) {
@@ -249,7 +249,7 @@ function listTrials(trials) {
   items[0]?.focus();
 }
 
-/** Show what the sensors saw in a trial, beside what they typically see in its true and in its recognised type. */
+/** Show what the sensors saw in a trial, next to what they typically see in its true and in its recognised type. */
 function showTrial({ trial, shown: values, truth, read, typical, decisive }) {
   const [name, other] = [set.grasps[truth], set.grasps[read]];
   say($("trial-heading"), `Trial ${trial + 1}: ${name}${read === truth ? "" : `, read as ${other}`}`);
