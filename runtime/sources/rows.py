@@ -31,6 +31,8 @@ _WINDOW = 10
 # A shorter break between rows is not counted: serial adapters and radios deliver rows in bunches.
 _BUNCH_US = 50_000
 _SLOW, _FAST = 0.75, 1.5
+# Within this share of the rate that was said last, it is the same.
+_WAVERS = 0.1
 # What is wrong with a sender that is connected is reported after this time without a row, or since it was noticed.
 _NOTICE_US = 2_000_000
 _SILENT = f"connected, but no row has come for {_NOTICE_US / 1e6:g} s or longer: is its program running?"
@@ -254,6 +256,7 @@ class RowSource(Source):
         self._came_us = self._ticked_us = now_us()
         # A fault of single rows, and until when it is reported.
         self._fault, self._fault_until_us = "", -1
+        self._told_hz = 0.0
         self._last: tuple[float, Sequence[float | None]] | None = None
         self._ready.clear()
         self.watch.begin()
@@ -420,6 +423,10 @@ class RowSource(Source):
         hz, stated = self.watch.hz, self.wiring.rate_hz
         if hz is None or (hz >= _SLOW * stated and self.watch.steady_hz <= _FAST * stated):
             return ""
+        # A rate that wavers a little is no other fault.
+        if abs(hz - self._told_hz) > _WAVERS * self._told_hz:
+            self._told_hz = hz
+        hz = self._told_hz
         two = "" if hz < stated else ", unless two programs send"
         return (
             f"{hz:.3g} rows a second arrive, but glove.toml says {stated:g}: set rate_hz = {float(f'{hz:.2g}'):g}{two}"

@@ -1,5 +1,6 @@
 """Rows as frames: what a column becomes, on which grid, at what time; and what a broken sender does."""
 
+import random
 from collections.abc import Callable, Sequence
 
 import pytest
@@ -71,6 +72,7 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
         text: str = GLOVE,
         names: Sequence[str] = NAMES,
         only: Sequence[str] | None = None,
+        faults: list[str] | None = None,
     ) -> tuple[RowSource, Frames]:
         harness = parse_harness(text, "glove.toml")
         source = RowSource(Script([chunk for _, chunk in chunks]), harness, 0, names, whole_scan(harness, names))
@@ -84,6 +86,8 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
             while frame is not None:
                 frames.append(frame)
                 frame = source.read(0) if source._ready else None
+            if faults is not None:
+                faults.append(source.fault_message())
         return source, frames
 
     return played
@@ -347,6 +351,17 @@ def test_what_is_wrong_with_all_rows_is_said(play: Play) -> None:
     assert source.fault_message() == "the data holds no rows: 'rst:0x10 (POWERON_RESET)'"
     source, _ = play([(100_000 * n, b"%d,0,0,0,0,0,0\n" % (100 * n)) for n in range(12)])
     assert source.fault_message() == "10 rows a second arrive, but glove.toml says 100: set rate_hz = 10"
+
+
+def test_a_rate_that_wavers_is_said_once(play: Play) -> None:
+    """Ten rows a second, a little more and less, and then twenty."""
+    draw, times, said = random.Random(3), [0], list[str]()
+    for number in range(200):
+        times.append(times[-1] + draw.randrange(85_000, 115_000) // (1 if number < 100 else 2))
+    play([(us, b"%d,0,0,0,0,0,0\n" % (us // 1000)) for us in times], faults=said)
+    rates = [sentence.split(" rows")[0] for sentence in said if sentence]
+    assert len(dict.fromkeys(rates)) <= 4
+    assert float(rates[-1]) == pytest.approx(20, rel=0.15)
 
 
 def test_a_sender_that_falls_silent_or_sends_something_else_is_said(play: Play) -> None:
