@@ -4,7 +4,7 @@
     TOPIC/joints  the header that names the joints of its angles; retained, so that late readers have it, too
     TOPIC/health  once a second, if requested: the glove's health
 
-A broker that goes away is connected to again; what comes meanwhile is lost.
+A broker that goes away is connected to again; what comes meanwhile is lost. The header is sent to it again.
 """
 
 from functools import partial
@@ -27,17 +27,25 @@ class MqttTopics(Sink):
         *_, self._topic = place_of(where)
         self._client = connect(where, SinkError)
         self._joints: tuple[str, ...] = ()
+        # A broker that was away may have lost what it kept.
+        self._client.on_connect = lambda *_: self._forget()
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish the line, after a header if the joints are others than before."""
         if angles is not None and angles.names != self._joints:
-            self._joints = angles.names
-            self.attempt(partial(self._send, "joints", encode_header(angles), retain=True))
+            self.attempt(partial(self._send_header, angles))
         self.attempt(partial(self._send, "grasp", encode(grasp, preshape, angles)))
 
     def health(self, report: HealthReport) -> None:
         """Publish the report's line."""
         self.attempt(partial(self._send, "health", encode_health(report)))
+
+    def _send_header(self, angles: JointAngles) -> None:
+        self._send("joints", encode_header(angles), retain=True)
+        self._joints = angles.names
+
+    def _forget(self) -> None:
+        self._joints = ()
 
     def _send(self, topic: str, line: bytes, *, retain: bool = False) -> None:
         sent = self._client.publish(f"{self._topic}/{topic}", line.rstrip(), retain=retain)
