@@ -10,7 +10,7 @@ from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.ports import device_fault, port_fault
 from thenar.drivers.spi.chips import SPI_CHIPS
-from thenar.drivers.transports import line_port_fault
+from thenar.drivers.transports import OTHER_PORTS, line_port_fault
 
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, spelled
@@ -110,6 +110,8 @@ def _of_stream(place: Place, stream: StreamWiring) -> Iterator[Fault]:
     if not stream.used:
         yield place, "must have one of the keys switches, joints and taxels; doctor --line proposes them"
     if stream.frame is not None:
+        if stream.port.startswith(OTHER_PORTS):
+            yield (*place, "frame"), "is for a port of bytes, not of messages: leave it out"
         try:
             numbers = frame_format(stream.frame).numbers
         except SettingError as reason:
