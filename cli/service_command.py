@@ -88,8 +88,8 @@ def _filled(name: str, words: tuple[str, ...]) -> str:
 
 
 def _quoted(word: str) -> str:
-    """Return a word as a unit of systemd spells it."""
-    for letter, spelled in (("\\", "\\\\"), ('"', '\\"'), ("%", "%%"), ("$", "$$"), ("\n", "\\n")):
+    """Return a word as a unit of systemd spells it, whose colon keeps "$"."""
+    for letter, spelled in (("\\", "\\\\"), ('"', '\\"'), ("%", "%%"), ("\n", "\\n")):
         word = word.replace(letter, spelled)
     return f'"{word}"'
 

@@ -85,6 +85,16 @@ def test_systemds_own_tools_find_no_fault(tmp_path: Path) -> None:
     subprocess.run(users, capture_output=True, check=True)
 
 
+def test_the_path_of_python_may_hold_blanks_and_what_systemd_expands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    python = tmp_path / "$HOME 50 % ä" / "python"
+    python.parent.mkdir()
+    python.symlink_to(sys.executable)
+    monkeypatch.setattr(sys, "executable", str(python))
+    assert service(tmp_path, *INSTALL) == 0
+    checked = subprocess.run([tool("systemd-analyze"), "verify", str(tmp_path / UNIT)], capture_output=True, check=False)
+    assert (checked.returncode, checked.stderr) == (0, b"")
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
