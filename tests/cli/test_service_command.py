@@ -9,6 +9,7 @@ import sys
 from configparser import ConfigParser
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -93,6 +94,21 @@ def test_the_path_of_python_may_hold_blanks_and_what_systemd_expands(tmp_path: P
     assert service(tmp_path, *INSTALL) == 0
     checked = subprocess.run([tool("systemd-analyze"), "verify", str(tmp_path / UNIT)], capture_output=True, check=False)
     assert (checked.returncode, checked.stderr) == (0, b"")
+
+
+def test_a_python_that_is_linked_out_of_a_closed_folder_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    closed = tmp_path / "home"
+    closed.mkdir(0o700)
+    (closed / "python").touch()
+    with TemporaryDirectory() as open_folder:
+        Path(open_folder).chmod(0o755)
+        python = Path(open_folder) / "python"
+        python.symlink_to(closed / "python")
+        monkeypatch.setattr(sys, "executable", str(python))
+        assert service(tmp_path, *INSTALL) == 0
+    assert f"warning: the user thenar cannot reach {python}: /" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
