@@ -9,7 +9,7 @@ Messages at other addresses are left out, and so is a second sender.
 """
 
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from thenar.drivers.errors import SettingError
 from thenar.drivers.extras import optional
@@ -18,6 +18,9 @@ from thenar.drivers.names import shortened
 from thenar.drivers.readers import LineReader
 
 from .rows import row_kinds
+
+if TYPE_CHECKING:
+    from logging import LogRecord
 
 _PORT = re.compile(r"osc:([^/]+:[0-9]{1,5})(/[^ #*,?\[\]{}]*[^ #*,?\[\]{}/])")
 
@@ -52,6 +55,11 @@ class OscParser(LineParser):
         return []
 
 
+def _is_not_of_osc(record: "LogRecord") -> bool:
+    """Return whether a record of the log is not by python-osc, which writes one for each unusual datagram."""
+    return "pythonosc" not in record.pathname
+
+
 def _number(value: Any) -> float | None:
     return finite(float(value)) if isinstance(value, int | float) else None  # a bool is an int
 
@@ -71,6 +79,9 @@ class OscReader(LineReader):
             raise SettingError(f"{shortened(repr(self._place))} names no address: write osc:HOST:PORT/ADDRESS")
         with optional(SettingError, self._place):
             import pythonosc.osc_packet  # noqa: F401
+        from logging import getLogger
+
+        getLogger().addFilter(_is_not_of_osc)
         super().open()
 
 

@@ -144,6 +144,13 @@ def test_arguments_in_order_and_bundles_by_name_are_rows(source: RowSource) -> N
     assert source.reader.odd == "a datagram that is not OSC"
 
 
+def test_a_value_of_an_unusual_type_writes_no_line(source: RowSource, caplog: pytest.LogCaptureFixture) -> None:
+    with sender(source) as glove:
+        glove.send(bundle(b"?", padded("/glove") + padded(",TIT")))
+        assert row(source) == (1, bytes([128]))
+    assert not caplog.records
+
+
 def test_a_second_sender_is_left_out_and_said(source: RowSource) -> None:
     with sender(source) as first, sender(source) as second:
         for number in count():
