@@ -26,26 +26,20 @@ class MqttTopics(Sink):
         self.where, self._longest_s = where, longest_s
         *_, self._topic = place_of(where)
         self._client = connect(where, SinkError)
-        self._joints: tuple[str, ...] = ()
-        # A broker that was away may have lost what it kept.
-        self._client.on_connect = lambda *_: self._forget()
+        self._joints = list[str]()
+        # A broker that was away lacks the header, or may have lost it.
+        self._client.on_connect = lambda *_: self._joints.clear()
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish the line, after a header if the joints are others than before."""
-        if angles is not None and angles.names != self._joints:
-            self.attempt(partial(self._send_header, angles))
+        if angles is not None and list(angles.names) != self._joints:
+            self._joints[:] = angles.names
+            self.attempt(partial(self._send, "joints", encode_header(angles), retain=True))
         self.attempt(partial(self._send, "grasp", encode(grasp, preshape, angles)))
 
     def health(self, report: HealthReport) -> None:
         """Publish the report's line."""
         self.attempt(partial(self._send, "health", encode_health(report)))
-
-    def _send_header(self, angles: JointAngles) -> None:
-        self._send("joints", encode_header(angles), retain=True)
-        self._joints = angles.names
-
-    def _forget(self) -> None:
-        self._joints = ()
 
     def _send(self, topic: str, line: bytes, *, retain: bool = False) -> None:
         sent = self._client.publish(f"{self._topic}/{topic}", line.rstrip(), retain=retain)

@@ -9,7 +9,7 @@ Messages at other addresses are left out, and so is a second sender.
 """
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from thenar.drivers.errors import SettingError
 from thenar.drivers.extras import optional
@@ -18,9 +18,6 @@ from thenar.drivers.names import shortened
 from thenar.drivers.readers import LineReader
 
 from .rows import row_kinds
-
-if TYPE_CHECKING:
-    from logging import LogRecord
 
 _PORT = re.compile(r"osc:([^/]+:[0-9]{1,5})(/[^ #*,?\[\]{}]*[^ #*,?\[\]{}/])")
 
@@ -55,7 +52,7 @@ class OscParser(LineParser):
         return []
 
 
-def _is_not_of_osc(record: "LogRecord") -> bool:
+def _is_not_of_osc(record: Any) -> bool:
     """Return whether a record of the log is not by python-osc, which writes one for each unusual datagram."""
     return "pythonosc" not in record.pathname
 
