@@ -39,7 +39,7 @@ def command(
 
     With --line, listen to a board or program that sends numbers, in lines or binary frames, and show each column:
     meanwhile press every switch and pad, and bend every finger. PORT is a serial port, tcp://HOST:PORT,
-    udp://HOST:PORT, ble://NAME, - (stdin), lsl:NAME or ros:/TOPIC.
+    udp://HOST:PORT, ble://NAME, - (stdin), lsl:NAME, ros:/TOPIC, mqtt:HOST/TOPIC or osc:HOST:PORT/ADDRESS.
 
     Exit code 1 if something is missing; with --build, also if the glove's calibration does not fit the build.
 

@@ -81,15 +81,16 @@ def _filled(name: str, words: tuple[str, ...]) -> str:
     if reason := fault(str(Path.cwd()), 4095):
         raise click.UsageError(f"the path of this folder {reason}, so no service can name it: go to another")
     for path in (Path(sys.executable), asked["build"], asked["glove"]):
-        if closed := [above for above in path.absolute().parents if not above.stat().st_mode & stat.S_IXOTH]:
+        parents = (*path.resolve().parents, *path.absolute().parents)  # a venv's Python is a link
+        if closed := [above for above in parents if not above.stat().st_mode & stat.S_IXOTH]:
             warning(f"the user thenar cannot reach {path}: {closed[-1]} is closed to others; move it to /opt/thenar")
     line = " ".join(map(_quoted, (sys.executable, "-m", "thenar.cli", "run", *words)))
     return text.replace("@FOLDER@", str(Path.cwd()).replace("%", "%%")).replace("@COMMAND@", line)
 
 
 def _quoted(word: str) -> str:
-    """Return a word as a unit of systemd spells it."""
-    for letter, spelled in (("\\", "\\\\"), ('"', '\\"'), ("%", "%%"), ("$", "$$"), ("\n", "\\n")):
+    """Return a word as a unit of systemd spells it, whose colon keeps "$"."""
+    for letter, spelled in (("\\", "\\\\"), ('"', '\\"'), ("%", "%%"), ("\n", "\\n")):
         word = word.replace(letter, spelled)
     return f'"{word}"'
 

@@ -48,13 +48,13 @@ _UNIT = (
 )
 # A value: the group that matches says how it is written.
 _VALUE = re.compile(
-    rf"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{{1,3}})?)(?: ?(?:{_UNIT}))?|(?P<hex>0[xX][0-9A-Fa-f]{{1,12}})"
+    rf"(?P<number>[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d{{1,3}})?)(?: ?(?:{_UNIT}))?"
+    rf"|(?P<hex>0[xX][0-9A-Fa-f]{{1,12}})"
     rf"|(?P<truth>(?i:true|false))|(?P<time>{_TIME})|(?P<none>(?i:|[+-]?nan|[+-]?inf(?:inity)?|null|none|na|-))"
 )
 _NAME = re.compile(r"[^\W\d][^,;:\t\"{}]*")
 _WORD = re.compile(r"[^\W\d]\w*")
 _PAIR = re.compile(rf"(.*?):({_TIME}|[^:]*)")
-_SIGN = re.compile(r"\s*[:=]\s*")
 _WORD_OF_JSON = re.compile(r"\A[^\W\d]\w*\s*[:=]\s*(?=[{\[])")
 _CHECKED = re.compile(rb"\$([^$*]*)\*([0-9A-Fa-f]{2})")
 _CHECKSUM = re.compile(rb"\*[0-9A-Fa-f]{2}$")
@@ -178,7 +178,7 @@ def _is_checked(line: bytes) -> bool:
 
 
 def _fields(text: str) -> list[str]:
-    text = _SIGN.sub(":", text)
+    text = ":".join(part.strip() for part in re.split("[:=]", text))
     if ";" in text:  # where a comma is the decimal point
         return [field.strip().replace(",", ".") for field in text.split(";")]
     if not set(text).isdisjoint(",\t&"):

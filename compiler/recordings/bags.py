@@ -110,11 +110,13 @@ def _cells(name: str, value: Any) -> Iterator[tuple[str, float | str]]:
     """Yield the numbers and texts in a field of a message, by their names; a joint's numbers by that of the joint."""
     if is_dataclass(value):
         joints = getattr(value, "name", None)
+        # Names of which two are equal tell nothing apart.
+        joints = joints if isinstance(joints, list) and len(set(map(str, joints))) == len(joints) else None
         for part in fields(value):
             inner = getattr(value, part.name)
-            if part.name in _BESIDE or (inner is joints and isinstance(joints, list)) or part.name.startswith("__"):
+            if part.name in _BESIDE or inner is joints or part.name.startswith("__"):
                 continue
-            if isinstance(joints, list) and isinstance(inner, np.ndarray) and len(inner) == len(joints):
+            if joints is not None and isinstance(inner, np.ndarray) and len(inner) == len(joints):
                 inner = dict(sorted(zip(joints, inner.tolist(), strict=True)))
             yield from _cells(name if part.name == "data" else f"{name}.{part.name}", inner)
     elif isinstance(value, dict):

@@ -135,8 +135,8 @@ class ColumnRoles(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     A label, subject, object, session or trial may be spread over several columns, whose values are combined. Otherwise
     `frames` defines the trials: "independent" makes each row one; with "restart" a trial begins where `time` starts
     again, or the label, subject, object or session changes. Labels in `none` mean that nothing is held, as "none"
-    always does; with "" among them, so does an empty cell. `rename` gives
-    columns of the table other names, which all other keys use, and the set has.
+    always does; with "" among them, so does an empty cell. `rename` gives columns of the table other names, which all
+    other keys use, and the set has.
     """
 
     label: str | tuple[str, ...]

@@ -132,7 +132,8 @@ def _paired(first: Table, other: Table, segments: bool) -> _Pair:
 def _texts(table: Table, column: Column) -> NDArray[np.str_]:
     """Return the cells of a column that names trials, numbers without leading zeros."""
     texts = names(column, table.cells, table.size).values
-    return np.where(np.char.isdecimal(texts), np.char.lstrip(texts, "0"), texts)
+    bare = np.char.lstrip(texts, "0")
+    return np.where(np.char.isdecimal(texts), np.where(bare == "", "0", bare), texts)
 
 
 def _each(texts: NDArray[np.str_], change: Callable[[str], str]) -> NDArray[np.str_]:

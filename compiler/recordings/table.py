@@ -248,8 +248,10 @@ def _read_motion(path: Path) -> Table:
         rows = (line if line.strip() else "" for line in lines)
         if path.suffix.lower() == ".trc" and first.startswith("PathFileType"):
             marker, header = "", []
-            _, _, *names = (next(lines, "").rstrip().split("\t") for _ in range(4))
-            for name, axis in zip_longest(*names, fillvalue=""):
+            _, _, names, axes = (next(lines, "").rstrip().split("\t") for _ in range(4))
+            if any(map(str.strip, axes[:2])):  # below the number of the frame and its time
+                raise TableError(f"{path.name} row 5 names no coordinates: it begins with {shortened(repr(axes[0]))}")
+            for name, axis in zip_longest(names, axes, fillvalue=""):
                 marker, axis = name.strip() or marker, axis.strip().rstrip("0123456789").lower()
                 header.append(f"{marker}.{axis}" if axis else marker)
             return _read_csv(path.name, chain(["\t".join(header)], rows), PLAIN, "\t", 4)

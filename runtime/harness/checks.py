@@ -10,7 +10,7 @@ from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.ports import device_fault, port_fault
 from thenar.drivers.spi.chips import SPI_CHIPS
-from thenar.drivers.transports import line_port_fault
+from thenar.drivers.transports import OTHER_PORTS, line_port_fault
 
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, spelled
@@ -110,14 +110,7 @@ def _of_stream(place: Place, stream: StreamWiring) -> Iterator[Fault]:
     if not stream.used:
         yield place, "must have one of the keys switches, joints and taxels; doctor --line proposes them"
     if stream.frame is not None:
-        try:
-            numbers = frame_format(stream.frame).numbers
-        except SettingError as reason:
-            yield (*place, "frame"), str(reason)
-        else:
-            if numbers != len(stream.columns):
-                said = f"{len(stream.columns)} columns are named, but a frame has {numbers} numbers"
-                yield (*place, "frame"), f'{said}: name every one in order, "" for unused ones'
+        yield from _of_frame((*place, "frame"), stream, stream.frame)
     known = tuple(filter(None, stream.columns)) or (*stream.used, *([] if stream.time is None else [stream.time]))
     named: list[tuple[Place, str]] = [(("time",), stream.time)] if stream.time is not None else []
     named += [(("switches", number), name) for number, name in enumerate(stream.switches)]
@@ -132,6 +125,20 @@ def _of_stream(place: Place, stream: StreamWiring) -> Iterator[Fault]:
         yield from _of_board((*place, "board"), stream, stream.board)
     columns = ((*place, "columns", number) for number in range(len(stream.columns)))
     yield from _of_names(((where, name) for where, name in zip(columns, stream.columns, strict=True) if name), "column")
+
+
+def _of_frame(place: Place, stream: StreamWiring, pattern: str) -> Iterator[Fault]:
+    """Yield faults of the pattern of binary frames."""
+    if stream.port.startswith(OTHER_PORTS):
+        yield place, "is for a port of bytes, not of messages: leave it out"
+    try:
+        numbers = frame_format(pattern).numbers
+    except SettingError as reason:
+        yield place, str(reason)
+        return
+    if numbers != len(stream.columns):
+        said = f"{len(stream.columns)} columns are named, but a frame has {numbers} numbers"
+        yield place, f'{said}: name every one in order, "" for unused ones'
 
 
 def _of_board(place: Place, stream: StreamWiring, board: BoardWiring) -> Iterator[Fault]:

@@ -26,6 +26,8 @@ NOT_YET = "not opened yet"
 RETRY_S = 0.2
 # How long a reading may block before its thread checks whether it should stop.
 READ_S = 0.1
+# How long closing waits for a reading, or for an opening: a name's or a radio's search may take longer.
+_CLOSE_S = 5.0
 # Frames that arrived and were not taken yet; a loop that stalls for longer loses the oldest.
 _MOST_WAITING = 4096
 # How long to wait for something new if there is no device with a period.
@@ -70,10 +72,10 @@ class DeviceThread:
         self._stop.set()
 
     def close(self) -> None:
-        """End it: returns once the device is closed."""
+        """End it: returns once the device is closed. One that is still being opened after 5 s is left to the thread."""
         self.stop()
         if self._thread.is_alive():
-            self._thread.join()
+            self._thread.join(_CLOSE_S)
 
     def _keep(self) -> None:
         while not self._stop.is_set():
@@ -344,7 +346,7 @@ class Sources:
         return self
 
     def __exit__(self, *_: object) -> None:
-        # All are stopped first: each may take as long as one reading.
+        # All are stopped first: each may take as long as one reading, or opening.
         for keeper in self._keepers:
             keeper.stop()
         for keeper in self._keepers:

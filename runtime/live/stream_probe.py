@@ -85,7 +85,7 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
         bare = msgspec.structs.replace(bare, baud=baud)
     with reader_of(bare) as reader:
         chunks: list[tuple[int, bytes]] = []
-        if isinstance(reader, LineReader):
+        if isinstance(reader, LineReader) and not port.startswith(OTHER_PORTS):
             reader.chunks = chunks
         reader.open()
         came = list(_listened(reader, listen_s))

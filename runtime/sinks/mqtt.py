@@ -4,7 +4,7 @@
     TOPIC/joints  the header that names the joints of its angles; retained, so that late readers have it, too
     TOPIC/health  once a second, if requested: the glove's health
 
-A broker that goes away is connected to again; what comes meanwhile is lost.
+A broker that goes away is connected to again; what comes meanwhile is lost. The header is sent to it again.
 """
 
 from functools import partial
@@ -26,12 +26,14 @@ class MqttTopics(Sink):
         self.where, self._longest_s = where, longest_s
         *_, self._topic = place_of(where)
         self._client = connect(where, SinkError)
-        self._joints: tuple[str, ...] = ()
+        self._joints = list[str]()
+        # A broker that was away lacks the header, or may have lost it.
+        self._client.on_connect = lambda *_: self._joints.clear()
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish the line, after a header if the joints are others than before."""
-        if angles is not None and angles.names != self._joints:
-            self._joints = angles.names
+        if angles is not None and list(angles.names) != self._joints:
+            self._joints[:] = angles.names
             self.attempt(partial(self._send, "joints", encode_header(angles), retain=True))
         self.attempt(partial(self._send, "grasp", encode(grasp, preshape, angles)))
 

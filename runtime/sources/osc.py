@@ -52,6 +52,11 @@ class OscParser(LineParser):
         return []
 
 
+def _is_not_of_osc(record: Any) -> bool:
+    """Return whether a record of the log is not by python-osc, which writes one for each unusual datagram."""
+    return "pythonosc" not in record.pathname
+
+
 def _number(value: Any) -> float | None:
     return finite(float(value)) if isinstance(value, int | float) else None  # a bool is an int
 
@@ -71,6 +76,9 @@ class OscReader(LineReader):
             raise SettingError(f"{shortened(repr(self._place))} names no address: write osc:HOST:PORT/ADDRESS")
         with optional(SettingError, self._place):
             import pythonosc.osc_packet  # noqa: F401
+        from logging import getLogger
+
+        getLogger().addFilter(_is_not_of_osc)
         super().open()
 
 

@@ -142,6 +142,13 @@ def test_numbers_of_labels_are_named(capsys: pytest.CaptureFixture[str]) -> None
     assert imported("t.csv", "names.csv").taxonomy.types == ("power", "tip")
 
 
+def test_an_empty_key_is_not_the_trial_0(capsys: pytest.CaptureFixture[str]) -> None:
+    frame = pd.DataFrame({"label": ["tip", "cup"] * 12, "trial": np.arange(24), "flex": np.arange(24) / 8})
+    frame.astype({"trial": str}).replace({"trial": {"7": "00", "0": ""}}).to_csv("t.csv", index=False)
+    pd.DataFrame({"trial": np.arange(24), "object": ["ball", "pen"] * 12}).to_csv("facts.csv", index=False)
+    assert "facts.csv has no rows of the trial with row 2\n" in refused(capsys, "t.csv", "facts.csv")
+
+
 def recordings() -> dict[str, pd.DataFrame]:
     """Return two recordings, in each of which the hand closes in SEGMENTS, with clocks that begin elsewhere."""
     random, made = np.random.default_rng(5), {}

@@ -9,6 +9,7 @@ import sys
 from configparser import ConfigParser
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -38,6 +39,12 @@ def files(root: Path) -> set[str]:
 
 def service(root: Path, *words: str) -> int:
     return run(["service", *words, "--root", str(root)])
+
+
+def verified(unit: Path) -> tuple[int, str]:
+    command = [tool("systemd-analyze"), "verify", str(unit)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.returncode, done.stderr
 
 
 INSTALL = ("install", "build", "--glove", "glove.toml")
@@ -78,11 +85,33 @@ def test_it_runs_in_this_folder_without_root_and_is_watched(tmp_path: Path, plac
 
 def test_systemds_own_tools_find_no_fault(tmp_path: Path) -> None:
     assert service(tmp_path, *INSTALL, "--sink", 'jsonl:50 % of "$HOME"\n[Install]\\') == 0
-    command = [tool("systemd-analyze"), "verify", str(tmp_path / UNIT)]
-    checked = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (checked.returncode, checked.stderr) == (0, "")
+    assert verified(tmp_path / UNIT) == (0, "")
     users = [tool("systemd-sysusers"), "--dry-run", str(tmp_path / "etc/sysusers.d/thenar.conf")]
     subprocess.run(users, capture_output=True, check=True)
+
+
+def test_the_path_of_python_may_hold_what_systemd_expands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    python = tmp_path / "$HOME 50 % ä" / "python"
+    python.parent.mkdir()
+    python.symlink_to(sys.executable)
+    monkeypatch.setattr(sys, "executable", str(python))
+    assert service(tmp_path, *INSTALL) == 0
+    assert verified(tmp_path / UNIT) == (0, "")
+
+
+def test_a_python_that_is_linked_out_of_a_closed_folder_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    closed = tmp_path / "home"
+    closed.mkdir(0o700)
+    (closed / "python").touch()
+    with TemporaryDirectory() as open_folder:
+        Path(open_folder).chmod(0o755)
+        python = Path(open_folder) / "python"
+        python.symlink_to(closed / "python")
+        monkeypatch.setattr(sys, "executable", str(python))
+        assert service(tmp_path, *INSTALL) == 0
+    assert f"warning: the user thenar cannot reach {python}: /" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -286,3 +286,11 @@ def test_lost_bytes_that_the_checksum_does_not_show(pattern: str) -> None:
         rows = parser.feed(np.delete(line, lost[lost < len(line)]).tobytes())
         wrong += any(row != sent.row(None) for row in rows)
     assert wrong == WRONG[pattern]
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("line", [b"1" * 8000 + b"e" * 8000, b"a" + b" " * 16_000 + b"b:1"])
+def test_a_line_of_garbage_takes_no_time_that_grows_with_its_square(line: bytes) -> None:
+    parser = LineParser()
+    assert parser.feed((line + b"\n") * 100) == []
+    assert parser.counts.misfits == 100

@@ -157,6 +157,33 @@ def test_what_comes_while_the_broker_is_away_is_lost_and_what_comes_later_is_not
     sink.close()
 
 
+def test_joints_are_sent_again_to_a_broker_that_has_forgotten_them(
+    broker: Broker, make_grasp: MakeGrasp, angles: JointAngles
+) -> None:
+    sink = open_sink(f"{broker.place}/hand")
+    broker.end()
+
+    def loses() -> bool:
+        sink.publish(make_grasp(1), None, angles)
+        return "not currently connected" in sink.report().error
+
+    for _ in range(2):  # never sent; sent, and forgotten by the broker
+        eventually(loses)
+        broker.start()
+        with Other(broker, "hand/joints") as reader:
+
+            def arrives(reader: Other = reader) -> bool:
+                sink.publish(make_grasp(2), None, angles)
+                return not reader.got.empty()
+
+            eventually(arrives)
+            assert reader.got.get()[1] == encode_header(angles)[:-1]
+        broker.end()
+        sink.error = ""
+    sink.close()
+    broker.start()
+
+
 def test_a_broker_that_takes_nothing_loses_lines_and_does_not_block(broker: Broker, make_grasp: MakeGrasp) -> None:
     sink = open_sink(f"{broker.place}/hand")
     broker.process.send_signal(signal.SIGSTOP)

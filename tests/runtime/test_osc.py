@@ -5,6 +5,7 @@ import socket
 import struct
 from collections.abc import Callable, Iterator
 from itertools import count
+from threading import Event, Thread
 
 import pytest
 from hypothesis import given
@@ -12,9 +13,10 @@ from hypothesis import strategies as st
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from thenar.drivers.errors import SettingError
+from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.live.stream_probe import propose_stream
 from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp, Preshape
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sinks import open_sink
@@ -142,6 +144,13 @@ def test_arguments_in_order_and_bundles_by_name_are_rows(source: RowSource) -> N
     assert source.reader.odd == "a datagram that is not OSC"
 
 
+def test_a_value_of_an_unusual_type_writes_no_line(source: RowSource, caplog: pytest.LogCaptureFixture) -> None:
+    with sender(source) as glove:
+        glove.send(bundle(b"?", padded("/glove") + padded(",TIT")))
+        assert row(source) == (1, bytes([128]))
+    assert not caplog.records
+
+
 def test_a_second_sender_is_left_out_and_said(source: RowSource) -> None:
     with sender(source) as first, sender(source) as second:
         for number in count():
@@ -152,6 +161,29 @@ def test_a_second_sender_is_left_out_and_said(source: RowSource) -> None:
                 break
             assert number < 100
         assert "sends, too" in source.fault_message()
+
+
+def test_no_frame_is_proposed_for_messages_at_another_address() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        address = free.getsockname()
+    done = Event()
+
+    def send() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as glove:
+            for number in count():
+                glove.sendto(message("/glove", number % 100, number % 7), address)
+                if done.wait(0.005):
+                    return
+
+    sending = Thread(target=send)
+    sending.start()
+    try:
+        with pytest.raises(DeviceError, match="the data holds no rows: a message at /glove"):
+            propose_stream(f"osc:127.0.0.1:{address[1]}/glow", 115_200, 0.5)
+    finally:
+        done.set()
+        sending.join()
 
 
 @given(st.lists(st.one_of(numbers, st.booleans(), st.integers(-(2**31), 2**31 - 1)), min_size=1, max_size=8))

@@ -92,6 +92,16 @@ def test_a_bag_is_the_joints_pads_and_texts_of_its_topics(form: str, tmp_path: P
     assert left.startswith("topics left out: /camera (sensor_msgs/msg/Image, 1 messages: more than 4096 numbers")
 
 
+def test_joints_of_one_name_keep_their_order(tmp_path: Path) -> None:
+    def hands(send: Callable[..., None], _types: Any) -> None:
+        state(send, 1, ("flex", "flex"), [1.0, 2.0])
+        state(send, 2, ("flex", "flex"), [3.0, 4.0])
+
+    columns = read_table(bag(tmp_path / "b.bag", hands)).columns
+    joints = {name: list(column) for name, column in columns.items() if "position" in name}
+    assert list(joints.values()) == [[1.0, 3.0], [2.0, 4.0]]
+
+
 def test_a_value_is_of_use_for_half_a_second_and_ten_intervals(tmp_path: Path) -> None:
     """What a topic said once holds on; a sensor that stopped is missing."""
 
@@ -276,6 +286,11 @@ def test_markers_of_a_trc_have_their_names(blank: str, tmp_path: Path) -> None:
         ("t.trc", "PathFileType\n", "t.trc has no rows"),
         ("t.sto", "", "t.sto has no PathFileType or endheader"),
         ("t.sto", MOTION + "0\t1\n", "t.sto row 9 has 2 cells, its header 3"),
+        (
+            "t.trc",
+            TRC.replace("\t\tX1\tY1\tZ1\tX2\tY2\tZ2\t\n{blank}\n", ""),
+            "t.trc row 5 names no coordinates: it begins",
+        ),
         ("t.trc", TRC.format(blank="") + "3\t0.02\n", "t.trc row 9 has 2 cells, its header 8"),
     ],
 )

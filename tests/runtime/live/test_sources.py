@@ -298,6 +298,14 @@ def test_what_no_try_can_help_ends_it(kept: Kept) -> None:
     assert kept.keeper.failure is wrong
 
 
+def test_closing_does_not_wait_for_an_opening_that_hangs(kept: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_CLOSE_S", 0.01, raising=False)
+    kept.keeper.close()
+    assert not kept.device.closed.is_set()
+    kept.device.openings.put(None)
+    assert kept.device.closed.wait(LONG_S)
+
+
 def test_what_a_device_could_do_before_is_tried_again(kept: Kept) -> None:
     kept.device.openings.put(None)
     assert kept.next_change() == (True, "")

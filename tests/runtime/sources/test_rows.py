@@ -397,6 +397,7 @@ def test_a_clock_that_stands_still_is_said(play: Play, moving: int) -> None:
         (('time = "ms"', 'time = "ms"\nframe = "F0 X7"'), "'X7' is neither a byte nor a type of numbers: write fixed"),
         (('time = "ms"', 'time = "ms"\nframe = "F0 B5"'), "7 columns are named, but a frame has 5 numbers: name every"),
         (('time = "ms"', 'time = "pad"'), "'pad' is the sender's clock"),
+        (('port = "x"', 'port = "mqtt:h/t"\nframe = "F0 B7"'), "frame: is for a port of bytes, not of messages"),
         (("[0, 4095]", "[7, 7]"), "a range from 7"),
         (('"ms", "thumb", ""', '"ms", "thumb", "pad"'), "column 'pad' is already stream"),
         (('switches = ["thumb", "index"]', 'switches = ["thumb", "index", "pad"]'), "'pad' is already stream"),
