@@ -100,7 +100,7 @@ def test_tables_without_a_time_stand_row_by_row(capsys: pytest.CaptureFixture[st
     shuffled.to_csv("b.csv", index=False)
     assert imported("a.csv", "b.csv").switches.tolist() == values.astype(bool).tolist()
     # Three tables; and rows stay in their trial.
-    shuffled.rename(columns={"s2": "s4", "s3": "s5"}).to_excel("c.xlsx", index=False)
+    shuffled.set_axis(["s4", "s5", "trial"], axis="columns").to_excel("c.xlsx", index=False)
     assert imported("a.csv", "b.csv", "c.xlsx").switches.tolist() == values[:, [0, 1, 2, 1, 2]].astype(bool).tolist()
     shuffled.iloc[1:].to_csv("b.csv", index=False)
     assert "a.csv and b.csv have 5 and 4 rows of the trial with row " in refused(capsys, "a.csv", "b.csv")
