@@ -191,6 +191,15 @@ def test_the_studio_answers_until_a_signal_ends_it(start: Callable[..., Command]
     assert studio.end() == 0
 
 
+def test_a_signal_ends_the_studio_while_it_trains(start: Callable[..., Command], set_file: Path, tmp_path: Path) -> None:
+    studio = start("studio", set_file, "-o", tmp_path / "build", "--jobs", "1", "--web", "127.0.0.1:0")
+    with studio.page() as live:
+        ask(live, do="train", sensors=[0, 1, 7])
+        assert told(live, "work")["what"] == "train"
+        assert studio.end() == 0
+    assert not (tmp_path / "build").exists()
+
+
 def test_what_is_no_recording_is_refused(build_folder: Path, recording: Path, tmp_path: Path) -> None:
     (tmp_path / "text.mcap").write_text("no")
     for name, said in (("none.mcap", "does not exist"), ("text.mcap", "does not begin like an MCAP file")):
