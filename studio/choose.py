@@ -141,7 +141,7 @@ class ChoosePage(Closing):
         if asked.do in ("add", "drop"):
             self._names(asked.sensors)
             find = self._quick.best_next if asked.do == "add" else self._quick.least
-            return message(asked.do, sensor=find(asked.sensors))
+            return message(asked.do, sensor=find(asked.sensors), sensors=asked.sensors)
         if asked.do == "trial":
             return message("trial", self._quick.trial(asked.trial, asked.sensors), trial=asked.trial)
         if asked.do not in ("measure", "curve", "train"):

@@ -104,6 +104,19 @@ def test_the_best_is_added_measured_and_compared_with_the_curve(
     assert set(browser.text("command").rpartition(" ")[2].split(",")) == {*curve.points[4].sensors}
 
 
+def test_a_double_click_adds_a_sensor_once(browser: Browser, studio: Studio) -> None:
+    """Both clicks are on their way before the first is answered."""
+    browser.open(studio().server.url)
+    counts(browser, 0)
+    browser.script("const add = document.getElementById('add'); add.click(); add.click(); add.click();")
+    # What is asked for later is answered later.
+    browser.script("document.querySelector('#map g').dispatchEvent(new MouseEvent('click'))")
+    browser.wait(lambda: browser.text("trial-heading"))
+    counts(browser, 1)
+    browser.click("drop")
+    counts(browser, 0)
+
+
 def test_train_writes_the_build_of_the_chosen_sensors(browser: Browser, studio: Studio, tmp_path: Path) -> None:
     browser.open(studio(output=tmp_path / "build").server.url)
     counts(browser, 0)
