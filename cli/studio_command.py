@@ -48,6 +48,6 @@ def command(
     grasp_set = GraspSet.load(grasps)
     hand, priced = hand_of(layout).fitted(grasp_set.element_names), prices_of(grasp_set, prices)
     choices: dict[str, Any] = {"hand": hand, "prices": priced, "output": output, "jobs": jobs}
-    with suppress(KeyboardInterrupt), ChoosePage(grasp_set, grasps.name, web, token=web_token, **choices) as page:
+    with suppress(KeyboardInterrupt), ChoosePage(grasp_set, grasps, web, token=web_token, **choices) as page:
         say(f"thenar: the page is at {page.server.url}")
         page.run(Event())

@@ -5,6 +5,7 @@ with nested folds or the curve of what sensors are worth, is queued, done one at
 """
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from shlex import quote
@@ -54,8 +55,8 @@ class ChoosePage(Closing):
     ----------
     grasp_set : GraspSet
         The recordings.
-    name : str
-        The name of their file.
+    path : Path
+        Their file, as commands are to name it.
     address, token
         As for `Server`.
     hand : HandShape, optional
@@ -83,7 +84,7 @@ class ChoosePage(Closing):
     def __init__(
         self,
         grasp_set: GraspSet,
-        name: str,
+        path: Path,
         address: str,
         *,
         token: str | None,
@@ -92,7 +93,7 @@ class ChoosePage(Closing):
         output: Path | None = None,
         jobs: int = -1,
     ) -> None:
-        self._name, self._set, self._prices, self._jobs = name, grasp_set, prices or {}, jobs
+        self._path, self._set, self._prices, self._jobs = path, grasp_set, prices or {}, jobs
         self._hand, self._output = hand, None if output is None else check_target(output)
         self._quick = QuickAccuracy(self._set)
         self._levels = self._levels_of()
@@ -101,7 +102,7 @@ class ChoosePage(Closing):
         kinds = ["switch"] * len(self._set.switch_names) + ["pad"] * len(self._set.taxel_columns)
         kinds += ["joint"] * len(self._set.joints)
         about = {
-            "name": name,
+            "name": path.name,
             "trains": output is not None,
             "grasps": self._quick.grasps,
             "sensors": [
@@ -123,7 +124,7 @@ class ChoosePage(Closing):
                 continue
             try:
                 self._measure(asked)
-            except ThenarError as reason:
+            except (ThenarError, OSError, BrokenExecutor) as reason:
                 self.server.publish("work", message("work", done=0, total=0, why=str(reason)))
 
     def close(self) -> None:
@@ -178,7 +179,7 @@ class ChoosePage(Closing):
         if not names:
             return ""
         folder, have = quote(str(self._output or "build")), quote(",".join(names))
-        return f"thenar compile {quote(self._name)} -o {folder} --sensors {len(names)} --have {have}"
+        return f"thenar compile {quote(str(self._path))} -o {folder} --sensors {len(names)} --have {have}"
 
     def _scan_us(self, names: Sequence[str]) -> float:
         """Return the time on the wire of a scan of the switches and pads in `names`, on the chips that are proposed."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
@@ -45,7 +46,7 @@ def studio(people: GraspSet, hand: HandShape) -> Iterator[Callable[..., ChoosePa
 
         def start(**changes: Any) -> ChoosePage:
             known = {"hand": hand.fitted(people.element_names), "jobs": 1, "token": None} | changes
-            page = stack.enter_context(ChoosePage(people, "set.grasps", "127.0.0.1:0", **known))
+            page = stack.enter_context(ChoosePage(people, Path("recorded/set.grasps"), "127.0.0.1:0", **known))
             stop = Event()
             working = Thread(target=page.run, args=(stop,))
             working.start()

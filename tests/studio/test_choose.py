@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -38,6 +39,19 @@ def answers(page: ChoosePage, *asked: dict[str, Any]) -> list[dict[str, Any]]:
         return found
 
 
+def until(
+    page: ChoosePage, asked: dict[str, Any], topic: str, enough: Callable[[dict[str, Any]], bool]
+) -> dict[str, Any]:
+    """Return the first message of a topic after what is asked for that is enough."""
+    parts = urlsplit(page.server.url)
+    with connect(f"ws://{parts.netloc}/live", origin=Origin(f"http://{parts.netloc}"), proxy=None) as live:
+        live.send(json.dumps(asked))
+        while True:
+            told = json.loads(live.recv(timeout=PATIENCE_S))
+            if told["topic"] == topic and enough(told):
+                return dict(told)
+
+
 def counts(browser: Browser, number: int) -> None:
     """Wait until so many sensors are chosen, and the page has its answer."""
     browser.wait(lambda: browser.text("count") == f"{number} of 10")
@@ -61,7 +75,7 @@ def test_sensors_are_chosen_on_the_hand_and_in_the_list(browser: Browser, studio
     assert first.get_attribute("aria-pressed") == "true"
     boxes = browser.driver.find_elements(By.CSS_SELECTOR, "#list input")
     assert [box.is_selected() for box in boxes].count(True) == 1
-    assert browser.text("command") == f"thenar compile set.grasps -o build --sensors 1 --have {name}"
+    assert browser.text("command") == f"thenar compile recorded/set.grasps -o build --sensors 1 --have {name}"
     assert browser.text("price") == "2.50"
     assert browser.text("scan").endswith("µs on the wire")
     boxes[-1].send_keys(Keys.SPACE)
@@ -130,6 +144,20 @@ def test_train_writes_the_build_of_the_chosen_sensors(browser: Browser, studio: 
     assert {*(kept.name for kept in manifest.switches), *(joint.name for joint in manifest.joints)} == have
     assert any("accuracy, new subject: " in fact for fact in browser.texts("#facts li"))
     assert (tmp_path / "build" / "report.html").exists()
+
+
+@pytest.mark.parametrize("fault", [BrokenExecutor("a worker ended"), OSError("the disk is full")])
+def test_work_that_the_machine_fails_is_told_and_ends_nothing(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch, fault: Exception
+) -> None:
+    def failing(*_arguments: object, **_options: object) -> None:
+        raise fault
+
+    page = studio()
+    with monkeypatch.context() as patched:
+        patched.setattr("thenar.studio.choose.study_sensors", failing)
+        assert until(page, {"do": "curve"}, "work", lambda work: "why" in work)["why"] == str(fault)
+    assert until(page, {"do": "measure", "sensors": [0]}, "measure", bool)["sensors"] == [0]
 
 
 def test_a_number_of_the_matrix_shows_its_trials(browser: Browser, studio: Studio) -> None:
