@@ -11,6 +11,7 @@ from thenar.runtime.recipe import PAPERS_TRAINER
 
 from ..evaluation.rates import Rate, interval
 from ..facts import SensorCount
+from ..placement.sensors import SENSORS
 from ..text import cells, counted, duration, listed, percent
 from .points import Frontier, FrontierPoint, PointSetting, PointTime, ReferencePoint, front
 
@@ -49,7 +50,7 @@ def rough_of(frontier: Frontier) -> str:
 
 def counted_of(frontier: Frontier) -> str:
     """Return the name of what the size of a point counts: sensors if these were chosen, else its elements."""
-    return "sensors" if any(point.by_sensors for point in frontier.points) else elements_of(frontier)
+    return "sensors" if any(one.placement.method == SENSORS for one in frontier.tried) else elements_of(frontier)
 
 
 def counted_elements(frontier: Frontier, count: int) -> str:
