@@ -158,10 +158,10 @@ class ChoosePage(Closing):
         return None
 
     def _names(self, sensors: Sequence[int]) -> tuple[str, ...]:
-        """Return the names of sensors. Raises ThenarError if there is no such number."""
+        """Return the names of sensors, each once. Raises ThenarError if there is no such number."""
         if not all(0 <= sensor < len(self._quick.names) for sensor in sensors):
             raise ThenarError(f"there are {len(self._quick.names)} sensors, numbered from 0")
-        return tuple(self._quick.names[sensor] for sensor in sensors)
+        return tuple(dict.fromkeys(self._quick.names[sensor] for sensor in sensors))
 
     def _answer(self, sensors: Sequence[int]) -> bytes:
         names = self._names(sensors)

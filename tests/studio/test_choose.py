@@ -234,6 +234,12 @@ def test_what_a_page_may_not_ask_for_is_refused_and_ends_nothing(
     assert then["topic"] == "quick"
 
 
+def test_a_sensor_that_is_named_twice_counts_once(studio: Studio, people: GraspSet) -> None:
+    page = studio(prices=dict.fromkeys((*people.element_names, *people.joint_names), 2.5))
+    *_, twice, once = answers(page, {"do": "choose", "sensors": [3, 9, 3]}, {"do": "choose", "sensors": [3, 9]})
+    assert twice == once | {"sensors": [3, 9, 3]}
+
+
 def test_without_positions_the_sensors_are_drawn_in_a_grid(studio: Studio, people: GraspSet) -> None:
     _, hand = answers(studio(hand=None))
     assert not hand["placed"]
