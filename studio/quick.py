@@ -229,7 +229,7 @@ class QuickAccuracy:
     def _predicted(self, fold: _Sums, columns: list[int], rows: NDArray[np.intp]) -> NDArray[np.intp]:
         means, weights = fold.means[:, columns], self._weights(fold, columns)
         offsets = fold.shares - 0.5 * (means * weights.T).sum(axis=1)
-        scores = self._inputs[np.ix_(rows, columns)] @ weights + offsets
+        scores = self._inputs[rows[:, np.newaxis], columns] @ weights + offsets
         best: NDArray[np.intp] = scores.argmax(axis=1)
         return best
 
