@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -129,6 +130,26 @@ def test_a_double_click_adds_a_sensor_once(browser: Browser, studio: Studio) -> 
     counts(browser, 1)
     browser.click("drop")
     counts(browser, 0)
+
+
+def test_a_choice_outlives_its_server_but_not_its_set(browser: Browser, studio: Studio, people: GraspSet) -> None:
+    first = studio()
+    address = urlsplit(first.server.url).netloc
+    browser.open(first.server.url)
+    counts(browser, 0)
+    browser.click("add")
+    counts(browser, 1)
+    first.close()
+    browser.wait(lambda: "lost" in browser.text("link"))
+    again = studio(address=address)
+    browser.wait(lambda: "connected" in browser.text("link"))
+    browser.click("add")
+    counts(browser, 2)
+    again.close()
+    browser.wait(lambda: "lost" in browser.text("link"))
+    studio(replace(people, switches=people.switches[:, 1:], switch_names=people.switch_names[1:]), address)
+    browser.wait(lambda: browser.text("count") == "0 of 9")
+    browser.log()  # connections that were refused meanwhile
 
 
 def test_train_writes_the_build_of_the_chosen_sensors(browser: Browser, studio: Studio, tmp_path: Path) -> None:
