@@ -1,6 +1,8 @@
 """`thenar studio`: choose sensors on a page in the browser."""
 
+from contextlib import suppress
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import click
@@ -33,7 +35,7 @@ def command(
     each click. Measure runs nested folds; the curve shows what each sensor is worth; Train writes a build. A click on
     a number of the matrix of errors shows its trials.
 
-    SIGINT, SIGTERM and SIGHUP end it, with exit code 0.
+    SIGINT, SIGTERM and SIGHUP end it at once, what is measured or trained included, with exit code 0.
 
     \b
     Example:
@@ -43,11 +45,9 @@ def command(
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.studio import ChoosePage
 
-    from . import ended_by_signals
-
     grasp_set = GraspSet.load(grasps)
     hand, priced = hand_of(layout).fitted(grasp_set.element_names), prices_of(grasp_set, prices)
     choices: dict[str, Any] = {"hand": hand, "prices": priced, "output": output, "jobs": jobs}
-    with ended_by_signals() as stop, ChoosePage(grasp_set, grasps.name, web, token=web_token, **choices) as page:
+    with suppress(KeyboardInterrupt), ChoosePage(grasp_set, grasps, web, token=web_token, **choices) as page:
         say(f"thenar: the page is at {page.server.url}")
-        page.run(stop)
+        page.run(Event())

@@ -5,6 +5,7 @@ with nested folds or the curve of what sensors are worth, is queued, done one at
 """
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from shlex import quote
@@ -54,8 +55,8 @@ class ChoosePage(Closing):
     ----------
     grasp_set : GraspSet
         The recordings.
-    name : str
-        The name of their file.
+    path : Path
+        Their file, as commands are to name it.
     address, token
         As for `Server`.
     hand : HandShape, optional
@@ -83,7 +84,7 @@ class ChoosePage(Closing):
     def __init__(
         self,
         grasp_set: GraspSet,
-        name: str,
+        path: Path,
         address: str,
         *,
         token: str | None,
@@ -92,7 +93,7 @@ class ChoosePage(Closing):
         output: Path | None = None,
         jobs: int = -1,
     ) -> None:
-        self._name, self._set, self._prices, self._jobs = name, grasp_set, prices or {}, jobs
+        self._path, self._set, self._prices, self._jobs = path, grasp_set, prices or {}, jobs
         self._hand, self._output = hand, None if output is None else check_target(output)
         self._quick = QuickAccuracy(self._set)
         self._levels = self._levels_of()
@@ -101,7 +102,7 @@ class ChoosePage(Closing):
         kinds = ["switch"] * len(self._set.switch_names) + ["pad"] * len(self._set.taxel_columns)
         kinds += ["joint"] * len(self._set.joints)
         about = {
-            "name": name,
+            "name": path.name,
             "trains": output is not None,
             "grasps": self._quick.grasps,
             "sensors": [
@@ -123,7 +124,7 @@ class ChoosePage(Closing):
                 continue
             try:
                 self._measure(asked)
-            except ThenarError as reason:
+            except (ThenarError, OSError, BrokenExecutor) as reason:
                 self.server.publish("work", message("work", done=0, total=0, why=str(reason)))
 
     def close(self) -> None:
@@ -141,7 +142,7 @@ class ChoosePage(Closing):
         if asked.do in ("add", "drop"):
             self._names(asked.sensors)
             find = self._quick.best_next if asked.do == "add" else self._quick.least
-            return message(asked.do, sensor=find(asked.sensors))
+            return message(asked.do, sensor=find(asked.sensors), sensors=asked.sensors)
         if asked.do == "trial":
             return message("trial", self._quick.trial(asked.trial, asked.sensors), trial=asked.trial)
         if asked.do not in ("measure", "curve", "train"):
@@ -157,10 +158,10 @@ class ChoosePage(Closing):
         return None
 
     def _names(self, sensors: Sequence[int]) -> tuple[str, ...]:
-        """Return the names of sensors. Raises ThenarError if there is no such number."""
+        """Return the names of sensors, each once. Raises ThenarError if there is no such number."""
         if not all(0 <= sensor < len(self._quick.names) for sensor in sensors):
             raise ThenarError(f"there are {len(self._quick.names)} sensors, numbered from 0")
-        return tuple(self._quick.names[sensor] for sensor in sensors)
+        return tuple(dict.fromkeys(self._quick.names[sensor] for sensor in sensors))
 
     def _reply(self, sensors: Sequence[int]) -> bytes:
         names = self._names(sensors)
@@ -178,7 +179,7 @@ class ChoosePage(Closing):
         if not names:
             return ""
         folder, have = quote(str(self._output or "build")), quote(",".join(names))
-        return f"thenar compile {quote(self._name)} -o {folder} --sensors {len(names)} --have {have}"
+        return f"thenar compile {quote(str(self._path))} -o {folder} --sensors {len(names)} --have {have}"
 
     def _scan_us(self, names: Sequence[str]) -> float:
         """Return the time on the wire of a scan of the switches and pads in `names`, on the chips that are proposed."""

@@ -11,10 +11,10 @@ from thenar.runtime.recipe import PAPERS_TRAINER
 
 from ..evaluation.rates import Rate, interval
 from ..facts import SensorCount
+from ..placement.sensors import SENSORS
 from ..text import cells, counted, duration, listed, percent
 from .points import Frontier, FrontierPoint, PointSetting, PointTime, ReferencePoint, front
 
-_ROUGH = 8
 _LONGEST = 40  # letters of a name on a picture
 _SPARED = 0.005  # rates within half a point count as equal
 
@@ -43,13 +43,13 @@ def elements_of(frontier: Frontier) -> str:
 def rough_of(frontier: Frontier) -> str:
     """Return the front of what was tried, by accuracy against frame time, in a few words each: at most eight."""
     best = front(frontier.tried, lambda one: one.frame_us, lambda one: one.rate.mean)
-    shown = [best[round(place)] for place in np.linspace(0, len(best) - 1, min(len(best), _ROUGH))]
+    shown = [best[round(place)] for place in np.linspace(0, len(best) - 1, min(len(best), 8))]
     return ", ".join(f"{percent(one.rate.mean)} in {duration(one.frame_us)}" for one in shown)
 
 
 def counted_of(frontier: Frontier) -> str:
     """Return the name of what the size of a point counts: sensors if these were chosen, else its elements."""
-    return "sensors" if any(point.by_sensors for point in frontier.points) else elements_of(frontier)
+    return "sensors" if any(one.placement.method == SENSORS for one in frontier.tried) else elements_of(frontier)
 
 
 def counted_elements(frontier: Frontier, count: int) -> str:

@@ -20,9 +20,13 @@ const send = connect({
   open: () => link(true),
   closed: () => link(false),
   set: (message) => {
+    // Another server took the place of ours: its numbers are other sensors.
+    if (set && JSON.stringify(set) !== JSON.stringify(message)) {
+      chosen = [];
+      measured.clear();
+    }
     set = message;
     say($("name"), `${set.name}: choose sensors`);
-    chosen = chosen.filter((sensor) => sensor < set.sensors.length);
     $("train").hidden = !set.trains;
     listSensors();
     choose(chosen);
@@ -34,10 +38,14 @@ const send = connect({
     mark();
   },
   quick: (reply) => {
-    if (String(reply.sensors) === String(chosen)) show(reply);
+    if (isChosen(reply.sensors)) show(reply);
   },
-  add: ({ sensor }) => sensor === null || choose([...chosen, sensor]),
-  drop: ({ sensor }) => sensor === null || choose(chosen.filter((one) => one !== sensor)),
+  add: ({ sensor, sensors }) => {
+    if (sensor !== null && isChosen(sensors)) choose([...chosen, sensor]);
+  },
+  drop: ({ sensor, sensors }) => {
+    if (sensor !== null && isChosen(sensors)) choose(chosen.filter((one) => one !== sensor));
+  },
   measure: ({ sensors, points, of, recipe }) => {
     measured.set(key(sensors), { ...points[0], of, recipe });
     certify();
@@ -56,6 +64,8 @@ const send = connect({
   refused: ({ why }) => say($("refused"), why),
 });
 
+// An answer to an earlier choice comes too late.
+const isChosen = (sensors) => String(sensors) === String(chosen);
 const key = (sensors) => [...sensors].sort((a, b) => a - b).join(",");
 
 function link(open) {

@@ -185,10 +185,21 @@ def test_the_studio_answers_until_a_signal_ends_it(start: Callable[..., Command]
         ask(live, do="choose", sensors=[0, 7])
         answer = told(live, "quick")
         assert (answer["sensors"], answer["of"]) == ([0, 7], "within subject")
-        assert answer["command"] == "thenar compile set.grasps -o build --sensors 2 --have s0,j1"
+        assert answer["command"] == f"thenar compile {set_file} -o build --sensors 2 --have s0,j1"
         ask(live, do="train", sensors=[0])
         assert "no folder is known for a build: start thenar studio with -o" in told(live, "refused")["why"]
     assert studio.end() == 0
+
+
+def test_a_signal_ends_the_studio_while_it_trains(
+    start: Callable[..., Command], set_file: Path, tmp_path: Path
+) -> None:
+    studio = start("studio", set_file, "-o", tmp_path / "build", "--jobs", "1", "--web", "127.0.0.1:0")
+    with studio.page() as live:
+        ask(live, do="train", sensors=[0, 1, 7])
+        assert told(live, "work")["what"] == "train"
+        assert studio.end() == 0
+    assert not (tmp_path / "build").exists()
 
 
 def test_what_is_no_recording_is_refused(build_folder: Path, recording: Path, tmp_path: Path) -> None:

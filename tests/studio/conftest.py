@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
@@ -40,12 +41,12 @@ def people(hand: HandShape) -> GraspSet:
 
 @pytest.fixture
 def studio(people: GraspSet, hand: HandShape) -> Iterator[Callable[..., ChoosePage]]:
-    """Return what serves the page; changes are arguments of ChoosePage."""
+    """Return what serves the page of a set; changes are arguments of ChoosePage."""
     with ExitStack() as stack:
 
-        def start(**changes: Any) -> ChoosePage:
-            known = {"hand": hand.fitted(people.element_names), "jobs": 1, "token": None} | changes
-            page = stack.enter_context(ChoosePage(people, "set.grasps", "127.0.0.1:0", **known))
+        def start(grasp_set: GraspSet = people, address: str = "127.0.0.1:0", **changes: Any) -> ChoosePage:
+            known = {"hand": hand.fitted(grasp_set.element_names), "jobs": 1, "token": None} | changes
+            page = stack.enter_context(ChoosePage(grasp_set, Path("recorded/set.grasps"), address, **known))
             stop = Event()
             working = Thread(target=page.run, args=(stop,))
             working.start()

@@ -2,6 +2,8 @@
 
 import json
 from collections.abc import Callable
+from concurrent.futures import BrokenExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -38,6 +40,19 @@ def answers(page: ChoosePage, *asked: dict[str, Any]) -> list[dict[str, Any]]:
         return found
 
 
+def until(
+    page: ChoosePage, asked: dict[str, Any], topic: str, enough: Callable[[dict[str, Any]], bool]
+) -> dict[str, Any]:
+    """Return the first message of a topic after what is asked for that is enough."""
+    parts = urlsplit(page.server.url)
+    with connect(f"ws://{parts.netloc}/live", origin=Origin(f"http://{parts.netloc}"), proxy=None) as live:
+        live.send(json.dumps(asked))
+        while True:
+            told = json.loads(live.recv(timeout=PATIENCE_S))
+            if told["topic"] == topic and enough(told):
+                return dict(told)
+
+
 def counts(browser: Browser, number: int) -> None:
     """Wait until so many sensors are chosen, and the page has its answer."""
     browser.wait(lambda: browser.text("count") == f"{number} of 10")
@@ -61,7 +76,7 @@ def test_sensors_are_chosen_on_the_hand_and_in_the_list(browser: Browser, studio
     assert first.get_attribute("aria-pressed") == "true"
     boxes = browser.driver.find_elements(By.CSS_SELECTOR, "#list input")
     assert [box.is_selected() for box in boxes].count(True) == 1
-    assert browser.text("command") == f"thenar compile set.grasps -o build --sensors 1 --have {name}"
+    assert browser.text("command") == f"thenar compile recorded/set.grasps -o build --sensors 1 --have {name}"
     assert browser.text("price") == "2.50"
     assert browser.text("scan").endswith("µs on the wire")
     boxes[-1].send_keys(Keys.SPACE)
@@ -104,6 +119,39 @@ def test_the_best_is_added_measured_and_compared_with_the_curve(
     assert set(browser.text("command").rpartition(" ")[2].split(",")) == {*curve.points[4].sensors}
 
 
+def test_a_double_click_adds_a_sensor_once(browser: Browser, studio: Studio) -> None:
+    """Both clicks are on their way before the first is answered."""
+    browser.open(studio().server.url)
+    counts(browser, 0)
+    browser.script("const add = document.getElementById('add'); add.click(); add.click(); add.click();")
+    # What is asked for later is answered later.
+    browser.script("document.querySelector('#map g').dispatchEvent(new MouseEvent('click'))")
+    browser.wait(lambda: browser.text("trial-heading"))
+    counts(browser, 1)
+    browser.click("drop")
+    counts(browser, 0)
+
+
+def test_a_choice_outlives_its_server_but_not_its_set(browser: Browser, studio: Studio, people: GraspSet) -> None:
+    first = studio()
+    address = urlsplit(first.server.url).netloc
+    browser.open(first.server.url)
+    counts(browser, 0)
+    browser.click("add")
+    counts(browser, 1)
+    first.close()
+    browser.wait(lambda: "lost" in browser.text("link"))
+    again = studio(address=address)
+    browser.wait(lambda: "connected" in browser.text("link"))
+    browser.click("add")
+    counts(browser, 2)
+    again.close()
+    browser.wait(lambda: "lost" in browser.text("link"))
+    studio(replace(people, switches=people.switches[:, 1:], switch_names=people.switch_names[1:]), address)
+    browser.wait(lambda: browser.text("count") == "0 of 9")
+    browser.log()  # connections that were refused meanwhile
+
+
 def test_train_writes_the_build_of_the_chosen_sensors(browser: Browser, studio: Studio, tmp_path: Path) -> None:
     browser.open(studio(output=tmp_path / "build").server.url)
     counts(browser, 0)
@@ -117,6 +165,20 @@ def test_train_writes_the_build_of_the_chosen_sensors(browser: Browser, studio: 
     assert {*(kept.name for kept in manifest.switches), *(joint.name for joint in manifest.joints)} == have
     assert any("accuracy, new subject: " in fact for fact in browser.texts("#facts li"))
     assert (tmp_path / "build" / "report.html").exists()
+
+
+@pytest.mark.parametrize("fault", [BrokenExecutor("a worker ended"), OSError("the disk is full")])
+def test_work_that_the_machine_fails_is_told_and_ends_nothing(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch, fault: Exception
+) -> None:
+    def failing(*_arguments: object, **_options: object) -> None:
+        raise fault
+
+    page = studio()
+    with monkeypatch.context() as patched:
+        patched.setattr("thenar.studio.choose.study_sensors", failing)
+        assert until(page, {"do": "curve"}, "work", lambda work: "why" in work)["why"] == str(fault)
+    assert until(page, {"do": "measure", "sensors": [0]}, "measure", bool)["sensors"] == [0]
 
 
 def test_a_number_of_the_matrix_shows_its_trials(browser: Browser, studio: Studio) -> None:
@@ -191,6 +253,12 @@ def test_what_a_page_may_not_ask_for_is_refused_and_ends_nothing(
     assert refused["topic"] == "refused"
     assert said in refused["why"]
     assert then["topic"] == "quick"
+
+
+def test_a_sensor_that_is_named_twice_counts_once(studio: Studio, people: GraspSet) -> None:
+    page = studio(prices=dict.fromkeys((*people.element_names, *people.joint_names), 2.5))
+    *_, twice, once = answers(page, {"do": "choose", "sensors": [3, 9, 3]}, {"do": "choose", "sensors": [3, 9]})
+    assert twice == once | {"sensors": [3, 9, 3]}
 
 
 def test_without_positions_the_sensors_are_drawn_in_a_grid(studio: Studio, people: GraspSet) -> None:

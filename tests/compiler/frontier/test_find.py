@@ -24,6 +24,7 @@ from thenar.compiler.frontier.points import Frontier, FrontierError, FrontierPoi
 from thenar.compiler.frontier.price import fit_here
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
+from thenar.compiler.frontier.words import counted_of
 from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.elements import Element
@@ -101,6 +102,13 @@ def test_a_rough_frontier_comes_before_what_is_refined(tmp_path: Path, first: tu
     assert early.tried == found.tried[: len(early.tried)]
     assert "frontier.svg" in names
     assert "frontier.json" not in names
+
+
+def test_a_rough_frontier_of_sensors_counts_sensors(tmp_path: Path, first: tuple[Request, Frontier]) -> None:
+    early = list[Frontier]()
+    request = first[0] | {"output": tmp_path / "out", "search": replace_rows(first[0]["search"], sensors=2)}
+    found = find_frontier(**request, rough=early.append)
+    assert [counted_of(one) for one in (*early, found)] == ["sensors", "sensors"]
 
 
 def test_rows_in_which_nothing_is_held_change_no_rate(tmp_path: Path, first: tuple[Request, Frontier]) -> None:
