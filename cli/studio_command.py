@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .options import hand_of, layout_option, prices_of, prices_option
+from .options import hand_of, layout_option, parts_of, prices_option
 from .parameters import WEB_ADDRESS, OutputFolder, existing_file, jobs_option, web_token_option
 from .printing import say
 
@@ -46,8 +46,14 @@ def command(
     from thenar.studio import ChoosePage
 
     grasp_set = GraspSet.load(grasps)
-    hand, priced = hand_of(layout).fitted(grasp_set.element_names), prices_of(grasp_set, prices)
-    choices: dict[str, Any] = {"hand": hand, "prices": priced, "output": output, "jobs": jobs}
+    files = {"--layout": layout, "--prices": prices}
+    choices: dict[str, Any] = {
+        "hand": hand_of(layout).fitted(grasp_set.element_names),
+        "parts": parts_of(grasp_set, prices),
+        "options": [word for option, path in files.items() if path is not None for word in (option, str(path))],
+        "output": output,
+        "jobs": jobs,
+    }
     with suppress(KeyboardInterrupt), ChoosePage(grasp_set, grasps, web, token=web_token, **choices) as page:
         say(f"thenar: the page is at {page.server.url}")
         page.run(Event())

@@ -17,6 +17,7 @@ import msgspec
 from thenar.compiler.artifact.compile import check_target, compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
+from thenar.compiler.glove.prices import Part
 from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.hand import HandShape, grid_places, places_of, shape_of
 from thenar.compiler.placement.constraints import Limits
@@ -61,8 +62,10 @@ class ChoosePage(Closing):
         As for `Server`.
     hand : HandShape, optional
         The glove laid flat, with the positions of all switches and pads. Without, they are drawn in a grid.
-    prices : mapping of str to float, optional
-        The price of every sensor, by name.
+    parts : mapping of str to Part, optional
+        The part of a price list for every sensor, by name.
+    options : sequence of str
+        Options of `thenar compile` that name the files of hand and parts, for the command that the page shows.
     output : Path, optional
         The folder of the builds that the page trains; without one it trains none.
     jobs : int
@@ -89,11 +92,14 @@ class ChoosePage(Closing):
         *,
         token: str | None,
         hand: HandShape | None = None,
-        prices: Mapping[str, float] | None = None,
+        parts: Mapping[str, Part] | None = None,
+        options: Sequence[str] = (),
         output: Path | None = None,
         jobs: int = -1,
     ) -> None:
-        self._path, self._set, self._prices, self._jobs = path, grasp_set, prices or {}, jobs
+        self._path, self._set, self._jobs = path, grasp_set, jobs
+        self._parts, self._options = parts or {}, options
+        self._prices = {name: part.price for name, part in self._parts.items()}
         self._hand, self._output = hand, None if output is None else check_target(output)
         self._quick = QuickAccuracy(self._set)
         self._levels = self._levels_of()
@@ -179,7 +185,8 @@ class ChoosePage(Closing):
         if not names:
             return ""
         folder, have = quote(str(self._output or "build")), quote(",".join(names))
-        return f"thenar compile {quote(str(self._path))} -o {folder} --sensors {len(names)} --have {have}"
+        more = "".join(f" {quote(option)}" for option in self._options)
+        return f"thenar compile {quote(str(self._path))} -o {folder}{more} --sensors {len(names)} --have {have}"
 
     def _scan_us(self, names: Sequence[str]) -> float:
         """Return the time on the wire of a scan of the switches and pads in `names`, on the chips that are proposed."""
@@ -206,7 +213,7 @@ class ChoosePage(Closing):
         many: dict[str, Any] = {"jobs": self._jobs}
         if asked.do == "train":
             assert self._output is not None
-            documents = Documents(self._hand)
+            documents = Documents(self._hand, parts=self._parts)
             built = compile_build(self._set, self._output, recipe, documents=documents, progress=report, **many)
             content: dict[str, Any] = {"folder": str(self._output), "facts": [str(fact) for fact in built.facts]}
         else:

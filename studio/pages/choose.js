@@ -64,7 +64,7 @@ const send = connect({
   refused: ({ why }) => say($("refused"), why),
 });
 
-// An answer to an earlier choice comes too late.
+// A reply to an earlier choice comes too late.
 const isChosen = (sensors) => String(sensors) === String(chosen);
 const key = (sensors) => [...sensors].sort((a, b) => a - b).join(",");
 

@@ -15,6 +15,7 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from thenar.compiler.artifact.sensor_study import study_sensors
+from thenar.compiler.glove.prices import Part
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime import Build
@@ -53,6 +54,11 @@ def until(
                 return dict(told)
 
 
+def priced(people: GraspSet) -> dict[str, Part]:
+    part = Part("plain", 2.5, ("*",))
+    return dict.fromkeys((*people.element_names, *people.joint_names), part)
+
+
 def counts(browser: Browser, number: int) -> None:
     """Wait until so many sensors are chosen, and the page has its answer."""
     browser.wait(lambda: browser.text("count") == f"{number} of 10")
@@ -65,7 +71,7 @@ def heads(browser: Browser, mark: str) -> None:
 
 def test_sensors_are_chosen_on_the_hand_and_in_the_list(browser: Browser, studio: Studio, people: GraspSet) -> None:
     """By mouse and by keyboard; accuracy, count, command, list and hand follow each time."""
-    page = studio(prices=dict.fromkeys((*people.element_names, *people.joint_names), 2.5))
+    page = studio(parts=priced(people), options=("--prices", "my prices.toml"))
     browser.open(page.server.url)
     counts(browser, 0)
     none = browser.text("rate")
@@ -76,7 +82,9 @@ def test_sensors_are_chosen_on_the_hand_and_in_the_list(browser: Browser, studio
     assert first.get_attribute("aria-pressed") == "true"
     boxes = browser.driver.find_elements(By.CSS_SELECTOR, "#list input")
     assert [box.is_selected() for box in boxes].count(True) == 1
-    assert browser.text("command") == f"thenar compile recorded/set.grasps -o build --sensors 1 --have {name}"
+    assert browser.text("command") == (
+        f"thenar compile recorded/set.grasps -o build --prices 'my prices.toml' --sensors 1 --have {name}"
+    )
     assert browser.text("price") == "2.50"
     assert browser.text("scan").endswith("µs on the wire")
     boxes[-1].send_keys(Keys.SPACE)
@@ -152,12 +160,15 @@ def test_a_choice_outlives_its_server_but_not_its_set(browser: Browser, studio: 
     browser.log()  # connections that were refused meanwhile
 
 
-def test_train_writes_the_build_of_the_chosen_sensors(browser: Browser, studio: Studio, tmp_path: Path) -> None:
-    browser.open(studio(output=tmp_path / "build").server.url)
+def test_train_writes_the_build_of_the_chosen_sensors(
+    browser: Browser, studio: Studio, people: GraspSet, tmp_path: Path
+) -> None:
+    browser.open(studio(output=tmp_path / "build", parts=priced(people)).server.url)
     counts(browser, 0)
-    for number in (1, 2):
-        browser.click("add")
-        counts(browser, number)
+    browser.driver.find_element(By.CSS_SELECTOR, "#hand [role=button]").send_keys(Keys.ENTER)
+    counts(browser, 1)
+    browser.click("add")
+    counts(browser, 2)
     have = set(browser.text("command").rpartition(" ")[2].split(","))
     browser.click("train")
     browser.wait(lambda: browser.texts("#facts li"))
@@ -165,6 +176,7 @@ def test_train_writes_the_build_of_the_chosen_sensors(browser: Browser, studio: 
     assert {*(kept.name for kept in manifest.switches), *(joint.name for joint in manifest.joints)} == have
     assert any("accuracy, new subject: " in fact for fact in browser.texts("#facts li"))
     assert (tmp_path / "build" / "report.html").exists()
+    assert "2,pcs,plain" in (tmp_path / "build" / "spec" / "bom.csv").read_text()
 
 
 @pytest.mark.parametrize("fault", [BrokenExecutor("a worker ended"), OSError("the disk is full")])
@@ -256,7 +268,7 @@ def test_what_a_page_may_not_ask_for_is_refused_and_ends_nothing(
 
 
 def test_a_sensor_that_is_named_twice_counts_once(studio: Studio, people: GraspSet) -> None:
-    page = studio(prices=dict.fromkeys((*people.element_names, *people.joint_names), 2.5))
+    page = studio(parts=priced(people), options=("--prices", "my prices.toml"))
     *_, twice, once = answers(page, {"do": "choose", "sensors": [3, 9, 3]}, {"do": "choose", "sensors": [3, 9]})
     assert twice == once | {"sensors": [3, 9, 3]}
 
