@@ -52,10 +52,10 @@ endif
 	@echo "what each sensor is worth: $(OUT)/sensors.svg; what accuracy costs in time: $(OUT)/frontier/frontier.svg; the build on one page: $(OUT)/build/report.html; its glove: $(OUT)/build/spec;"
 	@echo "the rates: $(OUT)/evaluation.json."
 
-test: $(VENV)/installed  ## the tests, some six minutes on two idle cores
+test: $(VENV)/installed  ## the tests, some eight minutes on two idle cores
 	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS)
 
-test-slow: $(VENV)/installed pythons  ## the slower checks, some 15 minutes: real Weka, fuzzing, recordings at full length
+test-slow: $(VENV)/installed pythons  ## the slower checks, some 18 minutes: real Weka, fuzzing, recordings at full length
 	$(BIN)/python -m pytest -m slow -n $(CORES) --dist loadfile --no-loadscope-reorder
 
 test-all: test test-slow  ## both
