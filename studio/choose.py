@@ -111,6 +111,7 @@ class ChoosePage(Closing):
             "name": path.name,
             "trains": output is not None,
             "grasps": self._quick.grasps,
+            "trials": self._quick.trials,
             "sensors": [
                 {"name": name, "kind": kind, "price": self._prices.get(name)}
                 for name, kind in zip(self._quick.names, kinds, strict=True)

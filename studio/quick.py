@@ -31,10 +31,9 @@ _MOST_TRIED = 4000
 
 
 class Misread(msgspec.Struct, frozen=True):
-    """A trial that was recognised as another type: its number among those with a grasp, its person, the two types."""
+    """A trial that was recognised as another type: its number in `trials`, and the two types."""
 
     trial: int
-    subject: str
     truth: str
     read: str
 
@@ -91,6 +90,8 @@ class QuickAccuracy:
         The names of the sensors, by number: switches, pads, joints.
     grasps : tuple of str
         The grasp types.
+    trials : tuple of str
+        The trials in which something is held, in words: "trial 7 of Ana, cup", as the recordings number them.
 
     Raises
     ------
@@ -102,12 +103,15 @@ class QuickAccuracy:
         held, recipe = grasp_set.without_none(), Recipe()
         self._samples: Samples = samples_of(held, recipe)
         self._cut: Cut = cuts_of(held, recipe)[0]
-        self._set = held
         self.names = sensor_names(self._samples, held.element_names, held.joint_names)
         self.grasps = self._samples.grasps
         rows = self._samples
         self._inputs = np.concatenate([rows.switches.T, lines(rows.taxels), lines(rows.codes)]).T
         self._folds = [self._summed(fold.train, fold.test) for fold in self._cut.folds]
+        self.trials = tuple(
+            f"trial {held.trials[row]} of {held.subjects[row]}, {held.objects[row]}"
+            for row in np.unique(rows.trials, return_index=True)[1].tolist()
+        )
         every = np.arange(len(rows.labels))
         self._every = self._summed(every, every)
 
@@ -127,10 +131,7 @@ class QuickAccuracy:
             low=rate.low,
             high=rate.high,
             confusion=tuple(map(tuple, confusion.tolist())),
-            misread=tuple(
-                Misread(one, str(self._set.subjects[first[one]]), self.grasps[truth[one]], self.grasps[read[one]])
-                for one in wrong
-            ),
+            misread=tuple(Misread(one, self.grasps[truth[one]], self.grasps[read[one]]) for one in wrong),
             map=tuple(
                 (int(kind), x, y) for kind, (x, y) in zip(truth, self._places(columns, trial).tolist(), strict=True)
             ),

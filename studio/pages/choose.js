@@ -213,7 +213,7 @@ function drawMap({ map, misread }) {
     const group = document.createElementNS(SVG, "g"), title = document.createElementNS(SVG, "title");
     const error = wrong.get(trial), name = set.grasps[kind];
     group.setAttribute("transform", `translate(${across(x).toFixed(1)} ${down(y).toFixed(1)})`);
-    title.textContent = `trial ${trial + 1}: ${name}${error ? `, read as ${error.read}` : ""}`;
+    title.textContent = `${set.trials[trial]}: ${name}${error ? `, read as ${error.read}` : ""}`;
     group.append(title);
     glyph(group, kind);
     if (error) {
@@ -244,11 +244,11 @@ function column(name) {
 }
 
 function listTrials(trials) {
-  const items = trials.map(({ trial, subject }) => {
+  const items = trials.map(({ trial }) => {
     const button = document.createElement("button");
     button.type = "button";
     button.className = "plain";
-    button.textContent = `trial ${trial + 1} of ${subject}`;
+    button.textContent = set.trials[trial];
     button.addEventListener("click", () => ask("trial", { trial, sensors: chosen }));
     return button;
   });
@@ -262,11 +262,11 @@ function listTrials(trials) {
 /** Show what the sensors saw in a trial, next to what they typically see in its true and in its recognised type. */
 function showTrial({ trial, shown: values, truth, read, typical, decisive }) {
   const [name, other] = [set.grasps[truth], set.grasps[read]];
-  say($("trial-heading"), `Trial ${trial + 1}: ${name}${read === truth ? "" : `, read as ${other}`}`);
+  say($("trial-heading"), `${set.trials[trial]}: ${name}${read === truth ? "" : `, read as ${other}`}`);
   const names = decisive.map((sensor) => set.sensors[sensor].name);
   say($("decisive"), names.length ? `decided by ${names.join(", ")}` : "");
   $("trial").hidden = false;
-  const parts = [seen(`trial ${trial + 1}`, values), seen(`${name}, typically`, typical[0])];
+  const parts = [seen(set.trials[trial], values), seen(`${name}, typically`, typical[0])];
   if (read !== truth) parts.push(seen(`${other}, typically`, typical[1]));
   // Before it is on the page, a drawing has no width.
   $("hands").replaceChildren(...parts.map(({ figure }) => figure));

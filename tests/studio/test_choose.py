@@ -66,7 +66,7 @@ def counts(browser: Browser, number: int) -> None:
 
 def heads(browser: Browser, mark: str) -> None:
     """Wait until the trial of a mark on the map is shown."""
-    browser.wait(lambda: browser.text("trial-heading").lower() == mark.lower())
+    browser.wait(lambda: browser.text("trial-heading") == mark)
 
 
 def test_sensors_are_chosen_on_the_hand_and_in_the_list(browser: Browser, studio: Studio, people: GraspSet) -> None:

@@ -1,5 +1,6 @@
 """The quick accuracy of sensors, compared with discriminants by scipy, row by row."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,7 @@ def test_misread_trials_are_those_of_the_matrix(people: GraspSet, quick: QuickAc
     found = quick.of([0, 1])
     assert found.misread
     for one in found.misread:
-        assert (one.subject, one.truth) == (people.subjects[one.trial], people.grasps[one.trial])
+        assert one.truth == people.grasps[one.trial]
         assert one.read != one.truth
         counted = sum((other.truth, other.read) == (one.truth, one.read) for other in found.misread)
         assert found.confusion[quick.grasps.index(one.truth)][quick.grasps.index(one.read)] == counted
@@ -117,6 +118,15 @@ def test_on_the_map_types_are_as_far_apart_as_scikit_learn_finds_them(people: Gr
     for axis in range(2):
         assert abs(np.corrcoef(found[:, axis], expected[:, axis])[0, 1]) > 0.999
     assert [place[0] for place in quick.of(sensors).map] == samples.labels.tolist()
+
+
+def test_a_trial_has_the_number_of_the_recordings(people: GraspSet) -> None:
+    """Also after rows in which nothing is held."""
+    grasps = people.grasps.copy()
+    grasps[:12] = "none"
+    quick = QuickAccuracy(replace(people, grasps=grasps, trials=1000 + people.trials))
+    assert quick.trials[0] == "trial 1012 of A, thing"
+    assert len(quick.trials) == 60
 
 
 def test_no_sensor_reads_the_most_frequent_type(quick: QuickAccuracy) -> None:
