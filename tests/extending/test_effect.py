@@ -41,7 +41,7 @@ def test_a_foreign_effect_acts_where_it_is_listed(install: Callable[..., Any], s
 
 def simulated(package: Any, scene: Path) -> Path:
     written = scene.with_suffix(".grasps")
-    said = package.thenar("simulate", str(scene), "-o", str(written), "--jobs", "2")
+    said = package.thenar("simulate", str(scene), "-o", str(written), "--jobs", "2", "--json")
     assert ("joint.offset" in said) == (LISTED in scene.read_text())
     return written
 

@@ -38,7 +38,7 @@ def test_a_foreign_trainer_is_chosen_by_name_and_builds(installed: Any, recordin
     words = " ".join(installed.thenar("compile", "--help").split())
     assert "--trainer TRAINER What trains the model: logitboost (" in words
     assert "(naive Bayes: inputs are independent within a grasp type)" in words
-    assert "--joint-bins INTEGER RANGE Into how many bins naive Bayes cuts a joint. [default: 8; x>=2]" in words
+    assert "--joint-bins INTEGER RANGE Into how many bins naive Bayes cuts a joint. [default: 8] [x>=2]" in words
 
     given = ("--trainer", "naive-bayes", "--joint-bins", "5", "--folds", "3")
     installed.thenar("compile", str(recordings), "-o", str(build), *given)
@@ -68,7 +68,7 @@ def test_a_foreign_trainers_frontier_has_one_stage_and_builds(installed: Any, re
     words = " ".join(installed.thenar("frontier", "--help").split())
     of_trainer = words[words.index("--trainer TRAINER What trains the model: ") :].partition(" --")[0]
     assert "naive-bayes (" in of_trainer
-    assert "--joint-bins INTEGER RANGE Into how many bins naive Bayes cuts a joint. [default: 8; x>=2]" in words
+    assert "--joint-bins INTEGER RANGE Into how many bins naive Bayes cuts a joint. [default: 8] [x>=2]" in words
 
     folder, build = tmp_path / "frontier", tmp_path / "build"
     given = ("frontier", str(recordings), "-o", str(folder), "--trainer", "naive-bayes")
