@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from thenar.drivers.names import fault
+from thenar.runtime.files import write_atomically
 
 from .parameters import OutputFolder
 from .printing import echo, warning
@@ -60,7 +61,7 @@ def command(action: str, words: tuple[str, ...], root: Path, dry_run: bool) -> N
                 echo(f"# {path}\n{text}")
             elif words:
                 path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_text(text, encoding="utf-8")
+                write_atomically(path, text.encode())
             else:
                 path.unlink()
     except PermissionError as reason:

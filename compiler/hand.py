@@ -277,6 +277,11 @@ def _rounded(points: Floats) -> list[tuple[float, float]]:
     return [(x, y) for x, y in (np.round(points, 1) + 0.0).tolist()]
 
 
+def unknown_shape(view: str) -> dict[str, Any]:
+    """Return the fields of a drawing whose positions are unknown, for `grid_places`; `view` describes it."""
+    return {"view": view, "placed": False, "radius_mm": _GRID_RADIUS_MM}
+
+
 def grid_places(names: Sequence[str]) -> dict[str, tuple[float, float]]:
     """Return places in a grid for switches and taxels whose positions are unknown, by name, in mm."""
     wide, high = _PITCH_MM
@@ -289,9 +294,9 @@ def grid_hand(manifest: Manifest, ranges: Sequence[tuple[int, int]] | None = Non
     places = grid_places(names)
     taxels = tuple(switch.source for switch in manifest.switches if switch.threshold is not None)
     return HandDrawing(
-        view="switches and taxels in the order of the build; their positions on the hand are unknown" if names else "",
-        placed=False,
-        radius_mm=_GRID_RADIUS_MM,
+        **unknown_shape(
+            "switches and taxels in the order of the build; their positions on the hand are unknown" if names else ""
+        ),
         switches=drawn_switches(manifest, {name: at for name, at in places.items() if name not in taxels}),
         taxels=drawn_taxels(manifest, {name: places[name] for name in dict.fromkeys(taxels)}),
         joints=drawn_joints(manifest.joints, ranges),

@@ -19,13 +19,14 @@ from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
 from thenar.compiler.glove.prices import Part
 from thenar.compiler.glove.propose import propose_harness
-from thenar.compiler.hand import HandShape, grid_places, places_of, shape_of
+from thenar.compiler.hand import HandShape, grid_places, places_of, shape_of, unknown_shape
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.elements import elements_of, names_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.drivers.closing import Closing
 from thenar.drivers.errors import ThenarError
+from thenar.runtime.errors import HarnessError
 from thenar.runtime.hand import DrawnSwitch, HandDrawing
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.scanning.ports import whole_scan
@@ -132,7 +133,8 @@ class ChoosePage(Closing):
             try:
                 self._measure(asked)
             except (ThenarError, OSError, BrokenExecutor) as reason:
-                self.server.publish("work", message("work", done=0, total=0, why=str(reason)))
+                # Parameters are named between backticks, for commands to spell.
+                self.server.publish("work", message("work", done=0, total=0, why=str(reason).replace("``", "")))
 
     def close(self) -> None:
         """Close the page."""
@@ -147,7 +149,6 @@ class ChoosePage(Closing):
         if asked.do == "choose":
             return self._reply(asked.sensors)
         if asked.do in ("add", "drop"):
-            self._names(asked.sensors)
             find = self._quick.best_next if asked.do == "add" else self._quick.least
             return message(asked.do, sensor=find(asked.sensors), sensors=asked.sensors)
         if asked.do == "trial":
@@ -165,9 +166,8 @@ class ChoosePage(Closing):
         return None
 
     def _names(self, sensors: Sequence[int]) -> tuple[str, ...]:
-        """Return the names of sensors, each once. Raises ThenarError if there is no such number."""
-        if not all(0 <= sensor < len(self._quick.names) for sensor in sensors):
-            raise ThenarError(f"there are {len(self._quick.names)} sensors, numbered from 0")
+        """Return the names of sensors, each once, in this order. Raises EvaluationError if there is no such number."""
+        self._quick.check(sensors)
         return tuple(dict.fromkeys(self._quick.names[sensor] for sensor in sensors))
 
     def _reply(self, sensors: Sequence[int]) -> bytes:
@@ -189,10 +189,15 @@ class ChoosePage(Closing):
         more = "".join(f" {quote(option)}" for option in self._options)
         return f"thenar compile {quote(str(self._path))} -o {folder}{more} --sensors {len(names)} --have {have}"
 
-    def _scan_us(self, names: Sequence[str]) -> float:
-        """Return the time on the wire of a scan of the switches and pads in `names`, on the chips that are proposed."""
+    def _scan_us(self, names: Sequence[str]) -> float | None:
+        """Return the time on the wire of a scan of the switches and pads in `names`, on the chips that are proposed;
+        None if one bus has no room for them.
+        """
         read = [self._levels[name] for name in names if name in self._levels]
-        harness = propose_harness(read)
+        try:
+            harness = propose_harness(read)
+        except HarnessError:
+            return None
         return scan_us(whole_scan(harness, read), harness).us if read else 0.0
 
     def _levels_of(self) -> dict[str, str]:
@@ -246,6 +251,5 @@ def _drawn(grasp_set: GraspSet, hand: HandShape | None) -> HandDrawing:
     known = hand if hand is not None and names and hand.knows(names) else None
     places = grid_places(names) if known is None else places_of(known, names)
     switches = tuple(DrawnSwitch(name, x, y, number) for number, (name, (x, y)) in enumerate(places.items()))
-    unknown = {"view": "the positions of the sensors are unknown", "placed": False, "radius_mm": 3.0}
-    shown = unknown if known is None else shape_of(known)
+    shown = unknown_shape("the positions of the sensors are unknown") if known is None else shape_of(known)
     return HandDrawing(**shown, switches=switches, taxels=(), joints=())

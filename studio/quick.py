@@ -138,12 +138,20 @@ class QuickAccuracy:
         )
 
     def best_next(self, sensors: Sequence[int]) -> int | None:
-        """Return the sensor that raises the accuracy of rows most; None if all are there."""
+        """Return the sensor that raises the accuracy of rows most; None if all are there.
+
+        Raises EvaluationError if there is no sensor of a number.
+        """
+        self.check(sensors)
         others = [one for one in range(len(self.names)) if one not in sensors]
         return max(others, key=lambda one: self._right([*sensors, one]), default=None)
 
     def least(self, sensors: Sequence[int]) -> int | None:
-        """Return the sensor without which the accuracy of rows falls least; None if there is none."""
+        """Return the sensor without which the accuracy of rows falls least; None if there is none.
+
+        Raises EvaluationError if there is no sensor of a number.
+        """
+        self.check(sensors)
         return max(sensors, key=lambda one: self._right([other for other in sensors if other != one]), default=None)
 
     def trial(self, number: int, sensors: Sequence[int]) -> SeenTrial:
@@ -178,12 +186,15 @@ class QuickAccuracy:
         low, high = self._inputs.min(axis=0), self._inputs.max(axis=0)
         return tuple(((inputs - low) / np.maximum(high - low, 1e-9)).round(3).tolist())
 
-    def _columns(self, sensors: Sequence[int]) -> list[int]:
-        """Return the sensors in their order. Raises EvaluationError if there is no such number."""
-        columns = sorted(set(sensors))
-        if columns and not 0 <= columns[0] <= columns[-1] < len(self.names):
+    def check(self, sensors: Sequence[int]) -> None:
+        """Raise EvaluationError unless there are sensors with these numbers."""
+        if not all(0 <= sensor < len(self.names) for sensor in sensors):
             raise EvaluationError(f"there are {len(self.names)} sensors, numbered from 0")
-        return columns
+
+    def _columns(self, sensors: Sequence[int]) -> list[int]:
+        """Return the sensors in their order, each once. Raises EvaluationError if there is no such number."""
+        self.check(sensors)
+        return sorted(set(sensors))
 
     def _summed(self, train: NDArray[np.intp], test: NDArray[np.intp]) -> _Sums:
         labels, inputs = self._samples.labels[train], self._inputs[train]

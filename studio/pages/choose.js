@@ -122,7 +122,7 @@ function show(reply) {
   shown = reply;
   say($("rate"), interval(reply));
   say($("count"), `${chosen.length} of ${set.sensors.length}`);
-  say($("scan"), reply.scan_us ? `${reply.scan_us.toFixed(0)} µs on the wire` : "none is read");
+  say($("scan"), scanTime(reply.scan_us));
   $("price").hidden = $("price-term").hidden = reply.price === null;
   if (reply.price !== null) say($("price"), reply.price.toFixed(2));
   const change = before && before.sensors.length !== chosen.length ? 100 * (reply.mean - before.mean) : null;
@@ -139,6 +139,11 @@ function show(reply) {
   certify();
   // After the accuracy is painted: a map may have thousands of marks.
   setTimeout(() => reply === shown && drawMap(reply));
+}
+
+function scanTime(us) {
+  if (us === null) return "unknown: they are more than the chips of one bus read";
+  return us ? `${us.toFixed(0)} µs on the wire` : "none is read";
 }
 
 function weakest({ confusion: counts }) {

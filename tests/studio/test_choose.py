@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -23,6 +24,7 @@ from thenar.runtime.recipe import Recipe
 from thenar.studio import ChoosePage
 
 from ..browser import Browser
+from ..sets import grasp_set_of
 
 Studio = Callable[..., ChoosePage]
 PATIENCE_S = 30
@@ -271,6 +273,18 @@ def test_a_sensor_that_is_named_twice_counts_once(studio: Studio, people: GraspS
     page = studio(parts=priced(people), options=("--prices", "my prices.toml"))
     *_, twice, once = answers(page, {"do": "choose", "sensors": [3, 9, 3]}, {"do": "choose", "sensors": [3, 9]})
     assert twice == once | {"sensors": [3, 9, 3]}
+
+
+def test_of_more_switches_than_a_bus_reads_only_the_scan_time_is_unknown() -> None:
+    labels = np.arange(24) % 2
+    closed = np.tile(labels[:, np.newaxis], 1200)
+    many = grasp_set_of(["cup", "pen"], labels, switches=closed, subjects=np.repeat(["A", "B"], 12))
+    with ChoosePage(many, Path("many.grasps"), "127.0.0.1:0", token=None) as page:
+        _, _, few, all_of_them = answers(
+            page, *({"do": "choose", "sensors": list(range(number))} for number in (2, 1200))
+        )
+    assert few["scan_us"] > 0
+    assert (all_of_them["scan_us"], all_of_them["mean"]) == (None, 1.0)
 
 
 def test_without_positions_the_sensors_are_drawn_in_a_grid(studio: Studio, people: GraspSet) -> None:

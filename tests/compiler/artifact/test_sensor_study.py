@@ -37,6 +37,21 @@ def test_the_worth_of_a_sensor_is_paired_over_people() -> None:
     assert (worth.mean, worth.low, worth.high) == pytest.approx((np.mean(gains), low, high), abs=1e-6)
 
 
+@pytest.mark.parametrize("number", [1, 3])
+def test_a_point_of_the_curve_is_that_of_its_number_alone(number: int) -> None:
+    curve, alone = (study_sensors(people(), Recipe(sensors=most), jobs=1) for most in (None, number))
+    point, found = curve.points[number - 1], alone.point
+    assert (point.mean, point.low, point.high, point.adapted, point.papers) == (
+        found.mean,
+        found.low,
+        found.high,
+        found.adapted,
+        found.papers,
+    )
+    assert point.sensors == found.sensors
+    assert point.mean < curve.points[-1].mean
+
+
 def test_the_curve_is_measured_in_folds_and_the_same_on_any_number_of_cores() -> None:
     grasp_set, seen = people(), list[tuple[int, int]]()
     study = study_sensors(grasp_set, Recipe(), jobs=2, report=lambda *done: seen.append(done))
