@@ -29,6 +29,7 @@ from rich.table import Table
 from thenar.runtime import Glove
 from thenar.runtime.frames import now_us
 from thenar.runtime.web.live import LivePage
+from thenar.runtime.web.server import Server
 
 MOST_US, HZ, WARM = 20, 400, 200
 # Says when all are connected; at the end of its input, how many frames each reader got.
@@ -84,7 +85,8 @@ def run_of(scene: Played, folder: Path, what: str, stack: ExitStack, *, page: bo
     if not page:
         stack.enter_context(run)
         return Case(what, lambda: next(run), feed), None
-    shown = stack.enter_context(LivePage(run, scene.folder, "127.0.0.1:0", token=None))
+    server = stack.enter_context(Server("live", "127.0.0.1:0", token=None))
+    shown = LivePage(server, run, scene.folder)
     stack.enter_context(run)
     return Case(what, lambda: shown.show(next(run)), feed), shown
 

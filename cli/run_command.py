@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from thenar.runtime.policy import Policy
     from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, OutputTrouble, Quarantined
     from thenar.runtime.web.live import LivePage
+    from thenar.runtime.web.server import Server
 
 
 # A drawing of the live view that waited for longer is not shown.
@@ -112,12 +113,12 @@ def command(
         viewed = sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
         asked: dict[str, Any] = {"preshapes": preshape, "record": record, "status": status}
         asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy}
-        page_of = None
+        server = None
         if web is not None:
-            from thenar.runtime.web.live import LivePage
+            from thenar.runtime.web.server import Server
 
-            page_of = partial(LivePage, folder=build, address=web, token=web_token)
-        _run_live(loaded, glove, viewed, page_of, frames, **asked)
+            server = Server("live", web, token=web_token)
+        _run_live(loaded, glove, viewed, server, build, frames, **asked)
     elif replay.suffix == ".mcap":
         selector = selecting(loaded, preshape, segments=True)
         replay_recording(loaded, replay, sinks, selector, frames, policy)
@@ -166,7 +167,8 @@ def _run_live(
     build: "Build",
     harness: Path | None,
     viewed: bool,
-    page_of: "Callable[[Glove], LivePage] | None",
+    server: "Server | None",
+    folder: Path,
     frames: int | None,
     *,
     status: bool,
@@ -180,12 +182,18 @@ def _run_live(
     with _unblocked("stderr"), _unblocked("stdout", _VIEW_US) if viewed else nullcontext():
         with ExitStack() as stack:
             stop = stack.enter_context(ended_by_signals())
+            if server is not None:
+                stack.enter_context(server)
             glove = Glove(build, str(harness), stop=stop, status=status, **asked)
             for lacking in filter(None, (glove.system.unread, glove.lacking)):
                 say(f"thenar: {lacking}")
-            page = None if page_of is None else stack.enter_context(page_of(glove))
-            if page is not None:
-                say(f"thenar: the page is at {page.server.url}")
+            page = None
+            if server is not None:
+                from thenar.runtime.web.live import LivePage, shell_message
+
+                server.publish("shell", shell_message(glove.system.harness.name, folder, build.manifest))
+                page = LivePage(server, glove, folder)
+                say(f"thenar: the page is at {server.url}")
             stack.enter_context(glove)
             view = stack.enter_context(LiveView(out())) if viewed else None
             recorder = glove.recorder

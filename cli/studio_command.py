@@ -1,59 +1,37 @@
-"""`thenar studio`: choose sensors on a page in the browser."""
+"""`thenar studio`: the pages of a project in the browser."""
 
 from contextlib import suppress
 from pathlib import Path
 from threading import Event
-from typing import Any
 
 import click
 
-from .options import hand_of, layout_option, parts_of, prices_option
-from .parameters import WEB_ADDRESS, OutputFolder, existing_file, jobs_option, web_token_option
+from .options import hand_of
+from .parameters import WEB_ADDRESS, existing_folder, jobs_option, web_token_option
 from .printing import say
 
 
 @click.command("studio")
-@click.argument("grasps", metavar="SET.grasps", type=existing_file)
-@click.option("-o", "--output", type=OutputFolder(), help="Folder of the build that the page trains.")
-@layout_option
-@prices_option
+@click.argument("folder", metavar="[FOLDER]", type=existing_folder, default=Path())
 @jobs_option()
-@click.option("--web", metavar="ADDRESS", default=WEB_ADDRESS, show_default=True, help="Address of the page.")
+@click.option("--web", metavar="ADDRESS", default=WEB_ADDRESS, show_default=True, help="Address of the pages.")
 @web_token_option
-def command(
-    grasps: Path,
-    output: Path | None,
-    layout: Path | None,
-    prices: Path | None,
-    jobs: int,
-    web: str,
-    web_token: str | None,
-) -> None:
-    """Choose sensors on a page in the browser: click them on and off, and see what they recognise.
+def command(folder: Path, jobs: int, web: str, web_token: str | None) -> None:
+    """Open the studio: pages in the browser that lead from the first trial to a recogniser.
 
-    The hand is the control. The accuracy of a new subject, the weakest pair, the time of a scan and the price follow
-    each click. Measure runs nested folds; the curve shows what each sensor is worth; Train writes a build. A click on
-    a number of the matrix of errors shows its trials.
+    FOLDER is a project, by default the current one: its .grasps sets, recordings and builds, and the files glove.toml,
+    layout.toml and prices.toml if they are there.
 
     SIGINT, SIGTERM and SIGHUP end it at once, what is measured or trained included, with exit code 0.
 
     \b
     Example:
-        thenar studio set.grasps
-        thenar studio set.grasps -o build/ --layout layout.toml --prices prices.toml
+        thenar studio
+        thenar studio project/ --jobs 1
     """
-    from thenar.compiler.recordings.graspset import GraspSet
-    from thenar.studio import ChoosePage
+    from thenar.studio import Project, open_studio
 
-    grasp_set = GraspSet.load(grasps)
-    files = {"--layout": layout, "--prices": prices}
-    choices: dict[str, Any] = {
-        "hand": hand_of(layout).fitted(grasp_set.element_names),
-        "parts": parts_of(grasp_set, prices),
-        "options": [word for option, path in files.items() if path is not None for word in (option, str(path))],
-        "output": output,
-        "jobs": jobs,
-    }
-    with suppress(KeyboardInterrupt), ChoosePage(grasp_set, grasps, web, token=web_token, **choices) as page:
-        say(f"thenar: the page is at {page.server.url}")
-        page.run(Event())
+    project = Project(folder, hand_of(None))
+    with suppress(KeyboardInterrupt), open_studio(project, web, token=web_token, jobs=jobs) as studio:
+        say(f"thenar: the page is at {studio.server.url}")
+        studio.run(Event())

@@ -1,8 +1,18 @@
-"""Pages that choose sensors and show errors: they train, so they need the compiler; the live pages are in runtime/web.
+"""Pages of a project, from its first trial to a recogniser; they train, so they need the compiler.
 
-`ChoosePage` serves the page on which sensors are clicked on and off.
+`open_studio` serves them. The live page and the server are in runtime/web.
 """
 
 from .choose import ChoosePage
+from .project import Project
+from .studio import Studio
 
-__all__ = ["ChoosePage"]
+__all__ = ["Project", "Studio", "open_studio"]
+
+
+def open_studio(project: Project, address: str, *, token: str | None, jobs: int = -1) -> Studio:
+    """Return the open studio of a project: see `Studio`."""
+    studio = Studio(project, address, token=token, jobs=jobs)
+    ChoosePage(studio)
+    studio.changed()
+    return studio

@@ -1,180 +1,109 @@
 """The page *Choose*: click sensors on and off, and see what they recognise.
 
 Every browser has its own choice, so a page sends it whole and gets its own reply. What takes longer, a measurement
-with nested folds or the curve of what sensors are worth, is queued, done one at a time by `run`, and sent to all pages.
+with nested folds or the curve of what sensors are worth, is queued, and its result is sent to all pages.
 """
 
-from collections.abc import Mapping, Sequence
-from concurrent.futures import BrokenExecutor
-from pathlib import Path
-from queue import Empty, SimpleQueue
+from collections.abc import Sequence
+from functools import partial
 from shlex import quote
-from threading import Event
 from typing import Any
 
-import msgspec
-
-from thenar.compiler.artifact.compile import check_target, compile_build
+from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
-from thenar.compiler.glove.prices import Part
 from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.hand import HandShape, grid_places, places_of, shape_of, unknown_shape
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.elements import elements_of, names_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
-from thenar.drivers.closing import Closing
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.hand import DrawnSwitch, HandDrawing
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import scan_us
-from thenar.runtime.web.server import Server, message
+from thenar.runtime.web.server import message
 
 from .quick import QuickAccuracy
+from .studio import Asked, Handler, Report, Studio
 
-PAGES = Path(__file__).parent / "pages"
-_MOST_QUEUED = 8
-_LOOK_S = 0.2
-
-
-class _Asked(msgspec.Struct, frozen=True):
-    """What a page asks for: "choose", "measure", "train", "add" (the best) or "drop" (the least) for sensors by their
-    numbers, a "trial" by its number as they read it, or the "curve".
-    """
-
-    do: str
-    sensors: tuple[int, ...] = ()
-    trial: int = 0
+_BUILD = "build"
 
 
-class ChoosePage(Closing):
-    """Serves the page until it is closed; a context manager.
+class ChoosePage:
+    """The page *Choose* of a studio."""
 
-    Parameters
-    ----------
-    grasp_set : GraspSet
-        The recordings.
-    path : Path
-        Their file, as commands are to name it.
-    address, token
-        As for `Server`.
-    hand : HandShape, optional
-        The glove laid flat, with the positions of all switches and pads. Without, they are drawn in a grid.
-    parts : mapping of str to Part, optional
-        The part of a price list for every sensor, by name.
-    options : sequence of str
-        Options of `thenar compile` that name the files of hand and parts, for the command that the page shows.
-    output : Path, optional
-        The folder of the builds that the page trains; without one it trains none.
-    jobs : int
-        Worker processes of a measurement.
+    def __init__(self, studio: Studio) -> None:
+        self._studio, self._project = studio, studio.project
+        self._quick: QuickAccuracy | None = None
+        requests: dict[str, Handler] = {
+            "choose": lambda asked: self._reply(asked.sensors),
+            "add": lambda asked: self._found("add", asked.sensors),
+            "drop": lambda asked: self._found("drop", asked.sensors),
+            "trial": self._trial,
+            **dict.fromkeys(("measure", "curve", "train"), self._later),
+        }
+        studio.add("choose.html", "Choose", requests, self.read)
 
-    Attributes
-    ----------
-    server : Server
-        The server of the page; `server.url` is its address.
-
-    Raises
-    ------
-    CompileError, EvaluationError
-        If the recordings have a single grasp type, or cannot be cut into folds, or `output` holds other things.
-    SettingError, SinkError
-        As `Server` does.
-    """
-
-    def __init__(
-        self,
-        grasp_set: GraspSet,
-        path: Path,
-        address: str,
-        *,
-        token: str | None,
-        hand: HandShape | None = None,
-        parts: Mapping[str, Part] | None = None,
-        options: Sequence[str] = (),
-        output: Path | None = None,
-        jobs: int = -1,
-    ) -> None:
-        self._path, self._set, self._jobs = path, grasp_set, jobs
-        self._parts, self._options = parts or {}, options
+    def read(self, report: Report) -> None:
+        """Read the project's recordings, and show them. Raises ThenarError if there are none, or a single type."""
+        self._quick = None
+        try:
+            self._set = grasp_set = self._project.grasp_set()
+            self._quick = quick = QuickAccuracy(grasp_set)
+        except ThenarError as reason:
+            self._studio.publish("set", message("set", why=str(reason), sensors=(), grasps=(), trials=(), name=""))
+            return
+        self._hand = self._project.hand().fitted(grasp_set.element_names)
+        self._parts = self._project.parts((*grasp_set.element_names, *grasp_set.joint_names))
         self._prices = {name: part.price for name, part in self._parts.items()}
-        self._hand, self._output = hand, None if output is None else check_target(output)
-        self._quick = QuickAccuracy(self._set)
         self._levels = self._levels_of()
-        self._queue = SimpleQueue[_Asked]()
-        drawn = _drawn(self._set, hand)
-        kinds = ["switch"] * len(self._set.switch_names) + ["pad"] * len(self._set.taxel_columns)
-        kinds += ["joint"] * len(self._set.joints)
+        kinds = ["switch"] * len(grasp_set.switch_names) + ["pad"] * len(grasp_set.taxel_columns)
+        kinds += ["joint"] * len(grasp_set.joints)
         about = {
-            "name": path.name,
-            "trains": output is not None,
-            "grasps": self._quick.grasps,
-            "trials": self._quick.trials,
+            "why": "",
+            "name": ", ".join(path.name for path in self._project.sets()),
+            "grasps": quick.grasps,
+            "trials": quick.trials,
             "sensors": [
                 {"name": name, "kind": kind, "price": self._prices.get(name)}
-                for name, kind in zip(self._quick.names, kinds, strict=True)
+                for name, kind in zip(quick.names, kinds, strict=True)
             ],
         }
-        self._first = message("set", about), message("hand", drawn)
-        self.server = Server(
-            "choose", address, token=token, on_message=self._take, hello=lambda: self._first, folder=PAGES
-        )
+        self._studio.publish("sensors", message("sensors", _drawn(grasp_set, self._hand)))
+        self._studio.publish("set", message("set", about))
 
-    def run(self, stop: Event) -> None:
-        """Measure what pages ask for, until `stop` is set."""
-        while not stop.is_set():
-            try:
-                asked = self._queue.get(timeout=_LOOK_S)
-            except Empty:
-                continue
-            try:
-                self._measure(asked)
-            except (ThenarError, OSError, BrokenExecutor) as reason:
-                # Parameters are named between backticks, for commands to spell.
-                self.server.publish("work", message("work", done=0, total=0, why=str(reason).replace("``", "")))
+    @property
+    def _known(self) -> QuickAccuracy:
+        if self._quick is None:
+            raise ThenarError("the recordings are not read yet")
+        return self._quick
 
-    def close(self) -> None:
-        """Close the page."""
-        self.server.close()
+    def _found(self, do: str, sensors: tuple[int, ...]) -> bytes:
+        find = self._known.best_next if do == "add" else self._known.least
+        return message(do, sensor=find(sensors), sensors=sensors)
 
-    def _take(self, fields: Mapping[str, object]) -> bytes | None:
-        """Reply to a page. Raises ThenarError for a request that cannot be met."""
-        try:
-            asked = msgspec.convert(fields, _Asked)
-        except msgspec.ValidationError as wrong:
-            raise ThenarError(f"the page sent an invalid message: {wrong}") from None
-        if asked.do == "choose":
-            return self._reply(asked.sensors)
-        if asked.do in ("add", "drop"):
-            find = self._quick.best_next if asked.do == "add" else self._quick.least
-            return message(asked.do, sensor=find(asked.sensors), sensors=asked.sensors)
-        if asked.do == "trial":
-            return message("trial", self._quick.trial(asked.trial, asked.sensors), trial=asked.trial)
-        if asked.do not in ("measure", "curve", "train"):
-            raise ThenarError(f"a page cannot {asked.do}")
-        if asked.do == "train" and self._output is None:
-            raise ThenarError("no folder is known for a build: start thenar studio with -o")
+    def _trial(self, asked: Asked) -> bytes:
+        return message("trial", self._known.trial(asked.trial, asked.sensors), trial=asked.trial)
+
+    def _later(self, asked: Asked) -> None:
         if asked.do != "curve" and not asked.sensors:
             raise ThenarError("choose a sensor first: without any, nothing can be learnt")
-        if self._queue.qsize() >= _MOST_QUEUED:
-            raise ThenarError(f"{_MOST_QUEUED} measurements are waiting already: let them finish")
         self._names(asked.sensors)
-        self._queue.put(asked)
-        return None
+        self._studio.queue(asked.do, partial(self._measure, asked))
 
     def _names(self, sensors: Sequence[int]) -> tuple[str, ...]:
         """Return the names of sensors, each once, in this order. Raises EvaluationError if there is no such number."""
-        self._quick.check(sensors)
-        return tuple(dict.fromkeys(self._quick.names[sensor] for sensor in sensors))
+        self._known.check(sensors)
+        return tuple(dict.fromkeys(self._known.names[sensor] for sensor in sensors))
 
     def _reply(self, sensors: Sequence[int]) -> bytes:
         names = self._names(sensors)
         return message(
             "quick",
-            self._quick.of(sensors),
+            self._known.of(sensors),
             sensors=sensors,
             scan_us=self._scan_us(names),
             price=sum(self._prices[name] for name in names) if self._prices else None,
@@ -182,12 +111,17 @@ class ChoosePage(Closing):
         )
 
     def _command(self, names: Sequence[str]) -> str:
-        """Return the command that compiles a build of these sensors."""
+        """Return the commands that compile a build of these sensors."""
         if not names:
             return ""
-        folder, have = quote(str(self._output or "build")), quote(",".join(names))
-        more = "".join(f" {quote(option)}" for option in self._options)
-        return f"thenar compile {quote(str(self._path))} -o {folder}{more} --sensors {len(names)} --have {have}"
+        sets, have = [quote(str(path)) for path in self._project.sets()], quote(",".join(names))
+        more = "".join(f" {quote(option)}" for option in self._project.options())
+        first, recordings = "", sets[0]
+        if len(sets) > 1:
+            recordings = quote(str(self._project.folder / "all.grasps"))
+            first = f"thenar merge {' '.join(sets)} -o {recordings} && "
+        output = quote(str(self._project.new_path(_BUILD)))
+        return f"{first}thenar compile {recordings} -o {output}{more} --sensors {len(names)} --have {have}"
 
     def _scan_us(self, names: Sequence[str]) -> float | None:
         """Return the time on the wire of a scan of the switches and pads in `names`, on the chips that are proposed;
@@ -207,29 +141,25 @@ class ChoosePage(Closing):
         every = self._set.element_names
         return {every[one.column]: name for one, name in zip(elements, names_of(held, elements), strict=True)}
 
-    def _measure(self, asked: _Asked) -> None:
+    def _measure(self, asked: Asked, report: Report) -> None:
         """Measure the curve, or the accuracy of chosen sensors, or train a build of these; tell all pages."""
-
-        def report(done: int, total: int) -> None:
-            self.server.publish("work", message("work", done=done, total=total, what=asked.do))
-
-        report(0, 1)
         names = self._names(asked.sensors)
         recipe = Recipe() if asked.do == "curve" else Recipe(sensors=len(names), have=names)
-        many: dict[str, Any] = {"jobs": self._jobs}
+        many: dict[str, Any] = {"jobs": self._studio.jobs}
         if asked.do == "train":
-            assert self._output is not None
+            output = self._project.new_path(_BUILD)
             documents = Documents(self._hand, parts=self._parts)
-            built = compile_build(self._set, self._output, recipe, documents=documents, progress=report, **many)
-            content: dict[str, Any] = {"folder": str(self._output), "facts": [str(fact) for fact in built.facts]}
+            built = compile_build(self._set, output, recipe, documents=documents, progress=report, **many)
+            content: dict[str, Any] = {"folder": output.name, "facts": [str(fact) for fact in built.facts]}
+            self._project.remember(build=output.name)
+            self._studio.changed()
         else:
             limits = Limits.of(recipe, self._set, {}, prices=self._prices)
             content = self._content(study_sensors(self._set, recipe, limits=limits, report=report, **many))
-        self.server.publish(asked.do, message(asked.do, sensors=asked.sensors, **content))
-        report(1, 1)
+        self._studio.publish(asked.do, message(asked.do, sensors=asked.sensors, **content))
 
     def _content(self, study: SensorStudy) -> dict[str, object]:
-        numbers = {name: number for number, name in enumerate(self._quick.names)}
+        numbers = {name: number for number, name in enumerate(self._known.names)}
         return {
             "of": study.of,
             "enough": study.enough,

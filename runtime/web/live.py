@@ -10,8 +10,6 @@ from pathlib import Path
 
 import msgspec
 
-from thenar.drivers.closing import Closing
-
 from ..build import Build
 from ..frames import now_us
 from ..glove import Glove
@@ -32,42 +30,34 @@ _encode = msgspec.json.Encoder().encode
 _FRAME = b'{"topic":"frame",'
 
 
-class LivePage(Closing):
-    """Serves the live page of a glove until it is left; a context manager.
+class LivePage:
+    """Shows a glove on the page of a server.
 
     Parameters
     ----------
+    server : Server
+        The server, on which the topics "build", "hand", "past", "frame" and "health" are published.
     glove : Glove
         The running glove.
     folder : Path
         The build's folder, whose hand is drawn.
-    address, token
-        As for `Server`.
-
-    Attributes
-    ----------
-    server : Server
-        The server of the page; `server.url` is its address.
 
     Raises
     ------
     BuildError
         If the build's drawing of a hand is damaged.
-    SettingError, SinkError
-        As `Server` does.
     """
 
-    def __init__(self, glove: Glove, folder: Path, address: str, *, token: str | None) -> None:
-        self._glove, self._frames = glove, FrameText(glove.system.build, glove.system.harness)
+    def __init__(self, server: Server, glove: Glove, folder: Path) -> None:
+        self.server, self._glove = server, glove
+        self._frames = FrameText(glove.system.build, glove.system.harness)
         self._health: HealthReport | None = None
         # The latest changes of the prediction, for pages opened later.
         self._past, self._until_us = deque[Change](maxlen=_MOST_CHANGES), 0
-        manifest, name = glove.system.build.manifest, glove.system.harness.name
-        self._first = (
-            build_message(folder, manifest, name, preshapes=glove.has_preshapes),
-            message("hand", load_hand(folder, manifest)),
-        )
-        self.server = Server("live", address, token=token, hello=self._hello)
+        manifest = glove.system.build.manifest
+        server.publish("build", build_message(manifest, preshapes=glove.has_preshapes))
+        server.publish("hand", message("hand", load_hand(folder, manifest)))
+        server.publish("past", self._past_message)
 
     def show(self, moment: Moment) -> None:
         """Show the moment that the glove has just published. For the thread of the run."""
@@ -80,12 +70,8 @@ class LivePage(Closing):
             self._health = glove.health
             self.server.publish("health", partial(message, "health", self._health))
 
-    def close(self) -> None:
-        """Close the page."""
-        self.server.close()
-
-    def _hello(self) -> Sequence[bytes]:
-        return (*self._first, message("past", changes=list(self._past.copy()), until_us=self._until_us))
+    def _past_message(self) -> bytes:
+        return message("past", changes=list(self._past.copy()), until_us=self._until_us)
 
 
 def change_of(grasp: LiveGrasp) -> Change:
@@ -94,18 +80,39 @@ def change_of(grasp: LiveGrasp) -> Change:
     return (grasp.time_us, *now, grasp.segment_us)
 
 
-def build_message(folder: Path, manifest: Manifest, name: str, **shows: bool) -> bytes:
-    """Return the message on the build of a page called `name`: which one it is; its types, switches and joints; whether
-    it knows an empty hand; and what else the page `shows`: "preshapes" or a "replay".
+def shell_message(
+    project: str,
+    folder: Path | None = None,
+    manifest: Manifest | None = None,
+    *,
+    pages: Sequence[tuple[str, str]] = (),
+    wearer: str = "",
+) -> bytes:
+    """Return the message on the bar of all pages: the project's name, the build in a folder, the accuracy that it
+    states, the wearer, and the files and titles of the pages.
+    """
+    build = rate = ""
+    if folder is not None and manifest is not None:
+        build = f"{folder.resolve().name} {manifest.checksum[:8]}"
+        stated = min(manifest.rates, key=lambda rate: rate.protocol == "training")
+        ends = (
+            "" if stated.low is None or stated.high is None else f" [{100 * stated.low:.1f}, {100 * stated.high:.1f}]"
+        )
+        rate = f"{100 * stated.rate:.1f}{ends} % {stated.title}"
+    return message("shell", project=project, build=build, rate=rate, pages=pages, wearer=wearer)
+
+
+def build_message(manifest: Manifest, **shows: bool) -> bytes:
+    """Return the message on a build: its types, switches and joints; whether it knows an empty hand; and what else the
+    page `shows`: "preshapes" or a "replay".
     """
     known = {
-        "build": f"{folder.resolve().name} {manifest.checksum[:8]}",
         "grasps": manifest.classes,
         "switches": [switch.name for switch in manifest.switches],
         "joints": [joint.name for joint in manifest.joints],
         "empty_hand": manifest.knows_none,
     }
-    return message("build", known, name=name, **{"preshapes": False, "replay": False} | shows)
+    return message("build", known, **{"preshapes": False, "replay": False} | shows)
 
 
 class FrameText:

@@ -29,7 +29,7 @@ from ..live.replay import Stepper, periods_us
 from ..published import LiveGrasp
 from ..recording.reader import Entry, Reader
 from ..recording.session import Label, Session
-from .live import PAST_US, Change, FrameText, build_message, change_of
+from .live import PAST_US, Change, FrameText, build_message, change_of, shell_message
 from .server import Server, message
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -139,12 +139,14 @@ class ReplayPage(Closing):
         self._faults = list[str]()
         self._at_us, self._playing, self._speed, self._sought, self._shown = 0, False, 1.0, True, -1
         hand = message("hand", load_hand(build, loaded.manifest))
-        self._first = build_message(build, loaded.manifest, path.name, replay=True), hand
         self._scanned = Event()
         self._told = 0.0
         self._stop = Event()
         self._thread = Thread(target=self._scan, name="thenar scan", daemon=True)
-        self.server = Server("live", address, token=token, on_message=self._take, hello=lambda: self._first)
+        self.server = Server("live", address, token=token, on_message=self._take)
+        self.server.publish("shell", shell_message(path.name, build, loaded.manifest))
+        self.server.publish("build", build_message(loaded.manifest, replay=True))
+        self.server.publish("hand", hand)
         self._kept = TemporaryFile(buffering=0)  # noqa: SIM115
 
     def run(self, stop: Event) -> None:

@@ -1,18 +1,19 @@
-"""`Server`: serves one page, its files, and live messages to every browser that has it open.
+"""`Server`: serves pages, their files, and live messages to every browser that has one open.
 
 It runs on a separate thread. A publisher leaves a reference and goes on; a message is made when it is sent, and none is
-made while no page is open. Every browser gets the newest message of each topic, at most 100 times a second. Only the
-system buffers for a browser: a slow one sees fewer moments, and one that reads nothing, or does not reply to a ping,
-for five seconds is dropped.
+made while no page is open. Every page gets the newest message of each of its topics, at most 30 times a second. Only
+the system buffers for a browser: a slow one sees fewer moments, and one that reads nothing, or does not reply to a
+ping, for five seconds is dropped.
 """
 
 import asyncio
 import logging
 import socket
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
+from typing import TypeVar
 
 import msgspec
 from aiohttp import WSCloseCode, WSMsgType, web
@@ -24,6 +25,7 @@ from ..sinks.sockets import listen
 from .guard import HEADERS, Guard
 
 Message = bytes | Callable[[], bytes]
+_Made = TypeVar("_Made", bytes, Message)
 
 _log = logging.getLogger("thenar")
 # Neither of them writes a stranger's input into our log.
@@ -33,7 +35,8 @@ _quiet.setLevel(logging.CRITICAL)
 PAGES = Path(__file__).parent / "pages"
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
-PERIOD_S = 0.01
+PERIOD_S = 1 / 30
+_MOST_TOPICS = 64
 # Pages open at the same time, and connections, some of which fetch files.
 MOST_PAGES, MOST_CONNECTIONS = 32, 96
 # Time limit of a connection that is not a page.
@@ -55,12 +58,12 @@ def message(topic: str, content: object = None, **more: object) -> bytes:
 
 
 class Server(Closing):
-    """Serves a page until it is closed; a context manager.
+    """Serves pages until it is closed; a context manager.
 
     Parameters
     ----------
     page : str
-        Name of the page: "live" is `pages/live.html`.
+        Name of the first page: "live" is `pages/live.html`.
     address : str
         "127.0.0.1:8080", "localhost:8080", "[::1]:8080" or "8080". Port 0 is any free one.
     token : str or None
@@ -68,10 +71,8 @@ class Server(Closing):
     on_message : callable, optional
         Takes a page's message: an object with "do", a string. It is called on the server's thread. A ThenarError that
         it raises is sent to that page only, as the message "refused", and so is a message that it returns.
-    hello : callable, optional
-        Returns the first messages for a page. It is called on the server's thread.
     folder : Path
-        The folder of the page, whose files are served in addition to those of the live page.
+        A folder of pages, whose files are served in addition to those of the live page.
 
     Attributes
     ----------
@@ -95,7 +96,6 @@ class Server(Closing):
         *,
         token: str | None,
         on_message: Callable[[Mapping[str, object]], bytes | None] | None = None,
-        hello: Callable[[], Sequence[bytes]] | None = None,
         folder: Path = PAGES,
     ) -> None:
         self._files = _files(page, folder)
@@ -109,7 +109,7 @@ class Server(Closing):
             raise
         shown = socket.gethostname() if name in _ANY else name
         self.url = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/" + (f"?token={token}" if token else "")
-        self._on_message, self._hello = on_message, hello
+        self._on_message = on_message
         self._latest: dict[str, Message] = {}
         self._pages: list[_Page] = []
         self._started = Event()
@@ -118,8 +118,9 @@ class Server(Closing):
         self._started.wait()
 
     def publish(self, topic: str, message: Message) -> None:
-        """Make this the newest message of its topic for every page: its text, or a function that makes it on the
-        server's thread when a page is open. Never blocks. A message not sent before the next of its topic is dropped.
+        """Make this the newest message of its topic: its text, or a function that makes it on the server's thread, for
+        the pages that are open and for each one that is opened later. Never blocks. A message not sent before the next
+        of its topic is dropped.
         """
         self._latest[topic] = message
 
@@ -161,9 +162,9 @@ class Server(Closing):
                     task.cancel()
                 await asyncio.gather(*working, return_exceptions=True)
                 # The last message that a page shows is how it ended.
-                last = [_text(made) for made in self._latest.copy().values()]
+                last = {topic: _text(made) for topic, made in self._latest.copy().items()}
                 for page in tuple(self._pages):
-                    for text in last:
+                    for text in page.its(last).values():
                         await page.say(text)
                 await asyncio.gather(*(page.close(WSCloseCode.GOING_AWAY) for page in self._pages))
                 await self._server.shutdown(_CLOSING_S)
@@ -239,11 +240,10 @@ class Server(Closing):
         )
         live.headers.update(HEADERS)
         await live.prepare(request)
-        page = _Page(live, transport, self._loop.time())
-        latest = self._latest.copy()
-        first = [] if self._hello is None else list(self._hello())
-        for text in (*first, *map(_text, latest.values())):
-            await page.say(text)
+        topics = request.query.get("topics")
+        page = _Page(live, transport, self._loop.time(), frozenset(topics.split(",", _MOST_TOPICS)) if topics else None)
+        for made in page.its(self._latest.copy()).values():
+            await page.say(_text(made))
         self._pages.append(page)
         self._somebody.set()
         try:
@@ -287,18 +287,26 @@ class Server(Closing):
 
 
 class _Page:
-    """A page that is open in a browser: its WebSocket, and the messages waiting for it."""
+    """A page that is open in a browser: its WebSocket, the topics that it shows, or all, and the messages waiting for
+    it.
+    """
 
-    def __init__(self, live: web.WebSocketResponse, transport: asyncio.Transport, now_s: float) -> None:
-        self.socket, self.transport = live, transport
+    def __init__(
+        self, live: web.WebSocketResponse, transport: asyncio.Transport, now_s: float, topics: frozenset[str] | None
+    ) -> None:
+        self.socket, self.transport, self._topics = live, transport, topics
         # Nothing is sent until the system has taken everything before it: writing never has to wait.
         transport.set_write_buffer_limits(high=2**30)
         self._waiting: dict[str, bytes] = {}
         self._may, self._spoke_s = MOST_AT_ONCE, now_s
 
+    def its(self, messages: Mapping[str, _Made]) -> dict[str, _Made]:
+        """Return those of its topics."""
+        return {topic: made for topic, made in messages.items() if self._topics is None or topic in self._topics}
+
     async def send(self, new: Mapping[str, bytes]) -> None:
         """Send the newest of each topic, unless the page is behind; one that hangs does not reply to a ping."""
-        self._waiting.update(new)
+        self._waiting.update(self.its(new))
         if self.transport.get_write_buffer_size():
             return
         waiting, self._waiting = self._waiting, {}
@@ -327,7 +335,7 @@ def _files(page: str, folder: Path) -> dict[str, tuple[bytes, str]]:
     """Return content and type of each file, by its request path: nothing else can be read."""
     paths = {path.name: path for place in (PAGES, folder) for path in place.iterdir() if path.is_file()}
     found = {f"/{name}": (path.read_bytes(), _TYPES[path.suffix]) for name, path in paths.items()}
-    return {"/": found[f"/{page}.html"]} | {path: file for path, file in found.items() if file[1] != "text/html"}
+    return {"/": found[f"/{page}.html"], **found}
 
 
 def _text(made: Message) -> bytes:

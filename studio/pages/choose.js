@@ -1,6 +1,7 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
 import { drawHand } from "./hand.js";
-import { cell, connect, list, say } from "./wire.js";
+import { openPage } from "./shell.js";
+import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 const percent = (share) => (100 * share).toFixed(1);
@@ -16,9 +17,8 @@ let chosen = []; // numbers of sensors, in the order in which they were chosen
 let shown = null; // the last reply
 const measured = new Map(); // accuracies that were measured, by the sensors
 
-const send = connect({
-  open: () => link(true),
-  closed: () => link(false),
+const ask = openPage({
+  open: () => set && !set.why && choose(chosen),
   set: (message) => {
     // Another server took the place of ours: its numbers are other sensors.
     if (set && JSON.stringify(set) !== JSON.stringify(message)) {
@@ -26,12 +26,15 @@ const send = connect({
       measured.clear();
     }
     set = message;
-    say($("name"), `${set.name}: choose sensors`);
-    $("train").hidden = !set.trains;
+    say($("recordings"), set.name);
+    $("empty").hidden = !set.why;
+    say($("empty"), set.why);
+    $("with-set").hidden = Boolean(set.why);
+    if (set.why) return;
     listSensors();
     choose(chosen);
   },
-  hand: (message) => {
+  sensors: (message) => {
     drawn = message;
     $("drawn").hidden = !drawn.switches.length;
     hand = drawHand($("hand"), drawn, { onSwitch: (sensor) => toggle(sensor) });
@@ -57,26 +60,15 @@ const send = connect({
     list($("facts"), facts);
   },
   work: ({ done, total, what, why }) => {
-    const busy = { measure: "measuring", curve: "measuring the curve", train: "training" }[what];
+    const busy = { reading: "reading", measure: "measuring", curve: "measuring the curve", train: "training" }[what];
     say($("work"), why ?? (done < total ? `${busy}: ${Math.round((100 * done) / total)} %` : ""));
   },
   trial: (seen) => showTrial(seen),
-  refused: ({ why }) => say($("refused"), why),
 });
 
 // A reply to an earlier choice comes too late.
 const isChosen = (sensors) => String(sensors) === String(chosen);
 const key = (sensors) => [...sensors].sort((a, b) => a - b).join(",");
-
-function link(open) {
-  say($("link"), open ? "page: connected" : "page: lost, it reconnects by itself");
-  $("link").dataset.is = open ? "good" : "bad";
-  if (open && set) choose(chosen);
-}
-
-function ask(what, more = {}) {
-  say($("refused"), send({ do: what, ...more }) ? "" : "not connected");
-}
 
 function toggle(sensor) {
   choose(chosen.includes(sensor) ? chosen.filter((one) => one !== sensor) : [...chosen, sensor]);

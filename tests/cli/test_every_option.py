@@ -44,7 +44,7 @@ LINES: dict[str, tuple[str, str]] = {
     "firmware": ("build", "--target host -o new"),
     "spec": ("build", "-o new"),
     "run": ("build", "--replay set.grasps"),
-    "studio": ("missing.grasps", "--web 127.0.0.1:0"),
+    "studio": ("missing", "--web 127.0.0.1:0"),
     "monitor": ("missing.mcap", "-b build --web 127.0.0.1:0"),
     "teach": ("movements.grasps", "-b build -o new.json"),
     "calibrate": ("missing/port", "-o new.toml"),

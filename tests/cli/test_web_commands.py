@@ -178,28 +178,37 @@ def test_a_recording_is_shown_from_any_moment_of_it(
     assert monitor.end() == 0
 
 
-def test_the_studio_answers_until_a_signal_ends_it(start: Callable[..., Command], set_file: Path) -> None:
-    studio = start("studio", set_file, "--jobs", "1", "--web", "127.0.0.1:0")
+@pytest.fixture
+def project(set_file: Path, tmp_path: Path) -> Path:
+    """Return the folder of a project with a set."""
+    folder = tmp_path / "project"
+    folder.mkdir()
+    (folder / "set.grasps").write_bytes(set_file.read_bytes())
+    return folder
+
+
+def test_the_studio_answers_until_a_signal_ends_it(start: Callable[..., Command], project: Path) -> None:
+    studio = start("studio", project, "--jobs", "1", "--web", "127.0.0.1:0")
     with studio.page() as live:
         assert [sensor["kind"] for sensor in told(live, "set")["sensors"]] == 6 * ["switch"] + 2 * ["joint"]
         ask(live, do="choose", sensors=[0, 7])
         answer = told(live, "quick")
         assert (answer["sensors"], answer["of"]) == ([0, 7], "within subject")
-        assert answer["command"] == f"thenar compile {set_file} -o build --sensors 2 --have s0,j1"
-        ask(live, do="train", sensors=[0])
-        assert "no folder is known for a build: start thenar studio with -o" in told(live, "refused")["why"]
+        assert answer["command"] == f"thenar compile {project}/set.grasps -o {project}/build --sensors 2 --have s0,j1"
+        ask(live, do="format", name="disk")
+        assert "a page cannot 'format'" in told(live, "refused")["why"]
     assert studio.end() == 0
 
 
-def test_a_signal_ends_the_studio_while_it_trains(
-    start: Callable[..., Command], set_file: Path, tmp_path: Path
-) -> None:
-    studio = start("studio", set_file, "-o", tmp_path / "build", "--jobs", "1", "--web", "127.0.0.1:0")
+def test_a_signal_ends_the_studio_while_it_trains(start: Callable[..., Command], project: Path) -> None:
+    studio = start("studio", project, "--jobs", "1", "--web", "127.0.0.1:0")
     with studio.page() as live:
+        told(live, "set")
         ask(live, do="train", sensors=[0, 1, 7])
-        assert told(live, "work")["what"] == "train"
+        while told(live, "work")["what"] != "train":
+            pass
         assert studio.end() == 0
-    assert not (tmp_path / "build").exists()
+    assert not (project / "build").exists()
 
 
 def test_what_is_no_recording_is_refused(build_folder: Path, recording: Path, tmp_path: Path) -> None:

@@ -1,10 +1,9 @@
-"""A page *Choose* of a small set, whose measurements run, and a browser."""
+"""The studio of a small set, whose work is done, and a browser."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from threading import Event, Thread
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from selenium import webdriver
 from thenar.compiler.hand import HandShape
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.simulator.handmaps.handmap import hand_map
-from thenar.studio import ChoosePage
+from thenar.studio import Project, Studio, open_studio
 
 from ..browser import Browser
 from ..sets import grasp_set_of
@@ -40,19 +39,26 @@ def people(hand: HandShape) -> GraspSet:
 
 
 @pytest.fixture
-def studio(people: GraspSet, hand: HandShape) -> Iterator[Callable[..., ChoosePage]]:
-    """Return what serves the page of a set; changes are arguments of ChoosePage."""
+def studio(people: GraspSet, hand: HandShape, tmp_path: Path) -> Iterator[Callable[..., Studio]]:
+    """Return what opens the studio of a project with a set, or with none; `prices` is the text of its prices.toml."""
     with ExitStack() as stack:
 
-        def start(grasp_set: GraspSet = people, address: str = "127.0.0.1:0", **changes: Any) -> ChoosePage:
-            known = {"hand": hand.fitted(grasp_set.element_names), "jobs": 1, "token": None} | changes
-            page = stack.enter_context(ChoosePage(grasp_set, Path("recorded/set.grasps"), address, **known))
+        def start(
+            grasp_set: GraspSet | None = people, address: str = "127.0.0.1:0", hand: HandShape = hand, prices: str = ""
+        ) -> Studio:
+            folder = tmp_path / "recorded"
+            folder.mkdir(exist_ok=True)
+            if grasp_set is not None:
+                grasp_set.save(folder / "set.grasps")
+            if prices:
+                (folder / "prices.toml").write_text(prices)
+            opened = stack.enter_context(open_studio(Project(folder, hand), address, token=None, jobs=1))
             stop = Event()
-            working = Thread(target=page.run, args=(stop,))
+            working = Thread(target=opened.run, args=(stop,))
             working.start()
             stack.callback(working.join)
             stack.callback(stop.set)
-            return page
+            return opened
 
         yield start
 
@@ -65,7 +71,7 @@ def chromium(new_chromium: Callable[..., webdriver.Chrome]) -> Iterator[Browser]
 
 
 @pytest.fixture
-def browser(chromium: Browser, studio: Callable[..., ChoosePage]) -> Iterator[Browser]:
+def browser(chromium: Browser, studio: Callable[..., Studio]) -> Iterator[Browser]:
     """Return the browser, which leaves a page before its server ends; the page may not have complained of anything."""
     yield chromium
     complaints = chromium.log()

@@ -1,19 +1,19 @@
 // The page of a run, or of its recording: shows messages and sends requests.
 import { Replay } from "./replay.js";
+import { openPage } from "./shell.js";
 import { View } from "./view.js";
-import { connect, say } from "./wire.js";
+
 
 const $ = (id) => document.getElementById(id);
 const view = new View();
-const replay = new Replay(view, (what, value) => ask({ do: what, value }));
+const replay = new Replay(view, (what, value) => ask(what, { value }));
 
-const send = connect({
+const ask = openPage({
   open: () => view.state.link(true),
   closed: () => view.state.link(false),
   build: (build) => {
     view.build(build);
     $("replay-panel").hidden = $("truth").hidden = !build.replay;
-    $("glove-state").hidden = Boolean(build.replay);
     $("main").classList.toggle("replay", Boolean(build.replay));
   },
   hand: (hand) => view.setHand(hand),
@@ -25,9 +25,4 @@ const send = connect({
   health: (report) => view.health(report),
   overview: (overview) => replay.overview(overview),
   replay: (state) => replay.show(state),
-  refused: ({ why }) => say($("refused"), why),
 });
-
-function ask(asked) {
-  say($("refused"), send(asked) ? "" : "not connected");
-}

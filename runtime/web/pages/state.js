@@ -4,10 +4,10 @@ import { say } from "./wire.js";
 const LEAST_MS = 500, PERIODS = 3, INTERVALS = 9, LOOK_MS = 100;
 
 /** Return the time of day of a moment of performance.now(): "10:24:07". */
-const clock = (at) => new Date(Date.now() - performance.now() + at).toTimeString().slice(0, 8);
+export const clock = (at) => new Date(Date.now() - performance.now() + at).toTimeString().slice(0, 8);
 
 /**
- * Watches the age of the data, and says it in #age; the page's link in #link, the devices in #glove-state.
+ * Watches the age of the data, and says it in #age; the devices in #glove-state.
  *
  * Data is old after half a second, or after three periods of its source if these are longer. Old data, and all data while
  * the link is down, is greyed: the root element has the class "old".
@@ -23,6 +23,7 @@ export class State {
   /** @param {function(boolean): void} changed called with whether the data is old, when that changes */
   constructor(changed = () => {}) {
     this.changed = changed;
+    this.live = true; // a recording has no glove
     this.old = false;
     setInterval(() => this.#look(), LOOK_MS);
   }
@@ -42,11 +43,7 @@ export class State {
 
   /** Take the state of the connection to the server. */
   link(up) {
-    const words = up ? "connected" : "not connected";
-    if (this.#link?.up !== up) this.#link = { up, since: performance.now() };
-    const link = document.getElementById("link");
-    link.dataset.is = up ? "good" : "bad";
-    say(link, `page: ${words} since ${clock(this.#link.since)}`);
+    this.#link = up;
     this.#look();
   }
 
@@ -62,7 +59,7 @@ export class State {
   }
 
   #look() {
-    const up = Boolean(this.#link?.up), age = this.#readAt === null ? 0 : performance.now() - this.#readAt;
+    const up = Boolean(this.#link), age = this.#readAt === null ? 0 : performance.now() - this.#readAt;
     const middle = [...this.#intervals].sort((one, other) => one - other)[this.#intervals.length >> 1] ?? 0;
     const silent = age > Math.max(LEAST_MS, PERIODS * middle), old = !up || silent;
     const since = this.#readAt === null ? "" : ` since ${clock(this.#readAt)}`;
@@ -77,7 +74,7 @@ export class State {
 
   #glove(up, silent) {
     const element = document.getElementById("glove-state");
-    if (element === null) return;
+    element.hidden = !this.live;
     const lost = [...this.#lostAt].map(([name, at]) => `${name} lost${at === null ? "" : ` since ${clock(at)}`}`).join(", ");
     const words = !up ? "not known" : lost || (silent ? `silent${silent}` : this.#devices === null ? "not reported" : "connected");
     element.dataset.is = words === "connected" ? "good" : up && (lost || silent) ? "bad" : "warn";

@@ -40,8 +40,7 @@ export class View {
 
   /** Take the grasp types, switches and joints of the build, and whether its moments are those of a recording. */
   build(build) {
-    this.live = !build.replay; // moments of a recording have no age
-    say($("name"), build.name);
+    this.live = this.state.live = !build.replay; // moments of a recording have no age
     this.timeline.types = build.grasps.filter((name) => name !== "none");
     this.bits = new Map(build.switches.map((name, bit) => [name, bit]));
     this.joints = build.joints;
@@ -50,7 +49,6 @@ export class View {
     $("types").replaceChildren();
     for (const grasp of build.grasps) this.#row(grasp);
     $("preshape").hidden = !build.preshapes;
-    say($("build-state"), `build: ${build.build}`);
     $("empty-hand").hidden = build.empty_hand;
     this.classes = build.grasps;
   }

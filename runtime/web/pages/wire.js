@@ -5,7 +5,8 @@ const LONGEST_MS = 5000;
 
 /**
  * Connect to the server of this page.
- * @param {Object<string, function(object): void>} handlers by topic; "open" and "closed" are events of the connection itself
+ * @param {Object<string, function(object): void>} handlers by topic; "open" and "closed" are events of the connection itself;
+ * the server sends these topics
  * @returns {function(object): boolean} send({do: ..., ...}), which returns false while there is no connection
  */
 export function connect(handlers) {
@@ -14,7 +15,7 @@ export function connect(handlers) {
 
   function open() {
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-    socket = new WebSocket(`${scheme}//${location.host}/live`);
+    socket = new WebSocket(`${scheme}//${location.host}/live?topics=${Object.keys(handlers)}`);
     socket.addEventListener("open", () => {
       wait = FIRST_MS;
       handlers.open?.({});

@@ -13,7 +13,8 @@ from thenar.runtime import Glove
 from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.policy import Policy
-from thenar.runtime.web.live import LivePage
+from thenar.runtime.web.live import LivePage, shell_message
+from thenar.runtime.web.server import Server
 
 from ...browser import Browser as BareBrowser
 from ..conftest import on_bench
@@ -56,8 +57,10 @@ class Run:
         self.scene = scene
         self.bench, wired = on_bench(stack, scene, harness, folder)
         self.glove = Glove(scene.truth.build, wired, policy=FRANK, record=record, status=True)
-        self.page = LivePage(self.glove, build, "127.0.0.1:0", token=None)
-        stack.enter_context(self.page)
+        server = stack.enter_context(Server("live", "127.0.0.1:0", token=None))
+        system = self.glove.system
+        server.publish("shell", shell_message(system.harness.name, build, system.build.manifest))
+        self.page = LivePage(server, self.glove, build)
         stack.enter_context(self.glove)
         self._thread = Thread(target=self._run, name="loop")
         self._thread.start()

@@ -61,7 +61,10 @@ def test_a_stopped_run_is_old_for_later_pages_too(run: Callable[[], Any], browse
     assert float(browser.text("age").split()[2]) >= age
     assert browser.text("glove-state").startswith("glove: silent since ")
     assert browser.text("link").startswith("page: connected since ")
-    assert browser.text("build-state") == f"build: both {running.glove.system.build.manifest.checksum[:8]}"
+    manifest = running.glove.system.build.manifest
+    stated = browser.text("build-state")
+    assert stated.startswith(f"build: both {manifest.checksum[:8]}, {100 * manifest.rates[0].rate:.1f}")
+    assert stated.endswith(f" % {manifest.rates[0].title}")
 
 
 def bars_are(browser: Any, scene: Any) -> bool:
@@ -210,9 +213,10 @@ def test_names_are_text_wherever_they_are_shown(browser: Any) -> None:
         "devices": [{"name": image, "connected": False, "error": SCRIPT, "counts": [{"name": image, "value": 1}]}],
         "quarantined": [{"name": SCRIPT, "reason": image, "used": False}],
     }
-    with Server(
-        "live", "127.0.0.1:0", token=None, hello=lambda: [message("build", build), message("hand", hand)]
-    ) as server:
+    with Server("live", "127.0.0.1:0", token=None) as server:
+        server.publish("shell", message("shell", project=image, build=SCRIPT, rate=image, wearer=SCRIPT, pages=()))
+        server.publish("build", message("build", build))
+        server.publish("hand", message("hand", hand))
         server.publish("frame", message("frame", frame))
         server.publish("health", message("health", report))
         browser.open(server.url)

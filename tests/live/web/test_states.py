@@ -18,9 +18,10 @@ HAND = {
     **{"taxels": [], "joints": []},
 }
 BUILD = {
-    **{"name": "bench", "build": "build 01234567", "grasps": ["Add", "PoS"], "switches": ["a", "b", "c"], "joints": []},
+    **{"grasps": ["Add", "PoS"], "switches": ["a", "b", "c"], "joints": []},
     **{"preshapes": False, "records": False, "replay": False, "empty_hand": True},
 }
+SHELL = message("shell", project="bench", build="build 01234567", rate="", wearer="", pages=())
 GRASP = LiveGrasp(0, 0, 0, "Add", "Add", 0.95, 9, "ok", 2_000, None, 2_000)
 DETAIL = {"closed": "110", "joints": [], "taxels": {}, "probabilities": [0.95, 0.05], "late_us": 0}
 _INK = "return getComputedStyle(document.getElementById(arguments[0])).color"
@@ -66,8 +67,11 @@ def page(browser: Any) -> Any:
     with ExitStack() as stack:
 
         def opened(**build: object) -> Run:
-            hello = [message("build", BUILD | build), message("hand", HAND)]
-            return Run(stack.enter_context(Server("live", "127.0.0.1:0", token=None, hello=lambda: hello)), browser)
+            server = stack.enter_context(Server("live", "127.0.0.1:0", token=None))
+            server.publish("shell", SHELL)
+            server.publish("build", message("build", BUILD | build))
+            server.publish("hand", message("hand", HAND))
+            return Run(server, browser)
 
         yield opened
         browser.driver.get("about:blank")
@@ -167,8 +171,8 @@ def test_a_recordings_wrong_predictions_are_marked_by_sign_and_words(browser: An
     state = {"first_us": 0, "last_us": 9_000_000, "playing": False, "speed": 1.0, "share": 1.0, "faults": []}
     predictions = [(0, "none"), (1_000_000, "Add"), (2_000_000, "unknown"), (5_000_000, "PoS")]
     truth = [(500_000, 3_000_000, "Add"), (4_000_000, 8_000_000, "Add")]
-    hello = [message("build", BUILD | {"replay": True})]
-    with Server("live", "127.0.0.1:0", token=None, hello=lambda: hello) as server:
+    with Server("live", "127.0.0.1:0", token=None) as server:
+        server.publish("build", message("build", BUILD | {"replay": True}))
         server.publish("overview", message("overview", predictions=predictions, truth=truth))
         browser.open(server.url)
         for grasp, label, said in (

@@ -37,10 +37,10 @@ class Client:
             connection.close()
         return answer
 
-    def open(self, **options: Any) -> ClientConnection:
-        """Return a WebSocket as the page opens it."""
+    def open(self, path: str = "/live", **options: Any) -> ClientConnection:
+        """Return a WebSocket as a page opens it."""
         options = {"origin": self.origin, "compression": None, "open_timeout": PATIENCE_S, "proxy": None} | options
-        return connect(f"ws://{self.host}:{self.port}/live", **options)
+        return connect(f"ws://{self.host}:{self.port}{path}", **options)
 
 
 def told(live: ClientConnection) -> dict[str, Any]:

@@ -172,7 +172,6 @@ def test_pages_hold_nothing_inline_and_make_no_markup_of_text() -> None:
         "//etc/passwd",
         "/etc/passwd",
         "/..\\server.py",
-        "/live.html",
         "/server.py",
         "/live.js%00.css",
         "/.",

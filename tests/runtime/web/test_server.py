@@ -11,7 +11,8 @@ from thenar.runtime.web.server import message
 def test_a_page_its_files_and_the_newest_message_of_each_topic(
     serve: Callable[..., Any], hear: Callable[..., Any]
 ) -> None:
-    client = serve(hello=lambda: [message("build", name="first")])
+    client = serve()
+    client.server.publish("build", lambda: message("build", name="first"))
     client.server.publish("frame", message("frame", number=1))
     client.server.publish("frame", lambda: message("frame", number=2))
     page = client.ask("/")
@@ -23,6 +24,17 @@ def test_a_page_its_files_and_the_newest_message_of_each_topic(
         client.server.publish("frame", message("frame", number=3))
         while (told := hear(live))["number"] != 3:
             assert told == {"topic": "frame", "number": 2}
+
+
+def test_a_page_gets_the_topics_that_it_names(serve: Callable[..., Any], hear: Callable[..., Any]) -> None:
+    client = serve()
+    for topic in ("build", "frame"):
+        client.server.publish(topic, message(topic))
+    with client.open("/live?topics=frame,health") as live:
+        assert hear(live) == {"topic": "frame"}
+        client.server.publish("build", message("build", number=2))
+        client.server.publish("health", message("health"))
+        assert hear(live) == {"topic": "health"}
 
 
 def test_what_a_page_asks_for_is_handed_on_and_a_refusal_told(

@@ -1,0 +1,84 @@
+// The frame of every page: the bar on top, the links to the other pages, and the connection to the server.
+import { clock } from "./state.js";
+import { connect, say } from "./wire.js";
+
+const $ = (id) => document.getElementById(id);
+
+/**
+ * Fill the page's bar, and connect to its server.
+ * @param {Object<string, function(object): void>} handlers as for `connect`; a page gets the topics that it handles
+ * @returns {function(string, object=): boolean} ask(what, more): send a request; what is refused is said in #refused
+ */
+export function openPage(handlers) {
+  const bar = document.querySelector("header");
+  const title = document.createElement("h1"), brand = document.createElement("span"), badges = document.createElement("p");
+  brand.className = "brand";
+  brand.textContent = "thenar";
+  title.append(brand, " ", made("span", "name"));
+  for (const id of ["wearer", "glove-state", "build-state", "link"]) badges.append(made("span", id, "badge"), " ");
+  bar.append(title, badges, made("nav", "pages"));
+  $("pages").setAttribute("aria-label", "Pages");
+  for (const id of ["wearer", "glove-state", "build-state"]) $(id).hidden = true;
+  link(false, "connecting");
+  const send = connect({
+    ...handlers,
+    open: () => {
+      link(true, `connected since ${clock(performance.now())}`);
+      handlers.open?.();
+    },
+    closed: () => {
+      link(false, `not connected since ${clock(performance.now())}`);
+      handlers.closed?.();
+    },
+    shell: (message) => {
+      show(message);
+      handlers.shell?.(message);
+    },
+    glove: ({ is, words }) => {
+      $("glove-state").hidden = !words;
+      $("glove-state").dataset.is = is;
+      say($("glove-state"), `glove: ${words}`);
+      handlers.glove?.({ is, words });
+    },
+    refused: (message) => {
+      if ($("refused")) say($("refused"), message.why);
+      handlers.refused?.(message);
+    },
+  });
+  return (what, more = {}) => {
+    const sent = send({ do: what, ...more });
+    if ($("refused")) say($("refused"), sent ? "" : "not connected");
+    return sent;
+  };
+}
+
+function made(kind, id, name = "") {
+  const element = document.createElement(kind);
+  element.id = id;
+  element.className = name;
+  return element;
+}
+
+function link(up, words) {
+  $("link").dataset.is = up ? "good" : "bad";
+  say($("link"), `page: ${words}`);
+}
+
+function show({ project, pages, wearer, build, rate }) {
+  say($("name"), project);
+  for (const [id, words] of [["wearer", wearer && `wearer: ${wearer}`], ["build-state", build && `build: ${build}${rate && `, ${rate}`}`]]) {
+    $(id).hidden = !words;
+    say($(id), words);
+  }
+  const here = location.pathname.slice(1) || pages[0]?.[0];
+  const links = pages.map(([file, title]) => {
+    const found = document.createElement("a");
+    found.href = file;
+    found.textContent = title;
+    if (file === here) found.setAttribute("aria-current", "page");
+    return found;
+  });
+  // Links that stay keep the focus.
+  if (String([...$("pages").children]) !== String(links)) $("pages").replaceChildren(...links);
+  $("pages").hidden = links.length < 2;
+}

@@ -1,0 +1,148 @@
+"""A project: the recordings, builds and settings that lie in one folder, and what the studio remembers of them."""
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from thenar.compiler.glove.prices import Part, load_prices
+from thenar.compiler.hand import HandShape, load_layout
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.merging import merge
+from thenar.drivers.errors import SettingError, ThenarError
+from thenar.runtime.build import Build
+from thenar.runtime.files import write_atomically
+from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.names import fault, shortened
+
+_STATE = "studio.json"
+# What each kind of member is called, in a folder.
+_KINDS = {"set": "*.grasps", "recording": "*.mcap", "build": "*/build.json"}
+
+
+class Member(msgspec.Struct, frozen=True):
+    """A file or folder of a project, which pages name by its id."""
+
+    id: str
+    kind: str
+    name: str
+
+
+class State(msgspec.Struct, forbid_unknown_fields=True):
+    """What is remembered in studio.json: the name of the build in use, of the wearer, and of the sets left aside."""
+
+    build: str = ""
+    wearer: str = "me"
+    aside: tuple[str, ...] = ()
+
+
+class Project:
+    """The folder of a project.
+
+    Parameters
+    ----------
+    folder : Path
+        Its folder. Sets and recordings lie in it, a build is a folder in it, the settings are glove.toml, layout.toml
+        and prices.toml.
+    hand : HandShape
+        The glove laid flat that is drawn without a layout.toml.
+
+    Raises
+    ------
+    SettingError
+        If studio.json is damaged.
+    """
+
+    def __init__(self, folder: Path, hand: HandShape) -> None:
+        self.folder, self._usual = folder, hand
+        self._state = folder / _STATE
+        self.state = State()
+        if self._state.exists():
+            try:
+                self.state = msgspec.json.decode(self._state.read_bytes(), type=State)
+            except msgspec.DecodeError as wrong:
+                raise SettingError(f"{self._state}: {wrong}: correct it, or delete it to begin anew") from None
+
+    @property
+    def name(self) -> str:
+        """The name of the folder."""
+        return self.folder.resolve().name
+
+    def remember(self, **changes: object) -> None:
+        """Change the state, and write it."""
+        for name, value in changes.items():
+            setattr(self.state, name, value)
+        write_atomically(self._state, msgspec.json.format(msgspec.json.encode(self.state)))
+
+    def members(self, kind: str) -> list[Member]:
+        """Return the members of a kind, "set", "recording" or "build", by name."""
+        paths = [path.parent if kind == "build" else path for path in self.folder.glob(_KINDS[kind])]
+        return [Member(_id(path.name), kind, path.name) for path in sorted(paths)]
+
+    def path(self, kind: str, member: str) -> Path:
+        """Return the path of a member. Raises SettingError if there is none of this id."""
+        for one in self.members(kind):
+            if one.id == member:
+                return self.folder / one.name
+        raise SettingError(f"the project has no {kind} {shortened(repr(member))}: load the page again")
+
+    def sets(self) -> list[Path]:
+        """Return the sets in use."""
+        return [self.folder / one.name for one in self.members("set") if one.name not in self.state.aside]
+
+    def grasp_set(self) -> GraspSet:
+        """Return the recordings: all sets in use as one. Raises ThenarError if there is none, or they do not fit."""
+        sets = {path.name: GraspSet.load(path) for path in self.sets()}
+        if not sets:
+            raise SettingError("the project has no recordings yet: record some, or import a table with thenar import")
+        return next(iter(sets.values())) if len(sets) == 1 else merge(sets)
+
+    @property
+    def harness(self) -> Path:
+        """The path of glove.toml, which may not be there."""
+        return self.folder / "glove.toml"
+
+    def wiring(self) -> Harness:
+        """Return the harness. Raises HarnessError or OSError."""
+        return load_harness(self.harness)
+
+    def hand(self) -> HandShape:
+        """Return the glove laid flat. Raises MapError."""
+        layout = self.folder / "layout.toml"
+        return load_layout(layout) if layout.exists() else self._usual
+
+    def parts(self, names: Sequence[str]) -> dict[str, Part]:
+        """Return the part for each sensor, if there is a prices.toml. Raises ThenarError."""
+        prices = self.folder / "prices.toml"
+        return dict(load_prices(prices, names)) if prices.exists() else {}
+
+    def options(self) -> list[str]:
+        """Return the options of `thenar compile` that name the files of layout and prices."""
+        files = {"--layout": self.folder / "layout.toml", "--prices": self.folder / "prices.toml"}
+        return [word for option, path in files.items() if path.exists() for word in (option, str(path))]
+
+    def build(self) -> tuple[Path, Build] | None:
+        """Return the folder of the build in use, and the build; None without one. Raises BuildError."""
+        path = self.folder / self.state.build
+        return (path, Build.load(path)) if self.state.build and (path / "build.json").exists() else None
+
+    def new_path(self, name: str, ending: str = "") -> Path:
+        """Return the path of a new member: its name, with a number if it is taken.
+
+        Raises SettingError for a name that a file cannot have.
+        """
+        if reason := fault(name):
+            raise SettingError(f"the name {shortened(repr(name))} {reason}")
+        if "/" in name or name.startswith("."):
+            raise SettingError(f"the name {shortened(repr(name))} is not possible: use letters, digits and spaces")
+        for number in range(1, 10_000):
+            path = self.folder / f"{name}{'' if number == 1 else f'-{number}'}{ending}"
+            if not path.exists():
+                return path
+        raise ThenarError(f"{self.folder} has too many files called {name}")
+
+
+def _id(name: str) -> str:
+    return hashlib.sha256(name.encode("utf-8", "surrogateescape")).hexdigest()[:12]

@@ -1,0 +1,196 @@
+"""`Studio`: one server, the project that its pages show, and the work that they ask for.
+
+A page asks with a message: `do` names the request, other fields its values. A request is carried out on the server's
+thread if it takes milliseconds. Longer work is queued and done one at a time, by `run`; its progress is the topic
+"work". The devices of the glove have one user at a time, whose thread the `Station` keeps.
+"""
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import BrokenExecutor
+from functools import partial
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Event, Thread
+
+import msgspec
+
+from thenar.drivers.closing import Closing
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.web.live import shell_message
+from thenar.runtime.web.server import Message, Server, message
+
+from .project import Project
+
+PAGES = Path(__file__).parent / "pages"
+_MOST_QUEUED = 8
+_LOOK_S = 0.2
+Report = Callable[[int, int], None]
+
+
+class Asked(msgspec.Struct, frozen=True):
+    """What a page asks for: `do`, and the values that this takes.
+
+    sensors  numbers of sensors        trial  the number of a trial
+    id       of a member of the project    name  a name, or a key
+    value    a number
+    """
+
+    do: str
+    sensors: tuple[int, ...] = ()
+    trial: int = 0
+    id: str = ""
+    name: str = ""
+    value: float | None = None
+
+
+Handler = Callable[[Asked], bytes | None]
+
+
+class Studio(Closing):
+    """Serves the pages of a project until it is closed; a context manager.
+
+    Parameters
+    ----------
+    project : Project
+        The project.
+    address, token
+        As for `Server`.
+    jobs : int
+        Worker processes of a measurement.
+
+    Attributes
+    ----------
+    server : Server
+        The server of the pages; `server.url` is its address.
+    station : Station
+        What uses the glove.
+
+    Raises
+    ------
+    SettingError, SinkError
+        As `Server` does.
+    """
+
+    def __init__(self, project: Project, address: str, *, token: str | None, jobs: int = -1) -> None:
+        self.project, self.jobs = project, jobs
+        self._requests: dict[str, Handler] = {}
+        self._titles = list[tuple[str, str]]()
+        self._readers = list[Callable[[Report], None]]()
+        self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
+        self.server = Server("choose", address, token=token, on_message=self._take, folder=PAGES)
+        self.station = Station(self.server.publish)
+
+    def add(
+        self, file: str, title: str, requests: Mapping[str, Handler], read: Callable[[Report], None] | None = None
+    ) -> None:
+        """Add a page: its file in pages/, its title, and what carries out its requests, by their `do`.
+
+        `read` is queued whenever the project has changed: it publishes what the page shows of it.
+        """
+        self._titles.append((file, title))
+        self._requests |= requests
+        self._readers += [] if read is None else [read]
+
+    def publish(self, topic: str, made: Message) -> None:
+        """Make this the newest message of its topic."""
+        self.server.publish(topic, made)
+
+    def queue(self, what: str, work: Callable[[Report], None]) -> None:
+        """Do this later: `work` gets a function that takes how much is done, and of how much.
+
+        Raises ThenarError if too much waits already.
+        """
+        if self._queue.qsize() >= _MOST_QUEUED:
+            raise ThenarError(f"{_MOST_QUEUED} jobs are waiting already: let them finish")
+        self._queue.put((what, work))
+
+    def changed(self) -> None:
+        """Show the project as it is now, after a set or a build came, went or changed."""
+        built = self.project.build()
+        about = () if built is None else (built[0], built[1].manifest)
+        state = self.project.state
+        self.publish("shell", shell_message(self.project.name, *about, pages=self._titles, wearer=state.wearer))
+        kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
+        self.publish("project", message("project", kinds, state=state))
+        for read in self._readers:
+            self.queue("reading", read)
+
+    def run(self, stop: Event) -> None:
+        """Do what pages ask for, until `stop` is set."""
+        while not stop.is_set():
+            try:
+                what, work = self._queue.get(timeout=_LOOK_S)
+            except Empty:
+                continue
+            report = partial(self._report, what)
+            report(0, 1)
+            try:
+                work(report)
+                report(1, 1)
+            except (ThenarError, OSError, BrokenExecutor) as reason:
+                # Parameters are named between backticks, for commands to spell.
+                self.publish("work", message("work", done=0, total=0, why=str(reason).replace("``", "")))
+
+    def close(self) -> None:
+        """End what uses the glove, and close the pages."""
+        self.station.stop()
+        self.server.close()
+
+    def _report(self, what: str, done: int, total: int) -> None:
+        self.publish("work", message("work", done=done, total=total, what=what))
+
+    def _take(self, fields: Mapping[str, object]) -> bytes | None:
+        """Carry out a request. Raises ThenarError if it cannot be met."""
+        try:
+            asked = msgspec.convert(fields, Asked)
+        except msgspec.ValidationError as wrong:
+            raise ThenarError(f"the page sent an invalid message: {wrong}") from None
+        handler = self._requests.get(asked.do)
+        if handler is None:
+            raise ThenarError(f"a page cannot {asked.do[:20]!r}")
+        return handler(asked)
+
+
+class Station:
+    """The one user of the glove's devices: watching, recording, calibrating or running, on a thread.
+
+    Parameters
+    ----------
+    publish : callable
+        As `Server.publish`. The topic "station" says what uses the glove, and why it ended.
+    """
+
+    def __init__(self, publish: Callable[[str, Message], None]) -> None:
+        self._publish, self._stop = publish, Event()
+        self._thread: Thread | None = None
+        self.doing = ""
+        self._tell("")
+
+    def start(self, doing: str, work: Callable[[Event], None]) -> None:
+        """End what uses the glove, and start this: `work` gets an event that is set when it is to end."""
+        self.stop()
+        self._stop, self.doing = Event(), doing
+        self._thread = Thread(target=self._run, args=(doing, work, self._stop), name=f"thenar {doing}", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End what uses the glove."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._thread = None
+
+    def _run(self, doing: str, work: Callable[[Event], None], stop: Event) -> None:
+        self._tell(doing)
+        why = ""
+        try:
+            work(stop)
+        except (ThenarError, OSError) as reason:
+            why = str(reason)
+        self.doing = ""
+        self._tell("", why)
+
+    def _tell(self, doing: str, why: str = "") -> None:
+        self._publish("station", message("station", doing=doing, why=why))
+        if not doing:
+            self._publish("glove", message("glove", {"is": "warn", "words": "not in use"}))
