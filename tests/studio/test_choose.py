@@ -27,7 +27,7 @@ from ..sets import grasp_set_of
 
 Start = Callable[..., Studio]
 PATIENCE_S = 30
-PRICES = '[[part]]\nname = "plain"\nprice = 2.5\nfor = ["*"]\n'
+PRICES = '[[part]]\nname = "plain"\nprice = 2.5\nsensors = ["*"]\n'
 
 
 def answers(opened: Studio, *asked: dict[str, Any]) -> list[dict[str, Any]]:
