@@ -4,6 +4,7 @@
 """
 
 from .choose import ChoosePage
+from .compare import add_compare_page
 from .project import Project
 from .studio import Studio
 
@@ -14,5 +15,6 @@ def open_studio(project: Project, address: str, *, token: str | None, jobs: int 
     """Return the open studio of a project: see `Studio`."""
     studio = Studio(project, address, token=token, jobs=jobs)
     ChoosePage(studio)
+    add_compare_page(studio)
     studio.changed()
     return studio

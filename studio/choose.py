@@ -72,7 +72,7 @@ class ChoosePage:
                 for name, kind in zip(quick.names, kinds, strict=True)
             ],
         }
-        self._studio.publish("sensors", message("sensors", _drawn(grasp_set, self._hand)))
+        self._studio.publish("sensors", message("sensors", drawn(grasp_set, self._hand)))
         self._studio.publish("set", message("set", about))
 
     @property
@@ -175,7 +175,7 @@ class ChoosePage:
         }
 
 
-def _drawn(grasp_set: GraspSet, hand: HandShape | None) -> HandDrawing:
+def drawn(grasp_set: GraspSet, hand: HandShape | None) -> HandDrawing:
     """Return a drawing in which every switch and pad of a set is one to click on: its number is the sensor's."""
     names = grasp_set.element_names
     known = hand if hand is not None and names and hand.knows(names) else None

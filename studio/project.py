@@ -92,9 +92,9 @@ class Project:
         """Return the sets in use."""
         return [self.folder / one.name for one in self.members("set") if one.name not in self.state.aside]
 
-    def grasp_set(self) -> GraspSet:
-        """Return the recordings: all sets in use as one. Raises ThenarError if there is none, or they do not fit."""
-        sets = {path.name: GraspSet.load(path) for path in self.sets()}
+    def grasp_set(self, paths: Sequence[Path] = ()) -> GraspSet:
+        """Return recordings as one: these sets, or all in use. Raises ThenarError if there is none, or they do not fit."""
+        sets = {path.name: GraspSet.load(path) for path in paths or self.sets()}
         if not sets:
             raise SettingError("the project has no recordings yet: record some, or import a table with thenar import")
         return next(iter(sets.values())) if len(sets) == 1 else merge(sets)

@@ -32,7 +32,7 @@ class Asked(msgspec.Struct, frozen=True):
 
     sensors  numbers of sensors        trial  the number of a trial
     id       of a member of the project    name  a name, or a key
-    value    a number
+    value    a number                      ids   of several members
     """
 
     do: str
@@ -41,6 +41,7 @@ class Asked(msgspec.Struct, frozen=True):
     id: str = ""
     name: str = ""
     value: float | None = None
+    ids: tuple[str, ...] = ()
 
 
 Handler = Callable[[Asked], bytes | None]
