@@ -178,11 +178,16 @@ class CollectionGuide:
         """The newest frames; in review, those that were captured."""
         return self._captured if self.stage == "review" else (self._switches, self._glove)
 
+    @property
+    def waits(self) -> bool:
+        """Whether no countdown can start, because something is not read."""
+        return bool(self.lost) and self.stage in _WAITING
+
     def offered(self) -> dict[Key, str]:
         """Return the keys that are active now, and their effects."""
         if self.stage == "over":
             return {}
-        found = {} if self.lost and self.stage in _WAITING else dict(_OFFERED[self.stage])
+        found = {} if self.waits else dict(_OFFERED[self.stage])
         if self._left:
             found["skip"] = "skip this one"
         if self._past:
