@@ -1,13 +1,17 @@
 """`open_studio`: the pages of a studio, in the order of their links."""
 
 from .choose import ChoosePage
+from .collector import Collector
 from .project import Project
+from .record import RecordPage
 from .studio import Studio
 
 
 def open_studio(project: Project, address: str, *, token: str | None, jobs: int = -1) -> Studio:
     """Return the open studio of a project: see `Studio`."""
     studio = Studio(project, address, token=token, jobs=jobs)
+    collector = Collector(studio)
+    RecordPage(studio, collector)
     ChoosePage(studio)
     studio.changed()
     return studio
