@@ -128,8 +128,8 @@ class Project:
         path = self.folder / self.state.build
         return (path, Build.load(path)) if self.state.build and (path / "build.json").exists() else None
 
-    def new_path(self, name: str, ending: str = "") -> Path:
-        """Return the path of a new member: its name, with a number if it is taken.
+    def new_path(self, name: str, ending: str = "", *others: str) -> Path:
+        """Return the path of a new member: its name, with a number if a file with one of the endings has it already.
 
         Raises SettingError for a name that a file cannot have.
         """
@@ -138,9 +138,9 @@ class Project:
         if "/" in name or name.startswith("."):
             raise SettingError(f"the name {shortened(repr(name))} is not possible: use letters, digits and spaces")
         for number in range(1, 10_000):
-            path = self.folder / f"{name}{'' if number == 1 else f'-{number}'}{ending}"
-            if not path.exists():
-                return path
+            stem = name if number == 1 else f"{name}-{number}"
+            if not any((self.folder / f"{stem}{end}").exists() for end in (ending, *others)):
+                return self.folder / f"{stem}{ending}"
         raise ThenarError(f"{self.folder} has too many files called {name}")
 
 

@@ -1,0 +1,19 @@
+"""`open_studio`: the pages of a studio, in the order of their links."""
+
+from .choose import ChoosePage
+from .collector import Collector
+from .compare import add_compare_page
+from .project import Project
+from .record import RecordPage
+from .studio import Studio
+
+
+def open_studio(project: Project, address: str, *, token: str | None, jobs: int = -1) -> Studio:
+    """Return the open studio of a project: see `Studio`."""
+    studio = Studio(project, address, token=token, jobs=jobs)
+    collector = Collector(studio)
+    RecordPage(studio, collector)
+    ChoosePage(studio)
+    add_compare_page(studio)
+    studio.changed()
+    return studio
