@@ -6,6 +6,7 @@ from .compare import add_compare_page
 from .project import Project
 from .record import RecordPage
 from .studio import Studio
+from .wearer import WearerPage
 
 
 def open_studio(project: Project, address: str, *, token: str | None, jobs: int = -1) -> Studio:
@@ -14,6 +15,7 @@ def open_studio(project: Project, address: str, *, token: str | None, jobs: int 
     collector = Collector(studio)
     RecordPage(studio, collector)
     ChoosePage(studio)
+    WearerPage(studio, collector)
     add_compare_page(studio)
     studio.changed()
     return studio

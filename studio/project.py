@@ -31,9 +31,12 @@ class Member(msgspec.Struct, frozen=True):
 
 
 class State(msgspec.Struct, forbid_unknown_fields=True):
-    """What is remembered in studio.json: the name of the build in use, of the wearer, and of the sets left aside."""
+    """What is remembered in studio.json: the name of the build in use, of the one that it was adapted in place of, of
+    the wearer, and of the sets left aside.
+    """
 
     build: str = ""
+    former: str = ""
     wearer: str = "me"
     aside: tuple[str, ...] = ()
 

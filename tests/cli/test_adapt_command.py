@@ -111,7 +111,7 @@ def test_types_may_be_missing_and_contradictions_are_named(folder: Path, tmp_pat
     both.save(tmp_path / "two.grasps")
     said = thenar("adapt", folder / "build", tmp_path / "two.grasps", "-o", tmp_path / "new")
     assert said.returncode == 0
-    assert "a frame is the same for cup, pen" in said.stderr
+    assert "a frame is the same for cup, pen, in trials 0, 1:" in said.stderr
     assert "no trials of rod" in said.stderr
     # Even a frame that looks like another type is within the limits of its own.
     build = Build.load(tmp_path / "new")

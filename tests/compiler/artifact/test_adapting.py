@@ -60,6 +60,8 @@ def test_a_type_that_nobody_else_has_is_taught_by_three_trials(folder: Path, tmp
     adapted = made.manifest.adapted
     assert adapted is not None
     assert (made.after, adapted.counts, adapted.added) == (12, (3, 3, 3, 3), ("rod",))
+    assert made.by_type[3] == (3, 0, 3)
+    assert [sum(column) for column in zip(*made.by_type, strict=True)] == [12, made.before, made.after]
     found = verify(tmp_path / "mine", later)
     assert found.holds
     known = later.grasps != "rod"
