@@ -51,7 +51,7 @@ def _ask(studio: Studio, asked: Asked) -> None:
 def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Sequence[Path], _: Report) -> None:
     project, builds = studio.project, [Build.load(path) for path in paths]
     grasp_set = project.grasp_set(sets)
-    found = compare_builds(*paths, grasp_set)
+    found = compare_builds(paths[0], paths[1], grasp_set)
     kept = [_sensors(build.manifest) for build in builds]
     prices = {name: part.price for name, part in project.parts(list({**kept[0], **kept[1]})).items()}
     shown = [

@@ -44,13 +44,14 @@ class WearerPage:
             "wear": self._record,
             "chosen": self._chosen,
             "adapt": self._later,
-            "undo": self._undo,
+            "unwear": self._undo,
         }
         studio.add("wearer.html", "Wearer", requests, self.read)
 
     def read(self, report: Report) -> None:
         """Show the build of everybody, and which sets hold trials of the wearer for it."""
-        state, about = self._project.state, {"wearer": self._project.state.wearer}
+        state = self._project.state
+        about: dict[str, object] = {"wearer": state.wearer}
         try:
             base, build = self._base()
         except ThenarError as reason:
@@ -114,7 +115,7 @@ class WearerPage:
         """Begin to record two trials of each type of the build, or three if `name` is a type to add; or go on."""
         if not self._project.harness.exists():
             raise SettingError("the project has no glove.toml: connect a glove on the page Glove first")
-        wearer, (base, build) = self._project.state.wearer, self._base()
+        wearer, (_, build) = self._project.state.wearer, self._base()
         if lacking := Glove(build, self._project.wiring()).system.unread:
             raise SettingError(lacking)
         types, tasks = tasks_of(build.manifest, [asked.name] if asked.name else [])

@@ -236,7 +236,9 @@ class Server(Closing):
         if request.path == "/live":
             return await self._live(request)
         if offered := self._offered.get(request.path):
-            saved = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(offered[0], safe='', errors='replace')}"}
+            saved = {
+                "Content-Disposition": f"attachment; filename*=UTF-8''{quote(offered[0], safe='', errors='replace')}"
+            }
             return web.Response(body=offered[1], content_type="application/octet-stream", headers=HEADERS | saved)
         file = self._files.get(request.path)
         if file is None:

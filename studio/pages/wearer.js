@@ -100,4 +100,4 @@ $("record").addEventListener("submit", (event) => {
 $("adapt").addEventListener("click", () => {
   awaited = ask("adapt", { ids: ticked() });
 });
-$("undo").addEventListener("click", () => ask("undo"));
+$("undo").addEventListener("click", () => ask("unwear"));

@@ -96,8 +96,9 @@ def test_two_builds_are_compared_on_trials_that_neither_was_trained_on(
         read = [build.classify(*one) for one in zip(others.switches[:, kept], others.codes[:, joints], strict=True)]
         hits.append(np.array(read) == others.grasps)
     gained = 100 * (hits[1].mean() - hits[0].mean())
-    said = re.fullmatch(r"(\w+) is (\d+\.\d) points better \[.*\], on 36 trials that neither was trained on",
-                        browser.text("said"))
+    said = re.fullmatch(
+        r"(\w+) is (\d+\.\d) points better \[.*\], on 36 trials that neither was trained on", browser.text("said")
+    )
     assert said is not None
     assert (said[1], said[2]) == (names[int(gained > 0)], f"{abs(gained):.1f}")
     both = {row[0]: row[1:] for row in rows(browser, "both")}
@@ -146,7 +147,7 @@ def test_trials_that_a_build_was_trained_on_say_nothing(browser: Browser, projec
     browser.click("compare")
     browser.wait(lambda: "trained on each of these" in browser.text("said"))
     assert not browser.driver.find_element(By.ID, "differences").is_displayed()
-    assert [row[0] for row in rows(browser, "both")][0] == "Sensors"
+    assert rows(browser, "both")[0][0] == "Sensors"
 
 
 def test_a_report_is_exported_and_saved_by_the_browser(

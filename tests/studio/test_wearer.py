@@ -200,7 +200,7 @@ def test_axe_finds_nothing(browser: Browser, studio: Start, folder: Path, width:
         ({"do": "chosen", "ids": ["D.grasps"]}, "D.grasps is no recording of C for this build"),
         ({"do": "chosen", "ids": [7]}, "invalid message"),
         ({"do": "wear"}, "the project has no glove.toml"),
-        ({"do": "undo"}, "nothing to undo"),
+        ({"do": "unwear"}, "nothing to undo"),
     ],
 )
 def test_what_a_page_may_not_ask_for_is_refused(
