@@ -6,7 +6,7 @@ from pathlib import Path
 from shlex import join, quote
 
 from thenar.compiler.artifact.comparing import BuildComparison, compare_builds
-from thenar.compiler.artifact.documents import REPORT_NAME
+from thenar.compiler.artifact.documents import REPORT_NAME, report_of_build
 from thenar.compiler.facts import SensorCount
 from thenar.compiler.firmware.generate import firmware_files, write_folder
 from thenar.compiler.firmware.targets import TARGETS
@@ -14,8 +14,8 @@ from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.text import counted
 from thenar.drivers.errors import SettingError
 from thenar.runtime.build import TABLES_NAME, Build
-from thenar.runtime.errors import BuildError, HarnessError
-from thenar.runtime.files import read_file, write_atomically
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.files import write_atomically
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.timing import scan_us
@@ -24,8 +24,6 @@ from thenar.runtime.web.server import message
 from .choose import drawn
 from .project import Project
 from .studio import Asked, Handler, Report, Studio
-
-_LARGEST_REPORT = 64 << 20
 
 
 def add_compare_page(studio: Studio) -> None:
@@ -118,7 +116,8 @@ def _commands(studio: Studio, asked: Asked) -> bytes:
     """Return the commands that export what the buttons do."""
     build, page, folder = _places(studio.project, asked)
     firmware = ["thenar", "firmware", str(build), "--target", asked.name, "-o", str(folder)]
-    return message("commands", report=join(["cp", str(build / REPORT_NAME), str(page)]), firmware=join(firmware))
+    report = ["cp", str(build / REPORT_NAME), str(page)] if (build / REPORT_NAME).exists() else []
+    return message("commands", report=join(report), firmware=join(firmware))
 
 
 def _queue(studio: Studio, asked: Asked) -> None:
@@ -134,10 +133,7 @@ def _export(studio: Studio, asked: Asked, _: Report) -> None:
         write_folder(firmware_files(loaded.tables, loaded.manifest, asked.name), folder)
         said, address = TARGETS[asked.name].next_step.format(folder=quote(str(folder))), ""
     else:
-        report = build / REPORT_NAME
-        if not report.exists():
-            raise BuildError(f"{report} does not exist: compile this build again")
-        content = read_file(report, _LARGEST_REPORT, BuildError)
+        content = report_of_build(build)
         write_atomically(page, content)
         said, address = f"{page} works offline, in any browser", studio.server.offer(page.name, content)
     studio.publish("exported", message("exported", said=said, address=address, name=page.name))

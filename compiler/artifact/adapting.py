@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -11,7 +12,7 @@ from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME, Build, read_member
-from thenar.runtime.hand import HAND_NAME
+from thenar.runtime.hand import HAND_NAME, hand_from_bytes
 from thenar.runtime.manifest import Adapted, Manifest, Of, Recognised, Rejection, Switch, Wearing
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import LIMIT, MAX_BYTES, IntegerTables, tables_to_bytes
@@ -32,7 +33,7 @@ from ..scan_file import SCAN_NAME
 from ..wearer import STRENGTH, Adaptation
 from . import CompileError
 from .compile import check_target, closed_shares, origin_of, proof_of, publish, sha256
-from .documents import SPEC_FOLDER
+from .documents import REPORT_NAME, SPEC_FOLDER, stated_report
 from .ensemble import ensemble_to_bytes
 from .verify import load_ensemble
 from .verify_firmware import made_firmware
@@ -78,7 +79,7 @@ def adapt(
 ) -> AdaptedBuild:
     """Write a build for one person: the same elements, thresholds and kinds of terms, with scores for this person.
 
-    The base dependencies suffice; without the extra `compiler` the build has no firmware. The same input gives the same
+    The base dependencies suffice; without the extra `compiler` the build has no firmware and no report. The same input gives the same
     bytes on every machine.
 
     Parameters
@@ -179,11 +180,13 @@ def adapt(
         )
     )
     personal = manifest_from_bytes(described)
-    try:
+    files |= _carried(source, manifest)
+    note = ""
+    with suppress(ModuleNotFoundError):
         firmware, note = made_firmware(personal, tables)
-    except ModuleNotFoundError:
-        firmware, note = {}, ""
-    files |= {path: text.encode() for path, text in firmware.items()} | _carried(source, manifest)
+        files |= {path: text.encode() for path, text in firmware.items()}
+        hand = hand_from_bytes(files[HAND_NAME], personal)
+        files[REPORT_NAME] = stated_report(Build(personal, tables), hand, bits, codes, labels)
     publish(files | {MANIFEST_NAME: described}, target)
     warnings = tuple(_warnings(personal, adaptation, recordings))
     by_type = tuple(zip(counts, *right[:2], strict=True))

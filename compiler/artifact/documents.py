@@ -187,19 +187,30 @@ def report_of_build(folder: str | Path, grasp_set: GraspSet | None = None) -> by
     CompileError
         If the recordings lack inputs of the build.
     """
-    from ..report.content import ReportContent
-    from ..report.page import report_html
-    from ..report.tryout import page_data
-
     where = Path(folder)
     build = Build.load(where)
     if (where / REPORT_NAME).is_file():
         return (where / REPORT_NAME).read_bytes()
-    manifest, hand, tables = build.manifest, load_hand(where, build.manifest), (where / TABLES_NAME).read_bytes()
+    manifest = build.manifest
     if grasp_set is None:
         bits, codes = np.zeros((0, len(manifest.switches)), bool), np.zeros((0, len(manifest.joints)), np.uint16)
-        data = page_data(manifest, tables, hand, bits, codes, np.zeros(0, np.intp))
+        labels = np.zeros(0, np.intp)
     else:
         labels = labels_of(np.array(build.grasps), grasp_set)
-        data = page_data(manifest, tables, hand, *select_inputs(grasp_set, manifest), labels)
-    return report_html(ReportContent(manifest, build.tables, facts(manifest, tables_bytes=len(tables)), data))
+        bits, codes = select_inputs(grasp_set, manifest)
+    return stated_report(build, load_hand(where, manifest), bits, codes, labels)
+
+
+def stated_report(
+    build: Build, hand: HandDrawing, bits: NDArray[np.bool_], codes: NDArray[np.uint16], labels: NDArray[np.intp]
+) -> bytes:
+    """Return the page of a build, of what it states itself and of rows of its inputs (n, s) and (n, j), with labels."""
+    from ..report.content import ReportContent
+    from ..report.page import report_html
+    from ..report.tryout import page_data
+
+    tables = tables_to_bytes(build.tables)
+    data = page_data(build.manifest, tables, hand, bits, codes, labels)
+    return report_html(
+        ReportContent(build.manifest, build.tables, facts(build.manifest, tables_bytes=len(tables)), data)
+    )

@@ -100,6 +100,7 @@ def test_the_base_dependencies_suffice_and_give_the_same_bytes(folder: Path, tmp
     assert done.returncode == 0, done.stderr
     assert 'no firmware: pip install "thenar[compiler]"' in done.stdout
     assert not (tmp_path / "mine" / "firmware").exists()
+    assert not (tmp_path / "mine" / "report.html").exists()
     for name in ("build.json", "tables.bin", "ensemble.bin"):
         assert (tmp_path / "mine" / name).read_bytes() == (folder / "mine" / name).read_bytes()
 

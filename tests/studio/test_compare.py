@@ -17,6 +17,7 @@ from websockets.typing import Origin
 
 from thenar.cli import run
 from thenar.compiler.artifact.comparing import compare_builds
+from thenar.compiler.artifact.documents import report_of_build
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime import Build
 from thenar.studio import Studio
@@ -224,11 +225,11 @@ def test_what_a_page_may_not_ask_for_is_refused(
     assert sorted(folder.iterdir()) == before
 
 
-def test_a_build_without_a_report_says_so(project: Studio, folder: Path) -> None:
-    (folder / "few" / "report.html").unlink()
-    address = project.server.url.removeprefix("http://").rstrip("/")
-    with connect(f"ws://{address}/live?topics=work", origin=Origin(f"http://{address}"), proxy=None) as live:
-        live.send(json.dumps({"do": "report", "id": ids(project, "build")["few"], "name": "generic"}))
-        while "why" not in (told := json.loads(live.recv(timeout=PATIENCE_S))):
-            pass
-    assert "does not exist: compile this build again" in told["why"]
+def test_a_build_without_a_report_gets_one_of_what_it_states(browser: Browser, project: Studio, folder: Path) -> None:
+    (folder / "more" / "report.html").unlink()
+    begun(browser, project)
+    Select(browser.driver.find_element(By.ID, "build")).select_by_visible_text("more")
+    browser.wait(lambda: browser.text("report-command") == "")
+    browser.click("report")
+    browser.wait(lambda: browser.text("exported"))
+    assert (folder / "more.html").read_bytes() == report_of_build(folder / "more")
