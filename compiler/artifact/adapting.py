@@ -186,7 +186,10 @@ def adapt(
         firmware, note = made_firmware(personal, tables)
         files |= {path: text.encode() for path, text in firmware.items()}
         hand = hand_from_bytes(files[HAND_NAME], personal)
-        files[REPORT_NAME] = stated_report(Build(personal, tables), hand, bits, codes, labels)
+        confusion = np.zeros((len(names), len(names)), np.intp)
+        np.add.at(confusion, (labels, guesses[2]), 1)
+        build = Build(personal, tables)
+        files[REPORT_NAME] = stated_report(build, hand, bits, codes, labels, note, confusion)
     publish(files | {MANIFEST_NAME: described}, target)
     warnings = tuple(_warnings(personal, adaptation, recordings))
     by_type = tuple(zip(counts, *right[:2], strict=True))

@@ -202,15 +202,22 @@ def report_of_build(folder: str | Path, grasp_set: GraspSet | None = None) -> by
 
 
 def stated_report(
-    build: Build, hand: HandDrawing, bits: NDArray[np.bool_], codes: NDArray[np.uint16], labels: NDArray[np.intp]
+    build: Build,
+    hand: HandDrawing,
+    bits: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+    labels: NDArray[np.intp],
+    firmware: str = "",
+    confusion: NDArray[np.intp] | None = None,
 ) -> bytes:
-    """Return the page of a build, of what it states itself and of rows of its inputs (n, s) and (n, j), with labels."""
+    """Return the page of a build, of what it states itself, of rows of its inputs (n, s) and (n, j) with labels (n,),
+    and of what else is known of it, as in a BuildReport.
+    """
     from ..report.content import ReportContent
     from ..report.page import report_html
     from ..report.tryout import page_data
 
     tables = tables_to_bytes(build.tables)
     data = page_data(build.manifest, tables, hand, bits, codes, labels)
-    return report_html(
-        ReportContent(build.manifest, build.tables, facts(build.manifest, tables_bytes=len(tables)), data)
-    )
+    about = facts(build.manifest, tables_bytes=len(tables), firmware=firmware)
+    return report_html(ReportContent(build.manifest, build.tables, about, data, confusion=confusion))

@@ -66,6 +66,8 @@ def test_a_type_that_nobody_else_has_is_taught_by_three_trials(folder: Path, tmp
     page = (tmp_path / "mine" / "report.html").read_text()
     assert build.manifest.checksum in page
     assert f"{made.after} of 12 trials" in page
+    assert f"Firmware</dt><dd>{made.firmware}" in page.replace("\n", "")
+    assert "12 nested folds" in page.partition('id="confusion"')[2]
     found = verify(tmp_path / "mine", later)
     assert found.holds
     known = later.grasps != "rod"
