@@ -188,7 +188,9 @@ class Collector:
         trial, names = self._by_number[asked.trial], self._studio.project.wiring().switches
         closed = _bits(switches, len(names))
         sensors = [] if glove is None else list(glove.sensors)
-        return message("recorded", trial=trial.number, grasp=trial.grasp, thing=trial.object, closed=closed, raw=sensors)
+        return message(
+            "recorded", trial=trial.number, grasp=trial.grasp, thing=trial.object, closed=closed, raw=sensors
+        )
 
 
 def glove_message(devices: Sequence[DeviceHealth]) -> bytes:

@@ -77,6 +77,7 @@ class Studio(Closing):
         self._titles = list[tuple[str, str]]()
         self._readers = list[Callable[[Report], None]]()
         self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
+        self._stale = False
         self.server = Server("choose", address, token=token, on_message=self._take, folder=PAGES)
         self.station = Station(self.server.publish)
 
@@ -112,8 +113,15 @@ class Studio(Closing):
         self.publish("shell", shell_message(self.project.name, *about, pages=self._titles, wearer=state.wearer))
         kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
         self.publish("project", message("project", kinds, state=state))
+        # Of several changes the last is read: a recording or a build may come while another is read.
+        if not self._stale:
+            self._stale = True
+            self._queue.put(("reading", self._read))
+
+    def _read(self, report: Report) -> None:
+        self._stale = False
         for read in self._readers:
-            self.queue("reading", read)
+            read(report)
 
     def run(self, stop: Event) -> None:
         """Do what pages ask for, until `stop` is set."""
