@@ -57,7 +57,7 @@ def command(
     hold: float,
 ) -> None:
     """Calibrate the CyberGlove at PORT (/dev/ttyUSB0, socket://HOST:PORT, ...) for its wearer. Given a glove.toml,
-    calibrate the joints of its [[stream]], or its taxels with --taxels.
+    calibrate its joints, or its taxels with --taxels.
 
     The command asks for a flat hand, a fist and five more poses, shows the sensor values, and takes each pose when you
     press Enter. For taxels, leave all untouched first, then press each one once. The file is written at the end; until
@@ -121,6 +121,8 @@ def _asking_poses(typed: "TypedLines") -> "Callable[[PoseGuide], list[PoseKey]]"
     waiting: list[PoseKey] = []
 
     def ask(guide: "PoseGuide") -> "list[PoseKey]":
+        if guide.stage in ("held", "done"):
+            return []
         silent = guide.silent(now_us())
         if waiting:
             return [] if silent else [waiting.pop()]

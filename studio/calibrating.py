@@ -78,9 +78,8 @@ def lead_poses(
     with _posing(port, baud, hold_s, note) as (guide, take):
         while guide.stage != "done" and not stop.is_set():
             take()
-            if guide.stage != "held":
-                for key in view(guide):
-                    guide.press(now_us(), key)
+            for key in view(guide):
+                guide.press(now_us(), key)
         return guide if guide.stage == "done" else None
 
 
@@ -140,7 +139,7 @@ def _sources(glove: Path, *, taxels: bool) -> Iterator[tuple[Harness, Sources]]:
     if not taxels:
         device = harness.joint_device
         if not isinstance(device, StreamWiring):
-            raise SettingError(f"{glove.name} has no [[stream]] with joints: name the port of the CyberGlove")
+            raise SettingError(f"{glove.name} has no joints: add a [cyberglove], or `joints` to a [[stream]]")
         harness = replace(harness, buses=(), spi=(), streams=(device,))
     with Sources(harness, (), whole_scan(harness, (), every_taxel=taxels)) as sources:
         yield harness, sources

@@ -5,7 +5,7 @@ thread if it takes milliseconds. Longer work is queued and done one at a time, b
 "work". The devices of the glove have one user at a time, whose thread the `Station` keeps.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ import msgspec
 
 from thenar.drivers.closing import Closing
 from thenar.drivers.errors import ThenarError
+from thenar.runtime.published import DeviceHealth
 from thenar.runtime.web.live import shell_message
 from thenar.runtime.web.server import Message, Server, message
 
@@ -202,3 +203,9 @@ class Station:
         self._publish("station", message("station", doing=doing, why=why))
         if not doing:
             self._publish("glove", message("glove", {"is": "warn", "words": "not in use"}))
+
+
+def glove_message(devices: Sequence[DeviceHealth]) -> bytes:
+    """Return the message on the bar about the state of the glove's devices."""
+    lost = ", ".join(f"{device.name} lost" for device in devices if not device.connected)
+    return message("glove", {"is": "bad" if lost else "good", "words": lost or "connected"})
