@@ -86,7 +86,6 @@ def command(
     from thenar.runtime.harness.loading import load_harness
     from thenar.runtime.recording.guide import planned, read_journal
     from thenar.runtime.recording.session import Collection
-
     from thenar.studio.collecting import collect
 
     from . import ended_by_signals

@@ -13,7 +13,7 @@ from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
 from thenar.compiler.glove.propose import propose_harness
-from thenar.compiler.hand import HandShape, grid_places, places_of, shape_of, unknown_shape
+from thenar.compiler.hand import HandShape
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.elements import elements_of, names_of
 from thenar.compiler.recordings.graspset import GraspSet
@@ -27,6 +27,7 @@ from thenar.runtime.scanning.timing import scan_us
 from thenar.runtime.web.server import message
 
 from .quick import QuickAccuracy
+from .sensors import placed
 from .studio import Asked, Handler, Report, Studio
 
 _BUILD = "build"
@@ -177,9 +178,6 @@ class ChoosePage:
 
 def drawn(grasp_set: GraspSet, hand: HandShape | None) -> HandDrawing:
     """Return a drawing in which every switch and pad of a set is one to click on: its number is the sensor's."""
-    names = grasp_set.element_names
-    known = hand if hand is not None and names and hand.knows(names) else None
-    places = grid_places(names) if known is None else places_of(known, names)
+    places, fields = placed(grasp_set.element_names, hand)
     switches = tuple(DrawnSwitch(name, x, y, number) for number, (name, (x, y)) in enumerate(places.items()))
-    shown = unknown_shape("the positions of the sensors are unknown") if known is None else shape_of(known)
-    return HandDrawing(**shown, switches=switches, taxels=(), joints=())
+    return HandDrawing(**fields, switches=switches, taxels=(), joints=())

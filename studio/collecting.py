@@ -42,7 +42,7 @@ def collect(
     stop: Event,
     countdown_s: float = 3.0,
 ) -> int:
-    """Lead through the trials of a collection until all are done, the user leaves, or `stop` is set.
+    """Lead through the trials of a collection until all are done or the user leaves.
 
     Parameters
     ----------
@@ -54,6 +54,10 @@ def collect(
         The .mcap file to write, or to continue.
     view : callable
         Gets the guide and the state of the devices after every reading, and returns the keys pressed since.
+    stop : Event
+        Ends it.
+    countdown_s : float
+        Before a grasp is captured, seconds.
 
     Returns
     -------

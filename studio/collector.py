@@ -27,7 +27,8 @@ from thenar.runtime.web.server import message
 
 from .collecting import collect, standing, task
 from .quick import QuickAccuracy
-from .studio import Asked, Handler, Studio
+from .sensors import GloveSensors
+from .studio import Asked, Handler, Studio, glove_message
 
 _SHOW_US = 100_000
 # So many trials of every type have an accuracy.
@@ -181,20 +182,12 @@ class Collector:
         self._keys.put(asked.name)
 
     def _recorded(self, asked: Asked) -> bytes:
-        """Return what was captured in a trial: which switches were closed, and the bytes of the joints."""
+        """Return what was captured in a trial, as the hand shows it."""
         if asked.trial not in self._captured:
             raise ThenarError(f"trial {asked.trial} was not recorded")
-        switches, glove = self._captured[asked.trial]
-        trial, names = self._by_number[asked.trial], self._studio.project.wiring().switches
-        closed = _bits(switches, len(names))
-        sensors = [] if glove is None else list(glove.sensors)
-        return message("recorded", trial=trial.number, grasp=trial.grasp, thing=trial.object, closed=closed, raw=sensors)
-
-
-def glove_message(devices: Sequence[DeviceHealth]) -> bytes:
-    """Return the message on the bar about the state of the glove's devices."""
-    lost = ", ".join(f"{device.name} lost" for device in devices if not device.connected)
-    return message("glove", {"is": "bad" if lost else "good", "words": lost or "connected"})
+        sensors = GloveSensors(self._studio.project.wiring(), self._studio.project.hand())
+        trial, shown = self._by_number[asked.trial], sensors.read(*self._captured[asked.trial])
+        return message("recorded", sensors.drawn(shown), trial=trial.number, grasp=trial.grasp, thing=trial.object)
 
 
 def _bits(frame: SwitchFrame | None, count: int) -> list[bool]:

@@ -3,6 +3,7 @@
 from .choose import ChoosePage
 from .collector import Collector
 from .compare import add_compare_page
+from .glove import GlovePage
 from .project import Project
 from .record import RecordPage
 from .studio import Studio
@@ -13,6 +14,7 @@ def open_studio(project: Project, address: str, *, token: str | None, jobs: int 
     """Return the open studio of a project: see `Studio`."""
     studio = Studio(project, address, token=token, jobs=jobs)
     collector = Collector(studio)
+    GlovePage(studio)
     RecordPage(studio, collector)
     ChoosePage(studio)
     WearerPage(studio, collector)

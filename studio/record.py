@@ -4,13 +4,10 @@ import secrets
 from functools import partial
 from pathlib import Path
 
-import msgspec
-
 from thenar.compiler.recordings import check_names
 from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.compiler.recordings.taxonomy import collected
 from thenar.drivers.errors import SettingError, ThenarError
-from thenar.runtime.names import shortened
 from thenar.runtime.recording.guide import Journal, planned, read_journal
 from thenar.runtime.recording.session import Collection
 from thenar.runtime.web.server import message
@@ -37,7 +34,9 @@ class RecordPage:
         for member in self._project.members("recording"):
             about = self._about(self._project.folder / member.name)
             if about is not None and about[1] < about[2]:
-                found.append({"id": member.id, "name": member.name, "subject": about[0], "done": about[1], "total": about[2]})
+                found.append(
+                    {"id": member.id, "name": member.name, "subject": about[0], "done": about[1], "total": about[2]}
+                )
         objects = self._objects
         self._studio.publish(
             "recordings",
@@ -72,7 +71,9 @@ class RecordPage:
         """Begin a collection: `name` is the subject, `id` the taxonomy, `value` the repetitions; trial: with none."""
         repetitions = asked.value or 0
         if not (1 <= repetitions <= _MOST_REPETITIONS and repetitions == int(repetitions)):
-            raise SettingError(f"{repetitions:g} trials of each type: type a whole number from 1 to {_MOST_REPETITIONS}")
+            raise SettingError(
+                f"{repetitions:g} trials of each type: type a whole number from 1 to {_MOST_REPETITIONS}"
+            )
         check_names("subject", [asked.name])
         if asked.id == "own" and self._objects is None:
             raise SettingError("the project has no objects.toml, which lists your own types and their objects")
@@ -109,7 +110,13 @@ class RecordPage:
             grasp_set, report = import_recordings([recording])
             grasp_set.save(output)
             warnings = [finding.message for finding in report.warnings]
-            about = {"set": output.name, "size": str(grasp_set.size), "warnings": warnings, "done": done, "total": total}
+            about = {
+                "set": output.name,
+                "size": str(grasp_set.size),
+                "warnings": warnings,
+                "done": done,
+                "total": total,
+            }
             self._studio.publish("finished", message("finished", about))
         self._studio.changed()
 

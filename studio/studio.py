@@ -5,7 +5,7 @@ thread if it takes milliseconds. Longer work is queued and done one at a time, b
 "work". The devices of the glove have one user at a time, whose thread the `Station` keeps.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ import msgspec
 
 from thenar.drivers.closing import Closing
 from thenar.drivers.errors import ThenarError
+from thenar.runtime.published import DeviceHealth
 from thenar.runtime.web.live import shell_message
 from thenar.runtime.web.server import Message, Server, message
 
@@ -78,6 +79,7 @@ class Studio(Closing):
         self._titles = list[tuple[str, str]]()
         self._readers = list[Callable[[Report], None]]()
         self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
+        self._stale = False
         self.server = Server("choose", address, token=token, on_message=self._take, folder=PAGES)
         self.station = Station(self.server.publish)
 
@@ -113,8 +115,15 @@ class Studio(Closing):
         self.publish("shell", shell_message(self.project.name, *about, pages=self._titles, wearer=state.wearer))
         kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
         self.publish("project", message("project", kinds, state=state))
+        # Of several changes the last is read: a recording or a build may come while another is read.
+        if not self._stale:
+            self._stale = True
+            self._queue.put(("reading", self._read))
+
+    def _read(self, report: Report) -> None:
+        self._stale = False
         for read in self._readers:
-            self.queue("reading", read)
+            read(report)
 
     def run(self, stop: Event) -> None:
         """Do what pages ask for, until `stop` is set."""
@@ -195,3 +204,9 @@ class Station:
         self._publish("station", message("station", doing=doing, why=why))
         if not doing:
             self._publish("glove", message("glove", {"is": "warn", "words": "not in use"}))
+
+
+def glove_message(devices: Sequence[DeviceHealth]) -> bytes:
+    """Return the message on the bar about the state of the glove's devices."""
+    lost = ", ".join(f"{device.name} lost" for device in devices if not device.connected)
+    return message("glove", {"is": "bad" if lost else "good", "words": lost or "connected"})
