@@ -51,7 +51,8 @@ class ChoosePage:
         """Read the project's recordings, and show them. Raises ThenarError if there are none, or a single type."""
         self._quick = None
         try:
-            self._set = grasp_set = self._project.grasp_set()
+            grasp_set, self._trials, _ = self._project.recordings()
+            self._set = grasp_set
             self._quick = quick = QuickAccuracy(grasp_set)
         except ThenarError as reason:
             self._studio.publish("set", message("set", why=str(reason), sensors=(), grasps=(), trials=(), name=""))
@@ -114,12 +115,15 @@ class ChoosePage:
         """Return the commands that compile a build of these sensors."""
         if not names:
             return ""
-        sets, have = [quote(str(path)) for path in self._project.sets()], quote(",".join(names))
+        folder, edits = self._project.folder, self._project.edits
+        sets = [folder / name for name in dict.fromkeys(trial[0] for trial in self._trials)]
+        recordings, have, first = quote(str(sets[0])), quote(",".join(names)), ""
         more = "".join(f" {quote(option)}" for option in self._project.options())
-        first, recordings = "", sets[0]
-        if len(sets) > 1:
-            recordings = quote(str(self._project.folder / "all.grasps"))
-            first = f"thenar merge {' '.join(sets)} -o {recordings} && "
+        if len(sets) > 1 or edits.exists():
+            merged = [*sets, "--edits", edits] if edits.exists() else sets
+            # Beside the project, of which it would be one more set.
+            recordings = quote(str(folder.resolve().parent / f"{self._project.name}.grasps"))
+            first = f"thenar merge {' '.join(quote(str(one)) for one in merged)} -o {recordings} && "
         output = quote(str(self._project.new_path(_BUILD)))
         return f"{first}thenar compile {recordings} -o {output}{more} --sensors {len(names)} --have {have}"
 

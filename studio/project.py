@@ -8,6 +8,8 @@ import msgspec
 
 from thenar.compiler.glove.prices import Part, load_prices
 from thenar.compiler.hand import HandShape, load_layout
+from thenar.compiler.recordings import RecordingError
+from thenar.compiler.recordings.edits import TrialId, apply_edits
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.merging import merge
 from thenar.drivers.errors import SettingError, ThenarError
@@ -16,6 +18,8 @@ from thenar.runtime.files import write_atomically
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.names import fault, shortened
+
+from .edits import load_edits
 
 _STATE = "studio.json"
 # What each kind of member is called, in a folder.
@@ -93,11 +97,36 @@ class Project:
         return [self.folder / one.name for one in self.members("set") if one.name not in self.state.aside]
 
     def grasp_set(self) -> GraspSet:
-        """Return the recordings: all sets in use as one. Raises ThenarError if there is none, or they do not fit."""
-        sets = {path.name: GraspSet.load(path) for path in self.sets()}
+        """Return the recordings: all sets in use as one, with their edits. Raises ThenarError if there is none."""
+        return self.recordings()[0]
+
+    def recordings(self) -> tuple[GraspSet, list[TrialId], list[str]]:
+        """Return the recordings, for each of their rows the trial as it was recorded, and a sentence on each set that
+        does not fit and on each edit that is not used.
+
+        Raises ThenarError if there is no set, or the log of edits is damaged before its last line.
+        """
+        loaded, unused = dict[str, GraspSet](), list[str]()
+        for path in self.sets():
+            try:
+                loaded[path.name] = GraspSet.load(path)
+            except ThenarError as reason:
+                unused.append(f"{path.name} is left aside: {reason}")
+        sets, misfits = _fitting(loaded)
+        unused += misfits
         if not sets:
-            raise SettingError("the project has no recordings yet: record some, or import a table with thenar import")
-        return next(iter(sets.values())) if len(sets) == 1 else merge(sets)
+            none = "the project has no recordings yet: record some, or import a table with thenar import"
+            raise SettingError("; ".join(unused) or none)
+        edits, damaged = load_edits(self.edits)
+        # Those of sets that were left aside wait.
+        aside = {one.name for one in self.members("set")} - sets.keys()
+        grasp_set, trials, missing = apply_edits(sets, [edit for edit in edits if edit.set not in aside])
+        return grasp_set, trials, [*unused, *missing, *filter(None, [damaged])]
+
+    @property
+    def edits(self) -> Path:
+        """The path of the log of edits, which may not be there."""
+        return self.folder / "edits.jsonl"
 
     @property
     def harness(self) -> Path:
@@ -142,6 +171,22 @@ class Project:
             if not path.exists():
                 return path
         raise ThenarError(f"{self.folder} has too many files called {name}")
+
+
+def _fitting(sets: dict[str, GraspSet]) -> tuple[dict[str, GraspSet], list[str]]:
+    """Return the sets of which each fits those before it, and a sentence on each other."""
+    try:
+        merge(sets)
+        return sets, []
+    except RecordingError:
+        fitting, misfits = dict[str, GraspSet](), list[str]()
+    for name, one in sets.items():
+        try:
+            merge({**fitting, name: one})
+            fitting[name] = one
+        except RecordingError as reason:
+            misfits.append(f"{name} is left aside: {reason}")
+    return fitting, misfits
 
 
 def _id(name: str) -> str:
