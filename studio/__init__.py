@@ -4,6 +4,7 @@
 """
 
 from .choose import ChoosePage
+from .errors import ErrorsPage
 from .project import Project
 from .studio import Studio
 
@@ -13,6 +14,6 @@ __all__ = ["Project", "Studio", "open_studio"]
 def open_studio(project: Project, address: str, *, token: str | None, jobs: int = -1) -> Studio:
     """Return the open studio of a project: see `Studio`."""
     studio = Studio(project, address, token=token, jobs=jobs)
-    ChoosePage(studio)
+    ErrorsPage(studio, ChoosePage(studio))
     studio.changed()
     return studio

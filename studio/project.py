@@ -35,11 +35,14 @@ class Member(msgspec.Struct, frozen=True):
 
 
 class State(msgspec.Struct, forbid_unknown_fields=True):
-    """What is remembered in studio.json: the name of the build in use, of the wearer, and of the sets left aside."""
+    """What is remembered in studio.json: the name of the build in use, of the wearer, and of the sets left aside; and
+    the seconds that each kind of work last took.
+    """
 
     build: str = ""
     wearer: str = "me"
     aside: tuple[str, ...] = ()
+    took: dict[str, float] = {}
 
 
 class Project:
