@@ -3,6 +3,7 @@
 from .choose import ChoosePage
 from .collector import Collector
 from .compare import add_compare_page
+from .errors import ErrorsPage
 from .glove import GlovePage
 from .project import Project
 from .record import RecordPage
@@ -16,7 +17,7 @@ def open_studio(project: Project, address: str, *, token: str | None, jobs: int 
     collector = Collector(studio)
     GlovePage(studio)
     RecordPage(studio, collector)
-    ChoosePage(studio)
+    ErrorsPage(studio, ChoosePage(studio))
     WearerPage(studio, collector)
     add_compare_page(studio)
     studio.changed()

@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
+from time import monotonic
 
 import msgspec
 
@@ -31,7 +32,7 @@ Report = Callable[[int, int], None]
 class Asked(msgspec.Struct, frozen=True):
     """What a page asks for: `do`, and the values that this takes.
 
-    sensors  numbers of sensors        trial  the number of a trial
+    sensors  numbers of sensors        trial, trials  numbers of trials
     id       of a member of the project    name  a name, or a key
     value    a number                      ids   of several members
     """
@@ -39,6 +40,7 @@ class Asked(msgspec.Struct, frozen=True):
     do: str
     sensors: tuple[int, ...] = ()
     trial: int = 0
+    trials: tuple[int, ...] = ()
     id: str = ""
     name: str = ""
     value: float | None = None
@@ -75,11 +77,12 @@ class Studio(Closing):
 
     def __init__(self, project: Project, address: str, *, token: str | None, jobs: int = -1) -> None:
         self.project, self.jobs = project, jobs
-        self._requests: dict[str, Handler] = {}
+        self._requests: dict[str, Handler] = {"cancel": self._cancel}
         self._titles = list[tuple[str, str]]()
         self._readers = list[Callable[[Report], None]]()
         self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
         self._stale = False
+        self._began_s, self._cancelled = 0.0, False
         self.server = Server("choose", address, token=token, on_message=self._take, folder=PAGES)
         self.station = Station(self.server.publish)
 
@@ -133,10 +136,14 @@ class Studio(Closing):
             except Empty:
                 continue
             report = partial(self._report, what)
-            report(0, 1)
+            self._began_s, self._cancelled = monotonic(), False
             try:
+                report(0, 1)
                 work(report)
-                report(1, 1)
+                self.publish("work", message("work", done=1, total=1, what=what))
+                if what != "reading":
+                    took = round(monotonic() - self._began_s, 1)
+                    self.project.remember(took=self.project.state.took | {what: took})
             except (ThenarError, OSError, BrokenExecutor) as reason:
                 # Parameters are named between backticks, for commands to spell.
                 self.publish("work", message("work", done=0, total=0, why=str(reason).replace("``", "")))
@@ -147,7 +154,19 @@ class Studio(Closing):
         self.server.close()
 
     def _report(self, what: str, done: int, total: int) -> None:
-        self.publish("work", message("work", done=done, total=total, what=what))
+        """Tell how far the work is, and how long it takes still: as its parts so far, or as the last time, if known.
+
+        Raises ThenarError if it was cancelled.
+        """
+        if self._cancelled:
+            raise ThenarError("cancelled")
+        spent, last = monotonic() - self._began_s, self.project.state.took.get(what)
+        left = spent / done * (total - done) if done else None if last is None else max(last - spent, 0.0)
+        self.publish("work", message("work", done=done, total=total, what=what, left_s=left))
+
+    def _cancel(self, _: Asked) -> None:
+        """End the work at its next report."""
+        self._cancelled = True
 
     def _take(self, fields: Mapping[str, object]) -> bytes | None:
         """Carry out a request. Raises ThenarError if it cannot be met."""
