@@ -39,7 +39,10 @@ def command(a: Path, b: Path, recordings: Path) -> None:
 
 
 def _print(found: "BuildComparison", names: tuple[str, str]) -> None:
-    rates = [f"{100 * count / found.trials:.1f} %" for count in (found.a, found.b)]
+    rates = [
+        f"{100 * count / found.trials:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
+        for count, (low, high) in zip((found.a, found.b), found.ends, strict=True)
+    ]
     echo(f"{found.trials:,} {found.of}: {names[0]} {rates[0]}, {names[1]} {rates[1]}")
     points, low, high = (f"{100 * share:+.1f}" for share in (found.difference, found.low, found.high))
     counts = f"{found.better} trials better, {found.worse} worse, p {found.p:.2g}"

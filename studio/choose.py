@@ -144,15 +144,8 @@ class ChoosePage:
         """Return the commands that compile a build of these sensors."""
         if not names:
             return ""
-        folder, edits = self._project.folder, self._project.edits
-        sets = [folder / name for name in self._files]
-        recordings, have, first = quote(str(sets[0])), quote(",".join(names)), ""
-        more = "".join(f" {quote(option)}" for option in self._project.options())
-        if len(sets) > 1 or edits.exists():
-            merged = [*sets, "--edits", edits] if edits.exists() else sets
-            # Beside the project, of which it would be one more set.
-            recordings = quote(str(folder.resolve().parent / f"{self._project.name}.grasps"))
-            first = f"thenar merge {' '.join(quote(str(one)) for one in merged)} -o {recordings} && "
+        first, recordings = self._project.joined([self._project.folder / name for name in self._files])
+        have, more = quote(",".join(names)), "".join(f" {quote(option)}" for option in self._project.options())
         output = quote(str(self._project.new_path(_BUILD)))
         return f"{first}thenar compile {recordings} -o {output}{more} --sensors {len(names)} --have {have}"
 

@@ -11,7 +11,6 @@ from thenar.compiler.facts import SensorCount
 from thenar.compiler.firmware.generate import firmware_files, write_folder
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.glove.propose import propose_harness
-from thenar.compiler.text import counted
 from thenar.drivers.errors import SettingError
 from thenar.runtime.build import TABLES_NAME, Build
 from thenar.runtime.errors import HarnessError
@@ -29,7 +28,8 @@ from .studio import Asked, Handler, Report, Studio
 def add_compare_page(studio: Studio) -> None:
     """Add the page *Compare* to a studio."""
     requests: dict[str, Handler] = {
-        "compare": partial(_ask, studio),
+        "compare": partial(_later, studio),
+        "comparison": partial(_comparison, studio),
         "commands": partial(_commands, studio),
         **dict.fromkeys(("report", "firmware"), partial(_queue, studio)),
     }
@@ -37,31 +37,44 @@ def add_compare_page(studio: Studio) -> None:
     studio.publish("targets", message("targets", targets=[(name, target.help) for name, target in TARGETS.items()]))
 
 
-def _ask(studio: Studio, asked: Asked) -> None:
-    """Queue the comparison of two builds on some sets, or on all in use. Raises SettingError for other ids."""
+def _chosen(studio: Studio, asked: Asked) -> tuple[list[Path], list[Path]]:
+    """Return two builds, and sets, or all in use. Raises SettingError for other ids."""
     if len(asked.ids) < 2 or asked.ids[0] == asked.ids[1]:
         raise SettingError("choose two builds to compare")
-    paths = [studio.project.path("build", member) for member in asked.ids[:2]]
     sets = [studio.project.path("set", member) for member in asked.ids[2:]]
-    studio.queue("compare", partial(_compare, studio, asked.ids, paths, sets))
+    return [studio.project.path("build", member) for member in asked.ids[:2]], sets or studio.project.sets()
 
 
-def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Sequence[Path], _: Report) -> None:
+def _later(studio: Studio, asked: Asked) -> None:
+    builds, sets = _chosen(studio, asked)
+    studio.queue("compare", partial(_compare, studio, asked.ids, builds, sets))
+
+
+def _comparison(studio: Studio, asked: Asked) -> bytes:
+    """Return the command that compares two builds."""
+    builds, sets = _chosen(studio, asked)
+    first, recordings = studio.project.joined(sets)
+    return message("comparison", command=f"{first}{join(['thenar', 'compare', *map(str, builds)])} {recordings}")
+
+
+def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Sequence[Path], report: Report) -> None:
     project, builds = studio.project, [Build.load(path) for path in paths]
-    grasp_set = project.grasp_set(sets)
-    found = compare_builds(paths[0], paths[1], grasp_set)
+    grasp_set, _, unused = project.recordings(sets)
+    found = compare_builds(paths[0], paths[1], grasp_set, report)
     kept = [_sensors(build.manifest) for build in builds]
     prices = {name: part.price for name, part in project.parts(list({**kept[0], **kept[1]})).items()}
     shown = [
         {
             "name": path.name,
+            "right": right,
+            "ends": ends,
             "sensors": str(SensorCount.of_build(build.manifest)),
             "scan_us": _scan_us(project, build.manifest),
             "bytes": (path / TABLES_NAME).stat().st_size,
             "price": sum(prices[name] for name in names) if prices else None,
             "stated": str(build.manifest.headline or "not measured"),
         }
-        for path, build, names in zip(paths, builds, kept, strict=True)
+        for path, build, names, right, ends in zip(paths, builds, kept, (found.a, found.b), found.ends, strict=True)
     ]
     about = {
         "hand": drawn(grasp_set, project.hand().fitted(grasp_set.element_names)),
@@ -70,6 +83,7 @@ def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Se
         "only": [[name for name in one if name not in other] for one, other in (kept, kept[::-1])],
         "found": found,
         "said": _said(found, *(path.name for path in paths)),
+        "unused": unused,
     }
     studio.publish("compare", message("compare", about, ids=ids))
 
@@ -92,16 +106,13 @@ def _scan_us(project: Project, manifest: Manifest) -> float | None:
     return scan_us(scan, harness).us if scan.ports else 0.0
 
 
-def _said(found: BuildComparison | None, a: str, b: str) -> str:
+def _said(found: BuildComparison, a: str, b: str) -> str:
     """Return the difference of build b from build a in a sentence."""
-    if found is None:
-        return "one of them was trained on each of these trials: choose recordings that neither knows"
     middle, low, high = (100 * share for share in (found.difference, found.low, found.high))
     ahead = f"{b} is {middle:.1f} points better" if middle else f"{a} and {b} are equally good"
     if middle < 0:
         ahead, low, high = f"{a} is {-middle:.1f} points better", -high, -low
-    trials = counted(found.rates[0].total, "trial")
-    return f"{ahead} [{low:.1f}, {high:.1f}], on {trials} that neither was trained on"
+    return f"{ahead} [{low:.1f}, {high:.1f}], on {found.trials} {found.of}"
 
 
 def _places(project: Project, asked: Asked) -> tuple[Path, Path, Path]:

@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import join, quote
 
 import msgspec
 
@@ -131,6 +132,17 @@ class Project:
     def edits(self) -> Path:
         """The path of the log of edits, which may not be there."""
         return self.folder / "edits.jsonl"
+
+    def joined(self, paths: Sequence[Path]) -> tuple[str, str]:
+        """Return the beginning of a command that makes one set of several and of edits, and the name of the result; if
+        there is nothing to do, "" and the name of the only set.
+        """
+        if len(paths) == 1 and not self.edits.exists():
+            return "", quote(str(paths[0]))
+        # Beside the project, of which it would be one more set.
+        whole = str(self.folder.resolve().parent / f"{self.name}.grasps")
+        edits = ["--edits", str(self.edits)] if self.edits.exists() else []
+        return f"{join(['thenar', 'merge', *map(str, paths), *edits, '-o', whole])} && ", quote(whole)
 
     @property
     def harness(self) -> Path:

@@ -15,7 +15,6 @@ from thenar.compiler.evaluation.rates import Rate, interval
 from thenar.compiler.recordings import check_names
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.mcap_recording import import_recordings
-from thenar.compiler.recordings.merging import merge
 from thenar.compiler.recordings.taxonomy import tasks_of
 from thenar.compiler.samples import select_inputs
 from thenar.drivers.errors import SettingError, ThenarError
@@ -151,11 +150,10 @@ class WearerPage:
         """Return the trials in sets, and their types that the build does not know. Raises SettingError unless they are
         the wearer's.
         """
-        sets = {path.name: GraspSet.load(path) for path in paths}
-        for name, grasp_set in sets.items():
-            if not self._fits(grasp_set, build):
-                raise SettingError(f"{name} is no recording of {self._project.state.wearer} for this build")
-        whole = next(iter(sets.values())) if len(sets) == 1 else merge(sets)
+        for path in paths:
+            if not self._fits(GraspSet.load(path), build):
+                raise SettingError(f"{path.name} is no recording of {self._project.state.wearer} for this build")
+        whole = self._project.recordings(paths)[0]
         return whole, sorted({*whole.grasps.tolist()} - {*build.grasps, NONE})
 
     def _chosen(self, asked: Asked) -> bytes:
@@ -166,10 +164,7 @@ class WearerPage:
         known = int(np.count_nonzero(trained_on(build.manifest, trials)))
         notes = [f"new types are added: {list_names(added)}"] if added else []
         notes += [f"{known} of these trials are of the build's training: before is too good"] if known else []
-        first, recordings = "", quote(str(paths[0]))
-        if len(paths) > 1:
-            recordings = quote(str(self._project.new_path(f"all {self._project.state.wearer}", ".grasps")))
-            first = f"{join(['thenar', 'merge', *map(str, paths)])} -o {recordings} && "
+        first, recordings = self._project.joined(paths)
         more = "".join(f" --add-type {quote(name)}" for name in added)
         output = quote(str(self._project.new_path(self._project.state.wearer)))
         command = f"{first}thenar adapt {quote(str(base))} {recordings}{more} -o {output}"

@@ -79,8 +79,8 @@ def adapt(
 ) -> AdaptedBuild:
     """Write a build for one person: the same elements, thresholds and kinds of terms, with scores for this person.
 
-    The base dependencies suffice; without the extra `compiler` the build has no firmware and no report. The same input gives the same
-    bytes on every machine.
+    The base dependencies suffice; without the extra `compiler` the build has no firmware and no report. The same input
+    gives the same bytes on every machine.
 
     Parameters
     ----------

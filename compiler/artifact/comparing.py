@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.build import Build
 
-from ..evaluation.rates import Paired, paired_interval
+from ..evaluation.rates import Paired, Rate, paired_interval
 from ..recogniser import predicted_classes
 from ..recordings.graspset import GraspSet
 from ..samples import decided, select_inputs
@@ -41,6 +41,7 @@ class BuildComparison(Struct, frozen=True, kw_only=True):
     """Two builds, a and b, on `trials` trials of grasps; `of` says whether they were trained on these.
 
     a, b         trials that each recognises, by the majority of their frames
+    ends         the 95 % intervals of both accuracies
     difference   of the accuracies, b less a, -1..1; low, high: its 95 % interval
     better       trials that b alone recognises; worse: trials that a alone recognises
     p            McNemar's exact test, two-sided
@@ -51,6 +52,7 @@ class BuildComparison(Struct, frozen=True, kw_only=True):
     trials: int
     a: int
     b: int
+    ends: tuple[tuple[float, float], tuple[float, float]]
     difference: float
     low: float
     high: float
@@ -125,6 +127,7 @@ def compare_builds(
         trials=len(truth),
         a=int(right_a.sum()),
         b=int(right_b.sum()),
+        ends=(_ends(right_a, subjects), _ends(right_b, subjects)),
         difference=paired.difference,
         low=low,
         high=high,
@@ -146,6 +149,12 @@ def compare_builds(
             if names_a[place] != names_b[place]
         ),
     )
+
+
+def _ends(right: NDArray[np.bool_], subjects: NDArray[np.intp]) -> tuple[float, float]:
+    """Return the 95 % interval of the share of trials (T,) that are `right`, of these subjects (T,)."""
+    rate = Rate.predicted(right, np.ones(len(right), bool), np.arange(len(right)), of="new subject", groups=subjects)
+    return rate.low, rate.high
 
 
 def _chosen(seen_a: NDArray[np.bool_], seen_b: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.build import TABLES_NAME, Build
+from thenar.runtime.build import Build
 from thenar.runtime.hand import HandDrawing, load_hand
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest

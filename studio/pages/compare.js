@@ -1,7 +1,7 @@
 // The page Compare: two builds of the project on the same trials, and what one of them is exported as.
 import { drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
-import { cell, say } from "./wire.js";
+import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
@@ -10,12 +10,11 @@ const SIGNS = { both: "M0-4L4 0L0 4L-4 0Z", a: "M-4-3H4L0 4Z", b: "M-4 3H4L0-4Z"
 const percent = (share) => (100 * share).toFixed(1);
 
 let sets = []; // the project's sets, all of which are compared on unless some are unticked
-let errors = ""; // the page that shows a trial, if there is one
 
 const ask = openPage({
-  open: () => commands(),
-  shell: ({ pages }) => {
-    errors = pages.map(([file]) => file).find((file) => file.startsWith("errors")) ?? "";
+  open: () => {
+    commands();
+    comparison();
   },
   project: ({ builds, sets: named, state }) => {
     const ids = builds.map(({ id }) => id), current = builds.find(({ name }) => name === state.build)?.id ?? ids.at(-1);
@@ -23,9 +22,9 @@ const ask = openPage({
     fill($("b"), builds, current);
     fill($("build"), builds, current);
     listSets(named, state.aside);
-    $("compare").disabled = builds.length < 2;
     $("report").disabled = $("firmware").disabled = !builds.length;
     commands();
+    comparison();
   },
   targets: ({ targets }) => {
     fill($("target"), targets.map(([id, help]) => ({ id, name: `${id}: ${help}` })), targets[0][0]);
@@ -35,8 +34,9 @@ const ask = openPage({
     say($("report-command"), report);
     say($("firmware-command"), firmware);
   },
+  comparison: ({ command }) => say($("compare-command"), command),
   compare: (compared) => {
-    if (String(compared.ids.slice(0, 2)) === String([$("a").value, $("b").value])) show(compared);
+    if (String(compared.ids) === String(request())) show(compared);
   },
   exported: ({ said, address, name }) => {
     say($("exported"), said);
@@ -66,6 +66,7 @@ function listSets(members, aside) {
   sets = members.map(({ id, name }) => {
     const label = document.createElement("label"), box = document.createElement("input");
     box.type = "checkbox";
+    box.addEventListener("change", changed);
     box.checked = before.includes(id) ? !unticked.has(id) : !aside.includes(name);
     label.append(box, name);
     return { id, box, label };
@@ -73,63 +74,74 @@ function listSets(members, aside) {
   $("sets").replaceChildren($("sets").firstElementChild, ...sets.map(({ label }) => label));
 }
 
+const request = () => [$("a").value, $("b").value, ...sets.filter(({ box }) => box.checked).map(({ id }) => id)];
+
+/** Ask for the command that compares; what was compared before is another matter. */
+function comparison() {
+  $("compare").disabled = request().length < 3 || $("a").value === $("b").value;
+  say($("compare-command"), "");
+  if (!$("compare").disabled) ask("comparison", { ids: request() });
+}
+
 function commands() {
   if ($("build").value && $("target").value) ask("commands", { id: $("build").value, name: $("target").value });
 }
 
-function table(element, head, rows) {
+/** Fill a table with rows of texts or elements, of which the first is the head of its row. */
+function table(element, titles, rows) {
   const top = document.createElement("thead"), body = document.createElement("tbody");
-  const line = (cells) => {
+  const line = (kind, parts) => {
     const made = document.createElement("tr");
-    made.append(...cells);
+    made.append(...parts.map((part, at) => {
+      const place = cell(part === "" ? "td" : at ? kind : "th", "");
+      place.append(part);
+      return place;
+    }));
     return made;
   };
-  const titles = head.map((text) => cell(text ? "th" : "td", text));
-  for (const title of titles) if (title.scope) title.scope = "col";
-  top.append(line(titles));
-  body.append(...rows.map(([first, ...others]) => line([cell("th", first), ...others.map((one) => (one instanceof Node ? one : cell("td", one)))])));
+  top.append(line("th", titles));
+  for (const title of top.querySelectorAll("th")) title.scope = "col";
+  body.append(...rows.map((parts) => line("td", parts)));
   element.replaceChildren(top, body);
 }
 
 const scan = (us) => (us === null ? "unknown" : us ? `${us.toFixed(0)} µs` : "none is read");
-const interval = ({ mean, low, high }) => `${percent(mean)} % [${percent(low)}, ${percent(high)}]`;
+const points = (share) => `${share < 0 ? "−" : "+"}${percent(Math.abs(share))}`;
 
-function show({ builds, hand, both, only, found, said }) {
+function show({ builds, hand, both, only, found, said, unused }) {
   $("result").hidden = false;
   say($("said"), said);
+  list($("unused"), unused);
   const rows = [
+    ["Recognised of these trials", ({ right, ends }) => `${percent(right / found.trials)} % [${ends.map(percent).join(", ")}]`],
     ["Sensors", (build) => build.sensors],
     ["Scan of switches and pads", (build) => scan(build.scan_us)],
     ["Tables", (build) => `${build.bytes.toLocaleString("en")} bytes`],
     ["Accuracy as compiled", (build) => build.stated],
-  ].map(([title, text]) => [title, ...builds.map(text)]);
-  if (builds[0].price !== null) rows.push(["Price", ...builds.map(({ price }) => price.toFixed(2))]);
-  if (found) rows.unshift(["Recognised of these trials", ...found.rates.map(interval)]);
-  table($("both"), ["", ...builds.map(({ name }, at) => `${"ab"[at]}: ${name}`)], rows);
+    ...(builds[0].price === null ? [] : [["Price", ({ price }) => price.toFixed(2)]]),
+  ];
+  table($("both"), ["", ...builds.map(({ name }, at) => `${"ab"[at]}: ${name}`)], rows.map(([title, text]) => [title, ...builds.map(text)]));
   overlay(hand, { both, a: only[0], b: only[1] }, builds);
-  $("differences").hidden = !found;
-  if (!found) return;
-  const points = (a, b, count) => `${b >= a ? "+" : "−"}${percent(Math.abs(b - a) / count)}`;
-  const types = found.by_type.map(([type, count, a, b]) => [type, String(count), `${a}`, `${b}`, points(a, b, count)]);
+  const types = found.types.map(({ grasp, trials, a, b }) => [grasp, `${trials}`, `${a}`, `${b}`, points((b - a) / trials)]);
   table($("types"), ["Type", "Trials", "a right", "b right", "Points"], types);
-  say($("changed-heading"), `Trials that changed: ${found.changed.length || "none"}`);
-  const changed = found.changed.map(([trial, truth, a, b]) => {
-    const marked = [a, b].map((read) => {
-      const made = cell("td", read === truth ? `${read} (right)` : read);
-      made.dataset.is = read === truth ? "good" : "bad";
+  say($("changed-heading"), `Trials that changed: ${found.changed.length || "none"}; ${found.better} better, ${found.worse} worse with b`);
+  const changed = found.changed.map((trial) => {
+    const marked = [trial.a, trial.b].map((read) => {
+      const made = document.createElement("span");
+      made.textContent = read === trial.recorded ? `${read} (right)` : read;
+      made.dataset.is = read === trial.recorded ? "good" : "bad";
       return made;
     });
-    return [linked(trial), truth, ...marked];
+    return [linked(trial), trial.recorded, ...marked];
   });
   table($("changed"), ["Trial", "True type", "a", "b"], changed);
 }
 
-/** Return the name of a trial, which leads to it where a page shows it. */
-function linked(trial) {
-  if (!errors) return `trial ${trial}`;
+/** Return the name of a trial, as a link to it on the page Errors. */
+function linked({ trial, subject, object, recorded }) {
   const link = document.createElement("a");
-  link.href = `${errors}#trial=${trial}`;
-  link.textContent = `trial ${trial}`;
+  link.textContent = `trial ${trial} of ${subject}, ${object}`;
+  link.href = `errors.html#${encodeURIComponent(`${link.textContent}: ${recorded}`)}`;
   return link;
 }
 
@@ -163,11 +175,15 @@ function overlay(hand, kept, builds) {
   $("legend").replaceChildren(...entries);
 }
 
+function changed() {
+  $("result").hidden = true;
+  comparison();
+}
+
+for (const id of ["a", "b"]) $(id).addEventListener("change", changed);
 $("compare").addEventListener("click", () => {
   $("result").hidden = true;
-  const used = sets.filter(({ box }) => box.checked).map(({ id }) => id);
-  if (sets.length && !used.length) say($("refused"), "choose recordings");
-  else ask("compare", { ids: [$("a").value, $("b").value, ...used] });
+  ask("compare", { ids: request() });
 });
 for (const name of ["report", "firmware"]) {
   $(name).addEventListener("click", () => ask(name, { id: $("build").value, name: $("target").value }));

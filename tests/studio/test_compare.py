@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -88,7 +89,6 @@ def test_two_builds_are_compared_on_trials_that_neither_was_trained_on(
     assert sorted(names) == ["few", "more"]
     others = people.rows(np.isin(people.subjects, ["C", "D"]))
     found = compare_builds(folder / names[0], folder / names[1], people)
-    assert found is not None
     hits = []
     for name in names:
         build = Build.load(folder / name)
@@ -98,7 +98,7 @@ def test_two_builds_are_compared_on_trials_that_neither_was_trained_on(
         hits.append(np.array(read) == others.grasps)
     gained = 100 * (hits[1].mean() - hits[0].mean())
     said = re.fullmatch(
-        r"(\w+) is (\d+\.\d) points better \[.*\], on 36 trials that neither was trained on", browser.text("said")
+        r"(\w+) is (\d+\.\d) points better \[.*\], on 36 trials that neither build was trained on", browser.text("said")
     )
     assert said is not None
     assert (said[1], said[2]) == (names[int(gained > 0)], f"{abs(gained):.1f}")
@@ -138,17 +138,39 @@ def test_the_hand_shows_which_build_reads_a_sensor(browser: Browser, project: St
     ]
 
 
-def test_trials_that_a_build_was_trained_on_say_nothing(browser: Browser, project: Studio, people: GraspSet) -> None:
-    known = people.rows(np.isin(people.subjects, ["A", "B"]))
-    known.save(project.project.folder / "known.grasps")
+def test_trials_that_a_build_was_trained_on_are_called_so(
+    browser: Browser, project: Studio, folder: Path, people: GraspSet
+) -> None:
+    people.rows(np.isin(people.subjects, ["A", "B"])).save(folder / "known.grasps")
     project.changed()
     begun(browser, project)
     browser.wait(lambda: len(browser.driver.find_elements(By.CSS_SELECTOR, "#sets input")) == 2)
+    assert "thenar merge" in browser.text("compare-command")
     browser.driver.find_elements(By.CSS_SELECTOR, "#sets input")[1].send_keys(Keys.SPACE)
+    browser.wait(lambda: browser.text("compare-command").endswith(f"{folder}/known.grasps"))
     browser.click("compare")
-    browser.wait(lambda: "trained on each of these" in browser.text("said"))
-    assert not browser.driver.find_element(By.ID, "differences").is_displayed()
-    assert rows(browser, "both")[0][0] == "Sensors"
+    browser.wait(lambda: browser.text("said").endswith("on 36 trials that both builds were trained on"))
+
+
+def test_a_trial_that_changed_leads_to_it(browser: Browser, project: Studio, people: GraspSet) -> None:
+    compared(browser, project)
+    name, recorded, *_ = rows(browser, "changed")[-1]
+    browser.driver.find_elements(By.CSS_SELECTOR, "#changed a")[-1].send_keys(Keys.ENTER)
+    browser.wait(lambda: browser.script("return location.pathname") == "/errors.html")
+    browser.wait(lambda: browser.text("selection-heading").startswith(f"{name}: {recorded}"))
+
+
+def test_the_command_says_what_the_page_says(
+    browser: Browser, project: Studio, capsys: pytest.CaptureFixture[str]
+) -> None:
+    compared(browser, project)
+    assert run([*shlex.split(browser.text("compare-command"))[1:], "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    points = [100 * found[name] for name in ("difference", "low", "high")]
+    if points[0] < 0:
+        points = [-points[0], -points[2], -points[1]]
+    assert "{:.1f} points better [{:.1f}, {:.1f}]".format(*points) in browser.text("said")
+    assert len(found["changed"]) == len(rows(browser, "changed"))
 
 
 def test_a_report_is_exported_and_saved_by_the_browser(
