@@ -54,7 +54,7 @@ class Studio(Closing):
     ----------
     project : Project
         The project.
-    address, token
+    address, token, page
         As for `Server`.
     jobs : int
         Worker processes of a measurement.
@@ -72,14 +72,16 @@ class Studio(Closing):
         As `Server` does.
     """
 
-    def __init__(self, project: Project, address: str, *, token: str | None, jobs: int = -1) -> None:
+    def __init__(
+        self, project: Project, address: str, *, token: str | None, jobs: int = -1, page: str = "choose"
+    ) -> None:
         self.project, self.jobs = project, jobs
         self._requests: dict[str, Handler] = {}
         self._titles = list[tuple[str, str]]()
         self._readers = list[Callable[[Report], None]]()
         self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
         self._stale = False
-        self.server = Server("choose", address, token=token, on_message=self._take, folder=PAGES)
+        self.server = Server(page, address, token=token, on_message=self._take, folder=PAGES)
         self.station = Station(self.server.publish)
 
     def add(
