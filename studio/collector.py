@@ -172,8 +172,8 @@ class Collector:
             )
             quick = QuickAccuracy(grasp_set)
             found = quick.of(range(len(quick.names)))
-        except ThenarError:
-            return None
+        except ThenarError as reason:
+            return {"why": str(reason)}
         return {"of": found.of, "mean": found.mean, "low": found.low, "high": found.high}
 
     def _press(self, asked: Asked) -> None:

@@ -11,9 +11,9 @@ from .studio import Studio
 from .wearer import WearerPage
 
 
-def open_studio(project: Project, address: str, *, token: str | None, jobs: int = -1) -> Studio:
-    """Return the open studio of a project: see `Studio`."""
-    studio = Studio(project, address, token=token, jobs=jobs)
+def open_studio(project: Project, address: str, *, token: str | None, jobs: int = -1, page: str = "choose") -> Studio:
+    """Return the open studio of a project, whose first page is `page`: see `Studio`."""
+    studio = Studio(project, address, token=token, jobs=jobs, page=page)
     collector = Collector(studio)
     GlovePage(studio)
     RecordPage(studio, collector)

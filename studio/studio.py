@@ -57,7 +57,7 @@ class Studio(Closing):
     ----------
     project : Project
         The project.
-    address, token
+    address, token, page
         As for `Server`.
     jobs : int
         Worker processes of a measurement.
@@ -75,7 +75,9 @@ class Studio(Closing):
         As `Server` does.
     """
 
-    def __init__(self, project: Project, address: str, *, token: str | None, jobs: int = -1) -> None:
+    def __init__(
+        self, project: Project, address: str, *, token: str | None, jobs: int = -1, page: str = "choose"
+    ) -> None:
         self.project, self.jobs = project, jobs
         self._requests: dict[str, Handler] = {"cancel": self._cancel}
         self._titles = list[tuple[str, str]]()
@@ -83,7 +85,7 @@ class Studio(Closing):
         self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
         self._stale = False
         self._began_s, self._cancelled = 0.0, False
-        self.server = Server("choose", address, token=token, on_message=self._take, folder=PAGES)
+        self.server = Server(page, address, token=token, on_message=self._take, folder=PAGES)
         self.station = Station(self.server.publish)
 
     def add(

@@ -206,5 +206,8 @@ $("form").addEventListener("submit", (event) => {
   event.preventDefault();
   ask("find", { name: $("address").value.trim() });
 });
-$("connect").addEventListener("click", () => ask("connect"));
+$("connect").addEventListener("click", () => {
+  begun = false;
+  ask("connect");
+});
 $("watch").addEventListener("click", () => ask("watch"));

@@ -9,6 +9,7 @@ const percent = (share) => (100 * share).toFixed(1);
 const LETTERS = { accept: "Enter", redo: "r", undo: "u", skip: "s", pause: "p", quit: "q" };
 
 let stage = "over";
+let doing = ""; // what the collection is for
 let sensors = 0; // of the project's set, for Train
 let drawn = null; // the message on the glove's hand
 let hand = null;
@@ -82,6 +83,9 @@ function show(state) {
   const before = stage;
   stage = state.stage;
   const over = stage === "over";
+  // It was begun on the page Wearer, which adapts a build to the trials.
+  if (over && doing === "wearer") location.href = "wearer.html";
+  doing = state.doing;
   $("begin").hidden = !over;
   $("leading").hidden = over;
   if (over) return;
@@ -142,12 +146,7 @@ document.addEventListener("keydown", (event) => {
 function showTrials({ trials, accuracy }) {
   $("so-far").hidden = !trials.length;
   $("seen").hidden = true;
-  say(
-    $("accuracy"),
-    accuracy
-      ? `All sensors tell these trials apart in ${percent(accuracy.mean)} % [${percent(accuracy.low)}, ${percent(accuracy.high)}], ${accuracy.of}; quick: not nested`
-      : "An accuracy is shown from two trials of every type on.",
-  );
+  say($("accuracy"), accuracyWords(accuracy));
   const strip = $("strip"), same = [...strip.children].findIndex((item, at) => item.dataset.trial !== String(trials[at]?.[0]));
   const keep = same < 0 ? Math.min(strip.children.length, trials.length) : same;
   while (strip.children.length > keep) strip.lastChild.remove();
@@ -162,6 +161,13 @@ function showTrials({ trials, accuracy }) {
     strip.append(item);
   }
   $("strip-scroll").scrollLeft = strip.scrollWidth;
+}
+
+function accuracyWords(accuracy) {
+  if (!accuracy) return "An accuracy is shown from two trials of every type on.";
+  if (accuracy.why) return `No accuracy: ${accuracy.why}`;
+  const { mean, low, high, of } = accuracy;
+  return `All sensors tell these trials apart in ${percent(mean)} % [${percent(low)}, ${percent(high)}], ${of}; quick: not nested`;
 }
 
 $("subject").addEventListener("input", () => (edited = true));
