@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from thenar.runtime.names import of_device
+
 from .parameters import Number, OutputFile, check_devices, existing_file, existing_folder, overwrite_flag
-from .printing import echo, err, json_flag, of_device, out, progress, show, table
+from .printing import echo, err, json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

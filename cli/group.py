@@ -25,7 +25,7 @@ from .printing import echo
 GROUPS = {
     "Data": ("import", "simulate", "info", "draw", "merge", "split", "export"),
     "Choose and measure": ("place", "studio", "evaluate", "frontier", "stability"),
-    "Build": ("compile", "adapt", "verify", "spec", "firmware"),
+    "Build": ("compile", "adapt", "compare", "verify", "spec", "firmware"),
     "Live": ("doctor", "calibrate", "record", "wear", "run", "monitor", "segment", "teach", "emulate", "service"),
 }
 COMMANDS = tuple(name for names in GROUPS.values() for name in names)

@@ -1,7 +1,7 @@
 """`thenar record`: collect labelled grasps, with guidance."""
 
 import secrets
-from functools import partial
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -86,8 +86,10 @@ def command(
     from thenar.runtime.harness.loading import load_harness
     from thenar.runtime.recording.guide import planned, read_journal
     from thenar.runtime.recording.session import Collection
+    from thenar.studio.collecting import collect
 
-    from .collecting import collect
+    from . import ended_by_signals
+    from .collecting import Terminal
 
     recording = output.with_suffix(".mcap")
     keep_apart(glove, objects, output, recording)
@@ -114,13 +116,15 @@ def command(
     wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
     if journal is not None:
         wanted = _resumed(journal, wanted, seed)
-    trials = planned(wanted)
-    accepted = 0 if journal is None else len(journal.accepted)
-    write = partial(_write, recording, output, len(trials), loaded)
-    if accepted < len(trials):
-        collect(harness, glove, wanted, trials, recording, journal, countdown, write)
-    else:
-        write(accepted)
+    done, total = 0 if journal is None else len(journal.accepted), len(planned(wanted))
+    if done < total:
+        if sys.stdin is None:
+            raise click.UsageError("stdin is closed, but a collection is led by keys typed there: run it in a terminal")
+        if any(stream.port == "-" for stream in harness.streams):
+            raise click.UsageError("the keys that lead a collection come from stdin: send rows by udp: instead")
+        with ended_by_signals() as stop, Terminal(types, sys.stdin.fileno()) as terminal:
+            done = collect(glove, wanted, recording, journal, terminal, stop, countdown)
+    _write(recording, output, total, loaded, done)
 
 
 def _check_types(

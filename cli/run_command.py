@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 from click.core import ParameterSource
 
+from thenar.runtime.names import of_device
+
 from .consoles import Live, Printed, Text, bar, grid
 from .options import LazyOption
 from .parameters import Number, OutputFile, existing_file, existing_folder, overwrite_flag, web_options
-from .printing import of_device, out, say
+from .printing import out, say
 from .replaying import replay_recording, replay_set, say_what_was_lost, selecting, spoilt
 
 if TYPE_CHECKING:

@@ -16,7 +16,9 @@ from thenar.runtime.scanning.timing import glove_us, scan_us
 from .glove.propose import propose_cyberglove
 from .text import INDEPENDENT, counted, listed, microseconds, percent
 
-Topic = Literal["kept", "inputs", "fit", "compared", "accuracy", "caution", "integers", "faults", "scan", "wiring"]
+Topic = Literal[
+    "kept", "inputs", "fit", "compared", "accuracy", "caution", "integers", "firmware", "faults", "scan", "wiring"
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,7 @@ def facts(
         *_accuracy(manifest),
         *_cautions(manifest, harness),
         _integers(manifest),
-        *([Fact("kept", "firmware", firmware)] if firmware else []),
+        *([Fact("firmware", "firmware", firmware)] if firmware else []),
         *(
             Fact("faults", "at worst, on training rows", sentence)
             for sentence in (() if manifest.faults is None else manifest.faults.sentences)

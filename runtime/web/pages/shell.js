@@ -70,7 +70,8 @@ function show({ project, pages, wearer, build, rate }) {
     $(id).hidden = !words;
     say($(id), words);
   }
-  const here = location.pathname.slice(1) || pages[0]?.[0];
+  // The address of the first page may have no name: its module has.
+  const here = new URL(document.querySelector("script[type=module]").src).pathname.slice(1).replace(".js", ".html");
   const links = pages.map(([file, title]) => {
     const found = document.createElement("a");
     found.href = file;
