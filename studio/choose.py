@@ -52,12 +52,12 @@ class ChoosePage:
         self._quick = None
         try:
             self._set = grasp_set = self._project.grasp_set()
+            self._hand = self._project.hand().fitted(grasp_set.element_names)
+            self._parts = self._project.parts((*grasp_set.element_names, *grasp_set.joint_names))
             self._quick = quick = QuickAccuracy(grasp_set)
         except ThenarError as reason:
             self._studio.publish("set", message("set", why=str(reason), sensors=(), grasps=(), trials=(), name=""))
             return
-        self._hand = self._project.hand().fitted(grasp_set.element_names)
-        self._parts = self._project.parts((*grasp_set.element_names, *grasp_set.joint_names))
         self._prices = {name: part.price for name, part in self._parts.items()}
         self._levels = self._levels_of()
         kinds = ["switch"] * len(grasp_set.switch_names) + ["pad"] * len(grasp_set.taxel_columns)

@@ -8,7 +8,7 @@ const LETTERS = 14, LABEL = 20, BAR = 24, FOOT = 22; // pixels of a lane's name,
 const LEAST_US = 100_000, USUAL_US = 30_000_000, TICK = 90; // shortest window, the first one of a run, pixels a tick
 const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane
 const FOLLOW_MS = 100; // while it follows now, the lanes move ten times a second
-const STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200].flatMap((step) => [step, step / 100]);
+const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600, 14_400]; // seconds
 
 let style = null;
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (style = null));
@@ -278,7 +278,7 @@ export class Timeline {
   }
 
   #axis(pen, x, wide, high) {
-    const least = (this.#span / 1e6 / wide) * TICK, step = [...STEPS].sort((a, b) => a - b).find((one) => one >= least) ?? 86_400;
+    const least = (this.#span / 1e6 / wide) * TICK, step = STEPS.find((one) => one >= least) ?? 86_400;
     const base = this.live ? -this.dated : this.first ?? 0, digits = step < 0.1 ? 2 : step < 1 ? 1 : 0;
     pen.fillStyle = style.soft;
     for (let tick = Math.ceil((this.#from - base) / 1e6 / step) * step; base + tick * 1e6 <= this.#from + this.#span; tick += step) {
