@@ -301,7 +301,7 @@ class Planner:
 
     def elements(self, rows: Rows) -> Elements:
         """Return the elements available in these rows."""
-        return self.choices.available(rows, self.recipe.levels)
+        return self.choices.available(np.sort(rows), self.recipe.levels)
 
     def chosen(self, rows: Rows, **changes: Any) -> Elements:
         """Return the elements that the recipe, with other choices `changes`, keeps from these rows, in any order."""
