@@ -90,8 +90,9 @@ def test_a_page_of_a_run_shows_it_and_takes_no_requests(
 ) -> None:
     run, before = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0"), set(tmp_path.rglob("*"))
     with run.page() as live:
+        assert told(live, "shell")["project"] == "glove <b>"
         build = told(live, "build")
-        assert (build["name"], build["grasps"], build["replay"]) == ("glove <b>", ["cup", "pen", "rod", "none"], False)
+        assert (build["grasps"], build["replay"]) == (["cup", "pen", "rod", "none"], False)
         assert told(live, "hand")["switches"]
         frame = told(live, "frame")
         assert (frame["grasp"], frame["probabilities"]) == ("unknown", None)
@@ -155,7 +156,7 @@ def test_a_recording_is_shown_from_any_moment_of_it(
 ) -> None:
     monitor = start("monitor", recording, "--build", build_folder, "--web", "127.0.0.1:0")
     with monitor.page() as live:
-        assert told(live, "build")["name"] == "run.mcap"
+        assert told(live, "shell")["project"] == "run.mcap"
         assert told(live, "hand")["switches"]
         state = told(live, "replay", lambda state: state["share"] == 1)
         assert (state["playing"], state["speed"], state["truth"], state["faults"]) == (False, 1.0, None, [])
