@@ -192,6 +192,7 @@ function mark() {
   say($("relabel"), `Relabel ${count}`);
   say($("drop"), `Leave out ${count}`);
   const pair = pairOf(selected);
+  if (pair.length === 2) $("type").value = type(pair[1]);
   $("more").hidden = pair.length !== 2;
   if (pair.length !== 2) return;
   const query = new URLSearchParams({ types: pair.map(type).join(","), repetitions: 5 });
@@ -227,7 +228,7 @@ function card({ trial, shown, decisive }, typical) {
   const inputs = document.createElement("ul");
   list(inputs, decisive.map((sensor) => {
     const usual = [truth, read].map((name) => `${name} ${percent(typical[name][sensor])}`).join(", ");
-    return `${set.sensors[sensor].name} ${percent(shown[sensor])}; ${usual}`;
+    return `${set.sensors[sensor].name} ${percent(shown[sensor])} (${usual})`;
   }));
   made.append(label, verdict, ...hand(shown, decisive, set.trials[trial]), ...(decisive.length ? ["Decided by", inputs] : []));
   return made;

@@ -64,11 +64,6 @@ def counts(browser: Browser, number: int) -> None:
     browser.wait(lambda: browser.text("count") == f"{number} of 10")
 
 
-def heads(browser: Browser, mark: str) -> None:
-    """Wait until the trial of a mark on the map is shown."""
-    browser.wait(lambda: browser.text("trial-heading") == mark)
-
-
 def test_sensors_are_chosen_on_the_hand_and_in_the_list(browser: Browser, studio: Start, tmp_path: Path) -> None:
     """By mouse and by keyboard; accuracy, count, command, list and hand follow each time."""
     folder = tmp_path / "recorded"
@@ -133,10 +128,11 @@ def test_a_double_click_adds_a_sensor_once(browser: Browser, studio: Start) -> N
     browser.open(studio().server.url)
     counts(browser, 0)
     browser.script("const add = document.getElementById('add'); add.click(); add.click(); add.click();")
-    # What is asked for later is answered later.
-    browser.script("document.querySelector('#map g').dispatchEvent(new MouseEvent('click'))")
-    browser.wait(lambda: browser.text("trial-heading"))
     counts(browser, 1)
+    rate = browser.text("rate")
+    browser.click("measure")
+    browser.wait(lambda: browser.text("measured"))
+    assert (browser.text("count"), browser.text("rate")) == ("1 of 10", rate)
     browser.click("drop")
     counts(browser, 0)
 
@@ -194,35 +190,6 @@ def test_work_that_the_machine_fails_is_told_and_ends_nothing(
     assert until(page, {"do": "measure", "sensors": [0]}, "measure", bool)["sensors"] == [0]
 
 
-def test_a_number_of_the_matrix_shows_its_trials(browser: Browser, studio: Start) -> None:
-    browser.open(studio().server.url)
-    counts(browser, 0)
-    browser.click("add")
-    counts(browser, 1)
-    cell = browser.driver.find_element(By.CSS_SELECTOR, "#confusion button")
-    said, count = str(cell.get_attribute("aria-label")), int(cell.text)
-    cell.click()
-    trials = browser.driver.find_elements(By.CSS_SELECTOR, "#trials button")
-    assert len(trials) == count
-    trials[0].click()
-    browser.wait(lambda: browser.driver.find_element(By.ID, "trial").is_displayed())
-    truth, read = said.partition(" trials of ")[2].split(" read as ")
-    assert browser.text("trial-heading").endswith(f": {truth}, read as {read}")
-    captions = browser.texts("#hands figcaption")
-    assert captions[1:] == [f"{truth}, typically", f"{read}, typically"]
-    assert len(browser.texts("#hands li")) == 3 * 2
-    assert browser.text("decisive").startswith("decided by ")
-    browser.wait(lambda: len(browser.texts("#map title")) == 72)
-    marks = browser.texts("#map title")
-    misread = [mark for mark in marks if "read as" in mark]
-    assert len(browser.texts("#map .ring")) == len(misread) == sum(map(int, browser.texts("#confusion button")))
-    browser.script("document.querySelector('#map g').dispatchEvent(new MouseEvent('click'))")
-    heads(browser, marks[0])
-    for mark in misread[:2]:
-        browser.driver.find_element(By.TAG_NAME, "body").send_keys("n")
-        heads(browser, mark)
-
-
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (400, "dark")])
 def test_nothing_keeps_people_out_and_a_phone_sees_all(
     browser: Browser, studio: Start, width: int, scheme: str
@@ -231,9 +198,9 @@ def test_nothing_keeps_people_out_and_a_phone_sees_all(
     counts(browser, 0)
     browser.click("add")
     counts(browser, 1)
-    browser.driver.find_element(By.CSS_SELECTOR, "#confusion button").click()
-    browser.driver.find_element(By.CSS_SELECTOR, "#trials button").click()
-    browser.wait(lambda: browser.driver.find_element(By.ID, "trial").is_displayed())
+    assert browser.axe() == []
+    browser.click("curve")
+    browser.wait(lambda: browser.texts("#points tr"))
     assert browser.axe() == []
     assert browser.script("return document.documentElement.scrollWidth <= innerWidth")
 
@@ -254,8 +221,8 @@ def test_two_browsers_do_not_move_each_other(studio: Start) -> None:
         ({"do": "train", "sensors": []}, "choose a sensor first"),
         ({"do": "choose", "sensors": ["../../etc/passwd"]}, "invalid message"),
         ({"do": "choose", "sensors": 1}, "invalid message"),
-        ({"do": "trial", "trial": 72}, "there are 72 trials"),
-        ({"do": "trial", "trial": 1e300}, "invalid message"),
+        ({"do": "use", "id": "../other"}, "the project has no set"),
+        ({"do": "choose", "sensors": [1e300]}, "invalid message"),
         ({"do": "quit"}, "a page cannot 'quit'"),
     ],
 )
