@@ -25,6 +25,7 @@ from thenar.studio import Project, Studio
 
 from ..browser import Browser
 from ..sets import grasp_set_of
+from .test_compare import rows
 
 Start = Callable[..., Studio]
 PATIENCE_S = 30
@@ -51,13 +52,6 @@ def adapted(browser: Browser) -> None:
     browser.driver.find_element(By.ID, "adapt").send_keys(Keys.ENTER)
     browser.wait(lambda: browser.text("result-heading"))
     browser.wait(lambda: "adapted from" in browser.text("use"))
-
-
-def rows(browser: Browser) -> list[list[str]]:
-    found = browser.script(
-        "return [...document.querySelectorAll('#types tr')].map((row) => [...row.cells].map((c) => c.textContent))"
-    )
-    return [list(row) for row in found]
 
 
 def told(opened: Studio, request: dict[str, Any], topic: str) -> dict[str, Any]:
@@ -94,12 +88,12 @@ def test_a_build_is_adapted_to_its_wearer_and_back(
     kept = [mine.switch_names.index(switch.name) for switch in build.manifest.switches]
     joints = [mine.joint_names.index(joint.name) for joint in build.manifest.joints]
     read = [build.classify(*one) for one in zip(mine.switches[:, kept], mine.codes[:, joints], strict=True)]
-    by_type = {row[0]: [int(number) for number in row[1:]] for row in rows(browser)}
+    by_type = {row[0]: [int(number) for number in row[1:]] for row in rows(browser, "types")}
     for name in ("cup", "pen", "rod"):
         truth = mine.grasps == name
         assert by_type[name][:2] == [truth.sum(), (truth & (np.array(read) == name)).sum()]
     assert sum(counts[2] for counts in by_type.values()) == made.after
-    worst = rows(browser)[0]
+    worst = rows(browser, "types")[0]
     assert browser.text("worst") == f"{worst[0]}: {worst[3]} of {worst[1]}"
     assert int(worst[3]) / int(worst[1]) == min(after / count for count, _, after in by_type.values())
     assert browser.script("return document.activeElement.id") == "result-heading"
