@@ -28,7 +28,6 @@ def command(a: Path, b: Path, recordings: Path) -> None:
     \b
     Example:
         thenar compare build/ smaller/ later.grasps
-        thenar compare build/ mine/ mine.grasps --json
     """
     from thenar.compiler.artifact.comparing import compare_builds
     from thenar.compiler.recordings.graspset import GraspSet
@@ -47,13 +46,11 @@ def _print(found: "BuildComparison", names: tuple[str, str]) -> None:
     points, low, high = (f"{100 * share:+.1f}" for share in (found.difference, found.low, found.high))
     counts = f"{found.better} trials better, {found.worse} worse, p {found.p:.2g}"
     echo(f"difference: {points} points [{low}, {high}], {counts}")
-    numbers = ("trials", *(f"{name}, %" for name in names), "points")
+    numbers = ("trials", "first, %", "second, %", "points")
     grid = table(("type", *numbers), numbers)
     for each in found.types:
-        shares = [100 * count / each.trials for count in (each.a, each.b)]
-        grid.add_row(
-            each.grasp, f"{each.trials}", *(f"{share:.1f}" for share in shares), f"{shares[1] - shares[0]:+.1f}"
-        )
+        first, second = (100 * count / each.trials for count in (each.a, each.b))
+        grid.add_row(each.grasp, str(each.trials), f"{first:.1f}", f"{second:.1f}", f"{second - first:+.1f}")
     out().print(grid)
     for one in found.changed[:_SHOWN]:
         echo(f"trial {one.trial} of {one.subject}, {one.object}: {one.recorded}, first {one.a}, second {one.b}")
