@@ -27,7 +27,7 @@ from ..sets import grasp_set_of
 
 Start = Callable[..., Studio]
 PATIENCE_S = 30
-PRICES = '[[part]]\nname = "plain"\nprice = 2.5\nfor = ["*"]\n'
+PRICES = '[[part]]\nname = "plain"\nprice = 2.5\nsensors = ["*"]\n'
 
 
 def answers(opened: Studio, *asked: dict[str, Any]) -> list[dict[str, Any]]:
@@ -38,7 +38,10 @@ def answers(opened: Studio, *asked: dict[str, Any]) -> list[dict[str, Any]]:
         found = [json.loads(live.recv(timeout=PATIENCE_S)) for _ in range(2)]
         for one in asked:
             live.send(json.dumps(one))
-            found.append(json.loads(live.recv(timeout=PATIENCE_S)))
+            # What was told on opening may come once more.
+            while (told := json.loads(live.recv(timeout=PATIENCE_S)))["topic"] in ("sensors", "set"):
+                pass
+            found.append(told)
         return found
 
 
